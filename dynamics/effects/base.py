@@ -1,0 +1,90 @@
+"""The form of a physical effect, written once and used by the plant, the estimator and the diagnosis.
+
+An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is called through
+its address, so that every user of it (a tick of the plant, a sigma point of the filter, a sample of a log) runs
+the same machine code and a new effect recompiles none of them. There are four kinds:
+
+``rotor input``
+    changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four turn rates in
+    ``rotors``, once a step, in the order in which the vehicle lists the effects.
+``wrench``
+    adds force (world frame) and torque (body frame, about the centre of mass). Law ``(c, vehicle, state, wrench)``:
+    adds to the six numbers in ``wrench``.
+``body``
+    changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
+``sensing``
+    changes what the pose reports. ``sense(position, quaternion, coefficients)`` returns the changed pose.
+
+``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state`` and ``rotors`` are
+laid out by the constants below.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ..vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_POINTER = types.CPointer(types.float64)
+LAW = types.void(_POINTER, _POINTER, _POINTER, _POINTER)
+
+# vehicle: what a law may know of it
+MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
+COM = 7  # 3, m
+ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
+VEHICLE_SIZE = 22
+
+# state of the flight at which a wrench law is asked
+POSITION = 0  # 3, m, world, of the geometric centre
+ROTATION = 3  # 3 x 3, body to world
+VELOCITY = 12  # 3, m/s, world
+RATE = 15  # 3, rad/s, body
+ROTOR_SPEED = 18  # 4, rad/s, delivered
+ROTOR_THRUST = 22  # 4, N, delivered
+WIND = 26  # 3, m/s, world
+VOLTAGE = 29  # V; 0: not known
+TIME = 30  # s
+STATE_SIZE = 31
+
+# rotors: the turn rates that a rotor-input law rewrites, and what it may know
+SPEED = 0  # 4, rad/s
+STEP = 4  # s, since the law was last called
+ROTOR_VOLTAGE = 5  # V; 0: not known
+ROTORS_SIZE = 6
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """One coefficient of an effect, with its typical size for a 0.45 kg and for a 0.03 kg vehicle."""
+
+    name: str
+    unit: str
+    typical: tuple[float, float]
+    meaning: str
+    minimum: float = -np.inf
+    maximum: float = np.inf
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical effect: its law, coefficients and source. The docstring of its file states the law."""
+
+    name: str
+    kind: str
+    coefficients: tuple[Coefficient, ...]
+    source: str
+    law: Any = None  # compiled C function, for rotor input and wrench
+    memory: int = 0  # numbers that a rotor-input law keeps from step to step; all zero before its first
+    amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
+    sense: Callable[[Array, Array, Mapping[str, float]], tuple[Array, Array]] | None = None
+
+    def vector(self, coefficients: Mapping[str, float]) -> Array:
+        """Return the coefficients in the law's order; those not given are zero."""
+        return np.array([float(coefficients.get(c.name, 0.0)) for c in self.coefficients])

@@ -1,0 +1,27 @@
+"""Battery sag: at a given logged turn rate the rotors deliver less as the battery voltage falls.
+
+Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered turn rate is W (V / voltage_ref)^(n/2). It applies
+where the turn rates are commands, or worked out from commands at the reference voltage. Nothing changes where the
+voltage is not known.
+"""
+
+from numba import cfunc
+
+from .base import LAW, ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    if rotors[ROTOR_VOLTAGE] > 0.0 and vehicle[VOLTAGE_REF] > 0.0:
+        scale = (rotors[ROTOR_VOLTAGE] / vehicle[VOLTAGE_REF]) ** (0.5 * c[0])
+        for i in range(4):
+            rotors[i] *= scale
+
+
+EFFECT = Effect(
+    name="battery_sag",
+    kind="rotor input",
+    coefficients=(Coefficient("n", "1", (1.0, 1.0), "exponent of the voltage ratio", minimum=0.0, maximum=3.0),),
+    source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind a regulated drive",
+    law=law,
+)

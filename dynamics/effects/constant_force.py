@@ -1,0 +1,22 @@
+"""Constant force: a steady force, fixed in the world frame, at the centre of mass."""
+
+from numba import cfunc
+
+from .base import LAW, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        wrench[i] += c[i]
+
+
+EFFECT = Effect(
+    name="constant_force",
+    kind="wrench",
+    coefficients=tuple(
+        Coefficient(f"f{axis}", "N", (0.2, 0.015), f"along world {axis}") for axis in "xyz"
+    ),
+    source="definition",
+    law=law,
+)

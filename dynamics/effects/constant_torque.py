@@ -1,0 +1,22 @@
+"""Constant torque: a steady torque, fixed in the body frame (a bent arm, an unequal set of propellers)."""
+
+from numba import cfunc
+
+from .base import LAW, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        wrench[3 + i] += c[i]
+
+
+EFFECT = Effect(
+    name="constant_torque",
+    kind="wrench",
+    coefficients=tuple(
+        Coefficient(f"t{axis}", "Nm", (0.01, 1e-4), f"about body {axis}") for axis in "xyz"
+    ),
+    source="definition",
+    law=law,
+)

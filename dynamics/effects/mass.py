@@ -1,0 +1,28 @@
+"""Mass: the vehicle is heavier (dm > 0) or lighter than declared; inertia and centre of mass stay as they are."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .base import Coefficient, Effect
+
+if TYPE_CHECKING:
+    from ..vehicle import Vehicle
+
+
+def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
+    """Return the vehicle with ``dm`` kg added."""
+    mass = vehicle.mass + coefficients.get("dm", 0.0)
+    if not mass > 0:
+        raise InputError(f"effect mass: dm: {vehicle.name} would weigh {mass:g} kg; expected dm > {-vehicle.mass:g}")
+    return replace(vehicle, mass=mass)
+
+
+EFFECT = Effect(
+    name="mass",
+    kind="body",
+    coefficients=(Coefficient("dm", "kg", (0.04, 0.003), "added to the declared mass"),),
+    source="definition",
+    amend=amend,
+)

@@ -1,0 +1,316 @@
+"""The wrench filter's plain relative: an error-state extended Kalman filter on the same model.
+
+State, noise, measurement and tuning are those of ``ukf.py``; only the prediction of the covariance differs: it is
+``F P F' + B Q B'`` with the Jacobian F of the model (2)-(5), (11)-(14) at the estimate. The attitude error is a
+world-frame MRP rho, on the left of the attitude: R_true = exp([4 rho]x) R for small errors.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from ..dynamics.errors import InputError
+from ..dynamics.motion import effect_wrench
+from .estimate import NIS, Array, WrenchEstimate
+from .filter_record import N, drive, propagate
+from .ukf import WrenchUKF, _add_noise, _symmetrise, correct
+
+_TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
+_STEP = 1e-5  # m, m/s and rad/s
+
+
+@njit(cache=True)
+def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float, scale: float) -> None:
+    """Add ``scale * [(x, y, z)]x`` to the block of ``out`` that starts at ``row``, ``column``."""
+    out[row, column + 1] -= scale * z
+    out[row, column + 2] += scale * y
+    out[row + 1, column] += scale * z
+    out[row + 1, column + 2] -= scale * x
+    out[row + 2, column] -= scale * y
+    out[row + 2, column + 1] += scale * x
+
+
+@njit(cache=True)
+def _effects_at(f: np.ndarray, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
+    effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
+                  velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, out)
+
+
+@njit(cache=True)
+def _effect_jacobian(f: np.ndarray, rotation: Array, out: Array) -> None:
+    """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into ``out`` (12, 6).
+
+    By central differences: a law is a black box behind an address.
+    """
+    x, point, turned, minus = f.x, f.point, f.L[0:3, 0:3], f.W[0]
+    for i in range(NIS):
+        point[i] = x[i]
+    for n in range(12):
+        kind, axis = n // 3, n % 3
+        size = _TURN if kind == 0 else _STEP
+        for sign in (1.0, -1.0):
+            for i in range(3):
+                for j in range(3):
+                    turned[i, j] = rotation[i, j]
+            if kind == 0:
+                a, b = (axis + 1) % 3, (axis + 2) % 3
+                c, s = math.cos(size), sign * math.sin(size)
+                for j in range(3):
+                    turned[a, j] = c * rotation[a, j] - s * rotation[b, j]
+                    turned[b, j] = s * rotation[a, j] + c * rotation[b, j]
+            else:
+                where = axis + (10 if kind == 1 else 0 if kind == 2 else 7)
+                point[where] = x[where] + sign * size
+            _effects_at(f, point[0:3], turned, point[7:10], point[10:13], out[n] if sign > 0.0 else minus[0:6])
+            if kind > 0:
+                point[where] = x[where]
+        for i in range(6):
+            out[n, i] = (out[n, i] - minus[i]) / (2.0 * size)
+
+
+@njit(cache=True)
+def _acceleration_jacobian(f: np.ndarray, A: Array) -> None:
+    """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18), rows 3-5 and 9-11.
+
+    Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world): (4), (12). Expects
+    ``f.rotation``, ``f.acceleration`` and ``f.effect_wrench`` of the estimate, as ``propagate`` leaves them.
+    """
+    body, R, x, B = f.body, f.centre_rotation, f.x, f.Z
+    J, inverse = body.inertia, body.inverse_inertia
+    tau, omega = x[13:16], x[10:13]
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = f.rotation[i, j]
+    # B, rows 0-2: derivatives of the torque in the body frame; rows 3-5: of the force in the world frame
+    for i in range(6):
+        for j in range(N):
+            B[i, j] = 0.0
+    for i in range(3):
+        # R' tau at an attitude turned by 4 rho: R' (tau + tau x 4 rho)
+        t0, t1, t2 = R[0, i], R[1, i], R[2, i]
+        B[i, 0] = 4.0 * (t1 * tau[2] - t2 * tau[1])
+        B[i, 1] = 4.0 * (t2 * tau[0] - t0 * tau[2])
+        B[i, 2] = 4.0 * (t0 * tau[1] - t1 * tau[0])
+        for j in range(3):
+            B[i, 12 + j] = R[j, i]
+        B[3 + i, 15 + i] = 1.0
+    # - omega x J omega
+    h0 = J[0, 0] * omega[0] + J[0, 1] * omega[1] + J[0, 2] * omega[2]
+    h1 = J[1, 0] * omega[0] + J[1, 1] * omega[1] + J[1, 2] * omega[2]
+    h2 = J[2, 0] * omega[0] + J[2, 1] * omega[1] + J[2, 2] * omega[2]
+    _cross_into(B, 0, 3, h0, h1, h2, 1.0)
+    for j in range(3):
+        B[0, 3 + j] -= omega[1] * J[2, j] - omega[2] * J[1, j]
+        B[1, 3 + j] -= omega[2] * J[0, j] - omega[0] * J[2, j]
+        B[2, 3 + j] -= omega[0] * J[1, j] - omega[1] * J[0, j]
+    # thrust along the body's z axis
+    thrust = f.rotor_wrench[0]
+    _cross_into(B, 3, 0, R[0, 2] * thrust, R[1, 2] * thrust, R[2, 2] * thrust, -4.0)
+    if f.wrench_count > 0:
+        _effect_jacobian(f, R, f.D)
+        for n in range(12):
+            scale = 4.0 if n < 3 else 1.0
+            for i in range(3):
+                B[3 + i, n] += scale * f.D[n, i]
+                B[i, n] += scale * f.D[n, 3 + i]
+    for i in range(3):
+        for j in range(N):
+            A[3 + i, j] = inverse[i, 0] * B[0, j] + inverse[i, 1] * B[1, j] + inverse[i, 2] * B[2, j]
+            A[9 + i, j] = B[3 + i, j] / body.mass
+    c0, c1, c2 = -body.com[0], -body.com[1], -body.com[2]
+    if c0 == 0.0 and c1 == 0.0 and c2 == 0.0:
+        return
+    # the geometric centre, at c from the centre of mass: R (alpha x c + omega x (omega x c)), here s in the body frame
+    w0, w1, w2 = omega[0], omega[1], omega[2]
+    n0, n1, n2 = w1 * c2 - w2 * c1, w2 * c0 - w0 * c2, w0 * c1 - w1 * c0
+    a0, a1, a2 = f.acceleration[3], f.acceleration[4], f.acceleration[5]
+    s0 = a1 * c2 - a2 * c1 + w1 * n2 - w2 * n1
+    s1 = a2 * c0 - a0 * c2 + w2 * n0 - w0 * n2
+    s2 = a0 * c1 - a1 * c0 + w0 * n1 - w1 * n0
+    for j in range(N):
+        B[0, j] = A[4, j] * c2 - A[5, j] * c1
+        B[1, j] = A[5, j] * c0 - A[3, j] * c2
+        B[2, j] = A[3, j] * c1 - A[4, j] * c0
+    # omega x (omega x c) = omega (omega' c) - c omega' omega
+    dot = w0 * c0 + w1 * c1 + w2 * c2
+    for i in range(3):
+        w, c = omega[i], -body.com[i]
+        B[i, 3] += w * c0 - 2.0 * c * w0
+        B[i, 4] += w * c1 - 2.0 * c * w1
+        B[i, 5] += w * c2 - 2.0 * c * w2
+        B[i, 3 + i] += dot
+    for i in range(3):
+        for j in range(N):
+            A[9 + i, j] += R[i, 0] * B[0, j] + R[i, 1] * B[1, j] + R[i, 2] * B[2, j]
+    s3 = R[0, 0] * s0 + R[0, 1] * s1 + R[0, 2] * s2
+    s4 = R[1, 0] * s0 + R[1, 1] * s1 + R[1, 2] * s2
+    s5 = R[2, 0] * s0 + R[2, 1] * s1 + R[2, 2] * s2
+    _cross_into(A, 9, 0, s3, s4, s5, -4.0)
+
+
+@njit(cache=True)
+def model_jacobian(f: np.ndarray, dt: float, A: Array) -> None:
+    """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); torque and force keep their values, so rows 12-17 are zero.
+
+    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``. Expects what ``drive``
+    and ``propagate`` leave behind.
+    """
+    for i in range(12):
+        for j in range(N):
+            A[i, j] = 0.0
+    _acceleration_jacobian(f, A)
+    R = f.centre_rotation
+    # the turn of this step is at the old rate: 4 d(rho) = R Jl(omega dt) dt d(omega), Jl the left Jacobian of SO(3)
+    px, py, pz = f.x[10] * dt, f.x[11] * dt, f.x[12] * dt
+    square = px * px + py * py + pz * pz
+    if square > 1e-8:
+        angle = math.sqrt(square)
+        half, third = (1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / (square * angle)
+    else:
+        half, third = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    for i in range(3):
+        r0, r1, r2 = R[i, 0], R[i, 1], R[i, 2]
+        along = third * (r0 * px + r1 * py + r2 * pz)
+        straight = 1.0 - third * square
+        A[i, 3] = 0.25 * dt * (straight * r0 + along * px + half * (r1 * pz - r2 * py))
+        A[i, 4] = 0.25 * dt * (straight * r1 + along * py + half * (r2 * px - r0 * pz))
+        A[i, 5] = 0.25 * dt * (straight * r2 + along * pz + half * (r0 * py - r1 * px))
+        for j in range(N):
+            A[3 + i, j] *= dt
+            A[9 + i, j] *= dt
+            A[6 + i, j] = 0.5 * dt * A[9 + i, j]
+        A[6 + i, 9 + i] += dt
+
+
+@njit(cache=True)
+def predict(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None:
+    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s."""
+    x, P, A, G = f.x, f.P, f.S, f.D
+    drive(f, rotor_speeds, dt, voltage)
+    propagate(f, x, dt, f.centre)
+    model_jacobian(f, dt, A)
+    # F P F' = P + A P + (A P)' + A P A', where A = F - 1 has twelve rows that are not zero
+    for i in range(12):
+        for j in range(N):
+            G[i, j] = 0.0
+        for k in range(N):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(N):
+                    G[i, j] += a * P[k, j]
+    for i in range(12):
+        for j in range(12):
+            total = G[i, j] + G[j, i]
+            for k in range(N):
+                total += G[i, k] * A[j, k]
+            P[i, j] += total
+        for j in range(12, N):
+            P[i, j] += G[i, j]
+            P[j, i] += G[i, j]
+    _add_noise(f, f.centre_rotation, dt)
+    _symmetrise(P)
+    for i in range(NIS):
+        x[i] = f.centre[i]
+    x[NIS] = math.nan
+    f.time += dt
+
+
+@njit(cache=True)
+def step(f: np.ndarray, z: Array, parts: int, dt: float, voltage: float) -> None:
+    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,) that were measured."""
+    if dt > 0.0:
+        predict(f, z[0:4], dt, voltage)
+    if parts == 3:
+        correct(f, z[4:7], z[7:11], 0, 6)
+    elif parts == 2:
+        correct(f, z[4:7], z[7:11], 0, 3)
+    elif parts == 1:
+        correct(f, z[4:7], f.x[3:7], 3, 6)
+
+
+@njit(cache=True)
+def check_sample(f: np.ndarray, z: Array, parts: int) -> int:
+    """Return the ``parts`` of ``z`` (11,) that are usable: 1 position, 2 attitude; -1 if the quaternion is no rotation.
+
+    Turn rates that are not finite become the last ones that were; the quaternion is brought to length 1.
+    """
+    usable = 0
+    if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
+        usable += 1
+    if parts & 2 != 0:
+        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
+        if math.isfinite(square):
+            if square < 0.81 or square > 1.21:
+                return -1
+            scale = 1.0 / math.sqrt(square)
+            for i in range(7, 11):
+                z[i] *= scale
+            usable += 2
+    for i in range(4):
+        if not math.isfinite(z[i]):
+            z[i] = f.last_speeds[i]
+        f.last_speeds[i] = z[i]
+    return usable
+
+
+@njit(cache=True)
+def _step_and_copy(record: np.ndarray, z: Array, parts: int, dt: float, voltage: float, state: Array,
+                   covariance: Array) -> int:
+    f = record[0]
+    usable = check_sample(f, z, parts)
+    if usable >= 0:
+        step(f, z, usable, dt, voltage)
+    state[:] = f.x
+    covariance[:, :] = f.P
+    return usable
+
+
+def read_sample(
+    z: Array, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
+) -> int:
+    """Write turn rates, position and quaternion into ``z`` (11,); return what was given: 1 position, 2 attitude, 3 both.
+
+    Raises:
+        InputError: a shape is wrong.
+    """
+    parts = 0
+    try:
+        if len(rotor_speeds) != 4:  # type: ignore[arg-type]
+            raise ValueError
+        z[0:4] = rotor_speeds
+        if position is not None:
+            if len(position) != 3:  # type: ignore[arg-type]
+                raise ValueError
+            z[4:7] = position
+            parts = 1
+        if quaternion is not None:
+            if len(quaternion) != 4:  # type: ignore[arg-type]
+                raise ValueError
+            z[7:11] = quaternion
+            parts += 2
+    except (TypeError, ValueError):
+        raise InputError(
+            "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
+            f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
+        ) from None
+    return parts
+
+
+class WrenchEKF(WrenchUKF):
+    """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``, linearised.
+
+    It is made and used like ``WrenchUKF`` and shares all of it but the prediction of the covariance. Where the attitude
+    is well known the two agree closely; it serves as a check of the other, and where a step must cost less.
+    """
+
+    def _run(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None, dt: float,
+             voltage: float | None) -> WrenchEstimate:
+        z = self._z
+        parts = read_sample(z, rotor_speeds, position, quaternion)
+        state, covariance = np.empty(NIS + 1), np.empty((N, N))
+        volts = self._voltage if voltage is None else voltage
+        if _step_and_copy(self.record, z, parts, dt, volts, state, covariance) < 0:
+            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
+        return WrenchEstimate(state, covariance)

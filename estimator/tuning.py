@@ -1,0 +1,65 @@
+"""How much the filter trusts its model and its measurements."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..dynamics.errors import InputError
+from ..dynamics.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+# The vehicle and period for which the default tuning is stated: AR.Drone 2.0 at 200 Hz
+_PERIOD = 0.005
+_WEIGHT = 0.465 * 9.81
+_ARM = 0.1262
+
+
+@dataclass(frozen=True)
+class UKFTuning:
+    """Standard deviations per step, each a scalar or (3,) for x, y, z; the defaults suit ``ardrone2`` at 200 Hz.
+
+    The 10-90 % rise time of the force estimate is about ``2.2 * period * thrust_noise / force_walk``, and of the
+    torque estimate likewise: about 1 s as given. A ``motor_torque_noise`` far below the model's real error makes the
+    filter lose the attitude when the torque steps, which shows as a wrong lateral force.
+    """
+
+    motor_torque_noise: ArrayLike = 0.03  # Nm, body frame: torque that the rotor model misses, new each step
+    torque_walk: ArrayLike = 3.26e-4  # Nm, world frame: change of the external torque in a step
+    thrust_noise: ArrayLike = 0.3  # N, body frame: force that the rotor model misses, new each step
+    force_walk: ArrayLike = 3.26e-3  # N, world frame: change of the external force in a step
+    position_noise: ArrayLike = 0.001  # m, one measurement
+    attitude_noise: ArrayLike = 0.005  # rad, one measurement; the quarter of an MRP is handled inside
+    kappa: float = 2.0  # spread of the sigma points, (28)
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            try:
+                array = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"UKFTuning: {f.name} must be a number or three, got {value!r}") from error
+            if array.shape not in ((), (3,)) or not np.all(np.isfinite(array)) or np.any(array <= 0):
+                raise InputError(f"UKFTuning: {f.name} must be positive and finite, a number or three, got {value!r}")
+        if np.ndim(self.kappa) != 0:
+            raise InputError(f"UKFTuning: kappa must be one number, got {self.kappa!r}")
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, period: float = _PERIOD, rise_time: float = 1.0) -> "UKFTuning":
+        """Return the default tuning scaled to a vehicle's weight and size, its motion capture and the period in s.
+
+        ``rise_time`` (s, 10-90 %) is that of the estimated force and torque.
+        """
+        force = vehicle.weight / _WEIGHT
+        torque = force * vehicle.arm_l / _ARM
+        slower = np.sqrt(period / _PERIOD)
+        white, walk = 1.0 / slower, slower / rise_time
+        return cls(
+            motor_torque_noise=0.03 * torque * white,
+            torque_walk=3.26e-4 * torque * walk,
+            thrust_noise=0.3 * force * white,
+            force_walk=3.26e-3 * force * walk,
+            position_noise=vehicle.mocap.sigma_pos_m,
+            attitude_noise=vehicle.mocap.sigma_att_rad,
+        )

@@ -1,0 +1,487 @@
+"""The wrench filter: an unscented Kalman filter over pose, twist and external wrench of a quadrotor.
+
+McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016, (15)-(37).
+The filter is exact to the paper's 61 and 49 sigma points and cheaper:
+
+* The noise enters linearly, and so do those directions of the state that leave attitude and rate alone. Their pairs of
+  sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the covariance. What is left are the 13
+  points of attitude and rate (25 where a declared effect depends on position or velocity).
+* The root of the covariance is lower triangular, so only its first 6 (or 12) columns are needed; the others enter
+  through the Schur complement.
+* The measurement is linear in the error state, so the correction by 49 redrawn points is the Kalman update.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from ..dynamics.errors import InputError
+from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
+from ..dynamics.vehicle import Vehicle
+from .estimate import NIS, Array, WrenchEstimate
+from .filter_record import N, drive, filter_record, propagate
+from .tuning import UKFTuning
+
+NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
+_PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
+_SPREAD = 0.25  # largest variance of an MRP (a standard deviation of about 115 degrees)
+
+
+@njit(cache=True)
+def _root(f: np.ndarray, columns: int) -> None:
+    """Factor P: the first columns of its lower root into ``S``, the rest's Schur complement into ``M``."""
+    P, S, M = f.P, f.S, f.M
+    for j in range(columns):
+        pivot = P[j, j]
+        for k in range(j):
+            pivot -= S[k, j] * S[k, j]
+        # rounding may eat the smallest pivots; a tiny positive one keeps the filter alive and changes nothing
+        pivot = max(pivot, 1e-14 * P[j, j] + 1e-300)
+        scale = 1.0 / math.sqrt(pivot)
+        for i in range(N):
+            S[j, i] = P[j, i]
+        for k in range(j):
+            a = S[k, j]
+            for i in range(j, N):
+                S[j, i] -= a * S[k, i]
+        for i in range(j):
+            S[j, i] = 0.0
+        for i in range(j, N):
+            S[j, i] *= scale
+    M[:, :] = 0.0
+    first = columns - 6
+    for i in range(first, 12):
+        for j in range(first, 12):
+            M[i, j] = P[6 + i, 6 + j]
+    for k in range(columns):
+        for i in range(first, 12):
+            a = S[k, 6 + i]
+            for j in range(first, 12):
+                M[i, j] -= a * S[k, 6 + j]
+
+
+@njit(cache=True)
+def _linear_rows(f: np.ndarray, rotation: Array, dt: float, source: Array, out: Array) -> None:
+    """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n): ``out`` (18, n)."""
+    columns = source.shape[1]
+    J, c, mass = f.body.inverse_inertia, f.body.com, f.body.mass
+    offset = c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0
+    for i in range(3):
+        a0 = J[i, 0] * rotation[0, 0] + J[i, 1] * rotation[0, 1] + J[i, 2] * rotation[0, 2]
+        a1 = J[i, 0] * rotation[1, 0] + J[i, 1] * rotation[1, 1] + J[i, 2] * rotation[1, 2]
+        a2 = J[i, 0] * rotation[2, 0] + J[i, 1] * rotation[2, 1] + J[i, 2] * rotation[2, 2]
+        for j in range(columns):
+            out[i, j] = 0.0
+            out[3 + i, j] = dt * (a0 * source[6, j] + a1 * source[7, j] + a2 * source[8, j])
+            out[9 + i, j] = dt / mass * source[9 + i, j]
+            out[12 + i, j] = source[6 + i, j]
+            out[15 + i, j] = source[9 + i, j]
+    if offset:
+        # the geometric centre also moves with the angular acceleration: com x alpha
+        for j in range(columns):
+            ax, ay, az = out[3, j], out[4, j], out[5, j]
+            px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
+            for i in range(3):
+                out[9 + i, j] += rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz
+    for i in range(3):
+        for j in range(columns):
+            gain = out[9 + i, j]
+            out[6 + i, j] = source[i, j] + dt * (source[3 + i, j] + 0.5 * gain)
+            out[9 + i, j] = source[3 + i, j] + gain
+
+
+@njit(cache=True)
+def _add_noise(f: np.ndarray, rotation: Array, dt: float) -> None:
+    """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (16)."""
+    P, J, c, b = f.P, f.body.inverse_inertia, f.body.com, f.column
+    # stated per period: white noise averages over a longer step, a walk grows with it
+    white, walk = f.period / dt, dt / f.period
+    for n in range(3):
+        P[12 + n, 12 + n] += walk * f.torque_walk[n]
+        P[15 + n, 15 + n] += walk * f.force_walk[n]
+        ax, ay, az = J[0, n], J[1, n], J[2, n]
+        px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
+        for i in range(3):
+            b[3 + i] = dt * J[i, n]
+            b[9 + i] = dt * (rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz)
+        _add_column(P, b, dt, white * f.motor_torque[n])
+        for i in range(3):
+            b[3 + i] = 0.0
+            b[9 + i] = dt / f.body.mass * rotation[i, n]
+        _add_column(P, b, dt, white * f.thrust[n])
+
+
+@njit(cache=True)
+def _add_column(P: Array, b: Array, dt: float, variance: float) -> None:
+    """Add ``b variance b'`` to P, where ``b`` holds a noise input's rows of rate and velocity."""
+    for i in range(3):
+        b[6 + i] = 0.5 * dt * b[9 + i]
+    for i in range(3, 12):
+        a = variance * b[i]
+        for j in range(3, 12):
+            P[i, j] += a * b[j]
+
+
+@njit(cache=True)
+def predict(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None:
+    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
+    x, P, S, D, mean, q, rho = f.x, f.P, f.S, f.D, f.mean, f.q, f.rho
+    centre, point, after = f.centre, f.point, f.next
+    drive(f, rotor_speeds, dt, voltage)
+    columns = 6 if f.wrench_count == 0 else 12
+    _root(f, columns)
+    propagate(f, x, dt, centre)
+    rotation = f.centre_rotation
+    for i in range(3):
+        for j in range(3):
+            rotation[i, j] = f.rotation[i, j]
+    spread = math.sqrt(N + NOISE + f.kappa)
+    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
+    row = 0
+    for j in range(columns):
+        for sign in (spread, -spread):
+            for i in range(3):
+                rho[i] = sign * S[j, i]
+                point[10 + i] = x[10 + i] + sign * S[j, 3 + i]
+                point[i] = x[i] + sign * S[j, 6 + i]
+                point[7 + i] = x[7 + i] + sign * S[j, 9 + i]
+                point[13 + i] = x[13 + i] + sign * S[j, 12 + i]
+                point[16 + i] = x[16 + i] + sign * S[j, 15 + i]
+            quaternion_from_mrp(rho, q)
+            quaternion_multiply(q, x[3:7], point[3:7])
+            propagate(f, point, dt, after)
+            attitude_error(after[3:7], centre[3:7], D[row, 0:3])
+            for i in range(3):
+                D[row, 3 + i] = after[10 + i] - centre[10 + i]
+                D[row, 6 + i] = after[i] - centre[i]
+                D[row, 9 + i] = after[7 + i] - centre[7 + i]
+                D[row, 12 + i] = after[13 + i] - centre[13 + i]
+                D[row, 15 + i] = after[16 + i] - centre[16 + i]
+            row += 1
+    _linear_rows(f, rotation, dt, f.M, f.Y)
+    for i in range(12):
+        for j in range(N):
+            f.Z[i, j] = f.Y[j, i]
+    _linear_rows(f, rotation, dt, f.Z, P)
+    _add_noise(f, rotation, dt)
+    for i in range(N):
+        mean[i] = 0.0
+    for k in range(row):
+        for i in range(N):
+            mean[i] += weight * D[k, i]
+    for k in range(row):
+        for i in range(N):
+            a = weight * D[k, i]
+            for j in range(N):
+                P[i, j] += a * D[k, j]
+    for i in range(N):
+        for j in range(N):
+            P[i, j] -= mean[i] * mean[j]
+    _fold(f, centre, mean)
+    _symmetrise(P)
+    f.time += dt
+    x[NIS] = math.nan
+
+
+@njit(cache=True)
+def _fold(f: np.ndarray, base: Array, error: Array) -> None:
+    """Make ``base`` plus the error state (18,) the estimate; the mean MRP goes into the quaternion, (25), (35), (37)."""
+    x = f.x
+    quaternion_from_mrp(error[0:3], f.q)
+    quaternion_multiply(f.q, base[3:7], f.point[3:7])
+    normalise(f.point[3:7])
+    for i in range(4):
+        x[3 + i] = f.point[3 + i]
+    for i in range(3):
+        x[10 + i] = base[10 + i] + error[3 + i]
+        x[i] = base[i] + error[6 + i]
+        x[7 + i] = base[7 + i] + error[9 + i]
+        x[13 + i] = base[13 + i] + error[12 + i]
+        x[16 + i] = base[16 + i] + error[15 + i]
+
+
+@njit(cache=True)
+def _symmetrise(P: Array) -> None:
+    """Make P symmetric, and hold the attitude's variance where an MRP still means something."""
+    for i in range(N):
+        for j in range(i):
+            a = 0.5 * (P[i, j] + P[j, i])
+            P[i, j] = a
+            P[j, i] = a
+    for i in range(3):
+        if P[i, i] > _SPREAD:
+            scale = math.sqrt(_SPREAD / P[i, i])
+            for j in range(N):
+                P[i, j] *= scale
+                P[j, i] *= scale
+
+
+@njit(cache=True)
+def correct(f: np.ndarray, position: Array, quaternion: Array, first: int, last: int) -> bool:
+    """Take in rows ``first`` to ``last`` of the measurement (rho, x), (27)-(37), unless the gate refuses it."""
+    x, P, L, W, y = f.x, f.P, f.L, f.W, f.innovation
+    attitude_error(quaternion, x[3:7], y[0:3])
+    for i in range(3):
+        y[3 + i] = position[i] - x[i]
+    # rows of (rho, x) in the error state are 0-2 and 6-8
+    for i in range(first, last):
+        a = i if i < 3 else i + 3
+        for j in range(first, i + 1):
+            b = j if j < 3 else j + 3
+            total = P[a, b]
+            if i == j:
+                total += f.noise[i]
+            for k in range(first, j):
+                total -= L[i, k] * L[j, k]
+            L[i, j] = math.sqrt(total) if i == j else total / L[j, j]
+    # y becomes the whitened innovation, W the whitened cross covariance
+    nis = 0.0
+    for i in range(first, last):
+        for k in range(first, i):
+            y[i] -= L[i, k] * y[k]
+        y[i] /= L[i, i]
+        nis += y[i] * y[i]
+    x[NIS] = nis
+    if f.gate > 0.0 and nis > f.gate and f.refused < f.patience:
+        f.refused += 1
+        return False
+    f.refused = 0
+    mean = f.mean
+    for j in range(N):
+        mean[j] = 0.0
+    for i in range(first, last):
+        a = i if i < 3 else i + 3
+        for j in range(N):
+            W[i, j] = P[a, j]
+        for k in range(first, i):
+            b = L[i, k]
+            for j in range(N):
+                W[i, j] -= b * W[k, j]
+        b = 1.0 / L[i, i]
+        for j in range(N):
+            W[i, j] *= b
+            mean[j] += W[i, j] * y[i]
+    for k in range(first, last):
+        for i in range(N):
+            b = W[k, i]
+            for j in range(N):
+                P[i, j] -= b * W[k, j]
+    for i in range(NIS):
+        f.centre[i] = x[i]
+    _fold(f, f.centre, mean)
+    return True
+
+
+@njit(cache=True)
+def step(f: np.ndarray, z: Array, parts: int, dt: float, voltage: float) -> int:
+    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` that were measured.
+
+    ``z`` (11,) holds turn rates, position and quaternion; ``parts`` is the sum of 1 (position) and 2 (attitude). What is
+    not finite was not measured. Returns 1, with the filter as it was, if the quaternion is no rotation; else 0.
+    """
+    position, attitude = parts & 1 != 0, parts & 2 != 0
+    if position:
+        position = math.isfinite(z[4] + z[5] + z[6])
+    if attitude:
+        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
+        attitude = math.isfinite(square)
+        if attitude:
+            if square < 0.81 or square > 1.21:
+                return 1
+            normalise(z[7:11])
+    if dt > 0.0:
+        for i in range(4):
+            if not math.isfinite(z[i]):
+                z[i] = f.last_speeds[i]
+            f.last_speeds[i] = z[i]
+        predict(f, z[0:4], dt, voltage)
+    if position and attitude:
+        correct(f, z[4:7], z[7:11], 0, 6)
+    elif attitude:
+        correct(f, z[4:7], z[7:11], 0, 3)
+    elif position:
+        correct(f, z[4:7], f.x[3:7], 3, 6)
+    return 0
+
+
+@njit(cache=True)
+def _step_and_copy(record: np.ndarray, z: Array, parts: int, dt: float, voltage: float, state: Array,
+                   covariance: Array) -> int:
+    f = record[0]
+    code = step(f, z, parts, dt, voltage)
+    state[:] = f.x
+    covariance[:, :] = f.P
+    return code
+
+
+class WrenchUKF:
+    """Unscented Kalman filter for the external force and torque on a quadrotor.
+
+    Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct`` with measurements that
+    come at their own times. A measurement, or a part of it, that is None or not finite was not made. The sign of a
+    quaternion means nothing. Turn rates that are not finite are taken to be the last ones that were.
+
+    Args:
+        vehicle: the declared vehicle; its declared effects are part of the prediction model, and the estimated wrench is
+            what they do not explain.
+        tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
+        period: time between steps, s.
+        gate: refuse measurements whose NIS has a smaller chance than ``1 - gate`` (0.999, say); None takes in any.
+            After 0.1 s of nothing but refusals the next one is believed.
+
+    Raises:
+        InputError: period or gate out of range.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005, gate: float | None = None
+    ) -> None:
+        if not (math.isfinite(period) and period > 0):
+            raise InputError(f"WrenchUKF: period must be positive, in s, got {period!r}")
+        if gate is not None and not 0.5 <= gate < 1.0:
+            raise InputError(f"WrenchUKF: gate must be a probability from 0.5 to below 1, got {gate!r}")
+        self.vehicle = vehicle
+        self.tuning = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
+        self.period = float(period)
+        largest = 0.0 if gate is None else _chi2_quantile(gate)
+        patience = max(1, round(_PATIENCE / period))
+        self.record = filter_record(vehicle, self.tuning, self.period, largest, patience)
+        self._z = np.zeros(11)
+        self._voltage = vehicle.voltage_ref
+
+    def reset(
+        self,
+        position: ArrayLike,
+        quaternion: ArrayLike,
+        covariance: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Start at a pose, without an external wrench.
+
+        Args:
+            position: (3,) m, world.
+            quaternion: (4,) body to world, scalar first.
+            covariance: (18, 18) of (rho, omega, x, v, torque, force), rho being an MRP; default
+                ``default_covariance(vehicle, tuning)``.
+            velocity: (3,) m/s, world.
+            angular_velocity: (3,) rad/s, body.
+
+        Raises:
+            InputError: a shape is wrong, a number is not finite, the quaternion is not one of a rotation, or the
+                covariance is not symmetric and positive definite.
+        """
+        x = np.zeros(NIS + 1)
+        for name, value, where in (("position", position, slice(0, 3)), ("quaternion", quaternion, slice(3, 7)),
+                                   ("velocity", velocity, slice(7, 10)),
+                                   ("angular_velocity", angular_velocity, slice(10, 13))):
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape != x[where].shape or not np.all(np.isfinite(array)):
+                raise InputError(f"reset: {name} must be {x[where].size} finite numbers, got {value!r}")
+            x[where] = array
+        length = float(np.linalg.norm(x[3:7]))
+        if not 0.9 < length < 1.1:
+            raise InputError(f"reset: quaternion must have length 1, got {length:g}")
+        x[3:7] /= length
+        x[NIS] = math.nan
+        if covariance is None:
+            P = default_covariance(self.vehicle, self.tuning)
+        else:
+            P = np.array(covariance, dtype=np.float64)
+            if P.shape != (N, N) or not np.all(np.isfinite(P)) or not np.allclose(P, P.T, rtol=1e-8, atol=1e-300):
+                raise InputError(f"reset: covariance must be a finite symmetric (18, 18) matrix, got shape {P.shape}")
+            if np.linalg.eigvalsh(P)[0] <= 0:
+                raise InputError("reset: covariance must be positive definite")
+        f = self.record[0]
+        f["x"], f["P"] = x, P
+        f["memory"], f["time"], f["refused"] = 0.0, 0.0, 0
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a world-frame MRP."""
+        return np.array(self.record[0]["P"])
+
+    @property
+    def estimate(self) -> WrenchEstimate:
+        """What the filter believes now."""
+        return WrenchEstimate(np.array(self.record[0]["x"]), self.covariance)
+
+    def step(
+        self,
+        rotor_speeds: ArrayLike,
+        position: ArrayLike | None = None,
+        quaternion: ArrayLike | None = None,
+        voltage: float | None = None,
+    ) -> WrenchEstimate:
+        """Predict over one period with the turn rates of that period, then take in the pose at its end.
+
+        Args:
+            rotor_speeds: (4,) rad/s.
+            position: (3,) m, world, or None.
+            quaternion: (4,) body to world, scalar first, or None.
+            voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
+
+        Raises:
+            InputError: a shape is wrong or the quaternion's length is not 1; the filter stays as it was.
+        """
+        return self._run(rotor_speeds, position, quaternion, self.period, voltage)
+
+    def predict(self, rotor_speeds: ArrayLike, dt: float | None = None, voltage: float | None = None) -> WrenchEstimate:
+        """Carry the filter ``dt`` s (default: one period) ahead without a measurement."""
+        dt = self.period if dt is None else dt
+        if not (math.isfinite(dt) and dt > 0):
+            raise InputError(f"predict: dt must be positive, in s, got {dt!r}")
+        return self._run(rotor_speeds, None, None, dt, voltage)
+
+    def correct(self, position: ArrayLike | None, quaternion: ArrayLike | None) -> WrenchEstimate:
+        """Take in a pose, or a part of one, measured now."""
+        return self._run(self._z[0:4], position, quaternion, 0.0, None)
+
+    def _run(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None, dt: float,
+             voltage: float | None) -> WrenchEstimate:
+        z, parts = self._z, 0
+        try:
+            if len(rotor_speeds) != 4:  # type: ignore[arg-type]
+                raise ValueError
+            z[0:4] = rotor_speeds
+            if position is not None:
+                if len(position) != 3:  # type: ignore[arg-type]
+                    raise ValueError
+                z[4:7] = position
+                parts = 1
+            if quaternion is not None:
+                if len(quaternion) != 4:  # type: ignore[arg-type]
+                    raise ValueError
+                z[7:11] = quaternion
+                parts += 2
+        except (TypeError, ValueError):
+            raise InputError(
+                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
+                f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
+            ) from None
+        state, covariance = np.empty(NIS + 1), np.empty((N, N))
+        volts = self._voltage if voltage is None else voltage
+        if _step_and_copy(self.record, z, parts, dt, volts, state, covariance):
+            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
+        return WrenchEstimate(state, covariance)
+
+
+def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:
+    """Return the covariance (18, 18) of a vehicle that was just seen, near rest, with an unknown wrench."""
+    deviations = np.empty(N)
+    deviations[0:3] = np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0
+    deviations[3:6] = 0.5  # rad/s
+    deviations[6:9] = tuning.position_noise
+    deviations[9:12] = 0.5  # m/s
+    deviations[12:15] = 0.05 * vehicle.weight * vehicle.arm_l
+    deviations[15:18] = 0.1 * vehicle.weight
+    return np.diag(np.square(deviations))
+
+
+def _chi2_quantile(probability: float) -> float:
+    """Return the NIS (6 numbers) below which a consistent measurement lies with a probability."""
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(probability, 6))
