@@ -3,4 +3,12 @@
 Importing the package registers the environment ``windwrench/FanTracking-v0`` with Gymnasium.
 """
 
+import gymnasium
+
 __version__ = "0.1.0"
+
+gymnasium.register(
+    id="windwrench/FanTracking-v0",
+    entry_point="windwrench.envs.fan_tracking:FanTrackingEnv",
+    max_episode_steps=250,
+)

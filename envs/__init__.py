@@ -1,0 +1,7 @@
+"""Worlds: the plant in MuJoCo, the fan and its jet, and the fan-tracking environment."""
+
+from .fan_tracking import FanTrackingEnv
+from .jet import Fan
+from .scenarios import SCENARIOS, Scenario
+
+__all__ = ["SCENARIOS", "Fan", "FanTrackingEnv", "Scenario"]

@@ -6,6 +6,7 @@ world-frame MRP rho, on the left of the attitude: R_true = exp([4 rho]x) R for s
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -33,13 +34,13 @@ def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float,
 
 
 @njit(cache=True)
-def _effects_at(f: np.ndarray, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
+def _effects_at(f: Any, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
     effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
                   velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, out)
 
 
 @njit(cache=True)
-def _effect_jacobian(f: np.ndarray, rotation: Array, out: Array) -> None:
+def _effect_jacobian(f: Any, rotation: Array, out: Array) -> None:
     """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into ``out`` (12, 6).
 
     By central differences: a law is a black box behind an address.
@@ -71,7 +72,7 @@ def _effect_jacobian(f: np.ndarray, rotation: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def _acceleration_jacobian(f: np.ndarray, A: Array) -> None:
+def _acceleration_jacobian(f: Any, A: Array) -> None:
     """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18), rows 3-5 and 9-11.
 
     Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world): (4), (12). Expects
@@ -151,11 +152,11 @@ def _acceleration_jacobian(f: np.ndarray, A: Array) -> None:
 
 
 @njit(cache=True)
-def model_jacobian(f: np.ndarray, dt: float, A: Array) -> None:
-    """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); torque and force keep their values, so rows 12-17 are zero.
+def model_jacobian(f: Any, dt: float, A: Array) -> None:
+    """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); the rows of torque and force would be zero.
 
-    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``. Expects what ``drive``
-    and ``propagate`` leave behind.
+    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``. Expects what
+    ``drive`` and ``propagate`` leave behind.
     """
     for i in range(12):
         for j in range(N):
@@ -185,7 +186,7 @@ def model_jacobian(f: np.ndarray, dt: float, A: Array) -> None:
 
 
 @njit(cache=True)
-def predict(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None:
+def predict(f: Any, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s."""
     x, P, A, G = f.x, f.P, f.S, f.D
     drive(f, rotor_speeds, dt, voltage)
@@ -218,7 +219,7 @@ def predict(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> No
 
 
 @njit(cache=True)
-def step(f: np.ndarray, z: Array, parts: int, dt: float, voltage: float) -> None:
+def step(f: Any, z: Array, parts: int, dt: float, voltage: float) -> None:
     """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,) that were measured."""
     if dt > 0.0:
         predict(f, z[0:4], dt, voltage)
@@ -231,7 +232,7 @@ def step(f: np.ndarray, z: Array, parts: int, dt: float, voltage: float) -> None
 
 
 @njit(cache=True)
-def check_sample(f: np.ndarray, z: Array, parts: int) -> int:
+def check_sample(f: Any, z: Array, parts: int) -> int:
     """Return the ``parts`` of ``z`` (11,) that are usable: 1 position, 2 attitude; -1 if the quaternion is no rotation.
 
     Turn rates that are not finite become the last ones that were; the quaternion is brought to length 1.
@@ -256,10 +257,10 @@ def check_sample(f: np.ndarray, z: Array, parts: int) -> int:
 
 
 @njit(cache=True)
-def _step_and_copy(record: np.ndarray, z: Array, parts: int, dt: float, voltage: float, state: Array,
+def _step_and_copy(record: Any, z: Array, parts: int, dt: float, voltage: float, state: Array,
                    covariance: Array) -> int:
     f = record[0]
-    usable = check_sample(f, z, parts)
+    usable: int = check_sample(f, z, parts)
     if usable >= 0:
         step(f, z, usable, dt, voltage)
     state[:] = f.x
@@ -270,7 +271,7 @@ def _step_and_copy(record: np.ndarray, z: Array, parts: int, dt: float, voltage:
 def read_sample(
     z: Array, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
 ) -> int:
-    """Write turn rates, position and quaternion into ``z`` (11,); return what was given: 1 position, 2 attitude, 3 both.
+    """Write turn rates and pose into ``z`` (11,); return what was given of the pose: 1 position, 2 attitude, 3 both.
 
     Raises:
         InputError: a shape is wrong.

@@ -1,0 +1,128 @@
+"""The inner flight loop: from a position, velocity and yaw set point to rotor turn rates.
+
+A cascade on the estimated state: position, velocity and integral to a thrust vector; its direction to body rates and
+torques; torques and thrust through the inverse of the rotor mixing. The defaults halved the fan-tracking error of
+softer gains on the AR.Drone model.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..dynamics.motion import BODY, Array, body_record
+from ..dynamics.rotation import quaternion_to_matrix
+from ..dynamics.vehicle import Vehicle
+
+# set point: position 0-2, velocity 3-5, acceleration 6-8, yaw 9, yaw rate 10
+SETPOINT_SIZE = 11
+
+
+@dataclass(frozen=True)
+class FlightGains:
+    """Gains of the flight loop; each acts on an acceleration, so they do not depend on the vehicle's size."""
+
+    position: float = 4.0  # 1/s2
+    velocity: float = 6.0  # 1/s
+    integral: float = 1.0  # 1/s3
+    attitude: float = 110.0  # 1/s2
+    rate: float = 18.0  # 1/s
+    yaw: float = 12.0  # 1/s2
+    yaw_rate: float = 6.0  # 1/s
+    yaw_integral: float = 4.0  # 1/s3
+    tilt_limit: float = 0.5  # rad
+    leash: float = 0.5  # m, farthest that a moving set point runs ahead of the vehicle
+
+
+FLIGHT = np.dtype([
+    ("body", BODY),
+    ("unmixing", "f8", (4, 4)),
+    ("omega_max", "f8"),
+    *[(name, "f8") for name in FlightGains.__dataclass_fields__],
+    ("setpoint", "f8", (SETPOINT_SIZE,)),
+    ("sum", "f8", (3,)),
+    ("yaw_sum", "f8"),
+    ("rotation", "f8", (3, 3)),
+    ("command", "f8", (4,)),  # turn rates, rad/s
+])
+
+
+def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndarray:
+    """Return the flight loop's memory (1,) for a vehicle; ``omega_max`` limits its commands."""
+    gains = FlightGains() if gains is None else gains
+    record = np.zeros(1, dtype=FLIGHT)
+    c = record[0]
+    c["body"] = body_record(vehicle)[0]
+    c["unmixing"] = np.linalg.inv(vehicle.mixing)
+    # a rotor that makes four times its hover thrust where nothing else is stated
+    c["omega_max"] = vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    for name in FlightGains.__dataclass_fields__:
+        c[name] = getattr(gains, name)
+    c["command"] = vehicle.hover_rate
+    return record
+
+
+@njit(cache=True)
+def move_setpoint(c: np.ndarray, position: Array, dt: float) -> None:
+    """Move the set point with its own velocity for ``dt`` s, but no farther than the leash from the vehicle."""
+    for i in range(3):
+        target = c.setpoint[i] + dt * c.setpoint[3 + i]
+        c.setpoint[i] = min(max(target, position[i] - c.leash), position[i] + c.leash)
+    c.setpoint[9] += dt * c.setpoint[10]
+
+
+@njit(cache=True)
+def fly(c: np.ndarray, x: Array, dt: float) -> None:
+    """Write the turn rates (4,) rad/s that steer the estimated state ``x`` to the set point into ``c.command``.
+
+    ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body rate 10-12.
+    """
+    R, s = c.rotation, c.setpoint
+    quaternion_to_matrix(x[3:7], R)
+    a0, a1, a2 = 0.0, 0.0, 0.0
+    for i in range(3):
+        error = s[i] - x[i]
+        c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
+        a = s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
+        if i == 0:
+            a0 = a
+        elif i == 1:
+            a1 = a
+        else:
+            a2 = a
+    a2 = max(a2 + c.body.gravity, 0.3 * c.body.gravity)
+    lateral = math.sqrt(a0 * a0 + a1 * a1)
+    limit = a2 * math.tan(c.tilt_limit)
+    if lateral > limit:
+        a0 *= limit / lateral
+        a1 *= limit / lateral
+    thrust = c.body.mass * (a0 * R[0, 2] + a1 * R[1, 2] + a2 * R[2, 2])
+    length = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    ux, uy, uz = a0 / length, a1 / length, a2 / length
+    # body z x wanted z, in the body frame: the turn that the thrust axis needs
+    bx = R[0, 0] * ux + R[1, 0] * uy + R[2, 0] * uz
+    by = R[0, 1] * ux + R[1, 1] * uy + R[2, 1] * uz
+    wx, wy, wz = x[10], x[11], x[12]
+    yaw = math.atan2(R[1, 0], R[0, 0])
+    yaw_error = s[9] - yaw
+    yaw_error = math.atan2(math.sin(yaw_error), math.cos(yaw_error))
+    c.yaw_sum = min(max(c.yaw_sum + dt * yaw_error, -1.0), 1.0)
+    # the wanted yaw rate, a turn about the world's vertical, in the body frame
+    rx, ry, rz = R[2, 0] * s[10], R[2, 1] * s[10], R[2, 2] * s[10]
+    alpha_x = -c.attitude * by - c.rate * (wx - rx)
+    alpha_y = c.attitude * bx - c.rate * (wy - ry)
+    alpha_z = c.yaw * yaw_error + c.yaw_rate * (rz - wz) + c.yaw_integral * c.yaw_sum
+    J = c.body.inertia
+    hx = J[0, 0] * wx + J[0, 1] * wy + J[0, 2] * wz
+    hy = J[1, 0] * wx + J[1, 1] * wy + J[1, 2] * wz
+    hz = J[2, 0] * wx + J[2, 1] * wy + J[2, 2] * wz
+    tx = J[0, 0] * alpha_x + J[0, 1] * alpha_y + J[0, 2] * alpha_z + wy * hz - wz * hy
+    ty = J[1, 0] * alpha_x + J[1, 1] * alpha_y + J[1, 2] * alpha_z + wz * hx - wx * hz
+    tz = J[2, 0] * alpha_x + J[2, 1] * alpha_y + J[2, 2] * alpha_z + wx * hy - wy * hx
+    # what a declared centre of mass off the rotors' centre makes of the thrust is balanced here
+    tx += c.body.com[1] * thrust
+    ty -= c.body.com[0] * thrust
+    for i in range(4):
+        square = (c.unmixing[i, 0] * thrust + c.unmixing[i, 1] * tx + c.unmixing[i, 2] * ty + c.unmixing[i, 3] * tz)
+        c.command[i] = min(math.sqrt(max(square, 0.0)), c.omega_max)

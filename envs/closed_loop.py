@@ -1,0 +1,156 @@
+"""Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the wind."""
+
+import math
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
+from ..dynamics.motion import Array
+from ..dynamics.rotation import quaternion_of_yaw
+from ..dynamics.vehicle import Vehicle
+from ..estimator.filter_record import FILTER
+from ..estimator.tuning import UKFTuning
+from ..estimator.ukf import WrenchUKF
+from ..estimator.ukf import step as filter_step
+from .jet import FAN, Fan, fan_record, jet_table
+from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
+
+LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("flight", FLIGHT), ("fan", FAN)])
+
+
+@njit(cache=True)
+def tick(loops: np.ndarray, index: int, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array,
+         noise: Array, fan_y: float) -> None:
+    """Sense, estimate, steer and actuate once; MuJoCo's ``xfrc`` (6,) then holds the wrench of this tick.
+
+    ``noise`` (NOISE,) are unit normals. Everything that changes lies in ``loops[index]`` and the arrays given.
+    """
+    loop = loops[index]
+    plant, ukf, flight = loop.plant, loop.filter, loop.flight
+    plant.seen = sense(plant, qpos, noise)
+    filter_step(ukf, plant.z, plant.seen, TICK, plant.battery)
+    move_setpoint(flight, ukf.x, TICK)
+    fly(flight, ukf.x, TICK)
+    loop.fan.y = fan_y
+    actuate(plant, flight.command, loop.fan, axial, radial, qpos, qvel, noise, xfrc)
+
+
+class ClosedLoop:
+    """One vehicle in closed loop with its estimate, ticked at 200 Hz.
+
+    Args:
+        declared: the vehicle as filter and flight loop know it.
+        true: the vehicle as it is, with the effects that nobody declared; default: as declared.
+        tuning: of the filter; default ``UKFTuning.for_vehicle(declared)``.
+        fan: the jet it flies in, or None for still air without drag.
+        settings: of the plant.
+        gains: of the flight loop.
+    """
+
+    def __init__(
+        self,
+        declared: Vehicle,
+        true: Vehicle | None = None,
+        tuning: UKFTuning | None = None,
+        fan: Fan | None = None,
+        settings: PlantSettings | None = None,
+        gains: FlightGains | None = None,
+    ) -> None:
+        plant, self._body = plant_record(declared if true is None else true, settings or PlantSettings())
+        self.ukf = WrenchUKF(declared, tuning, TICK)
+        self.record = np.zeros(1, dtype=LOOP)
+        loop = self.record[0]
+        loop["plant"] = plant[0]
+        loop["filter"] = self.ukf.record[0]
+        loop["flight"] = flight_record(declared, gains)[0]
+        if fan is not None:
+            loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
+        self._table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
+        self.model, self.data = load_world(self._body)
+        self._body_id = self.model.body("vehicle").id
+        self._views()
+        self._steps = 0
+
+    def _views(self) -> None:
+        self._qpos, self._qvel = self.data.qpos, self.data.qvel
+        self._xfrc = self.data.xfrc_applied[self._body_id]
+        loop = self.record[0]
+        self.state: Array = loop["filter"]["x"]  # (20,) estimated state, laid out as in estimator.estimate
+        self.covariance: Array = loop["filter"]["P"]
+        self.setpoint: Array = loop["flight"]["setpoint"]
+        self.external: Array = loop["plant"]["external"]  # (6,) true external wrench, world
+        self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
+
+    @property
+    def position(self) -> Array:
+        """True position (3,) of the geometric centre, m, world."""
+        return self._qpos[:3]
+
+    @property
+    def quaternion(self) -> Array:
+        """True attitude (4,), body to world."""
+        return self._qpos[3:7]
+
+    @property
+    def velocity(self) -> Array:
+        """True velocity (3,), m/s, world."""
+        return self._qvel[:3]
+
+    @property
+    def seen(self) -> bool:
+        """Whether the last sample held a pose."""
+        return bool(self.record[0]["plant"]["seen"])
+
+    @property
+    def battery(self) -> float:
+        """Battery voltage, V; 0 where the vehicle states no reference."""
+        return float(self.record[0]["plant"]["battery"])
+
+    @property
+    def time(self) -> float:
+        """Time since the reset, s."""
+        return self._steps * TICK
+
+    def reset(self, rng: np.random.Generator, position: Array, yaw: float = 0.0) -> None:
+        """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured pose."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._views()
+        self._steps = 0
+        loop = self.record[0]
+        reset_plant(loop["plant"], self._body)
+        self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
+        self.setpoint[:] = 0.0
+        self.setpoint[:3], self.setpoint[9] = position, yaw
+        loop["flight"]["sum"], loop["flight"]["yaw_sum"] = 0.0, 0.0
+        loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((len(loop["fan"]["gusts"]), 3))
+        noise = rng.standard_normal(NOISE)
+        sense(self.record[0:1]["plant"][0], self._qpos, noise)
+        self.ukf.reset(self.sample[4:7], self.sample[7:11])
+        loop["filter"] = self.ukf.record[0]
+        mujoco.mj_forward(self.model, self.data)
+
+    def run(
+        self,
+        noise: Array,
+        fan_y: Array | None = None,
+        before: Callable[[int], None] | None = None,
+    ) -> None:
+        """Run one tick for each row of ``noise`` (n, NOISE), with the fan at ``fan_y`` (n,) m.
+
+        ``before`` is called with the tick's index ahead of each, to set set points or read what came of the last.
+        """
+        axial, radial = self._table
+        for k in range(len(noise)):
+            if before is not None:
+                before(k)
+            tick(self.record, 0, axial, radial, self._qpos, self._qvel, self._xfrc, noise[k],
+                 0.0 if fan_y is None else fan_y[k])
+            mujoco.mj_step(self.model, self.data, SUBSTEPS)
+            self._steps += 1
+
+    def healthy(self) -> bool:
+        """Whether every number of plant and filter is still finite (MuJoCo resets a state that is not)."""
+        return bool(math.isfinite(float(self.state[:19].sum())) and self.data.time > 0.5 * self.time)

@@ -1,0 +1,255 @@
+"""The fan-tracking environment."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
+from ..dynamics.effects import check_setting
+from ..dynamics.errors import InputError
+from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle, load_vehicle
+from ..estimator.tuning import UKFTuning
+from .closed_loop import ClosedLoop
+from .jet import Fan
+from .plant import NOISE, TICK, PlantSettings
+from .scenarios import Scenario, draw_fan_path, get_scenario
+
+DECISION_TICKS = 16  # 12.5 Hz
+EPISODE_SECONDS = 20.0
+SETTLE_TICKS = 300  # the filter settles in the jet before an episode starts
+DISTANCE = 2.3  # m, from the fan
+LOST_OFFSET = 2.5  # m
+TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
+CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
+
+# largest size of an observation's numbers
+_LIMITS = np.array([10, 10, 10, 1, 1, 1, 5, MAX_COMMAND], dtype=np.float32)
+
+
+class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A quadrotor in the jet of a moving fan must stay on the fan's axis by feeling the wind alone.
+
+    ## Description
+
+    A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of it, at the
+    height of its axis, and faces it. An unscented Kalman filter turns motor rates and motion-capture pose into the
+    external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back; off the axis it also turns it,
+    because its drag falls off across the vehicle's span. The agent sees the estimate, 12.5 times a second, and commands
+    a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.
+
+    ## Action space
+
+    ``Box(-1, 1, (1,), float32)``
+
+    | Num | Action                          | Min | Max | Unit |
+    | --- | ------------------------------- | --- | --- | ---- |
+    | 0   | commanded velocity along world y | -1  | 1   | m/s  |
+
+    A command out of range is clipped; one that is not finite raises ``InputError``.
+
+    ## Observation space
+
+    ``Box(-limit, limit, (8,), float32)``, in SI units, one frame
+
+    | Num | Observation                              | Limit | Unit |
+    | --- | ---------------------------------------- | ----- | ---- |
+    | 0-2 | estimated external force x, y, z (world)  | 10    | N    |
+    | 3-5 | estimated external torque x, y, z (world) | 1     | Nm   |
+    | 6   | own estimated velocity along y            | 5     | m/s  |
+    | 7   | last command                              | 1     | m/s  |
+
+    Where the fan is, is not observed: ``info`` has it.
+
+    ## Rewards
+
+    ``reward = reward_tracking + reward_change``, each of them in ``info``:
+
+    * ``reward_tracking = 1 / (1 + (offset / 0.3)^2)``, where ``offset`` is the true distance from the axis along y, in m;
+    * ``reward_change = -0.05 (command - last command)^2``.
+
+    ## Starting state
+
+    The vehicle hovers where the scenario says and the filter settles for 1.5 s in the standing jet. Fan path, offset and
+    all noise are drawn from the seed.
+
+    ## Episode end
+
+    Terminated when the vehicle is lost: 2.5 m off the axis, 1 m off its height or distance, or tilted by more than 70
+    degrees. Truncated after 20 s (250 decisions).
+
+    ## Arguments
+
+    ```python
+    gym.make("windwrench/FanTracking-v0", scenario="base", render_mode=None)
+    ```
+
+    | Parameter     | Default      | Description                                                               |
+    | ------------- | ------------ | ------------------------------------------------------------------------- |
+    | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                        |
+    | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know            |
+    | `effects`     | `()`         | effects of the true vehicle that nobody declared                           |
+    | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
+    | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
+    | `render_mode` | `None`       | `"human"` or `"rgb_array"`                                                 |
+
+    ## Version history
+
+    * v0: initial version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "base",
+        render_mode: str | None = None,
+        vehicle: str | Vehicle = "ardrone2",
+        effects: Sequence[EffectSetting] = (),
+        fan: Fan | None = None,
+        fan_path: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        width: int = 640,
+        height: int = 480,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}")
+        self.scenario = scenario if isinstance(scenario, Scenario) else get_scenario(scenario)
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        self.effects = tuple(check_setting(e, "FanTracking: effects") for e in effects)
+        self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
+        self.fan_path = fan_path
+        self.render_mode, self.width, self.height = render_mode, width, height
+        self.action_space = gym.spaces.Box(-MAX_COMMAND, MAX_COMMAND, (1,), np.float32)
+        self.observation_space = gym.spaces.Box(-_LIMITS, _LIMITS, (OBSERVATION_SIZE,), np.float32)
+        self._viewer: Any = None
+        self.loop: ClosedLoop | None = None
+
+    def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
+        """Return the closed loop for a true vehicle (before the undeclared effects); the filter knows the declared one."""
+        scenario = self.scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        declared = replace(self.vehicle, mocap=mocap)
+        true = replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects))
+        tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
+        # unmodelled disturbance in proportion to the vehicle, as stated for the AR.Drone
+        force = self.vehicle.weight / 4.56
+        settings = PlantSettings(disturbance_force=0.03 * force,
+                                 disturbance_torque=0.01 * force * self.vehicle.arm_l / 0.1262)
+        return ClosedLoop(declared, true, tuning, fan, settings)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; the same seed gives the same episode, bit for bit."""
+        super().reset(seed=seed)
+        rng = self.np_random
+        scenario, distance = self.scenario, DISTANCE
+        if scenario.varied:
+            distance = float(rng.uniform(2.0, 2.7))
+            fan = replace(self.fan, speed=self.fan.speed * float(rng.uniform(0.85, 1.25)),
+                          rotor_drag=self.fan.rotor_drag * float(rng.uniform(0.8, 1.2)),
+                          hull_area=self.fan.hull_area * float(rng.uniform(0.8, 1.2)))
+            vehicle = replace(self.vehicle, mass=self.vehicle.mass * float(rng.uniform(0.93, 1.07)),
+                              inertia=self.vehicle.inertia * float(rng.uniform(0.9, 1.1)))
+            self.loop = self._make_loop(vehicle, fan)
+        elif self.loop is None:
+            self.loop = self._make_loop(self.vehicle, self.fan)
+        loop = self.loop
+        ticks = round(EPISODE_SECONDS / TICK)
+        t = TICK * np.arange(ticks + 2)
+        self._motion, self._fan_speed, self._fan_y = draw_fan_path(scenario, rng, t)
+        if self.fan_path is not None:
+            self._motion, self._fan_y = "given", np.asarray(self.fan_path(t), dtype=np.float64)
+            if self._fan_y.shape != t.shape or not np.all(np.isfinite(self._fan_y)):
+                raise InputError(f"FanTracking: fan_path must return {t.size} finite numbers for {t.size} times")
+        offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
+        loop.reset(rng, np.array([distance, self._fan_y[0] + offset, self.fan.height]), math.pi)
+        loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), np.full(SETTLE_TICKS, self._fan_y[0]))
+        self._start = np.array([distance, 0.0, self.fan.height])
+        self._tick, self._command = 0, 0.0
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self._info(0.0, 0.0)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Fly 80 ms with a commanded velocity (1,) m/s along y."""
+        loop = self.loop
+        if loop is None:
+            raise InputError("FanTracking: call reset before step")
+        command = np.asarray(action, dtype=np.float64)
+        if command.shape != (1,) or not math.isfinite(command[0]):
+            raise InputError(f"FanTracking: action must be one finite number in m/s, shape (1,), got {action!r}")
+        value = min(max(float(command[0]), -MAX_COMMAND), MAX_COMMAND)
+        change, self._command = value - self._command, value
+        loop.setpoint[4] = value
+        first, last = self._tick, self._tick + DECISION_TICKS
+        path = self._fan_y[np.minimum(np.arange(first, last), len(self._fan_y) - 1)]
+        loop.run(self.np_random.standard_normal((DECISION_TICKS, NOISE)), path)
+        self._tick = last
+        offset = loop.position[1] - path[-1]
+        tracking = 1.0 / (1.0 + (offset / TRACKING_WIDTH) ** 2)
+        cost = -CHANGE_COST * change * change
+        lost = self._lost(offset)
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), tracking + cost, lost, False, self._info(tracking, cost, lost)
+
+    def _lost(self, offset: float) -> bool:
+        assert self.loop is not None
+        away = self.loop.position - self._start
+        w, x, y, _ = self.loop.quaternion
+        upright = 1.0 - 2.0 * (x * x + y * y)
+        return bool(abs(offset) > LOST_OFFSET or abs(away[0]) > 1.0 or abs(away[2]) > 1.0 or upright < 0.34
+                    or not self.loop.healthy())
+
+    def _observation(self) -> NDArray[np.float32]:
+        assert self.loop is not None
+        x = self.loop.state
+        frame = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
+        return np.clip(np.nan_to_num(frame), -_LIMITS, _LIMITS)
+
+    def _info(self, tracking: float, change: float, lost: bool = False) -> dict[str, Any]:
+        """Return the reward's terms and the truth that the agent does not see."""
+        loop = self.loop
+        assert loop is not None
+        k = min(self._tick, len(self._fan_y) - 1)
+        return {
+            "reward_tracking": tracking,
+            "reward_change": change,
+            "fan_y": float(self._fan_y[max(k - 1, 0)]),
+            "fan_velocity": float(self._fan_y[k] - self._fan_y[k - 1]) / TICK if k > 0 else 0.0,
+            "fan_motion": self._motion,
+            "y": float(loop.position[1]),
+            "offset": float(loop.position[1] - self._fan_y[max(k - 1, 0)]),
+            "force": loop.external[:3].copy(),
+            "torque": loop.external[3:].copy(),
+            "time": self._tick * TICK,
+            "lost": lost,
+        }
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a window.
+
+        Raises:
+            InputError: not reset yet, or this machine cannot draw.
+        """
+        if self.render_mode is None or self.loop is None:
+            raise InputError("FanTracking: render needs a render_mode ('human' or 'rgb_array') and a reset before it")
+        if self._viewer is None:
+            from .drawing import Viewer
+
+            self._viewer = Viewer(self.render_mode, self.width, self.height)
+        picture: NDArray[np.uint8] | None = self._viewer.draw(self.loop, float(self._fan_y[max(self._tick - 1, 0)]))
+        return picture
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None

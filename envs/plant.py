@@ -1,0 +1,183 @@
+"""The plant: a quadrotor in MuJoCo with real motors, real sensing and effects that nobody declared.
+
+One tick is one sample of the motion capture (5 ms). In it the motors follow their commands, rotors, effects, jet and
+unmodelled disturbance make a wrench that holds over the tick, and MuJoCo integrates the rigid body in two steps.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from importlib import resources
+
+import mujoco
+import numpy as np
+from numba import njit
+
+from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ..dynamics.motion import Array
+from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
+from ..dynamics.vehicle import Vehicle
+from .jet import STATIONS, gust, jet_wrench
+
+TICK = 0.005  # s
+SUBSTEPS = 2
+# unit normals that one tick uses: pose, disturbance, gusts, dropout
+_POSE, _DISTURBANCE, _GUSTS, _DROPOUT = 0, 6, 12, 12 + 3 * STATIONS
+NOISE = _DROPOUT + 1
+
+
+@dataclass(frozen=True)
+class PlantSettings:
+    """What the plant does that its vehicle file does not say."""
+
+    motor_lag: float = 0.04  # s, of a first-order motor whose true turn rate is logged
+    disturbance_force: float = 0.03  # N, standard deviation of the unmodelled part of the actuation, each axis
+    disturbance_torque: float = 0.01  # Nm
+    disturbance_time: float = 0.3  # s, over which it lasts
+    dropout: float = 0.0  # probability that a pose is lost
+    battery_life: float = 480.0  # s, over which the voltage falls by a tenth
+    sensor_noise: bool = True
+
+
+PLANT = np.dtype([
+    *MODEL_FIELDS,
+    ("motor_keep", "f8"),
+    ("omega_max", "f8"),
+    ("omega_lsb", "f8"),
+    ("sigma_position", "f8"),
+    ("sigma_attitude", "f8"),
+    ("disturbance_force", "f8"),
+    ("disturbance_torque", "f8"),
+    ("disturbance_keep", "f8"),
+    ("dropout", "f8"),  # a unit normal below it loses the pose
+    ("voltage_ref", "f8"),
+    ("battery_life", "f8"),
+    ("battery", "f8"),  # V now; 0: not modelled
+    ("speeds", "f8", (4,)),  # of the motors, rad/s
+    ("z", "f8", (11,)),  # the sample: logged turn rates of the last tick, position, quaternion
+    ("seen", "i8"),
+    ("disturbance", "f8", (6,)),
+    ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
+    ("jet", "f8", (6,)),  # the jet's part of it
+    ("rotation", "f8", (3, 3)),
+    ("q", "f8", (4,)),
+    ("rho", "f8", (3,)),
+    ("scratch", "f8", (3,)),
+])
+
+
+def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray, Vehicle]:
+    """Return the plant's memory (1,) for the true vehicle, and that vehicle with its body effects applied."""
+    record = np.zeros(1, dtype=PLANT)
+    p = record[0]
+    # the effect library's ground is the plant's floor
+    vehicle = vehicle if math.isfinite(vehicle.floor_z) else replace(vehicle, floor_z=0.0)
+    amended = load_model(p, vehicle)
+    # with an undeclared lag the log holds commands: the motor's own lag then is the effect's
+    lag = 0.0 if any(e.name == "motor_lag" for e in vehicle.effects) else settings.motor_lag
+    p["motor_keep"] = math.exp(-TICK / lag) if lag > 0 else 0.0
+    p["omega_max"] = vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    p["omega_lsb"] = vehicle.omega_lsb
+    p["sigma_position"] = vehicle.mocap.sigma_pos_m if settings.sensor_noise else 0.0
+    p["sigma_attitude"] = vehicle.mocap.sigma_att_rad if settings.sensor_noise else 0.0
+    p["disturbance_force"], p["disturbance_torque"] = settings.disturbance_force, settings.disturbance_torque
+    p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
+    p["dropout"] = _normal_quantile(settings.dropout)
+    p["voltage_ref"], p["battery_life"] = vehicle.voltage_ref, settings.battery_life
+    return record, amended
+
+
+def _normal_quantile(probability: float) -> float:
+    from scipy.special import ndtri
+
+    return float(ndtri(probability))
+
+
+def reset_plant(p: np.void, vehicle: Vehicle) -> None:
+    """Put the plant's memory at hover; ``vehicle`` is the true one with its body effects applied."""
+    for name in ("memory", "time", "disturbance", "external", "jet"):
+        p[name] = 0.0
+    p["speeds"] = vehicle.hover_rate
+    p["battery"] = 1.05 * vehicle.voltage_ref
+    p["z"][:4] = p["speeds"]
+
+
+def load_world(vehicle: Vehicle) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
+    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied."""
+    xml = resources.files(__package__).joinpath("quadrotor.xml").read_text(encoding="utf-8")
+    model = mujoco.MjModel.from_xml_string(xml)
+    body = model.body("vehicle").id
+    moments, axes = np.linalg.eigh(vehicle.inertia)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] *= -1
+    model.body_mass[body] = vehicle.mass
+    model.body_inertia[body] = moments
+    model.body_ipos[body] = vehicle.com
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    model.body_iquat[body] = quaternion
+    model.opt.gravity[2] = -vehicle.gravity
+    model.opt.timestep = TICK / SUBSTEPS
+    # the drawing follows the vehicle's size
+    scale = vehicle.arm_l / 0.1262
+    for geom in range(model.ngeom):
+        if model.geom_bodyid[geom] == body:
+            model.geom_pos[geom] *= scale
+            model.geom_size[geom] *= scale
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    return model, data
+
+
+@njit(cache=True)
+def sense(p: np.ndarray, qpos: Array, noise: Array) -> int:
+    """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where it is lost).
+
+    The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle that faces -x sees the
+    sign of its quaternion flip several times a second.
+    """
+    for i in range(3):
+        p.z[4 + i] = qpos[i] + p.sigma_position * noise[_POSE + i]
+        p.rho[i] = 0.25 * p.sigma_attitude * noise[_POSE + 3 + i]
+    quaternion_from_mrp(p.rho, p.q)
+    quaternion_multiply(p.q, qpos[3:7], p.z[7:11])
+    normalise(p.z[7:11])
+    if p.z[7] < 0.0:
+        for i in range(7, 11):
+            p.z[i] = -p.z[i]
+    return 0 if noise[_DROPOUT] < p.dropout else 3
+
+
+@njit(cache=True)
+def actuate(p: np.ndarray, command: Array, fan: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Array,
+            noise: Array, xfrc: Array) -> None:
+    """Let the motors follow their commands for one tick and write the wrench that acts in it into ``xfrc`` (6,)."""
+    load = 0.0
+    for i in range(4):
+        p.speeds[i] = command[i] + p.motor_keep * (p.speeds[i] - command[i])
+        p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
+        load += p.body.k[i] * p.speeds[i] * p.speeds[i]
+        p.z[i] = p.speeds[i] if p.omega_lsb == 0.0 else p.omega_lsb * math.floor(p.speeds[i] / p.omega_lsb + 0.5)
+    if p.voltage_ref > 0.0:
+        # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
+        full = 1.05 - 0.1 * p.time / p.battery_life - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
+        p.battery += 0.05 * (full * p.voltage_ref - p.battery)
+    drive(p, p.speeds, TICK, p.battery)
+    R = p.rotation
+    quaternion_to_matrix(qpos[3:7], R)
+    apply_effects(p, qpos[0:3], R, qvel[0:3], qvel[3:6])
+    if fan.speed > 0.0:
+        gust(fan, noise[_GUSTS:_DROPOUT])
+        jet_wrench(fan, axial, radial, qpos[0:3], R, qvel[0:3], qvel[3:6], p.body.com, p.scratch, p.jet)
+    fresh = math.sqrt(1.0 - p.disturbance_keep * p.disturbance_keep)
+    for i in range(3):
+        p.disturbance[i] = p.disturbance_keep * p.disturbance[i] + fresh * p.disturbance_force * noise[_DISTURBANCE + i]
+        p.disturbance[3 + i] = (p.disturbance_keep * p.disturbance[3 + i]
+                                + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i])
+    for i in range(3):
+        p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i]
+        p.external[3 + i] = (R[i, 0] * p.effect_wrench[3] + R[i, 1] * p.effect_wrench[4] + R[i, 2] * p.effect_wrench[5]
+                             + p.jet[3 + i] + p.disturbance[3 + i])
+        xfrc[i] = p.external[i] + R[i, 2] * p.rotor_wrench[0]
+        xfrc[3 + i] = (p.external[3 + i] + R[i, 0] * p.rotor_wrench[1] + R[i, 1] * p.rotor_wrench[2]
+                       + R[i, 2] * p.rotor_wrench[3])
+    p.time += TICK

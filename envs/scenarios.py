@@ -1,0 +1,69 @@
+"""The scenarios of the fan-tracking task, as data."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """How the fan moves, where the vehicle starts, and what it measures with."""
+
+    summary: str
+    motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
+    speed: tuple[float, float] = (0.05, 0.35)  # m/s, largest speed of the fan
+    offset: tuple[float, float] = (0.0, 0.1)  # m, of the vehicle from the fan's axis at the start, on either side
+    rise_time: float = 0.45  # s, of the filter
+    sigma_position: float = 0.001  # m
+    sigma_attitude: float = 0.005  # rad
+    turbulence: float = 0.10
+    varied: bool = False  # fan strength, distance and vehicle drawn anew each episode
+
+
+SCENARIOS: dict[str, Scenario] = {
+    "static": Scenario("the fan stands still; start 0.8 m off its axis", motions=("still",), offset=(0.8, 0.8)),
+    "base": Scenario("the fan moves at up to 0.05-0.35 m/s: a sine, a triangle, a ramp, or not at all"),
+    "fast": Scenario("the fan moves at up to 0.2-0.6 m/s", motions=("sine", "triangle", "ramp"), speed=(0.2, 0.6)),
+    "slow-filter": Scenario("base, with a filter of 1 s rise time", rise_time=1.0),
+    "noisy": Scenario("base, with a pose noise of 0.01 m and 0.05 rad", sigma_position=0.01, sigma_attitude=0.05),
+    "gusty": Scenario("base, with 35 % turbulence", turbulence=0.35),
+    "far": Scenario("base, from 1.0-1.4 m off the axis", offset=(1.0, 1.4)),
+    "varied": Scenario("base, with fan strength, distance and vehicle drawn anew", varied=True),
+}
+
+
+def get_scenario(name: str) -> Scenario:
+    """Return a scenario by its name.
+
+    Raises:
+        InputError: no scenario has this name.
+    """
+    if name not in SCENARIOS:
+        raise unknown_name("scenario", name, SCENARIOS)
+    return SCENARIOS[name]
+
+
+def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tuple[str, float, Array]:
+    """Draw how the fan moves: name of the motion, its largest speed (m/s), and y (n,) m at times ``t`` (n,) s.
+
+    The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after 0.8-1.6 m.
+    """
+    motion = scenario.motions[rng.integers(len(scenario.motions))]
+    speed = float(rng.uniform(*scenario.speed))
+    sign = float(rng.choice([-1.0, 1.0]))
+    travel = float(rng.uniform(0.5, 1.2))
+    if motion == "sine":
+        y = travel * np.sin(speed / travel * t)
+    elif motion == "triangle":
+        y = travel * 2 / math.pi * np.arcsin(np.sin(math.pi / 2 * speed / travel * t))
+    elif motion == "ramp":
+        y = np.minimum(speed * t, 0.8 + (travel - 0.5) * 8 / 7)
+    else:
+        y, speed = np.zeros_like(t), 0.0
+    return motion, speed, sign * y

@@ -1,0 +1,469 @@
+"""The classical alternative to the wrench filter: a nonlinear force and torque observer on a low-pass-filtered pose.
+
+Yuksel, Secchi, Buelthoff and Franchi, *A nonlinear force observer for quadrotors and application to physical
+interactive tasks*, AIM 2014, with the pose filtered and differentiated as in Tomic and Haddadin, *A unified framework
+for external wrench estimation, interaction control and collision reflexes for flying robots*, IROS 2014.
+
+The wrench estimate w^ is driven through a gain L so that its error decays exponentially::
+
+    w^' = L (w - w^),    w = p' - u
+
+where p is the momentum (linear of the centre of mass, angular in world axes, so that no gyroscopic term is left) and u
+what the model says that rotors, gravity and declared effects add to it. Only differences of p enter (the auxiliary
+variable of the paper), never an acceleration. Over a step at constant w the solution is exact::
+
+    w^[k] = exp(-L T) w^[k-1] + (1 - exp(-L T)) / T * (p[k] - p[k-1] - integral of u)
+
+p comes from the low-pass-filtered pose and is late by the filter's delay; u goes through the same filter, so that the
+vehicle's own manoeuvres cancel and do not show as a wrench. Both filters are discretised exactly (the pose as a
+straight line between samples, u as constant over a step), so that any cutoff at any period is stable.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+from scipy.linalg import expm
+
+from ..dynamics.errors import InputError
+from ..dynamics.motion import effect_wrench
+from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
+from ..dynamics.vehicle import Vehicle
+from .ekf import check_sample, read_sample
+from .estimate import NIS, Array, WrenchEstimate
+from .filter_record import N, drive
+from .ukf import WrenchUKF
+
+_DAMPING = math.sqrt(0.5)  # Butterworth
+
+_LOW_PASS = np.dtype([
+    ("frequency", "f8"),  # rad/s
+    ("delay", "f8"),  # s, of a slow signal
+    ("transition", "f8", (2, 2)),  # of output and its rate over a step
+    ("old", "f8", (2,)),  # what the sample before adds, the input being a straight line
+    ("new", "f8", (2,)),  # and the present one
+])
+
+OBSERVER = np.dtype([
+    ("translation", _LOW_PASS),
+    ("rotation", _LOW_PASS),
+    ("force_decay", "f8", (3,)),
+    ("torque_decay", "f8", (3,)),
+    # the filtered pose: centre of mass, quaternion, and their rates
+    ("p", "f8", (3,)),
+    ("v", "f8", (3,)),
+    ("q", "f8", (4,)),
+    ("dq", "f8", (4,)),
+    # what the model says of force (world) and torque (world), filtered, and their rates
+    ("u", "f8", (6,)),
+    ("du", "f8", (6,)),
+    ("impulse", "f8", (6,)),  # of the filtered u over the last step
+    ("angular_momentum", "f8", (3,)),  # of the filtered pose, world axes
+    ("sample_p", "f8", (3,)),  # the last sample, or what was expected of it
+    ("sample_q", "f8", (4,)),
+    ("position_gap", "f8"),  # s since the last sample
+    ("attitude_gap", "f8"),
+    # the step in progress
+    ("R_old", "f8", (3, 3)),
+    ("R_new", "f8", (3, 3)),
+    ("R", "f8", (3, 3)),  # of the filtered attitude
+    ("omega", "f8", (3,)),  # body rate of the filtered attitude
+    ("alpha", "f8", (3,)),  # its rate, by the model
+    ("old_p", "f8", (3,)),  # the sample before
+    ("old_q", "f8", (4,)),
+    ("momentum", "f8", (3,)),  # before the step
+    ("turn", "f8", (3,)),
+    ("scratch_q", "f8", (4,)),
+])
+
+
+@dataclass(frozen=True)
+class ObserverTuning:
+    """Gains of the observer and cutoffs of its pose filters.
+
+    The 10-90 % rise time of force and torque is about ``2.2 / gain``: 1 s as given.
+    """
+
+    force_gain: ArrayLike = 2.2  # 1/s, a scalar or (3,) for world x, y, z
+    torque_gain: ArrayLike = 2.2  # 1/s, likewise
+    position_cutoff_hz: float = 3.0
+    attitude_cutoff_hz: float = 5.0
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            shapes: tuple[tuple[int, ...], ...] = ((), (3,)) if f.name.endswith("gain") else ((),)
+            expected = "positive and finite, a number or three" if len(shapes) > 1 else "positive and finite"
+            try:
+                array = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"ObserverTuning: {f.name} must be {expected}, got {value!r}") from error
+            if array.shape not in shapes or not np.all(np.isfinite(array)) or np.any(array <= 0):
+                raise InputError(f"ObserverTuning: {f.name} must be {expected}, got {value!r}")
+
+
+class NonlinearObserver:
+    """Force and torque observer with the interface of ``WrenchUKF``; it knows no covariance (NaN) and no NIS.
+
+    The pose and twist that it returns are those of the low-pass filters, moved ahead by the filters' delay with the
+    model. Through gaps in the measurements the model carries on with the last wrench.
+
+    Args:
+        vehicle: the declared vehicle with its declared effects.
+        tuning: gains and cutoffs.
+        period: time between steps, s.
+
+    Raises:
+        InputError: period out of range.
+    """
+
+    def __init__(self, vehicle: Vehicle, tuning: ObserverTuning | None = None, period: float = 0.005) -> None:
+        if not (math.isfinite(period) and period > 0):
+            raise InputError(f"NonlinearObserver: period must be positive, in s, got {period!r}")
+        self.vehicle = vehicle
+        self.tuning = ObserverTuning() if tuning is None else tuning
+        self.period = float(period)
+        # lends its checks, its model of the vehicle and its state vector
+        self._filter = WrenchUKF(vehicle, None, period)
+        self._record = np.zeros(1, dtype=OBSERVER)
+        o = self._record[0]
+        _low_pass(o["translation"], self.tuning.position_cutoff_hz, period)
+        _low_pass(o["rotation"], self.tuning.attitude_cutoff_hz, period)
+        o["force_decay"] = np.exp(-period * np.asarray(self.tuning.force_gain))
+        o["torque_decay"] = np.exp(-period * np.asarray(self.tuning.torque_gain))
+        self._z = np.zeros(11)
+        self._voltage = vehicle.voltage_ref
+        self.reset((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+
+    def reset(
+        self,
+        position: ArrayLike,
+        quaternion: ArrayLike,
+        covariance: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Start at a pose, in equilibrium and without an external wrench.
+
+        Args:
+            position: (3,) m, world.
+            quaternion: (4,) body to world, scalar first.
+            covariance: not used; here because the filters have it.
+            velocity: (3,) m/s, world.
+            angular_velocity: (3,) rad/s, body.
+
+        Raises:
+            InputError: a shape is wrong, a number is not finite, or the quaternion is not one of a rotation.
+        """
+        self._filter.reset(position, quaternion, None, velocity, angular_velocity)
+        _start(self._filter.record, self._record)
+
+    @property
+    def covariance(self) -> Array:
+        """NaN (18, 18): an observer has none."""
+        return np.full((N, N), math.nan)
+
+    @property
+    def estimate(self) -> WrenchEstimate:
+        """What the observer believes now."""
+        return WrenchEstimate(np.array(self._filter.record[0]["x"]), self.covariance)
+
+    def step(
+        self,
+        rotor_speeds: ArrayLike,
+        position: ArrayLike | None = None,
+        quaternion: ArrayLike | None = None,
+        voltage: float | None = None,
+    ) -> WrenchEstimate:
+        """Go one period on with the turn rates of that period and the pose at its end.
+
+        Args:
+            rotor_speeds: (4,) rad/s.
+            position: (3,) m, world, or None.
+            quaternion: (4,) body to world, scalar first, or None.
+            voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
+
+        Raises:
+            InputError: a shape is wrong or the quaternion's length is not 1; the observer stays as it was.
+        """
+        z = self._z
+        parts = read_sample(z, rotor_speeds, position, quaternion)
+        state = np.empty(NIS + 1)
+        volts = self._voltage if voltage is None else voltage
+        if _step_and_copy(self._filter.record, self._record, z, parts, self.period, volts, state) < 0:
+            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
+        return WrenchEstimate(state, self.covariance)
+
+
+def _low_pass(record: Any, cutoff_hz: float, period: float) -> None:
+    """Fill in a second-order low-pass, y'' = w^2 (x - y) - 2 d w y', for an input that is straight between samples."""
+    w = 2.0 * math.pi * cutoff_hz
+    # states y and y'/w, then the input and its change over the step
+    matrix = np.zeros((4, 4))
+    matrix[0, 1] = w * period
+    matrix[1, :3] = -w * period, -2.0 * _DAMPING * w * period, w * period
+    matrix[2, 3] = 1.0
+    M = expm(matrix)
+    unit = np.array([1.0, w])
+    record["frequency"], record["delay"] = w, 2.0 * _DAMPING / w
+    record["transition"] = M[:2, :2] * unit[:, None] / unit
+    record["old"] = (M[:2, 2] - M[:2, 3]) * unit
+    record["new"] = M[:2, 3] * unit
+
+
+@njit(cache=True)
+def _filter_sample(g: Any, y: Array, dy: Array, old: Array, new: Array) -> None:
+    """Move a filter's output ``y`` and its rate ``dy`` (n,) on by a step with the input from ``old`` to ``new``."""
+    A, a, b = g.transition, g.old, g.new
+    for i in range(len(y)):
+        value, rate = y[i], dy[i]
+        y[i] = A[0, 0] * value + A[0, 1] * rate + a[0] * old[i] + b[0] * new[i]
+        dy[i] = A[1, 0] * value + A[1, 1] * rate + a[1] * old[i] + b[1] * new[i]
+
+
+@njit(cache=True)
+def _filter_input(o: Any, g: Any, i: int, u: float, dt: float) -> None:
+    """Filter row ``i`` of u, constant over the step, and write the integral of the filtered one over it."""
+    value, rate, A = o.u[i], o.du[i], g.transition
+    o.u[i] = A[0, 0] * value + A[0, 1] * rate + (g.old[0] + g.new[0]) * u
+    o.du[i] = A[1, 0] * value + A[1, 1] * rate + (g.old[1] + g.new[1]) * u
+    # the filter's own equation, integrated over the step
+    lag = (o.du[i] - rate) / g.frequency + 2.0 * _DAMPING * (o.u[i] - value)
+    o.impulse[i] = u * dt - lag / g.frequency
+
+
+@njit(cache=True)
+def _twist(f: Any, o: Any) -> None:
+    """Write rotation, body rate and angular momentum (world axes) of the filtered attitude."""
+    q, d, R, J, omega = o.q, o.dq, o.R, f.body.inertia, o.omega
+    square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    scale = 2.0 / square
+    # 2 q* q' / |q|^2: the norm, which a filter does not keep, drops out
+    omega[0] = scale * (q[0] * d[1] - q[1] * d[0] - q[2] * d[3] + q[3] * d[2])
+    omega[1] = scale * (q[0] * d[2] - q[2] * d[0] - q[3] * d[1] + q[1] * d[3])
+    omega[2] = scale * (q[0] * d[3] - q[3] * d[0] - q[1] * d[2] + q[2] * d[1])
+    for i in range(4):
+        o.scratch_q[i] = q[i] / math.sqrt(square)
+    quaternion_to_matrix(o.scratch_q, R)
+    h0 = J[0, 0] * omega[0] + J[0, 1] * omega[1] + J[0, 2] * omega[2]
+    h1 = J[1, 0] * omega[0] + J[1, 1] * omega[1] + J[1, 2] * omega[2]
+    h2 = J[2, 0] * omega[0] + J[2, 1] * omega[1] + J[2, 2] * omega[2]
+    for i in range(3):
+        o.angular_momentum[i] = R[i, 0] * h0 + R[i, 1] * h1 + R[i, 2] * h2
+
+
+@njit(cache=True)
+def _seat_attitude(f: Any, o: Any, q: Array) -> None:
+    """Put the attitude filter where a vehicle that turns at ``omega`` and was just seen at ``q`` has it."""
+    omega = o.omega
+    turn_body(q, omega[0], omega[1], omega[2], -o.rotation.delay, o.q)
+    _spin(o)
+    _twist(f, o)
+
+
+@njit(cache=True)
+def _spin(o: Any) -> None:
+    """Set the rate of the filtered quaternion to that of a turn at ``omega``: (13), halved."""
+    q, d, omega = o.q, o.dq, o.omega
+    d[0] = 0.5 * (-q[1] * omega[0] - q[2] * omega[1] - q[3] * omega[2])
+    d[1] = 0.5 * (q[0] * omega[0] + q[2] * omega[2] - q[3] * omega[1])
+    d[2] = 0.5 * (q[0] * omega[1] + q[3] * omega[0] - q[1] * omega[2])
+    d[3] = 0.5 * (q[0] * omega[2] + q[1] * omega[1] - q[2] * omega[0])
+
+
+@njit(cache=True)
+def _seat_position(o: Any, p: Array) -> None:
+    """Put the position filter where a vehicle that moves at ``v`` and was just seen at ``p`` has it."""
+    for i in range(3):
+        o.p[i] = p[i] - o.translation.delay * o.v[i]
+
+
+@njit(cache=True)
+def _centre_of_mass(f: Any, position: Array, R: Array, out: Array) -> None:
+    c = f.body.com
+    for i in range(3):
+        out[i] = position[i] + R[i, 0] * c[0] + R[i, 1] * c[1] + R[i, 2] * c[2]
+
+
+@njit(cache=True)
+def _start(model: Any, record: Any) -> None:
+    """Set the observer to the pose and twist of the model's state."""
+    f, o = model[0], record[0]
+    x, c = f.x, f.body.com
+    o.sample_q[:] = x[3:7]
+    o.omega[:] = x[10:13]
+    quaternion_to_matrix(o.sample_q, o.R_new)
+    _centre_of_mass(f, x[0:3], o.R_new, o.sample_p)
+    a = x[11] * c[2] - x[12] * c[1], x[12] * c[0] - x[10] * c[2], x[10] * c[1] - x[11] * c[0]
+    for i in range(3):
+        o.v[i] = x[7 + i] + o.R_new[i, 0] * a[0] + o.R_new[i, 1] * a[1] + o.R_new[i, 2] * a[2]
+    for i in range(6):
+        o.u[i] = 0.0
+        o.du[i] = 0.0
+    o.position_gap, o.attitude_gap = 0.0, 0.0
+    _seat_position(o, o.sample_p)
+    _seat_attitude(f, o, o.sample_q)
+
+
+@njit(cache=True)
+def _model(f: Any, o: Any, dt: float) -> None:
+    """Work out u at the mean attitude of the step, and filter it."""
+    x, w, R = f.x, f.rotor_wrench, f.rotation
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = 0.5 * (o.R_old[i, j] + o.R_new[i, j])
+    for i in range(6):
+        f.effect_wrench[i] = 0.0
+    if f.wrench_count > 0:
+        effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, x[0:3], o.R_old,
+                      x[7:10], x[10:13], f.rotors, f.wind, f.voltage, f.time, f.effect_state, f.effect_wrench)
+    e = f.effect_wrench
+    for i in range(3):
+        force = R[i, 2] * w[0] + e[i]
+        if i == 2:
+            force -= f.body.mass * f.body.gravity
+        _filter_input(o, o.translation, i, force, dt)
+        torque = R[i, 0] * (w[1] + e[3]) + R[i, 1] * (w[2] + e[4]) + R[i, 2] * (w[3] + e[5])
+        _filter_input(o, o.rotation, 3 + i, torque, dt)
+
+
+@njit(cache=True)
+def _observe_force(f: Any, o: Any, measured: bool, dt: float) -> None:
+    force, mass, v = f.x[16:19], f.body.mass, o.v
+    if not measured:
+        for i in range(3):
+            change = (o.impulse[i] + force[i] * dt) / mass
+            o.p[i] += dt * (v[i] + 0.5 * change)
+            v[i] += change
+        return
+    for i in range(3):
+        o.momentum[i] = mass * v[i]
+    _filter_sample(o.translation, o.p, v, o.old_p, o.sample_p)
+    for i in range(3):
+        gain = (1.0 - o.force_decay[i]) / dt
+        force[i] = o.force_decay[i] * force[i] + gain * (mass * v[i] - o.momentum[i] - o.impulse[i])
+
+
+@njit(cache=True)
+def _observe_torque(f: Any, o: Any, measured: bool, dt: float) -> None:
+    torque, h, omega, R, inverse = f.x[13:16], o.angular_momentum, o.omega, o.R, f.body.inverse_inertia
+    if not measured:
+        turn_body(o.q, omega[0], omega[1], omega[2], dt, o.scratch_q)
+        o.q[:] = o.scratch_q
+        normalise(o.q)
+        quaternion_to_matrix(o.q, R)
+        for i in range(3):
+            h[i] += o.impulse[3 + i] + torque[i] * dt
+        for i in range(3):
+            o.alpha[i] = R[0, i] * h[0] + R[1, i] * h[1] + R[2, i] * h[2]
+        for i in range(3):
+            omega[i] = inverse[i, 0] * o.alpha[0] + inverse[i, 1] * o.alpha[1] + inverse[i, 2] * o.alpha[2]
+        _spin(o)
+        return
+    for i in range(3):
+        o.momentum[i] = h[i]
+    _filter_sample(o.rotation, o.q, o.dq, o.old_q, o.sample_q)
+    _twist(f, o)
+    for i in range(3):
+        gain = (1.0 - o.torque_decay[i]) / dt
+        torque[i] = o.torque_decay[i] * torque[i] + gain * (h[i] - o.momentum[i] - o.impulse[3 + i])
+
+
+@njit(cache=True)
+def _look_ahead(f: Any, o: Any) -> None:
+    """Write pose and twist as they are now: the filtered ones, ahead by the filters' delay.
+
+    The inverse of the filter, y + 2 d / w y' + y'' / w^2, with the derivatives of v and omega taken from the model.
+    """
+    x, R, J, inverse, omega, alpha = f.x, o.R, f.body.inertia, f.body.inverse_inertia, o.omega, o.alpha
+    h0 = J[0, 0] * omega[0] + J[0, 1] * omega[1] + J[0, 2] * omega[2]
+    h1 = J[1, 0] * omega[0] + J[1, 1] * omega[1] + J[1, 2] * omega[2]
+    h2 = J[2, 0] * omega[0] + J[2, 1] * omega[1] + J[2, 2] * omega[2]
+    t0, t1, t2 = o.u[3] + x[13], o.u[4] + x[14], o.u[5] + x[15]
+    m0 = R[0, 0] * t0 + R[1, 0] * t1 + R[2, 0] * t2 - (omega[1] * h2 - omega[2] * h1)
+    m1 = R[0, 1] * t0 + R[1, 1] * t1 + R[2, 1] * t2 - (omega[2] * h0 - omega[0] * h2)
+    m2 = R[0, 2] * t0 + R[1, 2] * t1 + R[2, 2] * t2 - (omega[0] * h1 - omega[1] * h0)
+    delay, square = o.rotation.delay, o.rotation.frequency * o.rotation.frequency
+    d0 = (R[0, 0] * o.du[3] + R[1, 0] * o.du[4] + R[2, 0] * o.du[5]) / square
+    d1 = (R[0, 1] * o.du[3] + R[1, 1] * o.du[4] + R[2, 1] * o.du[5]) / square
+    d2 = (R[0, 2] * o.du[3] + R[1, 2] * o.du[4] + R[2, 2] * o.du[5]) / square
+    for i in range(3):
+        alpha[i] = inverse[i, 0] * m0 + inverse[i, 1] * m1 + inverse[i, 2] * m2
+        x[10 + i] = omega[i] + delay * alpha[i] + inverse[i, 0] * d0 + inverse[i, 1] * d1 + inverse[i, 2] * d2
+        o.turn[i] = delay * omega[i] + alpha[i] / square
+    turn_body(o.q, o.turn[0], o.turn[1], o.turn[2], 1.0, x[3:7])
+    normalise(x[3:7])
+    delay, square = o.translation.delay, o.translation.frequency * o.translation.frequency
+    for i in range(3):
+        acceleration = (o.u[i] + x[16 + i]) / f.body.mass
+        x[7 + i] = o.v[i] + delay * acceleration + o.du[i] / (f.body.mass * square)
+        x[i] = o.p[i] + delay * o.v[i] + acceleration / square
+    c = f.body.com
+    if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0:
+        # from the centre of mass to the geometric centre
+        quaternion_to_matrix(x[3:7], f.rotation)
+        a = x[11] * c[2] - x[12] * c[1], x[12] * c[0] - x[10] * c[2], x[10] * c[1] - x[11] * c[0]
+        S = f.rotation
+        for i in range(3):
+            x[i] -= S[i, 0] * c[0] + S[i, 1] * c[1] + S[i, 2] * c[2]
+            x[7 + i] -= S[i, 0] * a[0] + S[i, 1] * a[1] + S[i, 2] * a[2]
+
+
+@njit(cache=True)
+def step(f: Any, o: Any, z: Array, parts: int, dt: float, voltage: float) -> None:
+    """Go ``dt`` s on, the period for which ``o`` was made, with the ``parts`` of ``z`` (11,) that were measured."""
+    x = f.x
+    drive(f, z[0:4], dt, voltage)
+    position, attitude = parts & 1 != 0, parts & 2 != 0
+    # the samples: those measured, else what is expected
+    for i in range(3):
+        o.old_p[i] = o.sample_p[i]
+        for j in range(3):
+            o.R_old[i, j] = o.R_new[i, j]
+    for i in range(4):
+        o.old_q[i] = o.sample_q[i]
+    turn_body(o.old_q, x[10], x[11], x[12], dt, o.sample_q)
+    normalise(o.sample_q)
+    if attitude:
+        # a quaternion and its negative are one attitude: take the one near the expected
+        dot = 0.0
+        for i in range(4):
+            dot += o.sample_q[i] * z[7 + i]
+        for i in range(4):
+            o.sample_q[i] = z[7 + i] if dot >= 0.0 else -z[7 + i]
+    quaternion_to_matrix(o.sample_q, o.R_new)
+    _model(f, o, dt)
+    if position:
+        _centre_of_mass(f, z[4:7], o.R_new, o.sample_p)
+    # after a gap that the filter has forgotten, the error of the dead reckoning is no motion: start from the new sample
+    if attitude and o.attitude_gap > o.rotation.delay:
+        turn_body(o.sample_q, o.omega[0], o.omega[1], o.omega[2], -dt, o.old_q)
+        _seat_attitude(f, o, o.old_q)
+    if position and o.position_gap > o.translation.delay:
+        for i in range(3):
+            o.old_p[i] = o.sample_p[i] - dt * o.v[i]
+        _seat_position(o, o.old_p)
+    o.position_gap = 0.0 if position else o.position_gap + dt
+    o.attitude_gap = 0.0 if attitude else o.attitude_gap + dt
+    _observe_torque(f, o, attitude, dt)
+    _observe_force(f, o, position, dt)
+    _look_ahead(f, o)
+    if not position:
+        quaternion_to_matrix(o.sample_q, f.rotation)
+        _centre_of_mass(f, x[0:3], f.rotation, o.sample_p)
+    f.time += dt
+    x[NIS] = math.nan
+
+
+@njit(cache=True)
+def _step_and_copy(model: Any, record: Any, z: Array, parts: int, dt: float, voltage: float,
+                   state: Array) -> int:
+    f = model[0]
+    usable: int = check_sample(f, z, parts)
+    if usable >= 0:
+        step(f, record[0], z, usable, dt, voltage)
+    state[:] = f.x
+    return usable
