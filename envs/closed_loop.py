@@ -1,7 +1,6 @@
 """Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the wind."""
 
 import math
-from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -68,7 +67,7 @@ class ClosedLoop:
         loop["flight"] = flight_record(declared, gains)[0]
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
-        self._table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
+        self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
         self.model, self.data = load_world(self._body)
         self._body_id = self.model.body("vehicle").id
         self._views()
@@ -132,20 +131,10 @@ class ClosedLoop:
         loop["filter"] = self.ukf.record[0]
         mujoco.mj_forward(self.model, self.data)
 
-    def run(
-        self,
-        noise: Array,
-        fan_y: Array | None = None,
-        before: Callable[[int], None] | None = None,
-    ) -> None:
-        """Run one tick for each row of ``noise`` (n, NOISE), with the fan at ``fan_y`` (n,) m.
-
-        ``before`` is called with the tick's index ahead of each, to set set points or read what came of the last.
-        """
-        axial, radial = self._table
+    def run(self, noise: Array, fan_y: Array | None = None) -> None:
+        """Run one tick for each row of ``noise`` (n, NOISE), with the fan at ``fan_y`` (n,) m."""
+        axial, radial = self.jet_table
         for k in range(len(noise)):
-            if before is not None:
-                before(k)
             tick(self.record, 0, axial, radial, self._qpos, self._qvel, self._xfrc, noise[k],
                  0.0 if fan_y is None else fan_y[k])
             mujoco.mj_step(self.model, self.data, SUBSTEPS)

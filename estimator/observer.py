@@ -38,6 +38,7 @@ from .filter_record import N, drive
 from .ukf import WrenchUKF
 
 _DAMPING = math.sqrt(0.5)  # Butterworth
+_FORGOTTEN = 4.0  # delays of a filter after which exp(-4) of its past is left
 
 _LOW_PASS = np.dtype([
     ("frequency", "f8"),  # rad/s
@@ -439,10 +440,10 @@ def step(f: Any, o: Any, z: Array, parts: int, dt: float, voltage: float) -> Non
     if position:
         _centre_of_mass(f, z[4:7], o.R_new, o.sample_p)
     # after a gap that the filter has forgotten, the error of the dead reckoning is no motion: start from the new sample
-    if attitude and o.attitude_gap > o.rotation.delay:
+    if attitude and o.attitude_gap > _FORGOTTEN * o.rotation.delay:
         turn_body(o.sample_q, o.omega[0], o.omega[1], o.omega[2], -dt, o.old_q)
         _seat_attitude(f, o, o.old_q)
-    if position and o.position_gap > o.translation.delay:
+    if position and o.position_gap > _FORGOTTEN * o.translation.delay:
         for i in range(3):
             o.old_p[i] = o.sample_p[i] - dt * o.v[i]
         _seat_position(o, o.old_p)

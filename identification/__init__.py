@@ -1,0 +1,1 @@
+"""Measured data: flight logs, their readers, and the wrench on a logged flight."""

@@ -2,10 +2,8 @@
 
 import csv
 import gzip
-import os
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.errors import InputError
+from ..dynamics.files import replaced
 
 Array = NDArray[np.float64]
 
@@ -79,7 +78,7 @@ def _open_text(path: Path, text: str) -> Table:
     lines = text.rstrip().splitlines()
     if '"' in text:
         try:
-            lines = [",".join(fields) for fields in csv.reader(lines, strict=True)]
+            lines = [",".join(field.replace(",", " ") for field in row) for row in csv.reader(lines, strict=True)]
         except csv.Error as error:
             raise InputError(f"{path}: not valid CSV: {error}") from error
     if not lines:
@@ -186,23 +185,3 @@ def write_csv(columns: Mapping[str, Array], path: Path, missing: str = "nan") ->
     """
     with replaced(path) as temporary:
         temporary.write_text(_csv_text(columns, missing), encoding="utf-8")
-
-
-@contextmanager
-def replaced(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside ``path`` that takes its place once the block has ended without an error.
-
-    Whoever reads ``path`` sees the old file or the whole new one, never a part.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)

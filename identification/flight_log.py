@@ -204,7 +204,8 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
         if spread > 300.0:
             doubts.append(f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres")
     if vehicle is not None:
-        thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
+        with np.errstate(over="ignore"):
+            thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
         turning = thrust[log.rotor_speeds.max(axis=1) > 0.0]
         ratio = float(np.median(turning)) if turning.size else 1.0
         if ratio > 10.0:

@@ -1,0 +1,1 @@
+"""Experiments: flying controllers through episodes and comparing them."""

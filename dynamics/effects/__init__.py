@@ -57,8 +57,10 @@ def check_setting(setting: EffectSetting, where: str = "effect") -> EffectSettin
     return setting
 
 
-def parse_setting(text: str) -> EffectSetting:
-    """Return the effect setting of a command line's ``NAME:coef=value,coef=value``; a bare NAME takes typical sizes.
+def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
+    """Return the effect setting of a command line's ``NAME:coef=value,coef=value``.
+
+    A bare NAME takes typical sizes, those of a 0.03 kg vehicle if ``vehicle`` weighs less than 0.1 kg.
 
     Raises:
         InputError: the text is not of that form, or names no known effect or coefficient.
@@ -67,7 +69,8 @@ def parse_setting(text: str) -> EffectSetting:
     if name not in names():
         raise unknown_name("effect", name, names(), "--effect")
     if not rest:
-        return EffectSetting(name, {c.name: c.typical[0] for c in get(name).coefficients})
+        size = 1 if vehicle is not None and vehicle.mass < 0.1 else 0
+        return EffectSetting(name, {c.name: c.typical[size] for c in get(name).coefficients})
     coefficients = {}
     for part in rest.split(","):
         key, equals, value = part.partition("=")

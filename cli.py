@@ -1,0 +1,232 @@
+"""The ``windwrench`` command."""
+
+import os
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from .dynamics.errors import InputError
+
+app = typer.Typer(
+    name="windwrench", no_args_is_help=True, add_completion=True, rich_markup_mode=None, pretty_exceptions_enable=False,
+    help="A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the wrench on a flight log.",
+)
+console = Console()
+_errors = Console(stderr=True)
+
+Out = Annotated[Path, typer.Option("--out", help="Folder for the results; it is made if need be.")]
+VehicleOption = Annotated[str, typer.Option("--vehicle", help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.")]
+
+
+def _folder(out: Path) -> Path:
+    """Make the results' folder before the work starts, so that no result is lost for want of it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {out}: cannot be made a folder: {error.strerror or error}") from error
+    if not os.access(out, os.W_OK):
+        raise InputError(f"--out {out}: is not writable")
+    return out
+
+
+def _progress() -> Progress:
+    return Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+                    console=_errors, transient=True)
+
+
+@app.command()
+def fly(
+    scenario: Annotated[str, typer.Option(help="static, base, fast, slow-filter, noisy, gusty, far or varied.")] = "base",
+    controller: Annotated[str, typer.Option(help="hover, admittance, ratio or oracle.")] = "admittance",
+    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
+    vehicle: VehicleOption = "ardrone2",
+    effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect NAME:coef=value of the true vehicle.")] = None,
+    video: Annotated[bool, typer.Option("--video", help="Also write fly.mp4 (needs the video extra).")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show it in a window while it flies.")] = False,
+    out: Out = Path("results/fly"),
+) -> None:
+    """Fly one episode in the jet; write a picture of it.
+
+    Example: windwrench fly --scenario static --controller admittance --video
+    """
+    from .controllers import make_controller
+    from .dynamics.effects import parse_setting
+    from .envs.fan_tracking import FanTrackingEnv
+    from .training.evaluate import DECISIONS, fly_episode
+    from .training.pictures import draw_episode
+
+    if video:
+        from .envs.video import VideoWriter
+    pilot = make_controller(controller)
+    mode = "rgb_array" if video else "human" if view else None
+    env = FanTrackingEnv(scenario, mode, vehicle, [parse_setting(e) for e in effect or []], width=960, height=640)
+    folder = _folder(out)
+    with _progress() as progress:
+        task = progress.add_task("flying", total=DECISIONS)
+        if video:
+            with VideoWriter(folder / "fly.mp4", env) as writer:
+                def each() -> None:
+                    writer.add()
+                    progress.advance(task)
+
+                episode = fly_episode(env, pilot, seed, each)
+        else:
+            episode = fly_episode(env, pilot, seed, lambda: progress.advance(task))
+    env.close()
+    draw_episode(episode, f"{controller}, {scenario}", folder / "fly.png")
+    table = Table("controller", "scenario", "fan", "RMSE (m)", "lost", "reward", box=box.SIMPLE_HEAD)
+    table.add_row(controller, scenario, episode.motion, f"{episode.rmse:.3f}", "yes" if episode.lost else "no",
+                  f"{episode.total_reward:.1f}")
+    console.print(table)
+    _say(folder / "fly.png", *([folder / "fly.mp4"] if video else []))
+
+
+@app.command()
+def benchmark(
+    controllers: Annotated[str, typer.Option(help="Names, with commas.")] = "hover,admittance,ratio,oracle",
+    scenarios: Annotated[str, typer.Option(help="Names, with commas.")] = "static,base",
+    episodes: Annotated[int, typer.Option(min=1, help="Paired episodes a scenario.")] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    out: Out = Path("results/benchmark"),
+) -> None:
+    """Fly controllers through the same episodes; write the leaderboard.
+
+    Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
+    """
+    from .training.benchmark import count_flights, fly_all, leaderboard, write_leaderboard
+    from .training.pictures import draw_leaderboard
+
+    names, worlds = _names(controllers, "--controllers"), _names(scenarios, "--scenarios")
+    folder = _folder(out)
+    with _progress() as progress:
+        task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
+        results = fly_all(names, worlds, episodes, seed, jobs, lambda count: progress.advance(task, count))
+    rows = leaderboard(results, names, seed)
+    path = write_leaderboard(rows, folder)
+    draw_leaderboard(rows, results, folder / "leaderboard.png")
+    table = Table("scenario", "controller", "RMSE (m), 95 %", "median", "lost", "score", "wins*", box=box.SIMPLE_HEAD)
+    for i, row in enumerate(rows):
+        low, high = row.rmse_ci95_m
+        last = i + 1 == len(rows) or rows[i + 1].scenario != row.scenario
+        table.add_row(row.scenario, row.controller, f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
+                      f"{row.median_rmse_m:.3f}", f"{row.lost_fraction:.1%}", f"{row.score:.2f}",
+                      f"{row.wins_over_admittance:.1%}", end_section=last)
+    console.print(table)
+    console.print(f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over admittance",
+                  highlight=False)
+    _say(path, folder / "leaderboard.png")
+
+
+@app.command()
+def estimate(
+    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    reader: Annotated[str | None, typer.Option(help="Reader for a log of another form, such as nanobench.")] = None,
+    vehicle: VehicleOption = "ardrone2",
+    out: Out = Path("results/estimate"),
+) -> None:
+    """Estimate the external wrench on a logged flight; write wrench.csv and a picture.
+
+    Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
+    """
+    from .dynamics.vehicle import load_vehicle
+    from .identification.estimate import estimate_log, plot_wrench, truth_rmse, write_wrench
+    from .identification.flight_log import read_log
+
+    model = load_vehicle(vehicle)
+    folder = _folder(out)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        flight = read_log(log, reader, model)
+    with console.status("estimating"):
+        series = estimate_log(flight, model)
+    path = write_wrench(series, folder)
+    picture = plot_wrench(series, flight, folder / "wrench.png")
+    for note in dict.fromkeys((*flight.notes, *series.notes)):
+        _errors.print(note, style="yellow" if note.startswith("warning") else "dim", highlight=False, markup=False)
+    console.print(f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s", highlight=False)
+    table = Table("", "x", "y", "z", box=box.SIMPLE_HEAD)
+    for name, values, unit in (("force", series.force, "N"), ("torque", series.torque, "Nm")):
+        table.add_row(f"{name}, mean ({unit})", *(f"{v:+.4g}" for v in values.mean(axis=0)))
+        table.add_row(f"{name}, std ({unit})", *(f"{v:.4g}" for v in values.std(axis=0)))
+    truth = truth_rmse(series, flight)
+    if truth is not None:
+        for name, error, unit in (("force", truth[0], "N"), ("torque", truth[1], "Nm")):
+            table.add_row(f"{name}, RMSE to truth ({unit})", *(f"{v:.4g}" for v in error))
+    console.print(table)
+    _say(path, picture)
+
+
+@app.command()
+def record(
+    out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path("results/flight.csv"),
+    vehicle: VehicleOption = "ardrone2",
+    effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect, NAME or NAME:coef=value,...")] = None,
+    trajectory: Annotated[str, typer.Option(help="hover, gentle, excite, ground, yaw or circle.")] = "excite",
+    seconds: Annotated[float, typer.Option(help="Length of the flight.")] = 60.0,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+) -> None:
+    """Fly a vehicle with effects that it does not declare; write a flight log.
+
+    Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out drag.csv
+    """
+    from .dynamics.effects import parse_setting
+    from .dynamics.vehicle import load_vehicle
+    from .envs.recording import record_flight
+    from .identification.files import file_kind
+    from .identification.flight_log import FlightLog, write_log
+
+    model = load_vehicle(vehicle)
+    effects = tuple(parse_setting(e, model) for e in effect or [])
+    file_kind(out)
+    with console.status(f"flying {seconds:g} s"):
+        columns = record_flight(model, effects, trajectory, seconds, seed)
+    write_log(FlightLog(name=out.stem, **columns), out)
+    console.print(f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
+                  f"{', '.join(e.name for e in effects) or 'no undeclared effect'}", highlight=False)
+    _say(out)
+
+
+@app.command()
+def effects() -> None:
+    """List the physical effects that plant and estimator know."""
+    from .dynamics.effects import get, names
+
+    table = Table("effect", "kind", "coefficient", "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
+    for name in names():
+        one = get(name)
+        for i, c in enumerate(one.coefficients):
+            table.add_row(name if i == 0 else "", one.kind if i == 0 else "", c.name, c.unit,
+                          f"{c.typical[0]:g} / {c.typical[1]:g}", c.meaning, end_section=i + 1 == len(one.coefficients))
+    console.print(table)
+
+
+def _names(text: str, option: str) -> list[str]:
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    if not names:
+        raise InputError(f"{option}: expected names with commas between them, got {text!r}")
+    return list(dict.fromkeys(names))
+
+
+def _say(*paths: Path) -> None:
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False, soft_wrap=True, markup=False)
+
+
+def main() -> None:
+    """Run the command; a user's mistake ends in one clear line and exit code 2."""
+    try:
+        app()
+    except InputError as error:
+        _errors.print(f"error: {error}", style="red", highlight=False, soft_wrap=True, markup=False)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        _errors.print("interrupted")
+        sys.exit(130)

@@ -1,0 +1,132 @@
+"""Flying a trajectory in the plant and keeping what a flight log holds."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.errors import InputError, unknown_name
+from ..dynamics.vehicle import EffectSetting, Vehicle
+from .closed_loop import ClosedLoop
+from .plant import NOISE, TICK, PlantSettings
+
+Array = NDArray[np.float64]
+_RAMP = 2.0  # s, over which a trajectory fades in
+
+# Weak background turbulence: 15 mN and 0.3 mNm over 0.25 s for a 0.46 kg vehicle
+BACKGROUND = PlantSettings(disturbance_force=0.015, disturbance_torque=0.0003, disturbance_time=0.25)
+
+
+def _waves(rng: np.random.Generator, t: Array, size: float, slowest: float, fastest: float, count: int = 4) -> Array:
+    """Return a sum (n,) of sines with random phases and frequencies (Hz), ``size`` in standard deviation."""
+    frequency = rng.uniform(slowest, fastest, count)
+    phase = rng.uniform(0, 2 * math.pi, count)
+    return size * math.sqrt(2.0 / count) * np.sin(2 * math.pi * frequency * t[:, None] + phase).sum(axis=1)
+
+
+def _hover(rng: np.random.Generator, t: Array) -> Array:
+    return np.tile([0.0, 0.0, 1.2, 0.3], (len(t), 1))
+
+
+def _gentle(rng: np.random.Generator, t: Array) -> Array:
+    return np.stack([_waves(rng, t, 0.4, 0.05, 0.15), _waves(rng, t, 0.4, 0.05, 0.15),
+                     1.2 + _waves(rng, t, 0.12, 0.05, 0.15), _waves(rng, t, 0.4, 0.03, 0.1)], axis=1)
+
+
+def _excite(rng: np.random.Generator, t: Array) -> Array:
+    return np.stack([_waves(rng, t, 0.7, 0.1, 0.5), _waves(rng, t, 0.7, 0.1, 0.5),
+                     1.4 + _waves(rng, t, 0.18, 0.15, 0.7), _waves(rng, t, 0.8, 0.05, 0.4)], axis=1)
+
+
+def _ground(rng: np.random.Generator, t: Array) -> Array:
+    height = 0.13 + 0.5 * np.square(np.sin(math.pi * t / rng.uniform(5.0, 7.0)))
+    return np.stack([_waves(rng, t, 0.3, 0.05, 0.2), _waves(rng, t, 0.3, 0.05, 0.2), height,
+                     _waves(rng, t, 0.3, 0.05, 0.2)], axis=1)
+
+
+def _yaw(rng: np.random.Generator, t: Array) -> Array:
+    rate = rng.uniform(1.0, 2.0) * rng.choice([-1.0, 1.0])
+    return np.stack([0.8 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t), 1.2 + 0.15 * np.sin(0.7 * t), rate * t], axis=1)
+
+
+def _circle(rng: np.random.Generator, t: Array) -> Array:
+    rate = rng.uniform(1.2, 1.8)
+    return np.stack([np.cos(rate * t), np.sin(rate * t), np.full_like(t, 1.2), np.zeros_like(t)], axis=1)
+
+
+TRAJECTORIES: dict[str, Callable[[np.random.Generator, Array], Array]] = {
+    "hover": _hover, "gentle": _gentle, "excite": _excite, "ground": _ground, "yaw": _yaw, "circle": _circle,
+}
+
+
+def draw_trajectory(name: str, rng: np.random.Generator, t: Array) -> Array:
+    """Return the set points (n, 11) of a trajectory at times ``t`` (n,) s; it fades in from its first point.
+
+    Raises:
+        InputError: no trajectory has this name.
+    """
+    if name not in TRAJECTORIES:
+        raise unknown_name("trajectory", name, TRAJECTORIES)
+    path = TRAJECTORIES[name](rng, t)
+    fade = np.clip(t / _RAMP, 0.0, 1.0)[:, None]
+    path = path[:1] + (path - path[:1]) * fade * fade * (3.0 - 2.0 * fade)
+    speed = np.gradient(path, t, axis=0)
+    acceleration = np.gradient(speed[:, :3], t, axis=0)
+    return np.concatenate([path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1)
+
+
+def record_flight(
+    vehicle: Vehicle,
+    effects: tuple[EffectSetting, ...] = (),
+    trajectory: str = "excite",
+    seconds: float = 60.0,
+    seed: int = 0,
+    settings: PlantSettings | None = None,
+) -> dict[str, Array]:
+    """Fly a vehicle with effects that it does not declare; return the columns of a flight log.
+
+    Args:
+        vehicle: as it is declared to its own flight loop.
+        effects: what it really has besides.
+        trajectory: one of ``TRAJECTORIES``.
+        seconds: length of the log.
+        seed: of everything random.
+        settings: of the plant; default: weak background turbulence in proportion to the vehicle.
+
+    Returns:
+        ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s of the interval that ends
+        at the sample, ``voltage`` (n,) V, and the true external ``force`` (n, 3) N and ``torque`` (n, 3) Nm (world frame,
+        about the centre of mass) over that interval.
+
+    Raises:
+        InputError: an unknown trajectory, or a length out of range.
+    """
+    if not TICK * 20 <= seconds <= 7200:
+        raise InputError(f"record: --seconds must lie between {TICK * 20:g} and 7200, got {seconds:g}")
+    if settings is None:
+        force = vehicle.weight / 4.5126
+        settings = replace(BACKGROUND, disturbance_force=BACKGROUND.disturbance_force * force,
+                           disturbance_torque=BACKGROUND.disturbance_torque * force * vehicle.arm_l / 0.127)
+    rng = np.random.default_rng(seed)
+    count = round(seconds / TICK) + 1
+    t = TICK * np.arange(count)
+    setpoints = draw_trajectory(trajectory, rng, t)
+    loop = ClosedLoop(vehicle, replace(vehicle, effects=(*vehicle.effects, *effects)), settings=settings)
+    loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
+    samples, external, voltage = np.empty((count, 11)), np.zeros((count, 6)), np.empty(count)
+    for k in range(count):
+        loop.setpoint[:] = setpoints[k]
+        # what the rotors did in the interval that ends here, then the pose that this tick samples
+        samples[k, :4], voltage[k], external[k] = loop.sample[:4], loop.battery, loop.external
+        loop.run(rng.standard_normal((1, NOISE)))
+        samples[k, 4:] = loop.sample[4:]
+        if not loop.healthy() or loop.position[2] < -0.5:
+            raise InputError(f"record: {vehicle.name} crashed after {loop.time:.1f} s: the effects are too large for its "
+                             "flight loop")
+    columns = {"t": t, "position": samples[:, 4:7], "quaternion": samples[:, 7:11], "rotor_speeds": samples[:, :4],
+               "force": external[:, :3], "torque": external[:, 3:]}
+    if vehicle.voltage_ref > 0:
+        columns["voltage"] = voltage
+    return columns

@@ -1,0 +1,43 @@
+"""Writing an episode as a film."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from ..dynamics.errors import InputError
+from .fan_tracking import FanTrackingEnv
+
+
+class VideoWriter:
+    """Appends pictures of an environment to an mp4; the file appears only when it is whole.
+
+    Raises:
+        InputError: the video extra is not installed.
+    """
+
+    def __init__(self, path: Path, env: FanTrackingEnv) -> None:
+        try:
+            import imageio_ffmpeg
+        except ImportError as error:
+            raise InputError("--video needs the video extra: pip install 'windwrench[video]'") from error
+        self.path, self.env = path, env
+        self._partial = path.with_suffix(".partial.mp4")
+        self._stream: Any = imageio_ffmpeg.write_frames(
+            str(self._partial), (env.width, env.height), fps=12.5, quality=7, macro_block_size=16)
+        self._stream.send(None)
+
+    def add(self) -> None:
+        """Append a picture of the environment as it is now."""
+        picture = self.env.render()
+        if picture is not None:
+            self._stream.send(picture.tobytes())
+
+    def __enter__(self) -> "VideoWriter":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stream.close()
+        if kind is None:
+            self._partial.replace(self.path)
+        else:
+            self._partial.unlink(missing_ok=True)

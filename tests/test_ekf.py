@@ -1,0 +1,131 @@
+"""The extended Kalman filter: its Jacobian against finite differences, its estimates against the unscented one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flights import PERIOD, yawing_flight
+from numba import njit
+from scipy.spatial.transform import Rotation
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.estimator.ekf import WrenchEKF, model_jacobian
+from windwrench.estimator.filter_record import drive, propagate
+
+VEHICLE = load_vehicle("ardrone2")
+OFFSET = EffectSetting("com_offset", {"cx": 0.02, "cy": -0.03, "cz": 0.05})
+EFFECTS = (OFFSET, EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),
+           EffectSetting("ground_effect", {"rho": 3.0}))
+ANISOTROPIC = UKFTuning(
+    motor_torque_noise=(0.02, 0.03, 0.04), torque_walk=(2e-4, 3e-4, 4e-4), thrust_noise=(0.2, 0.3, 0.4),
+    force_walk=(2e-3, 3e-3, 4e-3), position_noise=(0.001, 0.002, 0.003), attitude_noise=(0.003, 0.005, 0.008))
+
+
+@njit
+def one_step(record, speeds, dt, x, out):
+    drive(record[0], speeds, dt, 11.1)
+    propagate(record[0], x, dt, out)
+
+
+@njit
+def jacobian(record, speeds, dt, out, A):
+    drive(record[0], speeds, dt, 11.1)
+    propagate(record[0], record[0].x, dt, out)
+    model_jacobian(record[0], dt, A)
+
+
+def boxplus(x, error):
+    """Return the state (20,) that differs from ``x`` by an error (18,), the MRP's world-frame turn by scipy."""
+    y = x.copy()
+    turn = Rotation.from_mrp(error[:3]) * Rotation.from_quat(x[3:7], scalar_first=True)
+    y[3:7] = turn.as_quat(scalar_first=True)
+    y[10:13] += error[3:6]
+    y[0:3] += error[6:9]
+    y[7:10] += error[9:12]
+    y[13:19] += error[12:18]
+    return y
+
+
+def boxminus(y, x):
+    turn = Rotation.from_quat(y[3:7], scalar_first=True) * Rotation.from_quat(x[3:7], scalar_first=True).inv()
+    return np.concatenate([turn.as_mrp(), y[10:13] - x[10:13], y[0:3] - x[0:3], y[7:10] - x[7:10], y[13:19] - x[13:19]])
+
+
+@pytest.mark.parametrize("vehicle", [
+    VEHICLE, VEHICLE.with_effects(OFFSET), VEHICLE.with_effects(*EFFECTS),
+    replace(VEHICLE, inertia=np.array([[2.2e-3, 3e-4, -2e-4], [3e-4, 3e-3, 1e-4], [-2e-4, 1e-4, 4.8e-3]])),
+], ids=["plain", "offset", "effects", "full inertia"])
+@pytest.mark.parametrize("rate", [0.0, 4.0])
+def test_jacobian_equals_finite_differences(vehicle, rate):
+    rng = np.random.default_rng(0)
+    ekf = WrenchEKF(vehicle)
+    x = np.zeros(20)
+    x[0:3] = [0.1, -0.2, 0.5]
+    x[3:7] = Rotation.random(rng=rng).as_quat(scalar_first=True)
+    x[7:10], x[10:13] = rng.standard_normal(3), rate * rng.standard_normal(3)
+    x[13:16], x[16:19] = 0.05 * rng.standard_normal(3), rng.standard_normal(3)
+    ekf.record[0]["x"] = x
+    speeds, A, centre = np.array([350.0, 380.0, 360.0, 400.0]), np.zeros((12, 18)), np.zeros(20)
+    jacobian(ekf.record, speeds, PERIOD, centre, A)
+    F = np.eye(18)
+    F[:12] += A
+    high, low, numeric, size = np.zeros(20), np.zeros(20), np.empty((18, 18)), 1e-5
+    for n in range(18):
+        one_step(ekf.record, speeds, PERIOD, boxplus(x, size * np.eye(18)[n]), high)
+        one_step(ekf.record, speeds, PERIOD, boxplus(x, -size * np.eye(18)[n]), low)
+        numeric[:, n] = (boxminus(high, centre) - boxminus(low, centre)) / (2 * size)
+    assert np.abs(A).max() > 1
+    assert np.allclose(F, numeric, rtol=0, atol=1e-8)
+
+
+def both(vehicle, flight, tuning=ANISOTROPIC, missing=()):
+    filters = WrenchUKF(vehicle, tuning, PERIOD), WrenchEKF(vehicle, tuning, PERIOD)
+    for f in filters:
+        f.reset(flight["true_x"][0], flight["true_q"][0], None, flight["velocity"][0], flight["omega"][0])
+    out = []
+    for k in range(1, len(flight["rotors"])):
+        pose = () if k in missing else (flight["position"][k], flight["quaternion"][k])
+        out.append([f.step(flight["rotors"][k], *pose) for f in filters])
+    return out
+
+
+def test_close_to_the_unscented_filter_over_a_yawing_flight():
+    flight = yawing_flight(VEHICLE, 2001, seed=3, substeps=5)
+    pairs = both(VEHICLE, flight, missing=range(700, 720))
+    for u, e in pairs[400:]:
+        assert np.allclose(u.force, e.force, atol=1e-3)
+        assert np.allclose(u.torque, e.torque, atol=2e-5)
+        assert np.allclose(np.sqrt(np.diag(u.covariance)), np.sqrt(np.diag(e.covariance)), rtol=5e-3)
+    errors = np.array([np.concatenate([e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]]) for _, e in pairs[1000:]])
+    rms = np.sqrt(np.mean(errors**2, axis=0))
+    assert np.all(rms[:3] < 0.03)
+    assert np.all(rms[3:] < 2.4e-3)
+    assert np.isnan(pairs[705][1].nis)
+    nis = np.array([[u.nis, e.nis] for u, e in pairs[1000:]])
+    assert np.allclose(nis[:, 0], nis[:, 1], rtol=1e-2, atol=1e-2)
+
+
+def test_close_to_the_unscented_filter_with_effects():
+    pairs = both(VEHICLE.with_effects(*EFFECTS), yawing_flight(VEHICLE, 801, seed=4))
+    for u, e in pairs[400:]:
+        assert np.allclose(u.force, e.force, atol=2e-3)
+        assert np.allclose(u.torque, e.torque, atol=5e-5)
+
+
+def test_the_interface_is_that_of_the_unscented_filter():
+    ekf = WrenchEKF(VEHICLE)
+    covariance = 1e-4 * np.eye(18)
+    ekf.reset([0, 0, 1], [1, 0, 0, 0], covariance)
+    assert np.array_equal(ekf.covariance, covariance)
+    hover = np.full(4, VEHICLE.hover_rate)
+    before = ekf.step(hover, [0, 0, 1], [-1, 0, 0, 0])
+    assert before.covariance.shape == (18, 18)
+    assert np.linalg.eigvalsh(before.covariance)[0] > 0
+    assert before.nis < 1
+    with pytest.raises(InputError, match="quaternion"):
+        ekf.step(hover, [0, 0, 1], [2, 0, 0, 0])
+    with pytest.raises(InputError, match="rotor_speeds"):
+        ekf.step(hover[:3])
+    assert np.array_equal(ekf.estimate.state, before.state)
+    assert np.array_equal(ekf.predict(hover, PERIOD).covariance, ekf.covariance)
+    assert ekf.correct([0, 0, 1.0], None).nis >= 0

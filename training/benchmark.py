@@ -1,0 +1,139 @@
+"""The leaderboard: controllers on the same episodes, scored between hover (0) and oracle (1)."""
+
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from ..controllers import make_controller
+from ..dynamics.errors import InputError
+from ..dynamics.files import replaced
+from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.scenarios import get_scenario
+from .evaluate import Episode, benchmark_seeds, fly_episode
+
+_CHUNK = 5  # episodes that a worker flies at a time
+_REFERENCES = ("hover", "admittance", "oracle")  # what scores and wins are relative to
+_RESAMPLES = 4_000
+
+Results = dict[tuple[str, str], list[Episode]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the leaderboard."""
+
+    controller: str
+    scenario: str
+    episodes: int
+    seed: int
+    rmse_m: float  # mean over episodes
+    rmse_ci95_m: tuple[float, float]  # bootstrap over episodes
+    median_rmse_m: float
+    lost_fraction: float
+    score: float  # (hover - this) / (hover - oracle), of the means
+    wins_over_admittance: float  # share of the paired episodes with a smaller RMSE
+
+
+def fly_all(
+    controllers: Sequence[str],
+    scenarios: Sequence[str],
+    episodes: int,
+    seed: int,
+    jobs: int | None = None,
+    advance: Callable[[int], None] = lambda count: None,
+) -> Results:
+    """Fly every controller, and the references, through every scenario on the same seeds.
+
+    Args:
+        controllers: names.
+        scenarios: names.
+        episodes: a scenario.
+        seed: of the benchmark.
+        jobs: processes; default: one a core. The results do not depend on it.
+        advance: called with the number of episodes flown since the last call.
+
+    Raises:
+        InputError: an unknown name, or no episodes.
+    """
+    if episodes < 1:
+        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
+    if not 0 <= seed < 100_000:
+        raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
+    for name in controllers:
+        make_controller(name)
+    for name in scenarios:
+        get_scenario(name)
+    wanted = list(dict.fromkeys([*controllers, *_REFERENCES]))
+    seeds = benchmark_seeds(seed, episodes)
+    tasks = [(controller, scenario, seeds[i : i + _CHUNK])
+             for scenario in dict.fromkeys(scenarios) for controller in wanted for i in range(0, episodes, _CHUNK)]
+    results: Results = {(c, s): [] for s in scenarios for c in wanted}
+    jobs = min(jobs or os.cpu_count() or 1, len(tasks))
+
+    def take(task: tuple[str, str, list[int]], flown: list[Episode]) -> None:
+        results[task[0], task[1]].extend(flown)
+        advance(len(flown))
+
+    if jobs == 1:
+        for task in tasks:
+            take(task, _fly_chunk(task))
+    else:
+        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+            for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
+                take(task, flown)
+    return results
+
+
+def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes: int) -> int:
+    """Return how many episodes ``fly_all`` flies."""
+    return len({*controllers, *_REFERENCES}) * len(set(scenarios)) * episodes
+
+
+def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
+    name, scenario, seeds = task
+    env, controller = FanTrackingEnv(scenario), make_controller(name)
+    return [fly_episode(env, controller, seed) for seed in seeds]
+
+
+def leaderboard(results: Results, controllers: Sequence[str], seed: int) -> list[Row]:
+    """Return the leaderboard's rows, scenario by scenario, best first."""
+    rows = []
+    for scenario in dict.fromkeys(s for _, s in results):
+        rmse = {c: np.array([e.rmse for e in flown]) for (c, s), flown in results.items() if s == scenario}
+        span = rmse["hover"].mean() - rmse["oracle"].mean()
+        some = []
+        for name in dict.fromkeys(controllers):
+            flown, values = results[name, scenario], rmse[name]
+            ahead = values - rmse["admittance"]
+            some.append(Row(
+                controller=name, scenario=scenario, episodes=len(flown), seed=seed, rmse_m=float(values.mean()),
+                rmse_ci95_m=_interval(values), median_rmse_m=float(np.median(values)),
+                lost_fraction=float(np.mean([e.lost for e in flown])),
+                score=float((rmse["hover"].mean() - values.mean()) / span) if span > 0 else math.nan,
+                wins_over_admittance=float(np.mean(ahead < 0) + 0.5 * np.mean(ahead == 0)),
+            ))
+        rows.extend(sorted(some, key=lambda row: row.rmse_m))
+    return rows
+
+
+def _interval(values: np.ndarray) -> tuple[float, float]:
+    """Return the 95 % percentile bootstrap interval of the mean."""
+    rng = np.random.default_rng(0)
+    means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
+    """Write ``leaderboard.json`` at once or not at all; return its path."""
+    path = folder / "leaderboard.json"
+    with replaced(path) as partial:
+        partial.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+    return path

@@ -1,0 +1,75 @@
+"""Flying a controller through episodes, and what its tracking is worth."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..controllers import Controller
+from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET, FanTrackingEnv
+from ..envs.plant import TICK
+
+Array = NDArray[np.float64]
+DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)
+# Seeds of episodes that score controllers; those of training and validation lie below, so none is shared.
+FIRST_TEST_SEED = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """One flown episode, a sample a decision; the arrays end where the vehicle was lost."""
+
+    seed: int
+    motion: str
+    lost: bool
+    total_reward: float
+    time: Array  # (n,) s
+    y: Array  # (n,) m, of the vehicle
+    fan_y: Array  # (n,) m
+    command: Array  # (n,) m/s
+    observation: Array  # (n, 8)
+    force: Array  # (n, 3) N, true, world
+    torque: Array  # (n, 3) Nm, true, world
+
+    @property
+    def offset(self) -> Array:
+        """Offset (250,) m from the fan's axis; a lost vehicle's remaining time counts at 2.5 m."""
+        full = np.full(DECISIONS, LOST_OFFSET)
+        full[: len(self.y)] = np.minimum(np.abs(self.y - self.fan_y), LOST_OFFSET)
+        return full
+
+    @property
+    def rmse(self) -> float:
+        """Root-mean-square offset over the whole episode, m."""
+        return float(np.sqrt(np.mean(self.offset**2)))
+
+
+def fly_episode(
+    env: FanTrackingEnv, controller: Controller, seed: int, each: Callable[[], None] = lambda: None
+) -> Episode:
+    """Fly one episode and return it; ``each`` is called after every decision."""
+    controller.reset()
+    observation, info = env.reset(seed=seed)
+    rows: list[tuple[float, float, float, float]] = []
+    observations, forces, torques = [], [], []
+    total = 0.0
+    for _ in range(DECISIONS):
+        action = controller(observation, info)
+        observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))
+        total += float(reward)
+        rows.append((info["time"], info["y"], info["fan_y"], float(observation[7])))
+        observations.append(observation)
+        forces.append(info["force"])
+        torques.append(info["torque"])
+        each()
+        if lost:
+            break
+    t, y, fan_y, command = np.array(rows).T
+    return Episode(seed, info["fan_motion"], bool(info["lost"]), total, t, y, fan_y, command,
+                   np.array(observations, dtype=np.float64), np.array(forces), np.array(torques))
+
+
+def benchmark_seeds(seed: int, episodes: int) -> list[int]:
+    """Return the seeds of a benchmark's episodes; every controller flies the same ones."""
+    return [FIRST_TEST_SEED + 10_000 * seed + i for i in range(episodes)]
