@@ -15,9 +15,11 @@ test: $(VENV)/.tested
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 
-# the installed package, from outside the checkout, as a user's type checker sees it
+# as a user's type checker sees it: the built package, from outside the checkout
 types: $(VENV)/.tested
-	cd $(VENV) && $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
+	rm -rf $(VENV)/built
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --target $(VENV)/built .
+	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
 check: lint types test
 

@@ -7,8 +7,9 @@ import gymnasium
 
 __version__ = "0.1.0"
 
-gymnasium.register(
-    id="windwrench/FanTracking-v0",
-    entry_point="windwrench.envs.fan_tracking:FanTrackingEnv",
-    max_episode_steps=250,
-)
+if "windwrench/FanTracking-v0" not in gymnasium.registry:  # pytest imports this file a second time, as a folder's
+    gymnasium.register(
+        id="windwrench/FanTracking-v0",
+        entry_point="windwrench.envs.fan_tracking:FanTrackingEnv",
+        max_episode_steps=250,
+    )

@@ -4,13 +4,13 @@ import os
 import sys
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.table import Column, Table
 
 from .dynamics.errors import InputError
 
@@ -20,6 +20,7 @@ app = typer.Typer(
 )
 console = Console()
 _errors = Console(stderr=True)
+_UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; it is made if need be.")]
 VehicleOption = Annotated[str, typer.Option("--vehicle", help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.")]
@@ -101,10 +102,11 @@ def benchmark(
 
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
     """
-    from .training.benchmark import count_flights, fly_all, leaderboard, write_leaderboard
+    from .training.benchmark import check_request, count_flights, fly_all, leaderboard, write_leaderboard
     from .training.pictures import draw_leaderboard
 
     names, worlds = _names(controllers, "--controllers"), _names(scenarios, "--scenarios")
+    check_request(names, worlds, episodes, seed)
     folder = _folder(out)
     with _progress() as progress:
         task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
@@ -141,10 +143,10 @@ def estimate(
     from .identification.flight_log import read_log
 
     model = load_vehicle(vehicle)
-    folder = _folder(out)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         flight = read_log(log, reader, model)
+    folder = _folder(out)
     with console.status("estimating"):
         series = estimate_log(flight, model)
     path = write_wrench(series, folder)
@@ -188,7 +190,9 @@ def record(
     file_kind(out)
     with console.status(f"flying {seconds:g} s"):
         columns = record_flight(model, effects, trajectory, seconds, seed)
-    write_log(FlightLog(name=out.stem, **columns), out)
+    log = FlightLog(columns["t"], columns["position"], columns["quaternion"], columns["rotor_speeds"],
+                    columns.get("voltage"), columns["force"], columns["torque"], name=out.stem)
+    write_log(log, out)
     console.print(f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
                   f"{', '.join(e.name for e in effects) or 'no undeclared effect'}", highlight=False)
     _say(out)
@@ -199,7 +203,8 @@ def effects() -> None:
     """List the physical effects that plant and estimator know."""
     from .dynamics.effects import get, names
 
-    table = Table("effect", "kind", "coefficient", "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
+    name_column, coefficient_column = Column("effect", no_wrap=True), Column("coefficient", no_wrap=True)
+    table = Table(name_column, "kind", coefficient_column, "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
     for name in names():
         one = get(name)
         for i, c in enumerate(one.coefficients):
@@ -223,10 +228,11 @@ def _say(*paths: Path) -> None:
 def main() -> None:
     """Run the command; a user's mistake ends in one clear line and exit code 2."""
     try:
-        app()
-    except InputError as error:
-        _errors.print(f"error: {error}", style="red", highlight=False, soft_wrap=True, markup=False)
+        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
+    except (InputError, _UsageError) as error:
+        text = str(error) if isinstance(error, InputError) else error.format_message()
+        _errors.print(f"error: {text}", style="red", highlight=False, soft_wrap=True, markup=False)
         sys.exit(2)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         _errors.print("interrupted")
         sys.exit(130)

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import BODY, Array, body_record
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -63,8 +63,8 @@ def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndar
     return record
 
 
-@njit(cache=True)
-def move_setpoint(c: np.ndarray, position: Array, dt: float) -> None:
+@compiled
+def move_setpoint(c: Record, position: Array, dt: float) -> None:
     """Move the set point with its own velocity for ``dt`` s, but no farther than the leash from the vehicle."""
     for i in range(3):
         target = c.setpoint[i] + dt * c.setpoint[3 + i]
@@ -72,8 +72,8 @@ def move_setpoint(c: np.ndarray, position: Array, dt: float) -> None:
     c.setpoint[9] += dt * c.setpoint[10]
 
 
-@njit(cache=True)
-def fly(c: np.ndarray, x: Array, dt: float) -> None:
+@compiled
+def fly(c: Record, x: Array, dt: float) -> None:
     """Write the turn rates (4,) rad/s that steer the estimated state ``x`` to the set point into ``c.command``.
 
     ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body rate 10-12.

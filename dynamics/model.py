@@ -4,8 +4,8 @@ Filter and plant each hold one: the filter's has the declared effects, the plant
 """
 
 import numpy as np
-from numba import njit
 
+from .compiled import Record, compiled
 from .effects import compile_effects
 from .effects.base import ROTORS_SIZE, STATE_SIZE, VEHICLE_SIZE, Array
 from .effects.call import deliver
@@ -55,8 +55,8 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     return bundle.vehicle
 
 
-@njit(cache=True)
-def drive(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None:
+@compiled
+def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Work out what the rotors deliver over a step of ``dt`` s at the logged turn rates (4,) rad/s."""
     f.voltage = voltage
     for i in range(4):
@@ -66,8 +66,8 @@ def drive(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None
     rotor_wrench(f.body, f.rotors, f.rotor_wrench)
 
 
-@njit(cache=True)
-def apply_effects(f: np.ndarray, position: Array, rotation: Array, velocity: Array, omega: Array) -> None:
+@compiled
+def apply_effects(f: Record, position: Array, rotation: Array, velocity: Array, omega: Array) -> None:
     """Write what the wrench effects say at a state into ``f.effect_wrench``."""
     if f.wrench_count > 0:
         effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,

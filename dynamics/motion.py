@@ -4,9 +4,9 @@ Zero-order hold: attitude, thrust, torque and wrench are those of the start of t
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from .compiled import Record, compiled
 from .effects.base import (
     POSITION,
     RATE,
@@ -45,8 +45,8 @@ def body_record(vehicle: Vehicle) -> np.ndarray:
     return record
 
 
-@njit(cache=True)
-def rotor_wrench(body: np.ndarray, rotor_speeds: Array, out: Array) -> None:
+@compiled
+def rotor_wrench(body: Record, rotor_speeds: Array, out: Array) -> None:
     """Write total thrust (N) and body torques about the centre of mass (Nm) into ``out`` (4,): (1), (8)-(10)."""
     for i in range(4):
         total = 0.0
@@ -57,8 +57,8 @@ def rotor_wrench(body: np.ndarray, rotor_speeds: Array, out: Array) -> None:
     out[2] += body.com[0] * out[0]
 
 
-@njit(cache=True)
-def accelerations(body: np.ndarray, rotation: Array, omega: Array, rotors: Array, torque: Array, force: Array,
+@compiled
+def accelerations(body: Record, rotation: Array, omega: Array, rotors: Array, torque: Array, force: Array,
                   effects: Array, out: Array) -> None:
     """Write the accelerations of the geometric centre (world) and of the attitude (body) into ``out`` (6,): (4), (12).
 
@@ -95,8 +95,8 @@ def accelerations(body: np.ndarray, rotation: Array, omega: Array, rotors: Array
     out[2] -= body.gravity
 
 
-@njit(cache=True)
-def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body: np.ndarray, position: Array,
+@compiled
+def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body: Record, position: Array,
                   rotation: Array, velocity: Array, omega: Array, rotor_speeds: Array, wind: Array, voltage: float,
                   time: float, state: Array, out: Array) -> None:
     """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the body frame.

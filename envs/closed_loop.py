@@ -4,9 +4,9 @@ import math
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
+from ..dynamics.compiled import compiled
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
@@ -17,10 +17,11 @@ from ..estimator.ukf import step as filter_step
 from .jet import FAN, Fan, fan_record, jet_table
 from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
 
+_FASTEST = 200.0  # m/s and rad/s
 LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("flight", FLIGHT), ("fan", FAN)])
 
 
-@njit(cache=True)
+@compiled
 def tick(loops: np.ndarray, index: int, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array,
          noise: Array, fan_y: float) -> None:
     """Sense, estimate, steer and actuate once; MuJoCo's ``xfrc`` (6,) then holds the wrench of this tick.
@@ -74,8 +75,9 @@ class ClosedLoop:
         self._steps = 0
 
     def _views(self) -> None:
-        self._qpos, self._qvel = self.data.qpos, self.data.qvel
-        self._xfrc = self.data.xfrc_applied[self._body_id]
+        self._qpos: Array = self.data.qpos
+        self._qvel: Array = self.data.qvel
+        self._xfrc: Array = self.data.xfrc_applied[self._body_id]
         loop = self.record[0]
         self.state: Array = loop["filter"]["x"]  # (20,) estimated state, laid out as in estimator.estimate
         self.covariance: Array = loop["filter"]["P"]
@@ -141,5 +143,9 @@ class ClosedLoop:
             self._steps += 1
 
     def healthy(self) -> bool:
-        """Whether every number of plant and filter is still finite (MuJoCo resets a state that is not)."""
-        return bool(math.isfinite(float(self.state[:19].sum())) and self.data.time > 0.5 * self.time)
+        """Whether it still flies: every number of plant and filter finite, and nothing faster than a vehicle can be.
+
+        MuJoCo resets a state that is not finite, and complains in the console of one that soon will not be.
+        """
+        return bool(math.isfinite(float(self.state[:19].sum())) and float(np.abs(self._qvel).max()) < _FASTEST
+                    and self.data.time > 0.5 * self.time)

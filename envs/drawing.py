@@ -101,7 +101,7 @@ class Viewer:
         if float(loop.record[0]["fan"]["speed"]) > 0:
             for tracer in self._tracers:
                 fade = 0.55 * (1.0 - tracer[0] / 3.8)
-                _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014), tracer + [0, fan_y, height],
+                _add(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014), tracer + np.array([0.0, fan_y, height]),
                      np.array([0.25, 0.55, 0.95, fade]))
         force, torque = loop.state[16:19], loop.state[13:16]
         at = loop.position

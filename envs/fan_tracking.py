@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -102,7 +102,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     * v0: initial version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}  # noqa: RUF012
 
     def __init__(
         self,
@@ -160,7 +160,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.loop = self._make_loop(self.vehicle, self.fan)
         loop = self.loop
         ticks = round(EPISODE_SECONDS / TICK)
-        t = TICK * np.arange(ticks + 2)
+        t = TICK * np.arange(ticks + 2, dtype=np.float64)
         self._motion, self._fan_speed, self._fan_y = draw_fan_path(scenario, rng, t)
         if self.fan_path is not None:
             self._motion, self._fan_y = "given", np.asarray(self.fan_path(t), dtype=np.float64)
@@ -203,7 +203,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _lost(self, offset: float) -> bool:
         assert self.loop is not None
         away = self.loop.position - self._start
-        w, x, y, _ = self.loop.quaternion
+        _, x, y, _ = self.loop.quaternion
         upright = 1.0 - 2.0 * (x * x + y * y)
         return bool(abs(offset) > LOST_OFFSET or abs(away[0]) > 1.0 or abs(away[2]) > 1.0 or upright < 0.34
                     or not self.loop.healthy())
@@ -233,7 +233,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             "lost": lost,
         }
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a window.
 
         Raises:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..dynamics.compiled import Record, compiled
 
 Array = NDArray[np.float64]
 
@@ -85,8 +86,8 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
     return record
 
 
-@njit(cache=True)
-def jet_at(f: np.ndarray, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array) -> None:
+@compiled
+def jet_at(f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array) -> None:
     """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
     dy, dz = y - f.y, z - f.height
     r = math.sqrt(dy * dy + dz * dz)
@@ -104,8 +105,8 @@ def jet_at(f: np.ndarray, axial: Array, radial: Array, x: float, y: float, z: fl
     wind[1], wind[2] = scale * dy, scale * dz
 
 
-@njit(cache=True)
-def gust(f: np.ndarray, noise: Array) -> None:
+@compiled
+def gust(f: Record, noise: Array) -> None:
     """Let the gusts at the stations age by one tick; ``noise`` holds 36 unit normals."""
     fresh = math.sqrt(1.0 - f.keep * f.keep)
     for i in range(STATIONS):
@@ -116,8 +117,8 @@ def gust(f: np.ndarray, noise: Array) -> None:
             f.gusts[i, a] = f.keep * f.gusts[i, a] + fresh * total
 
 
-@njit(cache=True)
-def jet_wrench(f: np.ndarray, axial: Array, radial: Array, position: Array, rotation: Array, velocity: Array,
+@compiled
+def jet_wrench(f: Record, axial: Array, radial: Array, position: Array, rotation: Array, velocity: Array,
                omega: Array, com: Array, wind: Array, out: Array) -> None:
     """Write force and torque about the centre of mass (6,), world frame, of the wind on the vehicle into ``out``.
 

@@ -10,8 +10,8 @@ from importlib import resources
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ..dynamics.motion import Array
 from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
@@ -104,32 +104,29 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
 def load_world(vehicle: Vehicle) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
     """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied."""
     xml = resources.files(__package__).joinpath("quadrotor.xml").read_text(encoding="utf-8")
-    model = mujoco.MjModel.from_xml_string(xml)
-    body = model.body("vehicle").id
+    spec = mujoco.MjSpec.from_string(xml)
     moments, axes = np.linalg.eigh(vehicle.inertia)
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
-    model.body_mass[body] = vehicle.mass
-    model.body_inertia[body] = moments
-    model.body_ipos[body] = vehicle.com
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
-    model.body_iquat[body] = quaternion
+    # before it is compiled: the compiler takes short cuts for a centre of mass that lies in the body's origin
+    body = spec.body("vehicle")
+    body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
+    model = spec.compile()
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS
     # the drawing follows the vehicle's size
     scale = vehicle.arm_l / 0.1262
     for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] == body:
+        if model.geom_bodyid[geom] == model.body("vehicle").id:
             model.geom_pos[geom] *= scale
             model.geom_size[geom] *= scale
-    data = mujoco.MjData(model)
-    mujoco.mj_setConst(model, data)
-    return model, data
+    return model, mujoco.MjData(model)
 
 
-@njit(cache=True)
-def sense(p: np.ndarray, qpos: Array, noise: Array) -> int:
+@compiled
+def sense(p: Record, qpos: Array, noise: Array) -> int:
     """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where it is lost).
 
     The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle that faces -x sees the
@@ -147,8 +144,8 @@ def sense(p: np.ndarray, qpos: Array, noise: Array) -> int:
     return 0 if noise[_DROPOUT] < p.dropout else 3
 
 
-@njit(cache=True)
-def actuate(p: np.ndarray, command: Array, fan: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Array,
+@compiled
+def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array, qpos: Array, qvel: Array,
             noise: Array, xfrc: Array) -> None:
     """Let the motors follow their commands for one tick and write the wrench that acts in it into ``xfrc`` (6,)."""
     load = 0.0

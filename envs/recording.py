@@ -23,7 +23,8 @@ def _waves(rng: np.random.Generator, t: Array, size: float, slowest: float, fast
     """Return a sum (n,) of sines with random phases and frequencies (Hz), ``size`` in standard deviation."""
     frequency = rng.uniform(slowest, fastest, count)
     phase = rng.uniform(0, 2 * math.pi, count)
-    return size * math.sqrt(2.0 / count) * np.sin(2 * math.pi * frequency * t[:, None] + phase).sum(axis=1)
+    waves: Array = size * math.sqrt(2.0 / count) * np.sin(2 * math.pi * frequency * t[:, None] + phase).sum(axis=1)
+    return waves
 
 
 def _hover(rng: np.random.Generator, t: Array) -> Array:
@@ -111,7 +112,7 @@ def record_flight(
                            disturbance_torque=BACKGROUND.disturbance_torque * force * vehicle.arm_l / 0.127)
     rng = np.random.default_rng(seed)
     count = round(seconds / TICK) + 1
-    t = TICK * np.arange(count)
+    t = TICK * np.arange(count, dtype=np.float64)
     setpoints = draw_trajectory(trajectory, rng, t)
     loop = ClosedLoop(vehicle, replace(vehicle, effects=(*vehicle.effects, *effects)), settings=settings)
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))

@@ -8,15 +8,14 @@ the state has (18), the normalised innovation squared (NIS) with as many as the 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
 from ..dynamics.vehicle import Vehicle
@@ -256,8 +255,8 @@ def simulate_model(
         states[:, FORCE])
 
 
-@njit(cache=True)
-def _simulate(record: Any, start: Array, error: Array, speeds: Array, rate_loop: Array, fastest: float, process: Array,
+@compiled
+def _simulate(record: Record, start: Array, error: Array, speeds: Array, rate_loop: Array, fastest: float, process: Array,
               measurement: Array, dt: float, voltage: float, states: Array, measured: Array) -> None:
     f = record[0]
     x, after = f.x, f.next

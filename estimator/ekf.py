@@ -6,23 +6,19 @@ world-frame MRP rho, on the left of the attitude: R_true = exp([4 rho]x) R for s
 """
 
 import math
-from typing import Any
 
-import numpy as np
-from numba import njit
-from numpy.typing import ArrayLike
-
-from ..dynamics.errors import InputError
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import effect_wrench
-from .estimate import NIS, Array, WrenchEstimate
+from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
-from .ukf import WrenchUKF, _add_noise, _symmetrise, correct
+from .sample import check_sample, copy_estimate
+from .ukf import WrenchUKF, add_noise, correct_parts, symmetrise
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
 _STEP = 1e-5  # m, m/s and rad/s
 
 
-@njit(cache=True)
+@compiled
 def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float, scale: float) -> None:
     """Add ``scale * [(x, y, z)]x`` to the block of ``out`` that starts at ``row``, ``column``."""
     out[row, column + 1] -= scale * z
@@ -33,14 +29,14 @@ def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float,
     out[row + 2, column + 1] += scale * x
 
 
-@njit(cache=True)
-def _effects_at(f: Any, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
+@compiled
+def _effects_at(f: Record, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
     effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
                   velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, out)
 
 
-@njit(cache=True)
-def _effect_jacobian(f: Any, rotation: Array, out: Array) -> None:
+@compiled
+def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
     """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into ``out`` (12, 6).
 
     By central differences: a law is a black box behind an address.
@@ -71,8 +67,8 @@ def _effect_jacobian(f: Any, rotation: Array, out: Array) -> None:
             out[n, i] = (out[n, i] - minus[i]) / (2.0 * size)
 
 
-@njit(cache=True)
-def _acceleration_jacobian(f: Any, A: Array) -> None:
+@compiled
+def _acceleration_jacobian(f: Record, A: Array) -> None:
     """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18), rows 3-5 and 9-11.
 
     Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world): (4), (12). Expects
@@ -110,12 +106,12 @@ def _acceleration_jacobian(f: Any, A: Array) -> None:
     thrust = f.rotor_wrench[0]
     _cross_into(B, 3, 0, R[0, 2] * thrust, R[1, 2] * thrust, R[2, 2] * thrust, -4.0)
     if f.wrench_count > 0:
-        _effect_jacobian(f, R, f.D)
+        _effect_jacobian(f, R, f.H)
         for n in range(12):
             scale = 4.0 if n < 3 else 1.0
             for i in range(3):
-                B[3 + i, n] += scale * f.D[n, i]
-                B[i, n] += scale * f.D[n, 3 + i]
+                B[3 + i, n] += scale * f.H[n, i]
+                B[i, n] += scale * f.H[n, 3 + i]
     for i in range(3):
         for j in range(N):
             A[3 + i, j] = inverse[i, 0] * B[0, j] + inverse[i, 1] * B[1, j] + inverse[i, 2] * B[2, j]
@@ -151,8 +147,8 @@ def _acceleration_jacobian(f: Any, A: Array) -> None:
     _cross_into(A, 9, 0, s3, s4, s5, -4.0)
 
 
-@njit(cache=True)
-def model_jacobian(f: Any, dt: float, A: Array) -> None:
+@compiled
+def model_jacobian(f: Record, dt: float, A: Array) -> None:
     """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); the rows of torque and force would be zero.
 
     F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``. Expects what
@@ -185,10 +181,10 @@ def model_jacobian(f: Any, dt: float, A: Array) -> None:
         A[6 + i, 9 + i] += dt
 
 
-@njit(cache=True)
-def predict(f: Any, rotor_speeds: Array, dt: float, voltage: float) -> None:
+@compiled
+def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s."""
-    x, P, A, G = f.x, f.P, f.S, f.D
+    x, P, A, G = f.x, f.P, f.S, f.H
     drive(f, rotor_speeds, dt, voltage)
     propagate(f, x, dt, f.centre)
     model_jacobian(f, dt, A)
@@ -210,93 +206,24 @@ def predict(f: Any, rotor_speeds: Array, dt: float, voltage: float) -> None:
         for j in range(12, N):
             P[i, j] += G[i, j]
             P[j, i] += G[i, j]
-    _add_noise(f, f.centre_rotation, dt)
-    _symmetrise(P)
+    add_noise(f, f.centre_rotation, dt)
+    symmetrise(P)
     for i in range(NIS):
         x[i] = f.centre[i]
     x[NIS] = math.nan
     f.time += dt
 
 
-@njit(cache=True)
-def step(f: Any, z: Array, parts: int, dt: float, voltage: float) -> None:
-    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,) that were measured."""
-    if dt > 0.0:
-        predict(f, z[0:4], dt, voltage)
-    if parts == 3:
-        correct(f, z[4:7], z[7:11], 0, 6)
-    elif parts == 2:
-        correct(f, z[4:7], z[7:11], 0, 3)
-    elif parts == 1:
-        correct(f, z[4:7], f.x[3:7], 3, 6)
-
-
-@njit(cache=True)
-def check_sample(f: Any, z: Array, parts: int) -> int:
-    """Return the ``parts`` of ``z`` (11,) that are usable: 1 position, 2 attitude; -1 if the quaternion is no rotation.
-
-    Turn rates that are not finite become the last ones that were; the quaternion is brought to length 1.
-    """
-    usable = 0
-    if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
-        usable += 1
-    if parts & 2 != 0:
-        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
-        if math.isfinite(square):
-            if square < 0.81 or square > 1.21:
-                return -1
-            scale = 1.0 / math.sqrt(square)
-            for i in range(7, 11):
-                z[i] *= scale
-            usable += 2
-    for i in range(4):
-        if not math.isfinite(z[i]):
-            z[i] = f.last_speeds[i]
-        f.last_speeds[i] = z[i]
-    return usable
-
-
-@njit(cache=True)
-def _step_and_copy(record: Any, z: Array, parts: int, dt: float, voltage: float, state: Array,
-                   covariance: Array) -> int:
+@compiled
+def _step_and_copy(record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
     f = record[0]
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
-        step(f, z, usable, dt, voltage)
-    state[:] = f.x
-    covariance[:, :] = f.P
+        if dt > 0.0:
+            predict(f, z[0:4], dt, voltage)
+        correct_parts(f, z, usable)
+    copy_estimate(f, out)
     return usable
-
-
-def read_sample(
-    z: Array, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
-) -> int:
-    """Write turn rates and pose into ``z`` (11,); return what was given of the pose: 1 position, 2 attitude, 3 both.
-
-    Raises:
-        InputError: a shape is wrong.
-    """
-    parts = 0
-    try:
-        if len(rotor_speeds) != 4:  # type: ignore[arg-type]
-            raise ValueError
-        z[0:4] = rotor_speeds
-        if position is not None:
-            if len(position) != 3:  # type: ignore[arg-type]
-                raise ValueError
-            z[4:7] = position
-            parts = 1
-        if quaternion is not None:
-            if len(quaternion) != 4:  # type: ignore[arg-type]
-                raise ValueError
-            z[7:11] = quaternion
-            parts += 2
-    except (TypeError, ValueError):
-        raise InputError(
-            "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
-            f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
-        ) from None
-    return parts
 
 
 class WrenchEKF(WrenchUKF):
@@ -306,12 +233,4 @@ class WrenchEKF(WrenchUKF):
     is well known the two agree closely; it serves as a check of the other, and where a step must cost less.
     """
 
-    def _run(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None, dt: float,
-             voltage: float | None) -> WrenchEstimate:
-        z = self._z
-        parts = read_sample(z, rotor_speeds, position, quaternion)
-        state, covariance = np.empty(NIS + 1), np.empty((N, N))
-        volts = self._voltage if voltage is None else voltage
-        if _step_and_copy(self.record, z, parts, dt, volts, state, covariance) < 0:
-            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
-        return WrenchEstimate(state, covariance)
+    _compiled_step = staticmethod(_step_and_copy)

@@ -1,8 +1,8 @@
 """The memory of one wrench filter, as a record that compiled code works on."""
 
 import numpy as np
-from numba import njit
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ..dynamics.motion import Array, accelerations
 from ..dynamics.rotation import quaternion_to_matrix, turn_body
@@ -37,9 +37,11 @@ FILTER = np.dtype([
     ("M", "f8", (12, 12)),
     ("Y", "f8", (N, 12)),
     ("Z", "f8", (12, N)),
-    ("D", "f8", (24, N)),  # sigma points after the step, from the central one
+    ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
+    ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
+    ("error", "f8", (2, N)),
+    ("B", "f8", (6, N)),  # scaled noise inputs, one a row
     ("mean", "f8", (N,)),
-    ("column", "f8", (N,)),  # of the noise input matrix B
     ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
     ("next", "f8", (STATE_SIZE,)),  # where it is after the step
     ("centre", "f8", (STATE_SIZE,)),  # the same of the central one
@@ -69,8 +71,8 @@ def filter_record(vehicle: Vehicle, tuning: UKFTuning, period: float, gate: floa
     return record
 
 
-@njit(cache=True)
-def propagate(f: np.ndarray, x: Array, dt: float, out: Array) -> None:
+@compiled
+def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
     """Write the state that follows ``x`` after ``dt`` s into ``out``: (2)-(5), (11)-(14)."""
     quaternion_to_matrix(x[3:7], f.rotation)
     apply_effects(f, x[0:3], f.rotation, x[7:10], x[10:13])

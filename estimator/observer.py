@@ -21,20 +21,19 @@ straight line between samples, u as constant over a step), so that any cutoff at
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
-from numba import njit
+import scipy.linalg
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
 from ..dynamics.motion import effect_wrench
 from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
-from .ekf import check_sample, read_sample
 from .estimate import NIS, Array, WrenchEstimate
-from .filter_record import N, drive
+from .filter_record import drive
+from .sample import Sample, check_sample, copy_estimate, empty_estimate
 from .ukf import WrenchUKF
 
 _DAMPING = math.sqrt(0.5)  # Butterworth
@@ -135,7 +134,7 @@ class NonlinearObserver:
         _low_pass(o["rotation"], self.tuning.attitude_cutoff_hz, period)
         o["force_decay"] = np.exp(-period * np.asarray(self.tuning.force_gain))
         o["torque_decay"] = np.exp(-period * np.asarray(self.tuning.torque_gain))
-        self._z = np.zeros(11)
+        self._sample = Sample()
         self._voltage = vehicle.voltage_ref
         self.reset((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
@@ -160,17 +159,18 @@ class NonlinearObserver:
             InputError: a shape is wrong, a number is not finite, or the quaternion is not one of a rotation.
         """
         self._filter.reset(position, quaternion, None, velocity, angular_velocity)
+        self._filter.record[0]["P"] = math.nan
         _start(self._filter.record, self._record)
 
     @property
     def covariance(self) -> Array:
         """NaN (18, 18): an observer has none."""
-        return np.full((N, N), math.nan)
+        return self._filter.covariance
 
     @property
     def estimate(self) -> WrenchEstimate:
         """What the observer believes now."""
-        return WrenchEstimate(np.array(self._filter.record[0]["x"]), self.covariance)
+        return self._filter.estimate
 
     def step(
         self,
@@ -190,16 +190,16 @@ class NonlinearObserver:
         Raises:
             InputError: a shape is wrong or the quaternion's length is not 1; the observer stays as it was.
         """
-        z = self._z
-        parts = read_sample(z, rotor_speeds, position, quaternion)
-        state = np.empty(NIS + 1)
+        sample = self._sample
+        parts = sample.read(rotor_speeds, position, quaternion)
+        out = empty_estimate()
         volts = self._voltage if voltage is None else voltage
-        if _step_and_copy(self._filter.record, self._record, z, parts, self.period, volts, state) < 0:
-            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
-        return WrenchEstimate(state, self.covariance)
+        if _step_and_copy(self._filter.record, self._record, sample.z, parts, self.period, volts, out) < 0:
+            raise sample.bad_quaternion()
+        return WrenchEstimate(out)
 
 
-def _low_pass(record: Any, cutoff_hz: float, period: float) -> None:
+def _low_pass(record: Record, cutoff_hz: float, period: float) -> None:
     """Fill in a second-order low-pass, y'' = w^2 (x - y) - 2 d w y', for an input that is straight between samples."""
     w = 2.0 * math.pi * cutoff_hz
     # states y and y'/w, then the input and its change over the step
@@ -207,7 +207,7 @@ def _low_pass(record: Any, cutoff_hz: float, period: float) -> None:
     matrix[0, 1] = w * period
     matrix[1, :3] = -w * period, -2.0 * _DAMPING * w * period, w * period
     matrix[2, 3] = 1.0
-    M = expm(matrix)
+    M = scipy.linalg.expm(matrix)
     unit = np.array([1.0, w])
     record["frequency"], record["delay"] = w, 2.0 * _DAMPING / w
     record["transition"] = M[:2, :2] * unit[:, None] / unit
@@ -215,8 +215,8 @@ def _low_pass(record: Any, cutoff_hz: float, period: float) -> None:
     record["new"] = M[:2, 3] * unit
 
 
-@njit(cache=True)
-def _filter_sample(g: Any, y: Array, dy: Array, old: Array, new: Array) -> None:
+@compiled
+def _filter_sample(g: Record, y: Array, dy: Array, old: Array, new: Array) -> None:
     """Move a filter's output ``y`` and its rate ``dy`` (n,) on by a step with the input from ``old`` to ``new``."""
     A, a, b = g.transition, g.old, g.new
     for i in range(len(y)):
@@ -225,8 +225,8 @@ def _filter_sample(g: Any, y: Array, dy: Array, old: Array, new: Array) -> None:
         dy[i] = A[1, 0] * value + A[1, 1] * rate + a[1] * old[i] + b[1] * new[i]
 
 
-@njit(cache=True)
-def _filter_input(o: Any, g: Any, i: int, u: float, dt: float) -> None:
+@compiled
+def _filter_input(o: Record, g: Record, i: int, u: float, dt: float) -> None:
     """Filter row ``i`` of u, constant over the step, and write the integral of the filtered one over it."""
     value, rate, A = o.u[i], o.du[i], g.transition
     o.u[i] = A[0, 0] * value + A[0, 1] * rate + (g.old[0] + g.new[0]) * u
@@ -236,8 +236,8 @@ def _filter_input(o: Any, g: Any, i: int, u: float, dt: float) -> None:
     o.impulse[i] = u * dt - lag / g.frequency
 
 
-@njit(cache=True)
-def _twist(f: Any, o: Any) -> None:
+@compiled
+def _twist(f: Record, o: Record) -> None:
     """Write rotation, body rate and angular momentum (world axes) of the filtered attitude."""
     q, d, R, J, omega = o.q, o.dq, o.R, f.body.inertia, o.omega
     square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
@@ -256,8 +256,8 @@ def _twist(f: Any, o: Any) -> None:
         o.angular_momentum[i] = R[i, 0] * h0 + R[i, 1] * h1 + R[i, 2] * h2
 
 
-@njit(cache=True)
-def _seat_attitude(f: Any, o: Any, q: Array) -> None:
+@compiled
+def _seat_attitude(f: Record, o: Record, q: Array) -> None:
     """Put the attitude filter where a vehicle that turns at ``omega`` and was just seen at ``q`` has it."""
     omega = o.omega
     turn_body(q, omega[0], omega[1], omega[2], -o.rotation.delay, o.q)
@@ -265,8 +265,8 @@ def _seat_attitude(f: Any, o: Any, q: Array) -> None:
     _twist(f, o)
 
 
-@njit(cache=True)
-def _spin(o: Any) -> None:
+@compiled
+def _spin(o: Record) -> None:
     """Set the rate of the filtered quaternion to that of a turn at ``omega``: (13), halved."""
     q, d, omega = o.q, o.dq, o.omega
     d[0] = 0.5 * (-q[1] * omega[0] - q[2] * omega[1] - q[3] * omega[2])
@@ -275,22 +275,22 @@ def _spin(o: Any) -> None:
     d[3] = 0.5 * (q[0] * omega[2] + q[1] * omega[1] - q[2] * omega[0])
 
 
-@njit(cache=True)
-def _seat_position(o: Any, p: Array) -> None:
+@compiled
+def _seat_position(o: Record, p: Array) -> None:
     """Put the position filter where a vehicle that moves at ``v`` and was just seen at ``p`` has it."""
     for i in range(3):
         o.p[i] = p[i] - o.translation.delay * o.v[i]
 
 
-@njit(cache=True)
-def _centre_of_mass(f: Any, position: Array, R: Array, out: Array) -> None:
+@compiled
+def _centre_of_mass(f: Record, position: Array, R: Array, out: Array) -> None:
     c = f.body.com
     for i in range(3):
         out[i] = position[i] + R[i, 0] * c[0] + R[i, 1] * c[1] + R[i, 2] * c[2]
 
 
-@njit(cache=True)
-def _start(model: Any, record: Any) -> None:
+@compiled
+def _start(model: Record, record: Record) -> None:
     """Set the observer to the pose and twist of the model's state."""
     f, o = model[0], record[0]
     x, c = f.x, f.body.com
@@ -309,8 +309,8 @@ def _start(model: Any, record: Any) -> None:
     _seat_attitude(f, o, o.sample_q)
 
 
-@njit(cache=True)
-def _model(f: Any, o: Any, dt: float) -> None:
+@compiled
+def _model(f: Record, o: Record, dt: float) -> None:
     """Work out u at the mean attitude of the step, and filter it."""
     x, w, R = f.x, f.rotor_wrench, f.rotation
     for i in range(3):
@@ -331,8 +331,8 @@ def _model(f: Any, o: Any, dt: float) -> None:
         _filter_input(o, o.rotation, 3 + i, torque, dt)
 
 
-@njit(cache=True)
-def _observe_force(f: Any, o: Any, measured: bool, dt: float) -> None:
+@compiled
+def _observe_force(f: Record, o: Record, measured: bool, dt: float) -> None:
     force, mass, v = f.x[16:19], f.body.mass, o.v
     if not measured:
         for i in range(3):
@@ -348,8 +348,8 @@ def _observe_force(f: Any, o: Any, measured: bool, dt: float) -> None:
         force[i] = o.force_decay[i] * force[i] + gain * (mass * v[i] - o.momentum[i] - o.impulse[i])
 
 
-@njit(cache=True)
-def _observe_torque(f: Any, o: Any, measured: bool, dt: float) -> None:
+@compiled
+def _observe_torque(f: Record, o: Record, measured: bool, dt: float) -> None:
     torque, h, omega, R, inverse = f.x[13:16], o.angular_momentum, o.omega, o.R, f.body.inverse_inertia
     if not measured:
         turn_body(o.q, omega[0], omega[1], omega[2], dt, o.scratch_q)
@@ -373,8 +373,8 @@ def _observe_torque(f: Any, o: Any, measured: bool, dt: float) -> None:
         torque[i] = o.torque_decay[i] * torque[i] + gain * (h[i] - o.momentum[i] - o.impulse[3 + i])
 
 
-@njit(cache=True)
-def _look_ahead(f: Any, o: Any) -> None:
+@compiled
+def _look_ahead(f: Record, o: Record) -> None:
     """Write pose and twist as they are now: the filtered ones, ahead by the filters' delay.
 
     The inverse of the filter, y + 2 d / w y' + y'' / w^2, with the derivatives of v and omega taken from the model.
@@ -413,8 +413,8 @@ def _look_ahead(f: Any, o: Any) -> None:
             x[7 + i] -= S[i, 0] * a[0] + S[i, 1] * a[1] + S[i, 2] * a[2]
 
 
-@njit(cache=True)
-def step(f: Any, o: Any, z: Array, parts: int, dt: float, voltage: float) -> None:
+@compiled
+def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) -> None:
     """Go ``dt`` s on, the period for which ``o`` was made, with the ``parts`` of ``z`` (11,) that were measured."""
     x = f.x
     drive(f, z[0:4], dt, voltage)
@@ -459,12 +459,11 @@ def step(f: Any, o: Any, z: Array, parts: int, dt: float, voltage: float) -> Non
     x[NIS] = math.nan
 
 
-@njit(cache=True)
-def _step_and_copy(model: Any, record: Any, z: Array, parts: int, dt: float, voltage: float,
-                   state: Array) -> int:
+@compiled
+def _step_and_copy(model: Record, record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
     f = model[0]
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
         step(f, record[0], z, usable, dt, voltage)
-    state[:] = f.x
+    copy_estimate(f, out)
     return usable

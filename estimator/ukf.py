@@ -14,14 +14,15 @@ The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
 from ..dynamics.vehicle import Vehicle
-from .estimate import NIS, Array, WrenchEstimate
+from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
 from .filter_record import N, drive, filter_record, propagate
+from .sample import Sample, check_sample, copy_estimate, empty_estimate
 from .tuning import UKFTuning
 
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
@@ -29,8 +30,8 @@ _PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
 _SPREAD = 0.25  # largest variance of an MRP (a standard deviation of about 115 degrees)
 
 
-@njit(cache=True)
-def _root(f: np.ndarray, columns: int) -> None:
+@compiled
+def _root(f: Record, columns: int) -> None:
     """Factor P: the first columns of its lower root into ``S``, the rest's Schur complement into ``M``."""
     P, S, M = f.P, f.S, f.M
     for j in range(columns):
@@ -50,20 +51,22 @@ def _root(f: np.ndarray, columns: int) -> None:
             S[j, i] = 0.0
         for i in range(j, N):
             S[j, i] *= scale
-    M[:, :] = 0.0
-    first = columns - 6
-    for i in range(first, 12):
-        for j in range(first, 12):
-            M[i, j] = P[6 + i, 6 + j]
-    for k in range(columns):
-        for i in range(first, 12):
-            a = S[k, 6 + i]
-            for j in range(first, 12):
-                M[i, j] -= a * S[k, 6 + j]
+    # the Schur complement, six columns at once; rows of x and v have none where they are among the columns
+    last = 0 if columns == 6 else 6
+    for i in range(12):
+        for j in range(12):
+            M[i, j] = P[6 + i, 6 + j] if i >= last and j >= last else 0.0
+    for k in range(0, columns, 6):
+        for i in range(last, 12):
+            a0, a1, a2 = S[k, 6 + i], S[k + 1, 6 + i], S[k + 2, 6 + i]
+            a3, a4, a5 = S[k + 3, 6 + i], S[k + 4, 6 + i], S[k + 5, 6 + i]
+            for j in range(last, 12):
+                M[i, j] -= ((a0 * S[k, 6 + j] + a1 * S[k + 1, 6 + j]) + (a2 * S[k + 2, 6 + j] + a3 * S[k + 3, 6 + j])
+                            + (a4 * S[k + 4, 6 + j] + a5 * S[k + 5, 6 + j]))
 
 
-@njit(cache=True)
-def _linear_rows(f: np.ndarray, rotation: Array, dt: float, source: Array, out: Array) -> None:
+@compiled
+def _linear_rows(f: Record, rotation: Array, dt: float, source: Array, out: Array) -> None:
     """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n): ``out`` (18, n)."""
     columns = source.shape[1]
     J, c, mass = f.body.inverse_inertia, f.body.com, f.body.mass
@@ -92,102 +95,116 @@ def _linear_rows(f: np.ndarray, rotation: Array, dt: float, source: Array, out: 
             out[9 + i, j] = source[3 + i, j] + gain
 
 
-@njit(cache=True)
-def _add_noise(f: np.ndarray, rotation: Array, dt: float) -> None:
+@compiled
+def _add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
+    """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for speed."""
+    b0, b1, b2, b3, b4, b5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
+    for i in range(N):
+        a0, a1, a2 = sign * rows[b0, i], sign * rows[b1, i], sign * rows[b2, i]
+        a3, a4, a5 = sign * rows[b3, i], sign * rows[b4, i], sign * rows[b5, i]
+        for j in range(N):
+            P[i, j] += ((a0 * rows[b0, j] + a1 * rows[b1, j]) + (a2 * rows[b2, j] + a3 * rows[b3, j])
+                        + (a4 * rows[b4, j] + a5 * rows[b5, j]))
+
+
+@compiled
+def add_noise(f: Record, rotation: Array, dt: float) -> None:
     """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (16)."""
-    P, J, c, b = f.P, f.body.inverse_inertia, f.body.com, f.column
+    P, J, c, B = f.P, f.body.inverse_inertia, f.body.com, f.B
     # stated per period: white noise averages over a longer step, a walk grows with it
     white, walk = f.period / dt, dt / f.period
     for n in range(3):
         P[12 + n, 12 + n] += walk * f.torque_walk[n]
         P[15 + n, 15 + n] += walk * f.force_walk[n]
+        torque, thrust = dt * math.sqrt(white * f.motor_torque[n]), dt * math.sqrt(white * f.thrust[n]) / f.body.mass
         ax, ay, az = J[0, n], J[1, n], J[2, n]
         px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
         for i in range(3):
-            b[3 + i] = dt * J[i, n]
-            b[9 + i] = dt * (rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz)
-        _add_column(P, b, dt, white * f.motor_torque[n])
-        for i in range(3):
-            b[3 + i] = 0.0
-            b[9 + i] = dt / f.body.mass * rotation[i, n]
-        _add_column(P, b, dt, white * f.thrust[n])
+            B[n, 3 + i] = torque * J[i, n]
+            B[n, 9 + i] = torque * (rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz)
+            B[n, 6 + i] = 0.5 * dt * B[n, 9 + i]
+            B[3 + n, 9 + i] = thrust * rotation[i, n]
+            B[3 + n, 6 + i] = 0.5 * dt * B[3 + n, 9 + i]
+    _add_squares(P, B, 0, 1.0)
 
 
-@njit(cache=True)
-def _add_column(P: Array, b: Array, dt: float, variance: float) -> None:
-    """Add ``b variance b'`` to P, where ``b`` holds a noise input's rows of rate and velocity."""
+@compiled
+def _displace(x: Array, S: Array, j: int, spread: float, rho: Array, q: Array, out: Array) -> None:
+    """Write the sigma point ``spread`` along column ``j`` of the root into ``out``."""
     for i in range(3):
-        b[6 + i] = 0.5 * dt * b[9 + i]
-    for i in range(3, 12):
-        a = variance * b[i]
-        for j in range(3, 12):
-            P[i, j] += a * b[j]
+        rho[i] = spread * S[j, i]
+        out[10 + i] = x[10 + i] + spread * S[j, 3 + i]
+        out[i] = x[i] + spread * S[j, 6 + i]
+        out[7 + i] = x[7 + i] + spread * S[j, 9 + i]
+        out[13 + i] = x[13 + i] + spread * S[j, 12 + i]
+        out[16 + i] = x[16 + i] + spread * S[j, 15 + i]
+    quaternion_from_mrp(rho, q)
+    quaternion_multiply(q, x[3:7], out[3:7])
 
 
-@njit(cache=True)
-def predict(f: np.ndarray, rotor_speeds: Array, dt: float, voltage: float) -> None:
+@compiled
+def _error_from(after: Array, centre: Array, error: Array) -> None:
+    """Write the error state (18,) of one sigma point, seen from the central one, into ``error``, (24)."""
+    attitude_error(after[3:7], centre[3:7], error[0:3])
+    for i in range(3):
+        error[3 + i] = after[10 + i] - centre[10 + i]
+        error[6 + i] = after[i] - centre[i]
+        error[9 + i] = after[7 + i] - centre[7 + i]
+        error[12 + i] = after[13 + i] - centre[13 + i]
+        error[15 + i] = after[16 + i] - centre[16 + i]
+
+
+@compiled
+def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
-    x, P, S, D, mean, q, rho = f.x, f.P, f.S, f.D, f.mean, f.q, f.rho
-    centre, point, after = f.centre, f.point, f.next
+    x, P, H, E, mean, error = f.x, f.P, f.H, f.E, f.mean, f.error
     drive(f, rotor_speeds, dt, voltage)
     columns = 6 if f.wrench_count == 0 else 12
     _root(f, columns)
-    propagate(f, x, dt, centre)
-    rotation = f.centre_rotation
+    propagate(f, x, dt, f.centre)
     for i in range(3):
         for j in range(3):
-            rotation[i, j] = f.rotation[i, j]
-    spread = math.sqrt(N + NOISE + f.kappa)
-    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    row = 0
-    for j in range(columns):
-        for sign in (spread, -spread):
-            for i in range(3):
-                rho[i] = sign * S[j, i]
-                point[10 + i] = x[10 + i] + sign * S[j, 3 + i]
-                point[i] = x[i] + sign * S[j, 6 + i]
-                point[7 + i] = x[7 + i] + sign * S[j, 9 + i]
-                point[13 + i] = x[13 + i] + sign * S[j, 12 + i]
-                point[16 + i] = x[16 + i] + sign * S[j, 15 + i]
-            quaternion_from_mrp(rho, q)
-            quaternion_multiply(q, x[3:7], point[3:7])
-            propagate(f, point, dt, after)
-            attitude_error(after[3:7], centre[3:7], D[row, 0:3])
-            for i in range(3):
-                D[row, 3 + i] = after[10 + i] - centre[10 + i]
-                D[row, 6 + i] = after[i] - centre[i]
-                D[row, 9 + i] = after[7 + i] - centre[7 + i]
-                D[row, 12 + i] = after[13 + i] - centre[13 + i]
-                D[row, 15 + i] = after[16 + i] - centre[16 + i]
-            row += 1
-    _linear_rows(f, rotation, dt, f.M, f.Y)
+            f.centre_rotation[i, j] = f.rotation[i, j]
+    _linear_rows(f, f.centre_rotation, dt, f.M, f.Y)
     for i in range(12):
         for j in range(N):
             f.Z[i, j] = f.Y[j, i]
-    _linear_rows(f, rotation, dt, f.Z, P)
-    _add_noise(f, rotation, dt)
+    _linear_rows(f, f.centre_rotation, dt, f.Z, P)
+    add_noise(f, f.centre_rotation, dt)
+    spread = math.sqrt(N + NOISE + f.kappa)
+    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
+    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
+    # there where the model is nonlinear, in the first 12 rows
+    scale = math.sqrt(0.5 * weight)
     for i in range(N):
         mean[i] = 0.0
-    for k in range(row):
+    for j in range(columns):
+        for sign in range(2):
+            _displace(x, f.S, j, spread if sign == 0 else -spread, f.rho, f.q, f.point)
+            propagate(f, f.point, dt, f.next)
+            _error_from(f.next, f.centre, error[sign])
         for i in range(N):
-            mean[i] += weight * D[k, i]
-    for k in range(row):
-        for i in range(N):
-            a = weight * D[k, i]
-            for j in range(N):
-                P[i, j] += a * D[k, j]
-    for i in range(N):
-        for j in range(N):
-            P[i, j] -= mean[i] * mean[j]
-    _fold(f, centre, mean)
-    _symmetrise(P)
+            H[j, i] = scale * (error[0, i] - error[1, i])
+        for i in range(12):
+            total = error[0, i] + error[1, i]
+            E[j, i] = scale * total
+            mean[i] += weight * total  # (25)
+    for first in range(0, columns, 6):
+        _add_squares(P, H, first, 1.0)
+        _add_squares(P, E, first, 1.0)
+    for i in range(12):
+        a = mean[i]
+        for j in range(12):
+            P[i, j] -= a * mean[j]
+    _fold(f, f.centre, mean)
+    symmetrise(P)
     f.time += dt
     x[NIS] = math.nan
 
 
-@njit(cache=True)
-def _fold(f: np.ndarray, base: Array, error: Array) -> None:
-    """Make ``base`` plus the error state (18,) the estimate; the mean MRP goes into the quaternion, (25), (35), (37)."""
+@compiled
+def _fold(f: Record, base: Array, error: Array) -> None:
+    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (25), (35), (37)."""
     x = f.x
     quaternion_from_mrp(error[0:3], f.q)
     quaternion_multiply(f.q, base[3:7], f.point[3:7])
@@ -202,8 +219,8 @@ def _fold(f: np.ndarray, base: Array, error: Array) -> None:
         x[16 + i] = base[16 + i] + error[15 + i]
 
 
-@njit(cache=True)
-def _symmetrise(P: Array) -> None:
+@compiled
+def symmetrise(P: Array) -> None:
     """Make P symmetric, and hold the attitude's variance where an MRP still means something."""
     for i in range(N):
         for j in range(i):
@@ -218,8 +235,8 @@ def _symmetrise(P: Array) -> None:
                 P[j, i] *= scale
 
 
-@njit(cache=True)
-def correct(f: np.ndarray, position: Array, quaternion: Array, first: int, last: int) -> bool:
+@compiled
+def correct(f: Record, position: Array, quaternion: Array, first: int, last: int) -> bool:
     """Take in rows ``first`` to ``last`` of the measurement (rho, x), (27)-(37), unless the gate refuses it."""
     x, P, L, W, y = f.x, f.P, f.L, f.W, f.innovation
     attitude_error(quaternion, x[3:7], y[0:3])
@@ -263,57 +280,47 @@ def correct(f: np.ndarray, position: Array, quaternion: Array, first: int, last:
         for j in range(N):
             W[i, j] *= b
             mean[j] += W[i, j] * y[i]
-    for k in range(first, last):
-        for i in range(N):
-            b = W[k, i]
-            for j in range(N):
-                P[i, j] -= b * W[k, j]
+    for i in range(6):
+        if i < first or i >= last:
+            W[i, :] = 0.0
+    _add_squares(P, W, 0, -1.0)
     for i in range(NIS):
         f.centre[i] = x[i]
     _fold(f, f.centre, mean)
     return True
 
 
-@njit(cache=True)
-def step(f: np.ndarray, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` that were measured.
-
-    ``z`` (11,) holds turn rates, position and quaternion; ``parts`` is the sum of 1 (position) and 2 (attitude). What is
-    not finite was not measured. Returns 1, with the filter as it was, if the quaternion is no rotation; else 0.
-    """
-    position, attitude = parts & 1 != 0, parts & 2 != 0
-    if position:
-        position = math.isfinite(z[4] + z[5] + z[6])
-    if attitude:
-        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
-        attitude = math.isfinite(square)
-        if attitude:
-            if square < 0.81 or square > 1.21:
-                return 1
-            normalise(z[7:11])
-    if dt > 0.0:
-        for i in range(4):
-            if not math.isfinite(z[i]):
-                z[i] = f.last_speeds[i]
-            f.last_speeds[i] = z[i]
-        predict(f, z[0:4], dt, voltage)
-    if position and attitude:
+@compiled
+def correct_parts(f: Record, z: Array, parts: int) -> None:
+    """Correct with the checked ``parts`` of ``z`` (11,): 1 position, 2 attitude, 3 both."""
+    if parts == 3:
         correct(f, z[4:7], z[7:11], 0, 6)
-    elif attitude:
+    elif parts == 2:
         correct(f, z[4:7], z[7:11], 0, 3)
-    elif position:
+    elif parts == 1:
         correct(f, z[4:7], f.x[3:7], 3, 6)
-    return 0
 
 
-@njit(cache=True)
-def _step_and_copy(record: np.ndarray, z: Array, parts: int, dt: float, voltage: float, state: Array,
-                   covariance: Array) -> int:
+@compiled
+def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
+    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,) that were measured.
+
+    Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no rotation.
+    """
+    usable: int = check_sample(f, z, parts)
+    if usable >= 0:
+        if dt > 0.0:
+            predict(f, z[0:4], dt, voltage)
+        correct_parts(f, z, usable)
+    return usable
+
+
+@compiled
+def _step_and_copy(record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
     f = record[0]
-    code = step(f, z, parts, dt, voltage)
-    state[:] = f.x
-    covariance[:, :] = f.P
-    return code
+    usable: int = step(f, z, parts, dt, voltage)
+    copy_estimate(f, out)
+    return usable
 
 
 class WrenchUKF:
@@ -324,8 +331,8 @@ class WrenchUKF:
     quaternion means nothing. Turn rates that are not finite are taken to be the last ones that were.
 
     Args:
-        vehicle: the declared vehicle; its declared effects are part of the prediction model, and the estimated wrench is
-            what they do not explain.
+        vehicle: the declared vehicle; its declared effects are part of the prediction model, and the estimated wrench
+            is what they do not explain.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
         gate: refuse measurements whose NIS has a smaller chance than ``1 - gate`` (0.999, say); None takes in any.
@@ -334,6 +341,8 @@ class WrenchUKF:
     Raises:
         InputError: period or gate out of range.
     """
+
+    _compiled_step = staticmethod(_step_and_copy)
 
     def __init__(
         self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005, gate: float | None = None
@@ -348,7 +357,7 @@ class WrenchUKF:
         largest = 0.0 if gate is None else _chi2_quantile(gate)
         patience = max(1, round(_PATIENCE / period))
         self.record = filter_record(vehicle, self.tuning, self.period, largest, patience)
-        self._z = np.zeros(11)
+        self._sample = Sample()
         self._voltage = vehicle.voltage_ref
 
     def reset(
@@ -373,7 +382,7 @@ class WrenchUKF:
             InputError: a shape is wrong, a number is not finite, the quaternion is not one of a rotation, or the
                 covariance is not symmetric and positive definite.
         """
-        x = np.zeros(NIS + 1)
+        x = np.zeros(STATE_SIZE)
         for name, value, where in (("position", position, slice(0, 3)), ("quaternion", quaternion, slice(3, 7)),
                                    ("velocity", velocity, slice(7, 10)),
                                    ("angular_velocity", angular_velocity, slice(10, 13))):
@@ -406,7 +415,8 @@ class WrenchUKF:
     @property
     def estimate(self) -> WrenchEstimate:
         """What the filter believes now."""
-        return WrenchEstimate(np.array(self.record[0]["x"]), self.covariance)
+        f = self.record[0]
+        return WrenchEstimate(np.concatenate([f["x"], f["P"].ravel()]))
 
     def step(
         self,
@@ -426,46 +436,26 @@ class WrenchUKF:
         Raises:
             InputError: a shape is wrong or the quaternion's length is not 1; the filter stays as it was.
         """
-        return self._run(rotor_speeds, position, quaternion, self.period, voltage)
+        parts = self._sample.read(rotor_speeds, position, quaternion)
+        return self._run(parts, self.period, voltage)
 
     def predict(self, rotor_speeds: ArrayLike, dt: float | None = None, voltage: float | None = None) -> WrenchEstimate:
         """Carry the filter ``dt`` s (default: one period) ahead without a measurement."""
         dt = self.period if dt is None else dt
         if not (math.isfinite(dt) and dt > 0):
             raise InputError(f"predict: dt must be positive, in s, got {dt!r}")
-        return self._run(rotor_speeds, None, None, dt, voltage)
+        return self._run(self._sample.read(rotor_speeds, None, None), dt, voltage)
 
     def correct(self, position: ArrayLike | None, quaternion: ArrayLike | None) -> WrenchEstimate:
         """Take in a pose, or a part of one, measured now."""
-        return self._run(self._z[0:4], position, quaternion, 0.0, None)
+        return self._run(self._sample.read(self._sample.z[0:4], position, quaternion), 0.0, None)
 
-    def _run(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None, dt: float,
-             voltage: float | None) -> WrenchEstimate:
-        z, parts = self._z, 0
-        try:
-            if len(rotor_speeds) != 4:  # type: ignore[arg-type]
-                raise ValueError
-            z[0:4] = rotor_speeds
-            if position is not None:
-                if len(position) != 3:  # type: ignore[arg-type]
-                    raise ValueError
-                z[4:7] = position
-                parts = 1
-            if quaternion is not None:
-                if len(quaternion) != 4:  # type: ignore[arg-type]
-                    raise ValueError
-                z[7:11] = quaternion
-                parts += 2
-        except (TypeError, ValueError):
-            raise InputError(
-                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
-                f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
-            ) from None
-        state, covariance = np.empty(NIS + 1), np.empty((N, N))
+    def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
+        out = empty_estimate()
         volts = self._voltage if voltage is None else voltage
-        if _step_and_copy(self.record, z, parts, dt, volts, state, covariance):
-            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[7:11]):g}")
-        return WrenchEstimate(state, covariance)
+        if self._compiled_step(self.record, self._sample.z, parts, dt, volts, out) < 0:
+            raise self._sample.bad_quaternion()
+        return WrenchEstimate(out)
 
 
 def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.files import replaced
 from ..dynamics.vehicle import Vehicle
-from .files import replaced
 from .flight_log import FlightLog
 from .phases import FLIGHT, GROUND, LANDING, TAKE_OFF, Phase, flight_phases
 

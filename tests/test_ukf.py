@@ -159,7 +159,8 @@ def test_asynchronous_measurements_agree_with_regular_ones():
         b = halves.correct(None, q)
     np.testing.assert_allclose(a.force, b.force, atol=0.02)
     np.testing.assert_allclose(a.torque, b.torque, atol=0.002)
-    np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)  # half-steps integrate the rate a little better
+    # half-steps integrate the rate a little better
+    np.testing.assert_allclose(np.diag(a.covariance), np.diag(b.covariance), rtol=0.08)
 
 
 def test_the_gate_refuses_an_outlier_and_gives_in_to_a_lasting_change():

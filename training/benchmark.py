@@ -41,6 +41,22 @@ class Row:
     wins_over_admittance: float  # share of the paired episodes with a smaller RMSE
 
 
+def check_request(controllers: Sequence[str], scenarios: Sequence[str], episodes: int, seed: int) -> None:
+    """Check what ``fly_all`` is asked for, before anything is flown.
+
+    Raises:
+        InputError: an unknown name, no episodes, or a seed out of range.
+    """
+    if episodes < 1:
+        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
+    if not 0 <= seed < 100_000:
+        raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
+    for name in controllers:
+        make_controller(name)
+    for name in scenarios:
+        get_scenario(name)
+
+
 def fly_all(
     controllers: Sequence[str],
     scenarios: Sequence[str],
@@ -60,16 +76,9 @@ def fly_all(
         advance: called with the number of episodes flown since the last call.
 
     Raises:
-        InputError: an unknown name, or no episodes.
+        InputError: as ``check_request``.
     """
-    if episodes < 1:
-        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed < 100_000:
-        raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
-    for name in controllers:
-        make_controller(name)
-    for name in scenarios:
-        get_scenario(name)
+    check_request(controllers, scenarios, episodes, seed)
     wanted = list(dict.fromkeys([*controllers, *_REFERENCES]))
     seeds = benchmark_seeds(seed, episodes)
     tasks = [(controller, scenario, seeds[i : i + _CHUNK])
@@ -132,8 +141,9 @@ def _interval(values: np.ndarray) -> tuple[float, float]:
 
 
 def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
-    """Write ``leaderboard.json`` at once or not at all; return its path."""
+    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing is null."""
     path = folder / "leaderboard.json"
+    data = [{key: None if value != value else value for key, value in asdict(row).items()} for row in rows]
     with replaced(path) as partial:
-        partial.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n", encoding="utf-8")
+        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path

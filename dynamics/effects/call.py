@@ -4,14 +4,15 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
+from ..compiled import Record, compiled
 from .base import ROTOR_VOLTAGE, ROTORS_SIZE, SPEED, STEP, Array
 
 
-@intrinsic
-def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+@intrinsic  # type: ignore[untyped-decorator]
+def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Record, d: Any) -> Any:
     """Call the C function ``void f(double *, double *, double *, double *)`` at an address."""
     signature = types.void(types.int64, types.intp, types.intp, types.intp, types.intp)
 
@@ -25,14 +26,14 @@ def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> 
     return signature, generate
 
 
-@njit(cache=True)
+@compiled
 def add_wrenches(laws: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array) -> None:
     """Add what every wrench law says at ``state`` to ``wrench`` (6,): force in the world, torque in the body frame."""
     for i in range(len(laws)):
         _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, state.ctypes.data, wrench.ctypes.data)
 
 
-@njit(cache=True)
+@compiled
 def deliver(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array, dt: float, voltage: float,
             rotors: Array) -> None:
     """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver; ``rotors`` is (6,)."""

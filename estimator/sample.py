@@ -1,0 +1,95 @@
+"""One sample on its way into an estimator: turn rates and pose, checked, and the estimate on its way out."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..dynamics.compiled import Record, compiled
+from ..dynamics.errors import InputError
+from .estimate import STATE_SIZE, Array
+from .filter_record import N
+
+POSITION, ATTITUDE = 1, 2  # the parts of a pose; their sum is both
+
+
+class Sample:
+    """A buffer (11,) of turn rates, position and quaternion that compiled code reads."""
+
+    __slots__ = ("_position", "_quaternion", "_speeds", "z")
+
+    def __init__(self) -> None:
+        self.z = np.zeros(11)
+        self._speeds, self._position, self._quaternion = self.z[0:4], self.z[4:7], self.z[7:11]
+
+    def read(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None) -> int:
+        """Take in turn rates (4,) and what there is of a pose, (3,) and (4,); return its parts.
+
+        Raises:
+            InputError: a shape is wrong.
+        """
+        parts = 0
+        try:
+            if len(rotor_speeds) != 4:  # type: ignore[arg-type]
+                raise ValueError
+            self._speeds[:] = rotor_speeds
+            if position is not None:
+                if len(position) != 3:  # type: ignore[arg-type]
+                    raise ValueError
+                self._position[:] = position
+                parts = POSITION
+            if quaternion is not None:
+                if len(quaternion) != 4:  # type: ignore[arg-type]
+                    raise ValueError
+                self._quaternion[:] = quaternion
+                parts += ATTITUDE
+        except (TypeError, ValueError):
+            raise InputError(
+                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
+                f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
+            ) from None
+        return parts
+
+    def bad_quaternion(self) -> InputError:
+        """Return the error for a quaternion that is no rotation."""
+        return InputError(f"step: quaternion must have length 1, got {np.linalg.norm(self._quaternion):g}")
+
+
+@compiled
+def check_sample(f: Record, z: Array, parts: int) -> int:
+    """Return the ``parts`` of ``z`` (11,) that can be used, or -1 if the quaternion is no rotation.
+
+    Turn rates that are not finite become the last ones that were; the quaternion is brought to length 1.
+    """
+    usable = 0
+    if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
+        usable += 1
+    if parts & 2 != 0:
+        square = z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10]
+        if math.isfinite(square):
+            if square < 0.81 or square > 1.21:
+                return -1
+            scale = 1.0 / math.sqrt(square)
+            for i in range(7, 11):
+                z[i] *= scale
+            usable += 2
+    for i in range(4):
+        if not math.isfinite(z[i]):
+            z[i] = f.last_speeds[i]
+        f.last_speeds[i] = z[i]
+    return usable
+
+
+@compiled
+def copy_estimate(f: Record, out: Array) -> None:
+    """Write state (20) and covariance (18 x 18) one after the other into ``out`` (344,)."""
+    for i in range(STATE_SIZE):
+        out[i] = f.x[i]
+    for i in range(N):
+        for j in range(N):
+            out[STATE_SIZE + N * i + j] = f.P[i, j]
+
+
+def empty_estimate() -> Array:
+    """Return an array that ``copy_estimate`` can fill."""
+    return np.empty(STATE_SIZE + N * N)

@@ -1,0 +1,3 @@
+"""The paper, figure by figure: one file each, run by ``windwrench reproduce``."""
+
+NAMES = ("fig3", "fig4", "fig5", "fig6", "fig7", "extension")

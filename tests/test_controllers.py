@@ -1,0 +1,142 @@
+"""Controllers: which way they push, and what they need."""
+
+import numpy as np
+import pytest
+from windwrench.controllers import CONTROLLERS, Admittance, Hover, Oracle, Ratio, make_controller
+from windwrench.controllers.flight import flight_record, fly, move_setpoint
+from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.rotation import quaternion_of_yaw
+from windwrench.estimator.estimate import STATE_SIZE
+
+VEHICLE = load_vehicle("ardrone2")
+TORQUES = [0.001, 0.01, 0.03, 0.2]
+
+
+def observation(torque=0.0, force=0.5):
+    o = np.zeros(OBSERVATION_SIZE, dtype=np.float32)
+    o[TORQUE_Z], o[FORCE_X] = torque, force
+    return o
+
+
+def info(fan_y=0.0, y=0.0, fan_velocity=0.0):
+    return {"fan_y": fan_y, "y": y, "fan_velocity": fan_velocity}
+
+
+@pytest.mark.parametrize("name", sorted(CONTROLLERS))
+def test_a_command_is_one_number_within_bounds(name):
+    controller = make_controller(name)
+    controller.reset()
+    for torque in (0.0, 0.02, -5.0):
+        command = controller(observation(torque), info(fan_y=3.0, y=-3.0, fan_velocity=0.5))
+        assert command.shape == (1,)
+        assert abs(command[0]) <= MAX_COMMAND
+
+
+@pytest.mark.parametrize("make", [Admittance, Ratio])
+@pytest.mark.parametrize("torque", TORQUES)
+def test_the_admittance_laws_push_towards_the_axis_from_both_sides(make, torque):
+    # the torque is positive at positive y
+    assert make()(observation(torque))[0] < 0
+    assert make()(observation(-torque))[0] > 0
+
+
+@pytest.mark.parametrize("make", [Admittance, Ratio])
+@pytest.mark.parametrize("torque", TORQUES)
+def test_the_admittance_laws_are_odd_in_the_torque(make, torque):
+    np.testing.assert_array_equal(make()(observation(torque)), -make()(observation(-torque)))
+    assert make()(observation(0.0))[0] == 0.0
+
+
+def test_the_admittance_law_is_proportional_until_its_bound():
+    controller = Admittance(gain=20.0)
+    assert controller(observation(0.02))[0] == pytest.approx(-0.4)
+    assert controller(observation(0.04))[0] == pytest.approx(-0.8)
+    assert controller(observation(1.0))[0] == -MAX_COMMAND
+
+
+def test_the_ratio_grows_as_the_force_falls_but_not_without_bound():
+    controller = Ratio(gain=8.0, least_force=0.1)
+    assert controller(observation(0.01, 0.5))[0] == pytest.approx(-0.16)
+    assert controller(observation(0.01, 0.25))[0] == pytest.approx(-0.32)
+    assert controller(observation(0.01, 0.001))[0] == controller(observation(0.01, -1.0))[0] == pytest.approx(-0.8)
+
+
+def test_hover_does_nothing():
+    assert Hover()(observation(0.5))[0] == 0.0
+
+
+def test_the_oracle_moves_with_the_fan_and_towards_it():
+    oracle = Oracle()
+    assert oracle(observation(), info(fan_velocity=0.3))[0] == pytest.approx(0.3)
+    assert oracle(observation(), info(fan_y=0.2))[0] > 0
+    assert oracle(observation(), info(y=0.2))[0] < 0
+
+
+def test_the_oracle_needs_to_see_the_fan():
+    with pytest.raises(InputError, match=r"oracle: needs the environment's info"):
+        Oracle()(observation())
+
+
+def test_an_unknown_controller_names_the_nearest():
+    with pytest.raises(InputError, match="Did you mean 'admittance'"):
+        make_controller("admitance")
+
+
+def state(position=(0.0, 0.0, 1.0), yaw=0.0, velocity=(0.0, 0.0, 0.0), rate=(0.0, 0.0, 0.0)):
+    x = np.zeros(STATE_SIZE)
+    x[:3], x[3:7], x[7:10], x[10:13] = position, quaternion_of_yaw(yaw), velocity, rate
+    return x
+
+
+def steer(x, setpoint):
+    """Thrust and torques (4,) that the flight loop asks for."""
+    c = flight_record(VEHICLE)[0]
+    c["setpoint"][:] = 0.0
+    for index, value in setpoint.items():
+        c["setpoint"][index] = value
+    fly(c, x, 0.005)
+    return VEHICLE.rotor_wrench(c["command"])
+
+
+def test_the_flight_loop_hovers_at_its_set_point():
+    np.testing.assert_allclose(steer(state(), {2: 1.0}), [VEHICLE.weight, 0, 0, 0], atol=1e-9)
+
+
+def test_the_flight_loop_climbs_tilts_and_turns_the_right_way():
+    assert steer(state(), {2: 1.1})[0] > VEHICLE.weight
+    assert steer(state(), {0: 0.1, 2: 1.0})[2] > 0  # forward: nose down, about +y
+    assert steer(state(), {1: 0.1, 2: 1.0})[1] < 0  # left: about -x
+    assert steer(state(), {2: 1.0, 9: 0.1})[3] > 0
+    # facing backwards, forward in the world is backwards for the body
+    assert steer(state(yaw=np.pi), {0: 0.1, 2: 1.0, 9: np.pi})[2] < 0
+
+
+def test_the_flight_loop_damps_motion():
+    assert steer(state(velocity=(0.5, 0, 0)), {2: 1.0})[2] < 0
+    for axis in range(3):
+        rate = np.zeros(3)
+        rate[axis] = 1.0
+        assert steer(state(rate=rate), {2: 1.0})[1 + axis] < 0
+
+
+def test_the_shorter_way_round_is_taken():
+    assert steer(state(yaw=3.0), {2: 1.0, 9: -3.0})[3] > 0
+
+
+def test_the_flight_loop_s_commands_can_be_flown():
+    for where in ({0: 100.0, 1: -100.0, 2: 100.0, 9: 3.0}, {2: -100.0}):
+        c = flight_record(VEHICLE)[0]
+        for index, value in where.items():
+            c["setpoint"][index] = value
+        fly(c, state(rate=(30.0, -30.0, 10.0)), 0.005)
+        assert np.all(np.isfinite(c["command"]))
+        assert np.all((c["command"] >= 0) & (c["command"] <= VEHICLE.omega_max))
+
+
+def test_a_moving_set_point_waits_for_the_vehicle():
+    c = flight_record(VEHICLE)[0]
+    c["setpoint"][4] = 1.0
+    for _ in range(400):
+        move_setpoint(c, np.zeros(3), 0.005)
+    assert c["setpoint"][1] == pytest.approx(c["leash"])

@@ -1,0 +1,122 @@
+"""One effect, three uses: every effect of the library is described, flown by the plant and used by the estimator."""
+
+import sys
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
+from windwrench.dynamics.effects import check_setting, compile_effects, get, names, parse_setting
+from windwrench.envs.plant import PlantSettings
+from windwrench.envs.recording import record_flight
+from windwrench.identification.estimate import estimate_log
+from windwrench.identification.flight_log import FlightLog
+
+# nothing but the effect comes between model and flight: no disturbance, no lag, no quantised turn rates, no noise
+QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False)
+VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0, mocap=Mocap(200.0, 1e-4, 5e-4))
+# where an effect shows; "excite" shows most of them
+FLIGHTS = {"ground_effect": "ground"}
+LEAST_GAIN = 3.0  # by how much declaring an effect lowers the RMS of the wrench that is left
+
+
+@cache
+def flight(name=None, trajectory=None):
+    effects = () if name is None else (parse_setting(name, VEHICLE),)
+    columns = record_flight(VEHICLE, effects, trajectory or FLIGHTS.get(name, "excite"), 12.0, 1, QUIET)
+    return FlightLog(**columns)
+
+
+def remaining(log, vehicle):
+    """RMS of the estimated wrench, in parts of weight and of weight times arm, once the filter has settled."""
+    series = estimate_log(log, vehicle)
+    settled = series.t > 4.0
+    wrench = np.concatenate([series.force / vehicle.weight, series.torque / (vehicle.weight * vehicle.arm_l)], axis=1)
+    return np.sqrt(np.mean(np.sum(wrench[settled] ** 2, axis=1)))
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_effect_says_what_it_is(name):
+    effect = get(name)
+    assert effect.name == name
+    assert effect.kind in ("rotor input", "wrench", "body", "sensing")
+    assert effect.source.strip()
+    assert len((sys.modules[f"windwrench.dynamics.effects.{name}"].__doc__ or "").strip()) > 40
+    assert 0 < len(effect.coefficients) <= 8
+    assert len({c.name for c in effect.coefficients}) == len(effect.coefficients)
+    for c in effect.coefficients:
+        assert c.unit.strip()
+        assert c.meaning.strip()
+        assert all(np.isfinite(size) and c.minimum <= size <= c.maximum for size in c.typical)
+    for size in (0, 1):
+        assert any(c.typical[size] != 0 for c in effect.coefficients)
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_effect_has_the_function_of_its_kind(name):
+    effect = get(name)
+    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend, "sensing": effect.sense}
+    assert functions[effect.kind] is not None
+    if effect.law is not None:
+        assert effect.law.address != 0
+        bundle = compile_effects(VEHICLE.with_effects(parse_setting(name)))
+        laws = bundle.wrench_laws if effect.kind == "wrench" else bundle.rotor_laws
+        assert effect.law.address in laws
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_plant_flies_an_effect(name):
+    trajectory = FLIGHTS.get(name, "excite")
+    with_effect, without = flight(name), flight(None, trajectory)
+    assert not np.allclose(with_effect.rotor_speeds, without.rotor_speeds, rtol=1e-4, atol=0)
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_estimator_explains_an_effect_once_it_is_declared(name):
+    log = flight(name)
+    unexplained = remaining(log, VEHICLE)
+    explained = remaining(log, VEHICLE.with_effects(parse_setting(name, VEHICLE)))
+    assert explained < unexplained / LEAST_GAIN
+
+
+def test_the_same_flight_comes_out_twice():
+    again = record_flight(VEHICLE, (), "excite", 12.0, 1, QUIET)
+    np.testing.assert_array_equal(again["position"], flight(None, "excite").position)
+    np.testing.assert_array_equal(again["rotor_speeds"], flight(None, "excite").rotor_speeds)
+
+
+def test_a_bare_name_takes_the_sizes_of_the_vehicle():
+    small = parse_setting("rotor_drag", load_vehicle("crazyflie"))
+    assert small.coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[1]
+    assert parse_setting("rotor_drag").coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[0]
+
+
+def test_coefficients_on_a_command_line():
+    setting = parse_setting("rotor_drag:kdx=1e-4, kdy=2e-4")
+    assert setting == EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4})
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("rotordrag", "Did you mean 'rotor_drag'"),
+    ("rotor_drag:kd=1", "kdx"),
+    ("rotor_drag:kdx", "coef=value"),
+    ("rotor_drag:kdx=much", "coef=value"),
+    ("rotor_drag:kdx=nan", "finite"),
+    ("rotor_drag:kdx=-1", "between"),
+    ("motor_lag:tau=9", "between 0 and 0.5 s"),
+    ("", "unknown effect"),
+])
+def test_a_bad_setting_is_named(text, words):
+    with pytest.raises(InputError, match=words):
+        parse_setting(text)
+
+
+def test_a_setting_out_of_range_names_its_place():
+    with pytest.raises(InputError, match=r"here: effect motor_lag: tau"):
+        check_setting(EffectSetting("motor_lag", {"tau": -0.1}), "here")
+
+
+def test_too_many_effects_are_refused():
+    with pytest.raises(InputError, match="at most"):
+        record_flight(VEHICLE, (parse_setting("constant_force"),) * 17, "hover", 1.0)

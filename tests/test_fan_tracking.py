@@ -1,0 +1,255 @@
+"""The fan-tracking environment: its interface, its repeatability, how it starts and ends."""
+
+import hashlib
+import subprocess
+import sys
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import windwrench
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.envs import SCENARIOS, Fan, FanTrackingEnv, Scenario
+
+NAME = "windwrench/FanTracking-v0"
+
+
+def commands(count, seed=0):
+    return np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 1)).astype(np.float32)
+
+
+def fly(env, seed, count=15):
+    """Everything that an episode's first decisions return, as one array."""
+    observation, info = env.reset(seed=seed)
+    rows = [[*observation, 0.0, info["y"], info["fan_y"]]]
+    for action in commands(count):
+        observation, reward, _, _, info = env.step(action)
+        rows.append([*observation, reward, info["y"], info["fan_y"]])
+    return np.array(rows, dtype=np.float64)
+
+
+def test_gymnasium_s_checker_finds_nothing():
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gym.make(NAME).unwrapped, skip_render_check=True)
+
+
+def test_stable_baselines_checker_finds_nothing():
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(gym.make(NAME), warn=True)
+
+
+def test_the_name_makes_it_with_a_time_limit():
+    env = gym.make(NAME, scenario="static")
+    assert isinstance(env.unwrapped, FanTrackingEnv)
+    assert env.spec.max_episode_steps == 250
+    assert windwrench.__version__
+
+
+def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):
+    code = ("import gymnasium as gym, sys\n"
+            "env = gym.make('windwrench:windwrench/FanTracking-v0')\n"
+            "print(env.reset(seed=1)[0].shape)")
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "(8,)", done.stderr
+
+
+def test_a_seed_repeats_an_episode_bit_for_bit():
+    env = FanTrackingEnv()
+    first = fly(env, 7)
+    np.testing.assert_array_equal(fly(env, 7), first)
+    np.testing.assert_array_equal(fly(FanTrackingEnv(), 7), first)
+    assert not np.array_equal(fly(env, 8), first)
+
+
+@pytest.mark.parametrize("scenario", ["base", "varied"])
+def test_an_episode_does_not_feel_another_environment(scenario):
+    alone = fly(FanTrackingEnv(scenario), 3)
+    env, other = FanTrackingEnv(scenario), FanTrackingEnv("gusty")
+    other.reset(seed=9)
+    observation, info = env.reset(seed=3)
+    rows = [[*observation, 0.0, info["y"], info["fan_y"]]]
+    for action in commands(15):
+        other.step(np.array([0.7], np.float32))
+        observation, reward, _, _, info = env.step(action)
+        other.step(np.array([-0.2], np.float32))
+        rows.append([*observation, reward, info["y"], info["fan_y"]])
+    np.testing.assert_array_equal(np.array(rows, dtype=np.float64), alone)
+
+
+def test_an_episode_does_not_feel_numpy_s_global_random_state():
+    env = FanTrackingEnv("gusty")
+    first = fly(env, 5)
+    np.random.seed(123)  # noqa: NPY002
+    np.random.random(1000)  # noqa: NPY002
+    np.testing.assert_array_equal(fly(env, 5), first)
+
+
+def test_an_episode_leaves_numpy_s_global_random_state_alone():
+    np.random.seed(5)  # noqa: NPY002
+    expected = np.random.random(3)  # noqa: NPY002
+    np.random.seed(5)  # noqa: NPY002
+    fly(FanTrackingEnv("varied"), 5, 3)
+    np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
+
+
+def test_another_process_flies_the_same_episode(tmp_path):
+    code = ("import numpy as np, hashlib, windwrench, gymnasium as gym\n"
+            "env = gym.make('windwrench/FanTracking-v0').unwrapped\n"
+            "o, i = env.reset(seed=11); rows = [[*o, 0.0, i['y'], i['fan_y']]]\n"
+            "for a in np.random.default_rng(0).uniform(-0.5, 0.5, (15, 1)).astype(np.float32):\n"
+            "    o, r, _, _, i = env.step(a); rows.append([*o, r, i['y'], i['fan_y']])\n"
+            "print(hashlib.sha256(np.array(rows, dtype=np.float64).tobytes()).hexdigest())")
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == hashlib.sha256(fly(FanTrackingEnv(), 11).tobytes()).hexdigest(), done.stderr
+
+
+@pytest.mark.parametrize("scenario", sorted(SCENARIOS))
+def test_every_scenario_resets_and_steps(scenario):
+    env = FanTrackingEnv(scenario)
+    observation, info = env.reset(seed=0)
+    low, high = SCENARIOS[scenario].offset
+    assert low - 0.15 <= abs(info["offset"]) <= high + 0.15  # it drifts while the filter settles
+    for action in commands(10):
+        assert observation in env.observation_space
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert reward == info["reward_tracking"] + info["reward_change"]
+        assert not terminated
+        assert not truncated
+    assert observation in env.observation_space
+    assert info["time"] == pytest.approx(0.8)
+
+
+def test_the_reward_is_as_stated():
+    env = FanTrackingEnv()
+    env.reset(seed=2)
+    last = 0.0
+    for command in (0.4, -0.2, 1.0, 3.0):  # the last is clipped to 1
+        _, reward, _, _, info = env.step(np.array([command], np.float32))
+        used = min(float(np.float32(command)), 1.0)
+        assert reward == pytest.approx(1 / (1 + (info["offset"] / 0.3) ** 2) - 0.05 * (used - last) ** 2, rel=1e-12)
+        assert info["offset"] == pytest.approx(info["y"] - info["fan_y"])
+        last = used
+
+
+def test_the_observation_is_the_estimated_wrench_velocity_and_last_command():
+    env = FanTrackingEnv("static")
+    env.reset(seed=4)
+    for _ in range(25):
+        observation, _, _, _, info = env.step(np.array([0.25], np.float32))
+    assert observation[7] == np.float32(0.25)
+    assert observation[6] == pytest.approx(0.25, abs=0.15)
+    assert observation[0] == pytest.approx(info["force"][0], abs=0.25)
+    assert env.loop.velocity[1] == pytest.approx(observation[6], abs=0.05)
+
+
+def test_the_estimate_tells_the_side_of_the_axis():
+    torques = {}
+    for seed in range(8):
+        env = FanTrackingEnv(Scenario("still, half a metre off", motions=("still",), offset=(0.5, 0.5)))
+        _, info = env.reset(seed=seed)
+        seen = []
+        for _ in range(25):
+            observation, _, _, _, info = env.step(np.zeros(1, np.float32))
+            seen.append(observation[5])
+        torques.setdefault(float(np.sign(info["offset"])), []).append(np.mean(seen))
+    assert np.mean(torques[1.0]) > 0.015
+    assert np.mean(torques[-1.0]) < -0.015
+
+
+@pytest.mark.parametrize("action", [
+    np.array([np.nan]), np.array([np.inf]), np.zeros(2), np.zeros((1, 1)), 0.3, np.array([]),
+])
+def test_a_bad_action_is_named(action):
+    env = FanTrackingEnv()
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"action must be one finite number in m/s, shape \(1,\)"):
+        env.step(action)
+
+
+def test_an_unknown_scenario_names_the_nearest():
+    with pytest.raises(InputError, match="Did you mean 'static'"):
+        gym.make(NAME, scenario="statik")
+
+
+def test_an_unknown_vehicle_and_effect_are_named():
+    with pytest.raises(InputError, match="Did you mean 'crazyflie'"):
+        FanTrackingEnv(vehicle="crazyfly")
+    with pytest.raises(InputError, match="unknown effect 'drag'"):
+        FanTrackingEnv(effects=[EffectSetting("drag", {})])
+
+
+def test_a_bad_render_mode_is_named():
+    with pytest.raises(InputError, match="human, rgb_array or None, got 'ansi'"):
+        FanTrackingEnv(render_mode="ansi")
+
+
+def test_step_and_render_before_reset_are_named():
+    env = FanTrackingEnv(render_mode="rgb_array")
+    with pytest.raises(InputError, match="reset before step"):
+        env.step(np.zeros(1, np.float32))
+    with pytest.raises(InputError, match="reset"):
+        env.render()
+    with pytest.raises(InputError, match="render_mode"):
+        FanTrackingEnv().render()
+
+
+def test_a_given_fan_path_is_followed():
+    env = FanTrackingEnv("static", fan_path=lambda t: 0.1 * np.sin(t))
+    _, info = env.reset(seed=0)
+    assert info["fan_motion"] == "given"
+    for k in range(1, 30):
+        _, _, _, _, info = env.step(np.zeros(1, np.float32))
+        assert info["fan_y"] == pytest.approx(0.1 * np.sin(k * 0.08 - 0.005), abs=1e-9)
+        assert info["fan_velocity"] == pytest.approx(0.1 * np.cos(k * 0.08), abs=1e-3)
+
+
+@pytest.mark.parametrize("path", [lambda t: 0.0, lambda t: t[:-1], lambda t: np.full_like(t, np.nan)])
+def test_a_bad_fan_path_is_named(path):
+    with pytest.raises(InputError, match="fan_path must return"):
+        FanTrackingEnv(fan_path=path).reset(seed=0)
+
+
+def test_an_episode_is_truncated_after_250_decisions():
+    env = gym.make(NAME, scenario="static")
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(250)]
+    assert ends[:-1] == [(False, False)] * 249
+    assert ends[-1] == (False, True)
+
+
+def test_a_vehicle_that_leaves_is_lost():
+    env = FanTrackingEnv("static")
+    env.reset(seed=0)
+    side = np.sign(env.loop.position[1])
+    terminated = False
+    while not terminated:
+        assert env.loop.time < 6.0
+        observation, reward, terminated, truncated, info = env.step(np.array([side], np.float32))
+        assert observation in env.observation_space
+    assert not truncated
+    assert info["lost"]
+    assert abs(info["offset"]) > 2.5
+    assert reward < 0.05
+
+
+def test_a_stronger_fan_pushes_harder():
+    forces = []
+    for speed in (3.0, 4.5):
+        env = FanTrackingEnv("base", fan=Fan(speed=speed))
+        env.reset(seed=1)
+        forces.append(np.mean([env.step(np.zeros(1, np.float32))[4]["force"][0] for _ in range(20)]))
+    assert forces[1] > 1.3 * forces[0]
+
+
+def test_an_undeclared_effect_changes_the_flight_and_a_vehicle_may_be_given():
+    vehicle = load_vehicle("ardrone2")
+    plain = fly(FanTrackingEnv(vehicle=vehicle), 0, 5)
+    np.testing.assert_array_equal(fly(FanTrackingEnv(), 0, 5), plain)
+    heavy = fly(FanTrackingEnv(effects=[EffectSetting("mass", {"dm": 0.03})]), 0, 5)
+    assert heavy[-1, 2] < plain[-1, 2] - 0.15  # the filter reads the extra weight as a force down

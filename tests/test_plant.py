@@ -1,0 +1,227 @@
+"""The plant against the mechanics of a rigid body, and what it senses."""
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.jet import Fan, fan_record, jet_table
+from windwrench.envs.plant import (
+    NOISE,
+    SUBSTEPS,
+    TICK,
+    PlantSettings,
+    actuate,
+    load_world,
+    plant_record,
+    reset_plant,
+    sense,
+)
+from windwrench.envs.recording import TRAJECTORIES, record_flight
+from windwrench.identification.estimate import estimate_log
+from windwrench.identification.flight_log import FlightLog
+
+QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False)
+VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0)
+HOVER = VEHICLE.hover_rate
+
+
+class Bench:
+    """A plant driven by turn rates, without filter and flight loop."""
+
+    def __init__(self, vehicle=VEHICLE, settings=QUIET, position=(0.0, 0.0, 5.0), quaternion=(1.0, 0.0, 0.0, 0.0)):
+        self.record, body = plant_record(vehicle, settings)
+        self.plant = self.record[0]
+        reset_plant(self.plant, body)
+        self.model, self.data = load_world(body)
+        self.data.qpos[:3], self.data.qpos[3:7] = position, quaternion
+        self.fan = fan_record(Fan(speed=0.0), vehicle.positions, TICK)
+        self.table = jet_table(0.45, 0.10)
+
+    def run(self, command, ticks, noise=None):
+        """Hold turn rates (4,) for some ticks; return position, attitude, velocity and body rate after each (n, 13)."""
+        rows = np.empty((ticks, 13))
+        xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
+        for k in range(ticks):
+            actuate(self.plant, np.asarray(command, float), self.fan[0], *self.table, self.data.qpos, self.data.qvel,
+                    np.zeros(NOISE) if noise is None else noise[k], xfrc)
+            mujoco.mj_step(self.model, self.data, SUBSTEPS)
+            rows[k] = np.concatenate([self.data.qpos, self.data.qvel])
+        return rows
+
+
+def test_without_thrust_it_falls_freely():
+    rows = Bench().run(np.zeros(4), 100)
+    t = TICK * np.arange(1, 101)
+    np.testing.assert_allclose(rows[:, 9], -VEHICLE.gravity * t, rtol=1e-9)
+    np.testing.assert_allclose(rows[:, 2], 5.0 - 0.5 * VEHICLE.gravity * t**2, atol=0.5 * VEHICLE.gravity * TICK * t[-1])
+    np.testing.assert_array_equal(rows[:, 3], 1.0)
+
+
+def test_at_the_hover_rate_it_hangs():
+    rows = Bench().run(np.full(4, HOVER), 400)
+    np.testing.assert_allclose(rows[-1], [0, 0, 5, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_torque_step_turns_it_as_a_rigid_body(axis):
+    torque = np.zeros(3)
+    torque[axis] = 0.004
+    rows = Bench().run(VEHICLE.rotor_speeds(VEHICLE.weight, torque), 40)
+    t = TICK * np.arange(1, 41)
+    alpha = torque[axis] / VEHICLE.inertia[axis, axis]
+    np.testing.assert_allclose(rows[:, 10 + axis], alpha * t, rtol=1e-9)
+    angle = Rotation.from_quat(rows[:, 3:7], scalar_first=True).as_rotvec()[:, axis]
+    np.testing.assert_allclose(angle, 0.5 * alpha * t**2, atol=alpha * TICK / SUBSTEPS * t[-1])
+    others = [i for i in range(3) if i != axis]
+    np.testing.assert_allclose(rows[:, [10 + i for i in others]], 0.0, atol=1e-12)
+
+
+def test_thrust_points_along_the_body_s_own_vertical():
+    q = Rotation.from_euler("zyx", [2.0, 0.3, -0.4])
+    rows = Bench(quaternion=q.as_quat(scalar_first=True)).run(np.full(4, HOVER), 1)
+    acceleration = rows[0, 7:10] / TICK
+    np.testing.assert_allclose(acceleration, VEHICLE.gravity * (q.as_matrix()[:, 2] - [0, 0, 1]), rtol=1e-9)
+
+
+def test_a_free_spin_keeps_energy_and_angular_momentum():
+    inertia = np.array([[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]])
+    bench = Bench(replace(VEHICLE, inertia=inertia), position=(0, 0, 50.0))
+    bench.data.qvel[3:6] = start = np.array([2.0, -3.0, 1.0])
+    rows = bench.run(np.zeros(4), 100)
+    omega = rows[:, 10:13]
+    momentum = Rotation.from_quat(rows[:, 3:7], scalar_first=True).apply(omega @ inertia)
+    np.testing.assert_allclose(momentum[-1], inertia @ start, atol=0.03 * np.linalg.norm(inertia @ start))
+    energy = np.einsum("ni,ij,nj->n", omega, inertia, omega)
+    np.testing.assert_allclose(energy, start @ inertia @ start, rtol=0.03)
+
+
+def test_the_motors_follow_their_commands_with_the_stated_lag():
+    bench = Bench(settings=replace(QUIET, motor_lag=0.04))
+    command, logged = np.array([500.0, 400.0, 300.0, HOVER]), []
+    for _ in range(30):
+        bench.run(command, 1)
+        logged.append(bench.plant["z"][:4].copy())
+    decay = np.exp(-TICK * np.arange(1, 31) / 0.04)[:, None]
+    np.testing.assert_allclose(logged, command + (HOVER - command) * decay, rtol=1e-12)
+
+
+def test_a_motor_turns_neither_backwards_nor_too_fast():
+    bench = Bench()
+    bench.run([-100.0, 1e4, 0.0, HOVER], 1)
+    np.testing.assert_allclose(bench.plant["z"][:4], [0.0, VEHICLE.omega_max, 0.0, HOVER])
+
+
+def test_logged_rates_are_multiples_of_the_sensor_s_step_and_true_ones_are_not():
+    vehicle = load_vehicle("ardrone2")
+    assert vehicle.omega_lsb > 0
+    log = record_flight(vehicle, seconds=3.0, seed=4)["rotor_speeds"][1:]
+    steps = log / vehicle.omega_lsb
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    assert len(np.unique(np.round(steps))) > 5
+    bench = Bench(vehicle)
+    bench.run([401.0] * 4, 1)
+    # the body gets the thrust of the true rate
+    assert bench.plant["rotor_wrench"][0] == pytest.approx(4 * vehicle.k[0] * 401.0**2, rel=1e-12)
+    assert bench.plant["z"][0] != 401.0
+
+
+def sensed(quaternion, count=400, settings=QUIET, seed=0):
+    bench = Bench(settings=settings, quaternion=quaternion)
+    rng = np.random.default_rng(seed)
+    rows, seen = np.empty((count, 7)), np.empty(count)
+    for k in range(count):
+        seen[k] = sense(bench.plant, bench.data.qpos, rng.standard_normal(NOISE))
+        rows[k] = bench.plant["z"][4:11]
+    return rows, seen
+
+
+def test_the_pose_s_scalar_part_is_never_negative_so_its_sign_flips_facing_backwards():
+    q = Rotation.from_euler("z", math.pi).as_quat(scalar_first=True)
+    rows, _ = sensed(q, settings=replace(QUIET, sensor_noise=True))
+    assert rows[:, 3].min() >= 0.0
+    flips = np.count_nonzero(np.diff(np.sign(rows[:, 6])))
+    assert flips > 50  # of 400 samples; noise alone decides the sign
+    np.testing.assert_allclose(np.linalg.norm(rows[:, 3:], axis=1), 1.0, atol=1e-14)
+
+
+def test_the_pose_s_noise_has_the_stated_size_and_stands_in_the_world():
+    q = Rotation.from_euler("zx", [1.0, 0.8])
+    vehicle = VEHICLE.mocap
+    rows, _ = sensed(q.as_quat(scalar_first=True), 4000, replace(QUIET, sensor_noise=True))
+    np.testing.assert_allclose(rows[:, :3].std(axis=0), vehicle.sigma_pos_m, rtol=0.1)
+    error = (Rotation.from_quat(rows[:, 3:], scalar_first=True) * q.inv()).as_rotvec()
+    np.testing.assert_allclose(error.std(axis=0), vehicle.sigma_att_rad, rtol=0.1)
+
+
+def test_without_sensor_noise_the_pose_is_the_truth():
+    rows, seen = sensed((0.6, 0.0, 0.8, 0.0), 3)
+    np.testing.assert_allclose(rows, np.tile([0, 0, 5.0, 0.6, 0, 0.8, 0], (3, 1)), atol=1e-15)
+    assert np.all(seen == 3)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.05, 0.4])
+def test_dropouts_come_at_the_stated_rate(rate):
+    _, seen = sensed((1.0, 0.0, 0.0, 0.0), 4000, replace(QUIET, dropout=rate))
+    lost = np.mean(seen == 0)
+    assert abs(lost - rate) <= 4 * math.sqrt(rate * (1 - rate) / 4000)
+
+
+def test_the_filter_flies_on_through_dropouts():
+    loop = ClosedLoop(VEHICLE, settings=PlantSettings(dropout=0.3))
+    rng = np.random.default_rng(3)
+    loop.reset(rng, np.array([0.0, 0.0, 1.5]), math.pi)
+    loop.run(rng.standard_normal((2000, NOISE)))
+    assert loop.healthy()
+    np.testing.assert_allclose(loop.position, [0, 0, 1.5], atol=0.05)
+    np.testing.assert_allclose(loop.state[:3], loop.position, atol=0.01)
+    assert np.linalg.eigvalsh(loop.covariance)[0] > 0
+
+
+def test_the_disturbance_has_the_stated_size():
+    bench = Bench(settings=PlantSettings(motor_lag=0.0, sensor_noise=False, disturbance_time=0.05))
+    rng, samples = np.random.default_rng(5), []
+    for _ in range(8000):
+        bench.run(np.full(4, HOVER), 1, rng.standard_normal((1, NOISE)))
+        samples.append(bench.plant["disturbance"].copy())
+    np.testing.assert_allclose(np.std(samples, axis=0), [0.03] * 3 + [0.01] * 3, rtol=0.15)
+
+
+def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
+    effects = (EffectSetting("constant_force", {"fx": 0.1}), EffectSetting("constant_torque", {"tz": 0.01}))
+    log = record_flight(VEHICLE, effects, "hover", 3.0, 0, QUIET)
+    np.testing.assert_allclose(log["force"][1:], np.tile([0.1, 0, 0], (600, 1)), atol=1e-12)
+    np.testing.assert_allclose(log["torque"][1:, 2], 0.01, rtol=1e-3)
+
+
+@pytest.mark.parametrize("inertia", [None, [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]])
+@pytest.mark.parametrize("com", [(0.01, -0.02, 0.0), (0.0, 0.0, 0.05)])
+def test_a_centre_of_mass_off_the_rotors_moves_as_in_the_filter_s_model(com, inertia):
+    vehicle = VEHICLE if inertia is None else replace(VEHICLE, inertia=np.array(inertia))
+    vehicle = replace(vehicle, mocap=Mocap(200.0, 1e-4, 5e-4))
+    offset = EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True)))
+    log = FlightLog(**record_flight(vehicle, (offset,), "yaw", 12.0, 2, QUIET))
+    series = estimate_log(log, vehicle.with_effects(offset))
+    settled = series.t > 4.0
+    assert np.abs(series.force[settled]).max() < 0.02
+    assert np.abs(series.torque[settled]).max() < 0.002
+
+
+@pytest.mark.parametrize("trajectory", sorted(TRAJECTORIES))
+def test_every_trajectory_is_flown_without_touching_the_ground(trajectory):
+    columns = record_flight(load_vehicle("ardrone2"), (), trajectory, 15.0, 0)
+    assert columns["position"][:, 2].min() > 0.05
+    assert np.all(np.isfinite(columns["position"]))
+    assert np.abs(columns["force"]).max() < 0.1  # the background only
+    assert np.all(np.abs(columns["voltage"] / 11.1 - 1.0) < 0.15)
+
+
+@pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie", "hummingbird"])
+def test_every_preset_holds_its_place(vehicle):
+    columns = record_flight(load_vehicle(vehicle), (), "hover", 8.0, 0)
+    error = columns["position"][800:] - [0, 0, 1.2]
+    assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 0.05

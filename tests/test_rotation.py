@@ -1,0 +1,124 @@
+"""Rotations against scipy's, over drawn quaternions."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from windwrench.dynamics import rotation as r
+
+numbers = st.floats(-1.0, 1.0, allow_nan=False, width=64)
+quaternions = (
+    st.tuples(numbers, numbers, numbers, numbers)
+    .map(np.array)
+    .filter(lambda q: np.linalg.norm(q) > 0.05)
+    .map(lambda q: q / np.linalg.norm(q))
+)
+rates = st.tuples(*[st.floats(-40.0, 40.0)] * 3)
+
+
+def drawn(*strategies):
+    """``given`` without a deadline: the first call of a compiled function compiles it."""
+    return lambda test: settings(deadline=None)(given(*strategies)(test))
+
+
+def scipy_of(q):
+    return Rotation.from_quat(q, scalar_first=True)
+
+
+def call(function, *arguments, shape=4):
+    out = np.full(shape, np.nan)
+    function(*arguments, out)
+    return out
+
+
+def mrp_of(rotation):
+    """axis * tan(angle / 4), from the rotation vector."""
+    vector = rotation.as_rotvec()
+    angle = np.linalg.norm(vector)
+    return np.zeros(3) if angle == 0 else vector / angle * np.tan(angle / 4)
+
+
+@drawn(quaternions, quaternions)
+def test_a_product_turns_first_by_the_second_factor(a, b):
+    product = call(r.quaternion_multiply, a, b)
+    np.testing.assert_allclose(scipy_of(product).as_matrix(), (scipy_of(a) * scipy_of(b)).as_matrix(), atol=1e-14)
+    assert abs(np.linalg.norm(product) - 1) < 1e-14
+
+
+@drawn(quaternions)
+def test_the_matrix_takes_body_to_world(q):
+    np.testing.assert_allclose(r.matrix_of(q), scipy_of(q).as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(r.matrix_of(-q), r.matrix_of(q), atol=0)
+
+
+@drawn(quaternions)
+def test_an_mrp_is_axis_times_tangent_of_a_quarter_angle(q):
+    rho = call(r.mrp_from_quaternion, q, shape=3)
+    assert np.linalg.norm(rho) <= 1 + 1e-12
+    # at half a turn both axes are right
+    if abs(q[0]) > 1e-9:
+        np.testing.assert_allclose(rho, mrp_of(scipy_of(q)), atol=1e-12)
+
+
+@drawn(quaternions)
+def test_an_mrp_goes_there_and_back_whatever_the_quaternion_s_sign(q):
+    for sign in (1.0, -1.0):
+        back = call(r.quaternion_from_mrp, call(r.mrp_from_quaternion, sign * q, shape=3))
+        assert back[0] >= -1e-15
+        np.testing.assert_allclose(scipy_of(back).as_matrix(), scipy_of(q).as_matrix(), atol=1e-13)
+
+
+@drawn(st.tuples(numbers, numbers, numbers).map(lambda v: 0.57 * np.array(v)))
+def test_an_mrp_shorter_than_one_survives_the_quaternion(rho):
+    q = call(r.quaternion_from_mrp, rho)
+    assert abs(np.linalg.norm(q) - 1) < 1e-14
+    np.testing.assert_allclose(call(r.mrp_from_quaternion, q, shape=3), rho, atol=1e-14)
+
+
+@drawn(quaternions, quaternions)
+def test_the_attitude_error_stands_in_the_world_frame(q, reference):
+    error = scipy_of(q) * scipy_of(reference).inv()
+    if error.magnitude() > np.pi - 1e-6:
+        return  # half a turn: two axes are right
+    expected = mrp_of(error)
+    for sign in (1.0, -1.0):
+        rho = call(r.attitude_error, sign * q, reference, shape=3)
+        np.testing.assert_allclose(rho, expected, atol=1e-12)
+    # turning the reference by the error from the left gives q
+    again = call(r.quaternion_multiply, call(r.quaternion_from_mrp, expected), reference)
+    np.testing.assert_allclose(scipy_of(again).as_matrix(), scipy_of(q).as_matrix(), atol=1e-12)
+
+
+def test_a_yaw_error_of_a_tilted_vehicle_is_about_the_world_s_vertical():
+    reference = Rotation.from_euler("x", 1.0)
+    q = Rotation.from_euler("z", 0.2) * reference
+    rho = call(r.attitude_error, q.as_quat(scalar_first=True), reference.as_quat(scalar_first=True), shape=3)
+    np.testing.assert_allclose(rho, [0, 0, np.tan(0.05)], atol=1e-15)
+
+
+@drawn(quaternions, rates, st.floats(0.0, 0.1))
+def test_turning_the_body_is_the_exact_exponential_from_the_right(q, rate, dt):
+    turned = call(r.turn_body, q, *rate, dt)
+    expected = scipy_of(q) * Rotation.from_rotvec(np.array(rate) * dt)
+    np.testing.assert_allclose(scipy_of(turned).as_matrix(), expected.as_matrix(), atol=1e-13)
+    assert abs(np.linalg.norm(turned) - 1) < 1e-14
+
+
+@drawn(quaternions, st.tuples(numbers, numbers, numbers), st.floats(1e-12, 1e-3))
+def test_turning_by_next_to_nothing_loses_no_digits(q, axis, angle):
+    turned = call(r.turn_body, q, *axis, angle)
+    change = call(r.quaternion_multiply, q * [1, -1, -1, -1], turned)
+    np.testing.assert_allclose(change[1:], 0.5 * angle * np.array(axis), rtol=1e-3, atol=1e-15)
+
+
+@drawn(quaternions, st.floats(1e-6, 1e6))
+def test_normalising_keeps_the_direction(q, length):
+    scaled = q * length
+    r.normalise(scaled)
+    np.testing.assert_allclose(scaled, q, atol=1e-14)
+
+
+@drawn(st.floats(-10, 10))
+def test_a_yaw_is_a_turn_about_the_vertical(yaw):
+    np.testing.assert_allclose(scipy_of(r.quaternion_of_yaw(yaw)).as_matrix(), Rotation.from_euler("z", yaw).as_matrix(),
+                               atol=1e-14)

@@ -1,0 +1,190 @@
+"""Vehicles as data: presets, the YAML form and its errors, rotor geometry and mixing."""
+
+import numpy as np
+import pytest
+import yaml
+from data_paths import data_file
+from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
+from windwrench.dynamics.vehicle import parse_vehicle
+
+GOOD = {
+    "name": "mine", "mass": 0.5, "inertia": [0.002, 0.003, 0.004], "arm_l": 0.12,
+    "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6], "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
+}
+VEHICLE = load_vehicle("ardrone2")
+
+
+def saved(tmp_path, **changes):
+    """The path of GOOD with some fields changed; None takes a field away."""
+    path = tmp_path / "mine.yaml"
+    fields = {key: value for key, value in {**GOOD, **changes}.items() if value is not None}
+    path.write_text(yaml.safe_dump(fields), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_load_and_can_hover(name):
+    vehicle = load_vehicle(name)
+    assert vehicle.name == name
+    wrench = vehicle.rotor_wrench(np.full(4, vehicle.hover_rate))
+    np.testing.assert_allclose(wrench, [vehicle.weight, 0, 0, 0], atol=1e-9)
+    assert 1.5 * vehicle.hover_rate < vehicle.omega_max
+
+
+def test_the_documented_presets_are_there():
+    assert {"ardrone2", "crazyflie", "hummingbird"} <= set(preset_names())
+
+
+def test_a_minimal_file_loads(tmp_path):
+    vehicle = load_vehicle(saved(tmp_path))
+    assert vehicle.mass == 0.5
+    np.testing.assert_array_equal(vehicle.inertia, np.diag([0.002, 0.003, 0.004]))
+
+
+def test_a_full_inertia_matrix_loads(tmp_path):
+    inertia = [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]]
+    np.testing.assert_array_equal(load_vehicle(saved(tmp_path, inertia=inertia)).inertia, inertia)
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"mass": -0.5}, ["mass", "positive", "-0.5"]),
+    ({"mass": 0}, ["mass", "positive"]),
+    ({"mass": "heavy"}, ["mass", "positive number", "heavy"]),
+    ({"mass": float("nan")}, ["mass", "positive number", "nan"]),
+    ({"mass": float("inf")}, ["mass", "positive number", "inf"]),
+    ({"mass": True}, ["mass", "positive number", "True"]),
+    ({"mass": [0.5]}, ["mass", "positive number"]),
+    ({"arm_l": 0}, ["arm_l", "positive"]),
+    ({"k": [8e-6] * 3}, ["k", "4 finite numbers"]),
+    ({"k": [8e-6] * 3 + [-8e-6]}, ["k", "four positive"]),
+    ({"k": [8e-6] * 3 + [float("nan")]}, ["k", "4 finite numbers"]),
+    ({"p": [2e-7] * 5}, ["p", "4 finite numbers"]),
+    ({"p": 2e-7}, ["p", "4 finite numbers"]),
+    ({"inertia": [0.002, 0.003]}, ["inertia", "3 x 3"]),
+    ({"inertia": [[0.002, 0, 0], [0, 0.003, 0]]}, ["inertia", "3 x 3"]),
+    ({"inertia": [[0.002, 1e-4, 0], [0, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "symmetric"]),
+    ({"inertia": [0.002, -0.003, 0.004]}, ["inertia", "positive definite"]),
+    ({"inertia": [[0.002, 0.01, 0], [0.01, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "positive definite"]),
+    ({"rotor_positions": [[0.1, 0.1, 0]] * 3}, ["rotor_positions", "4 x 3"]),
+    ({"rotor_positions": [[0.1, 0.1]] * 4}, ["rotor_positions", "4 x 3"]),
+    ({"rotor_positions": [[0.1, 0.1, 0]] * 4}, ["rotor_positions", "independently"]),
+    ({"spin": [1, 1, 1, 2]}, ["spin", "1 or -1"]),
+    ({"com": [0, 0]}, ["com", "3 finite numbers"]),
+    ({"omega_lsb": -1.0}, ["omega_lsb", "negative"]),
+    ({"omega_source": "guessed"}, ["omega_source", "measured or commanded", "guessed"]),
+    ({"floor_z": 3.0, "ceiling_z": 1.0}, ["floor_z", "ceiling_z"]),
+    ({"maas": 0.5}, ["maas", "expected one of", "Did you mean 'mass'?"]),
+    ({"mocap": {"rate_hz": -1}}, ["mocap.rate_hz", "positive"]),
+    ({"mocap": {"rate": 100}}, ["mocap", "rate", "Did you mean 'rate_hz'?"]),
+    ({"mocap": 200}, ["mocap", "mapping"]),
+    ({"mass": None}, ["missing", "mass"]),
+    ({"k": None, "inertia": None}, ["missing", "inertia", "k"]),
+    ({"effects": [{"name": "rotor_dragg"}]}, ["effect", "rotor_dragg", "Did you mean 'rotor_drag'?"]),
+    ({"effects": [{"name": "rotor_drag", "coefficients": {"kd": 1e-4}}]}, ["rotor_drag", "coefficient", "kdx"]),
+    ({"effects": [{"name": "rotor_drag", "coefficients": {"kdx": -1}}]}, ["rotor_drag", "kdx", "between"]),
+    ({"effects": [{"name": "rotor_drag", "coefficients": {"kdx": float("nan")}}]}, ["rotor_drag", "kdx", "finite"]),
+    ({"effects": [{"name": "rotor_drag", "coefficients": [1]}]}, ["rotor_drag", "coefficients", "mapping"]),
+    ({"effects": [{"coefficients": {}}]}, ["effects", "name"]),
+    ({"effects": "rotor_drag"}, ["effects", "list"]),
+])
+def test_an_error_names_file_field_and_what_was_expected(tmp_path, changes, words):
+    path = saved(tmp_path, **changes)
+    with pytest.raises(InputError) as caught:
+        load_vehicle(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(("text", "word"), [
+    ("mass: [1, 2", "YAML"), ("- 1\n- 2\n", "mapping"), ("", "mapping"), ("3.5", "mapping"), ("\x00", "YAML"),
+])
+def test_a_file_of_another_form_is_named(tmp_path, text, word):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=word) as caught:
+        load_vehicle(path)
+    assert str(path) in str(caught.value)
+
+
+def test_bytes_that_are_no_text_are_named(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match="cannot be read") as caught:
+        load_vehicle(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.yaml: cannot be read"):
+        load_vehicle(tmp_path / "nowhere.yaml")
+
+
+def test_an_unknown_preset_names_the_nearest():
+    with pytest.raises(InputError, match="Did you mean 'ardrone2'"):
+        load_vehicle("ardrone")
+
+
+def test_the_measured_flights_vehicle_loads():
+    vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
+    assert vehicle.mass == 0.46
+    assert vehicle.mocap.sigma_pos_m == 0.001  # the file says "nominal 0.001"
+    assert vehicle.ceiling_z == 2.6
+    default = load_vehicle("ardrone2")
+    np.testing.assert_array_equal(np.sign(vehicle.mixing), np.sign(default.mixing))
+
+
+def test_a_dumped_vehicle_is_the_vehicle_again(tmp_path):
+    given = {
+        **GOOD, "inertia": [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]], "com": [0.01, 0.0, -0.02],
+        "rotor_positions": [[0.1, 0.12, 0.01], [-0.1, 0.12, 0], [-0.1, -0.12, 0], [0.1, -0.12, 0]],
+        "spin": [1, -1, 1, -1], "omega_lsb": 2.5, "omega_source": "commanded", "voltage_ref": 11.1, "floor_z": -0.5,
+        "ceiling_z": 2.5, "gravity": 9.8, "rotor_radius": 0.11, "mocap": {"rate_hz": 100.0, "sigma_pos_m": 0.002},
+        "effects": [{"name": "rotor_drag", "coefficients": {"kdx": 1.0e-4, "kdy": 2.0e-4}}],
+    }
+    vehicle = parse_vehicle(yaml.safe_dump(given))
+    text = dump_vehicle(vehicle)
+    path = tmp_path / "again.yaml"
+    path.write_text(text, encoding="utf-8")
+    again = load_vehicle(path)
+    assert dump_vehicle(again) == text
+    for name, value in given.items():
+        if name not in ("effects", "mocap"):
+            np.testing.assert_array_equal(getattr(again, name), value)
+    assert again.effects == (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),)
+    assert again.mocap == vehicle.mocap
+    assert again.omega_max == vehicle.omega_max
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_presets_survive_dumping(name):
+    text = dump_vehicle(load_vehicle(name))
+    assert dump_vehicle(parse_vehicle(text)) == text
+
+
+def test_mixing_is_the_paper_s():
+    k, p = np.array([8e-6, 8.2e-6, 7.9e-6, 8.1e-6]), np.array([2e-7, 2.2e-7, 1.9e-7, 2.1e-7])
+    vehicle = parse_vehicle(yaml.safe_dump({**GOOD, "k": k.tolist(), "p": p.tolist()}))
+    W = np.array([400.0, 410.0, 395.0, 420.0])
+    c, M, arm = k * W**2, p * W**2, GOOD["arm_l"]
+    expected = [
+        c.sum(),  # (1)
+        arm * (c[0] + c[1] - c[2] - c[3]),  # (8)
+        arm * (-c[0] + c[1] + c[2] - c[3]),  # (9)
+        M[0] - M[1] + M[2] - M[3],  # (10)
+    ]
+    np.testing.assert_allclose(vehicle.rotor_wrench(W), expected, rtol=1e-12)
+    np.testing.assert_allclose(vehicle.rotor_wrench(np.stack([W, W]))[1], expected, rtol=1e-12)
+
+
+def test_rotor_speeds_invert_the_rotor_wrench():
+    rng = np.random.default_rng(0)
+    for W in rng.uniform(200, 600, (50, 4)):
+        wrench = VEHICLE.rotor_wrench(W)
+        np.testing.assert_allclose(VEHICLE.rotor_speeds(wrench[0], wrench[1:]), W, rtol=1e-10)
+
+
+def test_what_no_rotor_can_give_is_clipped():
+    assert VEHICLE.rotor_speeds(1.0, np.array([0.5, 0.0, 0.0])).min() == 0.0
+    assert VEHICLE.rotor_speeds(100.0, np.zeros(3)).max() == VEHICLE.omega_max
