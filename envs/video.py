@@ -4,12 +4,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+from matplotlib.image import imsave
+from numpy.typing import NDArray
+
 from ..dynamics.errors import InputError
+from ..dynamics.files import replaced
 from .fan_tracking import FanTrackingEnv
 
 
 class VideoWriter:
-    """Appends pictures of an environment to an mp4; the file appears only when it is whole.
+    """Appends pictures of an environment to an mp4; it and the last picture beside it appear only when it is whole.
 
     Raises:
         InputError: the video extra is not installed.
@@ -25,12 +30,13 @@ class VideoWriter:
         self._stream: Any = imageio_ffmpeg.write_frames(
             str(self._partial), (env.width, env.height), fps=12.5, quality=7, macro_block_size=16)
         self._stream.send(None)
+        self._last: NDArray[np.uint8] | None = None
 
     def add(self) -> None:
         """Append a picture of the environment as it is now."""
-        picture = self.env.render()
-        if picture is not None:
-            self._stream.send(picture.tobytes())
+        self._last = self.env.render()
+        if self._last is not None:
+            self._stream.send(self._last.tobytes())
 
     def __enter__(self) -> "VideoWriter":
         return self
@@ -39,5 +45,8 @@ class VideoWriter:
         self._stream.close()
         if kind is None:
             self._partial.replace(self.path)
+            if self._last is not None:
+                with replaced(self.path.with_suffix(".scene.png")) as partial:
+                    imsave(partial, self._last, format="png")
         else:
             self._partial.unlink(missing_ok=True)

@@ -37,8 +37,8 @@ np.savez("pictures.npz", **pictures)
 """
 
 
-def run(folder, *command):
-    environment = {**os.environ, "MUJOCO_GL": BACKEND}
+def run(folder, *command, **changes):
+    environment = {**os.environ, "MUJOCO_GL": BACKEND, **changes}
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -107,10 +107,19 @@ def test_a_film_is_written_whole_or_not_at_all(tmp_path):
     done = run(tmp_path, sys.executable, "-c", FILM)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "broken off"
-    assert [p.name for p in tmp_path.iterdir()] == ["film.mp4"]
+    assert {p.name for p in tmp_path.iterdir()} == {"film.mp4", "film.scene.png"}
+    assert (tmp_path / "film.scene.png").read_bytes().startswith(b"\x89PNG")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "film.mp4"))
     assert frames == 5
     assert seconds == pytest.approx(0.4, abs=0.05)
+
+
+def test_without_a_screen_it_draws_without_being_told_how(tmp_path):
+    code = ("from windwrench.envs import FanTrackingEnv\n"
+            "env = FanTrackingEnv(render_mode='rgb_array', width=320, height=240); env.reset(seed=0)\n"
+            "print(env.render().shape)")
+    done = run(tmp_path, sys.executable, "-c", code, MUJOCO_GL="", DISPLAY="", WAYLAND_DISPLAY="")
+    assert done.stdout.strip() == "(240, 320, 3)", done.stderr
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(tmp_path):
