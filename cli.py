@@ -49,7 +49,7 @@ def fly(
     seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
     vehicle: VehicleOption = "ardrone2",
     effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect NAME:coef=value of the true vehicle.")] = None,
-    video: Annotated[bool, typer.Option("--video", help="Also write fly.mp4 and its last frame (needs the video extra).")] = False,
+    video: Annotated[bool, typer.Option("--video", help="Also write fly.mp4 and its last frame (video extra).")] = False,
     view: Annotated[bool, typer.Option("--view", help="Show it in a window while it flies.")] = False,
     out: Out = Path("results/fly"),
 ) -> None:

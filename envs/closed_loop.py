@@ -7,6 +7,7 @@ import numpy as np
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
 from ..dynamics.compiled import compiled
+from ..dynamics.errors import InputError
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
@@ -16,6 +17,7 @@ from ..estimator.ukf import WrenchUKF
 from ..estimator.ukf import step as filter_step
 from .jet import FAN, Fan, fan_record, jet_table
 from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
+from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 _FASTEST = 200.0  # m/s and rad/s
 LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("flight", FLIGHT), ("fan", FAN)])
@@ -48,6 +50,7 @@ class ClosedLoop:
         fan: the jet it flies in, or None for still air without drag.
         settings: of the plant.
         gains: of the flight loop.
+        load: a body that ``hang_load`` hangs on; default: none.
     """
 
     def __init__(
@@ -58,6 +61,7 @@ class ClosedLoop:
         fan: Fan | None = None,
         settings: PlantSettings | None = None,
         gains: FlightGains | None = None,
+        load: SuspendedLoad | None = None,
     ) -> None:
         plant, self._body = plant_record(declared if true is None else true, settings or PlantSettings())
         self.ukf = WrenchUKF(declared, tuning, TICK)
@@ -69,7 +73,8 @@ class ClosedLoop:
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
         self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
-        self.model, self.data = load_world(self._body)
+        self.model, self.data = load_world(self._body, load)
+        self._load = load
         self._body_id = self.model.body("vehicle").id
         self._views()
         self._steps = 0
@@ -131,7 +136,23 @@ class ClosedLoop:
         sense(self.record[0:1]["plant"][0], self._qpos, noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         loop["filter"] = self.ukf.record[0]
+        if self._load is not None:
+            set_down(self.model, self.data, self._load)
         mujoco.mj_forward(self.model, self.data)
+
+    def hang_load(self) -> None:
+        """Hang the load on: at rest below its anchor on the taut thread.
+
+        Raises:
+            InputError: this loop was made without a load.
+        """
+        if self._load is None:
+            raise InputError("ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)")
+        hang(self.model, self.data, self._load)
+
+    def load_pull(self) -> Array:
+        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load on the vehicle."""
+        return pull(self.data, self._body.com)
 
     def run(self, noise: Array, fan_y: Array | None = None) -> None:
         """Run one tick for each row of ``noise`` (n, NOISE), with the fan at ``fan_y`` (n,) m."""

@@ -17,6 +17,7 @@ from ..dynamics.motion import Array
 from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from .jet import STATIONS, gust, jet_wrench
+from .suspended_load import SuspendedLoad, add_load
 
 TICK = 0.005  # s
 SUBSTEPS = 2
@@ -101,8 +102,8 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
     p["z"][:4] = p["speeds"]
 
 
-def load_world(vehicle: Vehicle) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
-    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied."""
+def load_world(vehicle: Vehicle, load: SuspendedLoad | None = None) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
+    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied, and a load for it."""
     xml = resources.files(__package__).joinpath("quadrotor.xml").read_text(encoding="utf-8")
     spec = mujoco.MjSpec.from_string(xml)
     moments, axes = np.linalg.eigh(vehicle.inertia)
@@ -113,6 +114,8 @@ def load_world(vehicle: Vehicle) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
     # before it is compiled: the compiler takes short cuts for a centre of mass that lies in the body's origin
     body = spec.body("vehicle")
     body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
+    if load is not None:
+        add_load(spec, load)
     model = spec.compile()
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS

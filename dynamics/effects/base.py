@@ -2,7 +2,7 @@
 
 An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is called through
 its address, so that every user of it (a tick of the plant, a sigma point of the filter, a sample of a log) runs
-the same machine code and a new effect recompiles none of them. There are four kinds:
+the same machine code and a new effect recompiles none of them. There are three kinds:
 
 ``rotor input``
     changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four turn rates in
@@ -12,8 +12,6 @@ the same machine code and a new effect recompiles none of them. There are four k
     adds to the six numbers in ``wrench``.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
-``sensing``
-    changes what the pose reports. ``sense(position, quaternion, coefficients)`` returns the changed pose.
 
 ``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state`` and ``rotors`` are
 laid out by the constants below.
@@ -83,7 +81,6 @@ class Effect:
     law: Any = None  # compiled C function, for rotor input and wrench
     memory: int = 0  # numbers that a rotor-input law keeps from step to step; all zero before its first
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
-    sense: Callable[[Array, Array, Mapping[str, float]], tuple[Array, Array]] | None = None
 
     def vector(self, coefficients: Mapping[str, float]) -> Array:
         """Return the coefficients in the law's order; those not given are zero."""
