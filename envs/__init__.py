@@ -1,6 +1,6 @@
 """Worlds: the plant in MuJoCo, the fan and its jet, and the fan-tracking environment."""
 
-from . import headless  # noqa: F401, I001  before anything that imports MuJoCo
+from . import headless  # noqa: F401  before anything that imports MuJoCo
 from .fan_tracking import FanTrackingEnv
 from .jet import Fan
 from .scenarios import SCENARIOS, Scenario

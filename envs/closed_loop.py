@@ -88,6 +88,7 @@ class ClosedLoop:
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
         self.external: Array = loop["plant"]["external"]  # (6,) true external wrench, world
+        self.applied: Array = loop["plant"]["applied"]  # (6,) wrench that a user applies, world; zero after a reset
         self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
 
     @property

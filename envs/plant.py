@@ -59,6 +59,7 @@ PLANT = np.dtype([
     ("disturbance", "f8", (6,)),
     ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
     ("jet", "f8", (6,)),  # the jet's part of it
+    ("applied", "f8", (6,)),  # and the part that a user applies, held until it is changed
     ("rotation", "f8", (3, 3)),
     ("q", "f8", (4,)),
     ("rho", "f8", (3,)),
@@ -95,7 +96,7 @@ def _normal_quantile(probability: float) -> float:
 
 def reset_plant(p: np.void, vehicle: Vehicle) -> None:
     """Put the plant's memory at hover; ``vehicle`` is the true one with its body effects applied."""
-    for name in ("memory", "time", "disturbance", "external", "jet"):
+    for name in ("memory", "time", "disturbance", "external", "jet", "applied"):
         p[name] = 0.0
     p["speeds"] = vehicle.hover_rate
     p["battery"] = 1.05 * vehicle.voltage_ref
@@ -174,9 +175,9 @@ def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array,
         p.disturbance[3 + i] = (p.disturbance_keep * p.disturbance[3 + i]
                                 + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i])
     for i in range(3):
-        p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i]
+        p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i] + p.applied[i]
         p.external[3 + i] = (R[i, 0] * p.effect_wrench[3] + R[i, 1] * p.effect_wrench[4] + R[i, 2] * p.effect_wrench[5]
-                             + p.jet[3 + i] + p.disturbance[3 + i])
+                             + p.jet[3 + i] + p.disturbance[3 + i] + p.applied[3 + i])
         xfrc[i] = p.external[i] + R[i, 2] * p.rotor_wrench[0]
         xfrc[3 + i] = (p.external[3 + i] + R[i, 0] * p.rotor_wrench[1] + R[i, 1] * p.rotor_wrench[2]
                        + R[i, 2] * p.rotor_wrench[3])

@@ -59,9 +59,9 @@ def add_load(spec: "mujoco.MjSpec", load: SuspendedLoad) -> None:
 
 def set_down(model: "mujoco.MjModel", data: "mujoco.MjData", load: SuspendedLoad) -> None:
     """Take the load off the vehicle: it stands on its own, at rest, below its anchor, and the thread does not pull."""
-    model.body(_NAME).gravcomp[0] = 1.0
-    model.tendon("thread").limited[0] = 0
-    model.dof_damping[model.joint(_NAME).dofadr[0]:][:3] = load.drag
+    model.body_gravcomp[model.body(_NAME).id] = 1.0
+    model.tendon_limited[model.tendon("thread").id] = 0
+    model.joint(_NAME).damping[:3] = load.drag
     _place(model, data, load)
     data.joint(_NAME).qvel[:] = 0.0
 
@@ -76,8 +76,8 @@ def hang(model: "mujoco.MjModel", data: "mujoco.MjData", load: SuspendedLoad) ->
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, site, velocity, 0)
     _place(model, data, load)
     data.joint(_NAME).qvel[:3], data.joint(_NAME).qvel[3:] = velocity[3:], 0.0
-    model.body(_NAME).gravcomp[0] = 0.0
-    model.tendon("thread").limited[0] = 1
+    model.body_gravcomp[model.body(_NAME).id] = 0.0
+    model.tendon_limited[model.tendon("thread").id] = 1
 
 
 def _place(model: "mujoco.MjModel", data: "mujoco.MjData", load: SuspendedLoad) -> None:
