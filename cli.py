@@ -199,6 +199,43 @@ def record(
 
 
 @app.command()
+def reproduce(
+    figure: Annotated[str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")] = "all",
+    out: Out = Path("results/reproduction"),
+    seeds: Annotated[int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    page: Annotated[Path | None, typer.Option(help="Where to write the page; default: reproduction.md in the folder.")] = None,
+) -> None:
+    """Reproduce the paper's figures; what a run has finished, the next does not repeat.
+
+    Example: windwrench reproduce fig6 --out results/reproduction
+    """
+    import json
+
+    from .experiments import NAMES
+    from .experiments.reproduce import chosen, write_page
+    from .experiments.reproduce import reproduce as run
+
+    names = chosen(figure)
+    folder = _folder(out)
+    columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    with Progress(*columns, console=_errors, transient=True) as progress:
+        tasks = {name: progress.add_task(name, total=1.0) for name in names}
+        fresh = run(names, folder, seeds, jobs, lambda shares: [
+            progress.update(tasks[name], completed=share) for name, share in shares.items()] and None)
+    target = folder / "reproduction.md" if page is None else page
+    write_page(NAMES, folder, target)
+    table = Table("figure", "quantity", "the paper", "this kit", box=box.SIMPLE_HEAD)
+    for name in names:
+        rows = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["comparison"]
+        label = name if fresh[name] else f"{name} (kept)"
+        for i, row in enumerate(rows):
+            table.add_row(label if i == 0 else "", row["quantity"], row["paper"], row["here"], end_section=i + 1 == len(rows))
+    console.print(table)
+    _say(*(folder / f"{name}.png" for name in names), target)
+
+
+@app.command()
 def effects() -> None:
     """List the physical effects that plant and estimator know."""
     from .dynamics.effects import get, names

@@ -2,9 +2,10 @@
 
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
+from .mass_ukf import WrenchMassUKF
 from .observer import NonlinearObserver, ObserverTuning
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 
-__all__ = ["NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate", "WrenchEstimator",
+__all__ = ["NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate", "WrenchEstimator", "WrenchMassUKF",
            "WrenchUKF"]

@@ -9,10 +9,11 @@ import math
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import effect_wrench
+from .error_state import symmetrise
 from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
 from .sample import check_sample, copy_estimate
-from .ukf import WrenchUKF, add_noise, correct_parts, symmetrise
+from .ukf import WrenchUKF, add_noise, correct_parts
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
 _STEP = 1e-5  # m, m/s and rad/s

@@ -23,6 +23,7 @@ FILTER = np.dtype([
     ("thrust", "f8", (3,)),
     ("force_walk", "f8", (3,)),
     ("noise", "f8", (6,)),  # of the measurement (rho, x)
+    ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
     ("kappa", "f8"),
     ("period", "f8"),
     ("gate", "f8"),  # largest NIS of a measurement that is taken in; 0: any
@@ -67,6 +68,7 @@ def filter_record(vehicle: Vehicle, tuning: UKFTuning, period: float, gate: floa
         f[name] = np.square(deviation)
     f["noise"][:3] = np.square(np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0)  # (16)
     f["noise"][3:] = np.square(tuning.position_noise)
+    f["imu_noise"][:3], f["imu_noise"][3:] = np.square(tuning.gyro_noise), np.square(tuning.accelerometer_noise)
     f["kappa"], f["period"], f["gate"], f["patience"] = tuning.kappa, period, gate, patience
     return record
 

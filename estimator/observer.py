@@ -163,6 +163,11 @@ class NonlinearObserver:
         _start(self._filter.record, self._record)
 
     @property
+    def records(self) -> tuple[np.ndarray, np.ndarray]:
+        """The memories, each (1,), of model and observer, for compiled code that calls ``step`` of this module."""
+        return self._filter.record, self._record
+
+    @property
     def covariance(self) -> Array:
         """NaN (18, 18): an observer has none."""
         return self._filter.covariance

@@ -32,6 +32,8 @@ class UKFTuning:
     position_noise: ArrayLike = 0.001  # m, one measurement
     attitude_noise: ArrayLike = 0.005  # rad, one measurement; the quarter of an MRP is handled inside
     kappa: float = 2.0  # spread of the sigma points, (28)
+    gyro_noise: ArrayLike = 0.005  # rad/s, one measurement of ``correct_imu``
+    accelerometer_noise: ArrayLike = 0.05  # m/s2, likewise
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -18,16 +18,17 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
-from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
+from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
 from .filter_record import N, drive, filter_record, propagate
+from .imu import take_in_imu
 from .sample import Sample, check_sample, copy_estimate, empty_estimate
 from .tuning import UKFTuning
 
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 _PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
-_SPREAD = 0.25  # largest variance of an MRP (a standard deviation of about 115 degrees)
 
 
 @compiled
@@ -129,32 +130,6 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
 
 
 @compiled
-def _displace(x: Array, S: Array, j: int, spread: float, rho: Array, q: Array, out: Array) -> None:
-    """Write the sigma point ``spread`` along column ``j`` of the root into ``out``."""
-    for i in range(3):
-        rho[i] = spread * S[j, i]
-        out[10 + i] = x[10 + i] + spread * S[j, 3 + i]
-        out[i] = x[i] + spread * S[j, 6 + i]
-        out[7 + i] = x[7 + i] + spread * S[j, 9 + i]
-        out[13 + i] = x[13 + i] + spread * S[j, 12 + i]
-        out[16 + i] = x[16 + i] + spread * S[j, 15 + i]
-    quaternion_from_mrp(rho, q)
-    quaternion_multiply(q, x[3:7], out[3:7])
-
-
-@compiled
-def _error_from(after: Array, centre: Array, error: Array) -> None:
-    """Write the error state (18,) of one sigma point, seen from the central one, into ``error``, (24)."""
-    attitude_error(after[3:7], centre[3:7], error[0:3])
-    for i in range(3):
-        error[3 + i] = after[10 + i] - centre[10 + i]
-        error[6 + i] = after[i] - centre[i]
-        error[9 + i] = after[7 + i] - centre[7 + i]
-        error[12 + i] = after[13 + i] - centre[13 + i]
-        error[15 + i] = after[16 + i] - centre[16 + i]
-
-
-@compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
     x, P, H, E, mean, error = f.x, f.P, f.H, f.E, f.mean, f.error
@@ -180,9 +155,9 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
         mean[i] = 0.0
     for j in range(columns):
         for sign in range(2):
-            _displace(x, f.S, j, spread if sign == 0 else -spread, f.rho, f.q, f.point)
+            displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
             propagate(f, f.point, dt, f.next)
-            _error_from(f.next, f.centre, error[sign])
+            error_from(f.next, f.centre, error[sign])
         for i in range(N):
             H[j, i] = scale * (error[0, i] - error[1, i])
         for i in range(12):
@@ -196,43 +171,10 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
         a = mean[i]
         for j in range(12):
             P[i, j] -= a * mean[j]
-    _fold(f, f.centre, mean)
+    fold(f, f.centre, mean)
     symmetrise(P)
     f.time += dt
     x[NIS] = math.nan
-
-
-@compiled
-def _fold(f: Record, base: Array, error: Array) -> None:
-    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (25), (35), (37)."""
-    x = f.x
-    quaternion_from_mrp(error[0:3], f.q)
-    quaternion_multiply(f.q, base[3:7], f.point[3:7])
-    normalise(f.point[3:7])
-    for i in range(4):
-        x[3 + i] = f.point[3 + i]
-    for i in range(3):
-        x[10 + i] = base[10 + i] + error[3 + i]
-        x[i] = base[i] + error[6 + i]
-        x[7 + i] = base[7 + i] + error[9 + i]
-        x[13 + i] = base[13 + i] + error[12 + i]
-        x[16 + i] = base[16 + i] + error[15 + i]
-
-
-@compiled
-def symmetrise(P: Array) -> None:
-    """Make P symmetric, and hold the attitude's variance where an MRP still means something."""
-    for i in range(N):
-        for j in range(i):
-            a = 0.5 * (P[i, j] + P[j, i])
-            P[i, j] = a
-            P[j, i] = a
-    for i in range(3):
-        if P[i, i] > _SPREAD:
-            scale = math.sqrt(_SPREAD / P[i, i])
-            for j in range(N):
-                P[i, j] *= scale
-                P[j, i] *= scale
 
 
 @compiled
@@ -286,7 +228,7 @@ def correct(f: Record, position: Array, quaternion: Array, first: int, last: int
     _add_squares(P, W, 0, -1.0)
     for i in range(NIS):
         f.centre[i] = x[i]
-    _fold(f, f.centre, mean)
+    fold(f, f.centre, mean)
     return True
 
 
@@ -449,6 +391,26 @@ class WrenchUKF:
     def correct(self, position: ArrayLike | None, quaternion: ArrayLike | None) -> WrenchEstimate:
         """Take in a pose, or a part of one, measured now."""
         return self._run(self._sample.read(self._sample.z[0:4], position, quaternion), 0.0, None)
+
+    def correct_imu(self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None) -> WrenchEstimate:
+        """Take in an inertial measurement made now, at the geometric centre; see ``estimator.imu``.
+
+        Args:
+            gyro: (3,) rad/s, body, without bias, or None.
+            accelerometer: (3,) m/s2, body, specific force (+g along z at hover), without bias, or None.
+
+        Raises:
+            InputError: a shape is wrong or a number is not finite; the filter stays as it was.
+        """
+        z = np.zeros(6)
+        for name, value, where in (("gyro", gyro, slice(0, 3)), ("accelerometer", accelerometer, slice(3, 6))):
+            if value is not None:
+                array = np.asarray(value, dtype=np.float64)
+                if array.shape != (3,) or not np.all(np.isfinite(array)):
+                    raise InputError(f"correct_imu: {name} must be three finite numbers, got {value!r}")
+                z[where] = array
+        take_in_imu(self.record, z, gyro is not None, accelerometer is not None)
+        return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         out = empty_estimate()

@@ -56,7 +56,7 @@ def test_an_effect_says_what_it_is(name):
 @pytest.mark.parametrize("name", names())
 def test_an_effect_has_the_function_of_its_kind(name):
     effect = get(name)
-    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend, "sensing": effect.sense}
+    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend}
     assert functions[effect.kind] is not None
     if effect.law is not None:
         assert effect.law.address != 0
