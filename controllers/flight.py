@@ -32,7 +32,7 @@ class FlightGains:
     yaw_rate: float = 6.0  # 1/s
     yaw_integral: float = 4.0  # 1/s3
     tilt_limit: float = 0.5  # rad
-    leash: float = 0.5  # m, farthest that a moving set point runs ahead of the vehicle
+    leash: float = 0.5  # m, how far a moving set point runs ahead of the vehicle before it waits
 
 
 FLIGHT = np.dtype([
@@ -65,10 +65,12 @@ def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndar
 
 @compiled
 def move_setpoint(c: Record, position: Array, dt: float) -> None:
-    """Move the set point with its own velocity for ``dt`` s, but no farther than the leash from the vehicle."""
+    """Move the set point with its own velocity for ``dt`` s; on an axis where it runs too far ahead it waits."""
     for i in range(3):
-        target = c.setpoint[i] + dt * c.setpoint[3 + i]
-        c.setpoint[i] = min(max(target, position[i] - c.leash), position[i] + c.leash)
+        step = dt * c.setpoint[3 + i]
+        ahead = c.setpoint[i] + step - position[i]
+        if abs(ahead) <= c.leash or ahead * step <= 0.0:
+            c.setpoint[i] += step
     c.setpoint[9] += dt * c.setpoint[10]
 
 

@@ -94,6 +94,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know            |
     | `effects`     | `()`         | effects of the true vehicle that nobody declared                           |
     | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
+    | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
     | `render_mode` | `None`       | `"human"` or `"rgb_array"`                                                 |
 
@@ -111,6 +112,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         vehicle: str | Vehicle = "ardrone2",
         effects: Sequence[EffectSetting] = (),
         fan: Fan | None = None,
+        settings: PlantSettings | None = None,
         fan_path: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         width: int = 640,
         height: int = 480,
@@ -121,6 +123,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         self.effects = tuple(check_setting(e, "FanTracking: effects") for e in effects)
         self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
+        self.settings = settings
         self.fan_path = fan_path
         self.render_mode, self.width, self.height = render_mode, width, height
         self.action_space = gym.spaces.Box(-MAX_COMMAND, MAX_COMMAND, (1,), np.float32)
@@ -135,11 +138,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         declared = replace(self.vehicle, mocap=mocap)
         true = replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects))
         tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
-        # unmodelled disturbance in proportion to the vehicle, as stated for the AR.Drone
-        force = self.vehicle.weight / 4.56
-        settings = PlantSettings(disturbance_force=0.03 * force,
-                                 disturbance_torque=0.01 * force * self.vehicle.arm_l / 0.1262)
-        return ClosedLoop(declared, true, tuning, fan, settings)
+        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.vehicle))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

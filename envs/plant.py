@@ -38,6 +38,12 @@ class PlantSettings:
     battery_life: float = 480.0  # s, over which the voltage falls by a tenth
     sensor_noise: bool = True
 
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle) -> "PlantSettings":
+        """Return the settings with the disturbance, which is stated for the AR.Drone, scaled to a vehicle."""
+        force = vehicle.weight / 4.56
+        return cls(disturbance_force=0.03 * force, disturbance_torque=0.01 * force * vehicle.arm_l / 0.1262)
+
 
 PLANT = np.dtype([
     *MODEL_FIELDS,

@@ -16,7 +16,7 @@ from ..dynamics.motion import Array
 _NAME = "load"
 _RADIUS = 0.0115  # m, a 53 g ball of steel; for inertia and drawing
 # Of the thread's limit: time constant (s) and damping ratio. Four steps of MuJoCo are the stiffest that stays smooth:
-# the thread of a 53 g load gives by 0.2 mm.
+# the thread of a 53 g load gives by 0.1 mm.
 _THREAD = (0.01, 1.0)
 
 

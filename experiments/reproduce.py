@@ -108,7 +108,7 @@ def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
 
 
 def write_result(name: str, title: str, seeds: int, result: Result, folder: Path) -> None:
-    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json; the same result gives the same bytes."""
+    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json, the same bytes for the same result; times go beside them."""
     import matplotlib
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -123,6 +123,9 @@ def write_result(name: str, title: str, seeds: int, result: Result, folder: Path
         "experiment": name, "title": title, "version": __version__, "seeds": seeds, "figures": _plain(result.figures),
         "comparison": [asdict(row) for row in result.comparison], "remarks": result.remarks,
     }
+    if result.timing:
+        with replaced(folder / f"{name}.timing.json") as partial:
+            partial.write_text(json.dumps([asdict(row) for row in result.timing], indent=1) + "\n", encoding="utf-8")
     with replaced(folder / f"{name}.json") as partial:
         partial.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
@@ -159,7 +162,9 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
             continue
         parts += [f"## {kept['title']}", "", f"`windwrench reproduce {name} --seeds {kept['seeds']}`", "",
                   f"![{kept['title']}]({where}/{name}.png)", "", "| quantity | the paper | this kit |", "| --- | --- | --- |"]
-        parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in kept["comparison"]]
+        timing = folder / f"{name}.timing.json"
+        rows = kept["comparison"] + (json.loads(timing.read_text(encoding="utf-8")) if timing.is_file() else [])
+        parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in rows]
         for remark in kept["remarks"]:
             parts += ["", remark]
         parts += ["", f"Data: [{name}.csv]({where}/{name}.csv), figures of merit: [{name}.json]({where}/{name}.json), "

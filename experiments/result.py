@@ -30,3 +30,4 @@ class Result:
     picture: Figure
     comparison: list[Comparison]
     remarks: list[str] = field(default_factory=list)  # what the reader should know, one paragraph each
+    timing: list[Comparison] = field(default_factory=list)  # what differs from run to run, and is kept apart for that

