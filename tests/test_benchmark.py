@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from windwrench.controllers import make_controller
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv

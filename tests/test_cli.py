@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from windwrench.cli import main
 from windwrench.dynamics.effects import names
 

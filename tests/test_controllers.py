@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from windwrench.controllers import CONTROLLERS, Admittance, Hover, Oracle, Ratio, make_controller
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z

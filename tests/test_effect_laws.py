@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numba import cfunc
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import LAW, ROTORS_SIZE, STATE_SIZE, VELOCITY

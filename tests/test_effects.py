@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+
 from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
 from windwrench.dynamics.effects import check_setting, compile_effects, get, names, parse_setting
 from windwrench.envs.plant import PlantSettings

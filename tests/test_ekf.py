@@ -7,6 +7,7 @@ import pytest
 from flights import PERIOD, yawing_flight
 from numba import njit
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian

@@ -6,6 +6,7 @@ import pytest
 from data_paths import NANOBENCH, data_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.identification.estimate import estimate_log, plot_wrench, truth_rmse, write_wrench

@@ -8,6 +8,7 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+
 import windwrench
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs import SCENARIOS, Fan, FanTrackingEnv, Scenario

@@ -3,6 +3,7 @@ import json
 
 import numpy as np
 import pytest
+
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.errors import InputError
 from windwrench.experiments import fig3

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from windwrench.estimator import UKFTuning
 from windwrench.experiments import fig5
 from windwrench.experiments.fig5_estimators import ukf_runner

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from windwrench.controllers import Admittance, Hover
 from windwrench.dynamics import InputError
 from windwrench.experiments import fig7

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.flight_log import POSE, REQUIRED, ROTORS, FlightLog, read_log, write_log
 from windwrench.identification.readers.nanobench import motor_thrust

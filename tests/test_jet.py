@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.jet import HULL_RADIUS, STATIONS, Fan, fan_record, gust, jet_at, jet_table, jet_wrench
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flights import PERIOD, yawing_flight
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.rotation import matrix_of
 from windwrench.estimator import UKFTuning

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.jet import Fan, fan_record, jet_table

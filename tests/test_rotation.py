@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import rotation as r
 
 numbers = st.floats(-1.0, 1.0, allow_nan=False, width=64)

@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+
 from windwrench.dynamics import load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.estimate import STATE_SIZE

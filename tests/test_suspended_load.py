@@ -3,6 +3,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.errors import InputError
 from windwrench.envs.closed_loop import ClosedLoop

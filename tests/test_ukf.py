@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flights import PERIOD, yawing_flight
 from literal_ukf import LiteralUKF, matrix
+
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF

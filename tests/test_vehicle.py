@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from data_paths import data_file
+
 from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
 from windwrench.dynamics.vehicle import parse_vehicle
 

@@ -1,0 +1,92 @@
+"""The runner of the paper's figures: whole files or none, the same bytes again, and a run that goes on where it stopped."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from windwrench.dynamics import InputError
+from windwrench.experiments import NAMES
+from windwrench.experiments.reproduce import _module, chosen, reproduce, write_page, write_result
+from windwrench.experiments.result import Comparison, Result
+
+COMMAND = str(Path(sys.executable).with_name("windwrench"))
+
+
+def small_result(value=1.0):
+    figure = Figure()
+    figure.subplots().plot([0, value])
+    return Result({"value": np.float64(value), "gone": float("nan")}, {"x": np.arange(3), "name": np.array(["a", "b", "c"])},
+                  figure, [Comparison("a value (m)", "about 1", f"{value:.2f}")], ["A remark."],
+                  timing=[Comparison("time (us)", "-", "5")])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_experiment_has_what_the_runner_calls(name):
+    module = _module(name)
+    assert isinstance(module.TITLE, str)
+    assert module.SEEDS >= 1
+    assert callable(module.run)
+
+
+def test_the_same_result_gives_the_same_bytes(tmp_path):
+    for folder in ("one", "two"):
+        write_result("fig0", "A title", 3, small_result(), tmp_path / folder)
+    names = sorted(p.name for p in (tmp_path / "one").iterdir())
+    assert names == ["fig0.csv", "fig0.json", "fig0.png", "fig0.svg", "fig0.timing.json"]
+    for name in names:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+    kept = json.loads((tmp_path / "one" / "fig0.json").read_text())
+    assert kept["figures"] == {"value": 1.0, "gone": None}
+    assert (tmp_path / "one" / "fig0.csv").read_text() == "x,name\n0,a\n1,b\n2,c\n"
+
+
+def test_the_page_shows_the_table_and_the_picture(tmp_path):
+    write_result("fig3", "A title", 3, small_result(), tmp_path / "out")
+    write_page(["fig3", "fig4"], tmp_path / "out", tmp_path / "page.md")
+    page = (tmp_path / "page.md").read_text()
+    assert "| a value (m) | about 1 | 1.00 |" in page
+    assert "![A title](out/fig3.png)" in page
+    assert "`windwrench reproduce fig3 --seeds 3`" in page
+    assert "A remark." in page
+    assert "fig4" not in page
+
+
+def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
+    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": True}
+    first = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
+    (tmp_path / "fig6.png").unlink()
+    shares = []
+    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1, report=lambda s: shares.append(s["fig6"])) == {"fig6": True}
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == first
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
+
+
+def test_a_run_that_is_killed_leaves_no_half_file(tmp_path):
+    run = subprocess.Popen([COMMAND, "reproduce", "fig6", "--seeds", "1", "--out", str(tmp_path)], stdout=subprocess.DEVNULL,
+                           stderr=subprocess.DEVNULL, start_new_session=True)
+    time.sleep(2.5)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    for path in tmp_path.glob("*.json"):
+        json.loads(path.read_text())
+    again = subprocess.run([COMMAND, "reproduce", "fig6", "--seeds", "1", "--out", str(tmp_path)], capture_output=True,
+                           text=True)
+    assert again.returncode == 0, again.stderr
+    assert {p.name for p in tmp_path.iterdir()} >= {"fig6.csv", "fig6.json", "fig6.png", "fig6.svg", "reproduction.md"}
+
+
+def test_wrong_requests_are_named(tmp_path):
+    with pytest.raises(InputError, match=r"fig33.*Did you mean 'fig3'"):
+        chosen("fig33")
+    with pytest.raises(InputError, match="--seeds"):
+        reproduce(["fig6"], tmp_path, seeds=0)
+    assert chosen("all") == list(NAMES)

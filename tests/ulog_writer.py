@@ -1,0 +1,51 @@
+"""A small writer of ULog files, after the format's description in PX4's user guide."""
+
+import struct
+
+_TYPES = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "int32_t": "i", "bool": "?"}
+
+
+def _message(kind, payload):
+    return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+
+def ulog_bytes(topics, parameters=None):
+    """Return a ULog.
+
+    Args:
+        topics: mapping from a topic's name (``name`` or ``name#instance``) to its fields ``{"type name": column}``;
+            a column (N,), or (N, K) for an array; ``timestamp`` comes first.
+        parameters: mapping from a parameter's name to its value, int or float.
+    """
+    out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)]
+    for name, fields in topics.items():
+        declared = "".join(_declare(key, column) for key, column in fields.items())
+        if not name.endswith("#1"):
+            out.append(_message("F", f"{name.partition('#')[0]}:{declared}".encode()))
+    for name, value in (parameters or {}).items():
+        kind, code = ("int32_t", "i") if isinstance(value, int) else ("float", "f")
+        key = f"{kind} {name}".encode()
+        out.append(_message("P", bytes([len(key)]) + key + struct.pack(f"<{code}", value)))
+    for number, name in enumerate(topics):
+        plain, _, instance = name.partition("#")
+        out.append(_message("A", struct.pack("<BH", int(instance or 0), number) + plain.encode()))
+    for number, fields in enumerate(topics.values()):
+        codes = [_TYPES[key.split()[0]] for key in fields]
+        for row in zip(*fields.values(), strict=True):
+            data = b"".join(struct.pack(f"<{size(value)}{code}", *flat(value)) for code, value in zip(codes, row, strict=True))
+            out.append(_message("D", struct.pack("<H", number) + data))
+    return b"".join(out)
+
+
+def _declare(key, column):
+    kind, name = key.split()
+    width = getattr(column[0], "shape", ())
+    return f"{kind}[{width[0]}] {name};" if width else f"{kind} {name};"
+
+
+def size(value):
+    return len(flat(value))
+
+
+def flat(value):
+    return value.tolist() if getattr(value, "shape", ()) else [value.item() if hasattr(value, "item") else value]
