@@ -7,5 +7,7 @@ from .observer import NonlinearObserver, ObserverTuning
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 
-__all__ = ["NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate", "WrenchEstimator", "WrenchMassUKF",
-           "WrenchUKF"]
+__all__ = [
+    "NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate", "WrenchEstimator", "WrenchMassUKF",
+    "WrenchUKF",
+]
