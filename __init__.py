@@ -11,5 +11,6 @@ if "windwrench/FanTracking-v0" not in gymnasium.registry:  # pytest imports this
     gymnasium.register(
         id="windwrench/FanTracking-v0",
         entry_point="windwrench.envs.fan_tracking:FanTrackingEnv",
+        vector_entry_point="windwrench.envs.vector:FanTrackingVectorEnv",
         max_episode_steps=250,
     )

@@ -225,13 +225,12 @@ def reproduce(
             progress.update(tasks[name], completed=share) for name, share in shares.items()] and None)
     target = folder / "reproduction.md" if page is None else page
     write_page(NAMES, folder, target)
-    table = Table("figure", "quantity", "the paper", "this kit", box=box.SIMPLE_HEAD)
     for name in names:
-        rows = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))["comparison"]
-        label = name if fresh[name] else f"{name} (kept)"
-        for i, row in enumerate(rows):
-            table.add_row(label if i == 0 else "", row["quantity"], row["paper"], row["here"], end_section=i + 1 == len(rows))
-    console.print(table)
+        kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        console.print(f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"), style="bold", highlight=False)
+        for row in kept["comparison"]:
+            paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
+            console.print(f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False)
     _say(*(folder / f"{name}.png" for name in names), target)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Mocap, Vehicle, load_vehicle
@@ -227,6 +227,7 @@ def _draw(rows: list[dict[str, Any]], shown: dict[str, dict[str, Array]]) -> Fig
         axes.set_ylabel(f"settled error, RMS ({unit})")
         axes.grid(alpha=0.3, which="both")
         for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter(NullFormatter())
     panels[0, 0].legend(frameon=False, fontsize=9)

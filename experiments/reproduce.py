@@ -134,8 +134,14 @@ def _csv(columns: Mapping[str, NDArray[np.generic]]) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(zip(*([_plain(v) for v in column] for column in columns.values()), strict=True))
+    writer.writerows(zip(*([_cell(v) for v in column] for column in columns.values()), strict=True))
     return buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """Return a number with the six digits that a picture's data need, and anything else as it is."""
+    plain = _plain(value)
+    return float(f"{plain:.6g}") if isinstance(plain, float) else plain
 
 
 def _plain(value: Any) -> Any:
