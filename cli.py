@@ -130,7 +130,7 @@ def benchmark(
 @app.command()
 def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
-    reader: Annotated[str | None, typer.Option(help="Reader for a log of another form, such as nanobench.")] = None,
+    reader: Annotated[str | None, typer.Option(help="Reader for a log of another form: nanobench, crazyswarm2, px4_ulog or rosbag.")] = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/estimate"),
 ) -> None:
@@ -232,6 +232,31 @@ def reproduce(
             paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
             console.print(f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False)
     _say(*(folder / f"{name}.png" for name in names), target)
+
+
+@app.command()
+def speed(
+    rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
+    markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
+) -> None:
+    """Measure a filter step, flights against real time, and start-up, beside peers that are installed.
+
+    Example: windwrench speed --rounds 7
+    """
+    from .benchmarks.speed import HEADER, filters, flights, measure, rows_of, starts, write_markdown
+
+    with _progress() as progress:
+        task = progress.add_task("measuring", total=None)
+        contenders = [*filters(), *flights(), *starts()]
+        progress.update(task, total=rounds * len(contenders))
+        figures = measure(contenders, rounds, lambda: progress.advance(task))
+    table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
+    for row in rows_of(figures):
+        table.add_row(*row[:-1])
+    console.print(table)
+    if markdown is not None:
+        write_markdown(figures, rounds, markdown)
+        _say(markdown)
 
 
 @app.command()

@@ -136,7 +136,7 @@ def _start(estimator: Estimator | PeerFilter, run: ModelRun) -> None:
                     run.initial_angular_velocity)
 
 
-def _timed(estimator: Estimator | PeerFilter, run: ModelRun, steps: int) -> float:
+def time_step(estimator: Estimator | PeerFilter, run: ModelRun, steps: int) -> float:
     """Return the time of a step in s, a mean over ``steps`` of them from the start of the flight."""
     _start(estimator, run)
     step: Callable[..., object] = estimator.step
@@ -161,16 +161,21 @@ def agreement(run: ModelRun, ours: WrenchUKF, peer: PeerFilter, steps: int = PEE
     return force, torque
 
 
+def make_run(steps: int) -> ModelRun:
+    """Return the flight that is stepped through: yawed by 120 degrees, turning at 3 rad/s."""
+    vehicle, tuning = load_vehicle("ardrone2"), UKFTuning()
+    return simulate_model(
+        vehicle, tuning, np.full((steps, 4), vehicle.hover_rate), PERIOD, seed=1,
+        quaternion=(math.cos(math.pi / 3), 0.0, 0.0, math.sin(math.pi / 3)), angular_velocity=(0.0, 0.0, 3.0),
+        covariance=0.01 * default_covariance(vehicle, tuning))
+
+
 def main(rounds: int = ROUNDS, steps: int = STEPS, peer_steps: int = PEER_STEPS) -> None:
     """Measure and print."""
     from rich.console import Console
     from rich.table import Table
 
-    vehicle, tuning = load_vehicle("ardrone2"), UKFTuning()
-    run = simulate_model(
-        vehicle, tuning, np.full((max(steps, peer_steps), 4), vehicle.hover_rate), PERIOD, seed=1,
-        quaternion=(math.cos(math.pi / 3), 0.0, 0.0, math.sin(math.pi / 3)), angular_velocity=(0.0, 0.0, 3.0),
-        covariance=0.01 * default_covariance(vehicle, tuning))
+    vehicle, tuning, run = load_vehicle("ardrone2"), UKFTuning(), make_run(max(steps, peer_steps))
     ukf, peer = WrenchUKF(vehicle, tuning, PERIOD), PeerFilter(vehicle, tuning, PERIOD)
     entries: list[tuple[str, Estimator | PeerFilter, int]] = [
         ("WrenchUKF", ukf, steps),
@@ -179,11 +184,11 @@ def main(rounds: int = ROUNDS, steps: int = STEPS, peer_steps: int = PEER_STEPS)
         ("filterpy UnscentedKalmanFilter", peer, peer_steps),
     ]
     for _, estimator, _ in entries:
-        _timed(estimator, run, 3)  # compiles
+        time_step(estimator, run, 3)  # compiles
     times: list[list[float]] = [[] for _ in entries]
     for _ in range(rounds):
         for taken, (_, estimator, count) in zip(times, entries, strict=True):
-            taken.append(_timed(estimator, run, count))
+            taken.append(time_step(estimator, run, count))
     table = Table(title=f"Time of one step from Python, medians of {rounds} interleaved rounds")
     table.add_column("estimator")
     table.add_column("us a step", justify="right")
