@@ -114,9 +114,9 @@ def write_result(name: str, title: str, seeds: int, result: Result, folder: Path
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").unlink(missing_ok=True)
     with matplotlib.rc_context({"svg.hashsalt": "windwrench"}):
-        for kind, options in (("png", {"dpi": 110, "metadata": {"Software": None}}), ("svg", {"metadata": {"Date": None}})):
+        for kind, stamp in (("png", "Software"), ("svg", "Date")):
             with replaced(folder / f"{name}.{kind}") as partial:
-                result.picture.savefig(partial, format=kind, **options)  # type: ignore[arg-type]
+                result.picture.savefig(partial, format=kind, dpi=110, metadata={stamp: None})
     with replaced(folder / f"{name}.csv") as partial:
         partial.write_text(_csv(result.data), encoding="utf-8")
     summary = {

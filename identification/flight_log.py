@@ -16,6 +16,7 @@ A row whose seven pose fields are all empty is one in which motion capture lost 
 """
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -53,6 +54,7 @@ class FlightLog:
     source: str = ""  # the file and the reader
     notes: tuple[str, ...] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
     valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # (N,) the pose is there
+    extra: Mapping[str, Array] = field(default_factory=dict)  # (N,) or (N, ...) SI; what a reader found besides
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
@@ -69,7 +71,8 @@ def read_log(path: str | Path, reader: str | None = None, vehicle: Vehicle | Non
 
     Args:
         path: ``.csv``, ``.csv.gz`` or ``.parquet``.
-        reader: name of a reader in ``identification/readers/`` for a log of another form; None for the kit's own.
+        reader: name of a reader in ``identification/readers/`` for a log of another form, with that reader's option
+            behind a colon where it takes one (``rosbag:topics.yaml``); None for the kit's own.
         vehicle: the vehicle that flew, for checking units and, in a reader, for turning thrust into turn rates.
 
     Raises:
@@ -84,11 +87,16 @@ def read_log(path: str | Path, reader: str | None = None, vehicle: Vehicle | Non
     if reader is not None:
         log = find_reader(reader).read(path, vehicle)
     else:
+        for other in READERS.values():
+            if path.name.lower().endswith(other.suffixes):
+                raise InputError(f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file of this kind")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a ROS 2 bag")
         table = open_table(path)
         missing = [name for name in REQUIRED if name not in table.header]
         if missing:
             for other in READERS.values():
-                if set(other.signature) <= set(table.header):
+                if other.signature and set(other.signature) <= set(table.header):
                     raise InputError(f"{path}: this is a {other.name} log; expected --reader {other.name} "
                                      f"(reader={other.name!r}) with it")
             raise InputError(f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 _SHADES = {GROUND: "#d9d9d9", TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
 _AXES = (("x", "#0072b2"), ("y", "#d55e00"), ("z", "#007f5f"))
 _TRUTH = "#222222"
+_LASTING = 0.1  # s without a pose that is worth hatching
 
 
 def plot_wrench(series: "WrenchSeries", log: FlightLog, path: str | Path) -> Path:
@@ -104,13 +105,15 @@ def _draw_vectors(panel: "Axes", t: Array, mean: Array, std: Array, truth: Array
 
 
 def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
-    """Shade the phases, and hatch the stretches without a pose."""
+    """Shade the phases, and hatch the stretches without a pose that last; a pose slower than the log is none of them."""
     for phase in phases:
         if phase.name != FLIGHT:
             panel.axvspan(phase.start, phase.end, color=_SHADES[phase.name], zorder=0, lw=0)
-    if not log.valid.all():
-        lost = ~log.valid
-        lost[1:] |= ~log.valid[:-1]  # up to the next pose
+    seen = np.concatenate([[-np.inf], log.t[log.valid], [np.inf]])
+    gap = seen[np.searchsorted(seen, log.t, "left")] - seen[np.searchsorted(seen, log.t, "right") - 1]
+    lost = gap > _LASTING
+    if lost.any():
+        lost[1:] |= lost[:-1]  # up to the next pose
         panel.fill_between(log.t, 0.0, 1.0, where=lost, transform=panel.get_xaxis_transform(), facecolor="none",
                            edgecolor="#999999", hatch="///", zorder=0, lw=0)
 

@@ -261,7 +261,7 @@ def test_a_minute_at_200_hz_reads_fast(tmp_path, suffix):
 
 
 def test_an_unknown_reader_is_named(path):
-    with pytest.raises(InputError, match=r"unknown reader 'nanobensh'; expected one of nanobench.*Did you mean"):
+    with pytest.raises(InputError, match=r"unknown reader 'nanobensh'; expected one of .*nanobench.*Did you mean 'nanobench'"):
         read_log(path, reader="nanobensh")
 
 

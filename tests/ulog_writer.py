@@ -14,14 +14,14 @@ def ulog_bytes(topics, parameters=None):
 
     Args:
         topics: mapping from a topic's name (``name`` or ``name#instance``) to its fields ``{"type name": column}``;
-            a column (N,), or (N, K) for an array; ``timestamp`` comes first.
+            a column (N,), or (N, K) for an array; ``timestamp`` comes first. Fields named ``item[0].field`` and so on,
+            one item after the other, become an array of a nested type.
         parameters: mapping from a parameter's name to its value, int or float.
     """
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)]
     for name, fields in topics.items():
-        declared = "".join(_declare(key, column) for key, column in fields.items())
         if not name.endswith("#1"):
-            out.append(_message("F", f"{name.partition('#')[0]}:{declared}".encode()))
+            out += _formats(name, fields)
     for name, value in (parameters or {}).items():
         kind, code = ("int32_t", "i") if isinstance(value, int) else ("float", "f")
         key = f"{kind} {name}".encode()
@@ -35,6 +35,19 @@ def ulog_bytes(topics, parameters=None):
             data = b"".join(struct.pack(f"<{size(value)}{code}", *flat(value)) for code, value in zip(codes, row, strict=True))
             out.append(_message("D", struct.pack("<H", number) + data))
     return b"".join(out)
+
+
+def _formats(topic, fields):
+    """Return the format messages of a topic, its nested type's among them."""
+    plain = "".join(_declare(key, column) for key, column in fields.items() if "." not in key)
+    nested = [key.split() for key in fields if "." in key]
+    if not nested:
+        return [_message("F", f"{topic}:{plain}".encode())]
+    item = nested[0][1].partition("[")[0]
+    first = "".join(f"{kind} {name.partition('.')[2]};" for kind, name in nested if name.startswith(f"{item}[0]."))
+    count = len({name.partition(".")[0] for _, name in nested})
+    return [_message("F", f"{topic}:{plain}{item}_report[{count}] {item};".encode()),
+            _message("F", f"{item}_report:{first}".encode())]
 
 
 def _declare(key, column):
