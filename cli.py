@@ -3,6 +3,7 @@
 import os
 import sys
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -130,7 +131,8 @@ def benchmark(
 @app.command()
 def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
-    reader: Annotated[str | None, typer.Option(help="Reader for a log of another form: nanobench, crazyswarm2, px4_ulog or rosbag.")] = None,
+    reader: Annotated[str | None, typer.Option(help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag "
+                                                    "or rosbag:TOPICS.yaml.")] = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/estimate"),
 ) -> None:
@@ -221,8 +223,12 @@ def reproduce(
     columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
     with Progress(*columns, console=_errors, transient=True) as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
-        fresh = run(names, folder, seeds, jobs, lambda shares: [
-            progress.update(tasks[name], completed=share) for name, share in shares.items()] and None)
+
+        def report(shares: Mapping[str, float]) -> None:
+            for name, share in shares.items():
+                progress.update(tasks[name], completed=share)
+
+        fresh = run(names, folder, seeds, jobs, report)
     target = folder / "reproduction.md" if page is None else page
     write_page(NAMES, folder, target)
     for name in names:
@@ -260,10 +266,24 @@ def speed(
 
 
 @app.command()
-def effects() -> None:
-    """List the physical effects that plant and estimator know."""
+def effects(
+    markdown: Annotated[Path | None, typer.Option(help="Write the page of all effects to this file instead.")] = None,
+) -> None:
+    """List the physical effects that plant and estimator know.
+
+    Example: windwrench effects --markdown docs/effects.md
+    """
     from .dynamics.effects import get, names
 
+    if markdown is not None:
+        from .dynamics.effect_page import effects_page
+
+        try:
+            markdown.write_text(effects_page(), encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--markdown {markdown}: cannot be written: {error.strerror or error}") from error
+        _say(markdown)
+        return
     name_column, coefficient_column = Column("effect", no_wrap=True), Column("coefficient", no_wrap=True)
     table = Table(name_column, "kind", coefficient_column, "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
     for name in names():

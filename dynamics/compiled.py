@@ -1,6 +1,9 @@
 """How this kit's inner loops are compiled."""
 
-from collections.abc import Callable
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -17,3 +20,16 @@ def compiled(function: F) -> F:
     Strict arithmetic: with reordered sums a cached process could give other bits than a fresh one.
     """
     return cast(F, njit(cache=True)(function))
+
+
+@contextmanager
+def announced(patience: float = 2.0) -> Iterator[None]:
+    """Say on stderr what takes so long if the block, a first call of compiled code, lasts longer than ``patience`` s."""
+    timer = threading.Timer(patience, lambda: print(
+        "windwrench: compiling its inner loops, once for this installation (about 20 s) ...", file=sys.stderr, flush=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

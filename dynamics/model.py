@@ -7,25 +7,47 @@ import numpy as np
 
 from .compiled import Record, compiled
 from .effects import compile_effects
-from .effects.base import ROTORS_SIZE, STATE_SIZE, VEHICLE_SIZE, Array
-from .effects.call import deliver
+from .effects.base import (
+    HIDDEN,
+    PARAMETERS,
+    ROTOR_ACCELERATION,
+    ROTOR_TIME,
+    ROTORS_SIZE,
+    ROW_SIZE,
+    SAMPLE_SIZE,
+    STATE_SIZE,
+    STEP,
+    VEHICLE_SIZE,
+    Array,
+)
+from .effects.call import advance, deliver, report
 from .errors import InputError
-from .motion import BODY, body_record, effect_wrench, rotor_wrench
+from .motion import BODY, body_record, effect_wrench, fill_state, rotor_wrench
 from .vehicle import Vehicle
 
 MAX_EFFECTS = 16  # of a kind
-MEMORY = 96  # numbers that a rotor-input effect may keep
+MAX_SENSING = 4
+MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
+_SENSE_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
+_OWN_ROW = MAX_EFFECTS + MAX_SENSING  # the model's: whether it has delivered turn rates yet, and those
 
 MODEL_FIELDS: list[tuple[object, ...]] = [
     ("body", BODY),
     ("constants", "f8", (VEHICLE_SIZE,)),
     ("wrench_laws", "i8", (MAX_EFFECTS,)),
-    ("wrench_coefficients", "f8", (MAX_EFFECTS, 8)),
+    ("wrench_coefficients", "f8", (MAX_EFFECTS, ROW_SIZE)),
+    ("wrench_hooks", "i8", (MAX_EFFECTS,)),
     ("wrench_count", "i8"),
+    ("hooked", "i8"),  # whether any law has a state of its own
+    ("waiting", "i8"),  # whether those states are still to be carried over the step in hand
     ("rotor_laws", "i8", (MAX_EFFECTS,)),
-    ("rotor_coefficients", "f8", (MAX_EFFECTS, 8)),
+    ("rotor_coefficients", "f8", (MAX_EFFECTS, PARAMETERS)),
     ("rotor_count", "i8"),
-    ("memory", "f8", (MAX_EFFECTS, MEMORY)),
+    ("sense_laws", "i8", (MAX_SENSING,)),
+    ("sense_coefficients", "f8", (MAX_SENSING, PARAMETERS)),
+    ("sense_count", "i8"),
+    ("sample", "f8", (SAMPLE_SIZE,)),  # on its way through the sensing effects
+    ("memory", "f8", (_OWN_ROW + 1, MEMORY)),
     ("time", "f8"),
     ("voltage", "f8"),
     ("wind", "f8", (3,)),
@@ -43,16 +65,27 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
         InputError: more effects than a model holds.
     """
     bundle = compile_effects(vehicle)
-    if max(len(bundle.wrench_laws), len(bundle.rotor_laws)) > MAX_EFFECTS or bundle.rotor_memory > MEMORY:
-        raise InputError(f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind")
+    if max(len(bundle.wrench_laws), len(bundle.rotor_laws)) > MAX_EFFECTS or len(bundle.sense_laws) > MAX_SENSING:
+        raise InputError(f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and {MAX_SENSING} of "
+                         "sensing")
+    assert max(bundle.rotor_memory, bundle.sense_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
     record["constants"] = bundle.constants
     for kind, laws, coefficients in (("wrench", bundle.wrench_laws, bundle.wrench_coefficients),
-                                     ("rotor", bundle.rotor_laws, bundle.rotor_coefficients)):
+                                     ("rotor", bundle.rotor_laws, bundle.rotor_coefficients),
+                                     ("sense", bundle.sense_laws, bundle.sense_coefficients)):
         record[f"{kind}_count"] = len(laws)
         record[f"{kind}_laws"][: len(laws)] = laws
         record[f"{kind}_coefficients"][: len(laws)] = coefficients
+    record["wrench_hooks"][: len(bundle.wrench_hooks)] = bundle.wrench_hooks
+    record["hooked"] = int(np.any(bundle.wrench_hooks != 0))
     return bundle.vehicle
+
+
+def reset_model(record: np.void) -> None:
+    """Forget all that effects remember, and set the time to zero."""
+    record["memory"], record["time"], record["waiting"] = 0.0, 0.0, 0
+    record["wrench_coefficients"][:, HIDDEN:] = 0.0
 
 
 @compiled
@@ -61,14 +94,42 @@ def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     f.voltage = voltage
     for i in range(4):
         f.rotors[i] = rotor_speeds[i]
+    f.rotors[STEP], f.rotors[ROTOR_TIME] = dt, f.time
     if f.rotor_count > 0:
         deliver(f.rotor_laws[: f.rotor_count], f.rotor_coefficients, f.constants, f.memory, dt, voltage, f.rotors)
+    if f.wrench_count > 0:
+        last = f.memory[_OWN_ROW]
+        share = last[0] / dt if dt > 0.0 else 0.0
+        last[0] = 1.0
+        for i in range(4):
+            f.effect_state[ROTOR_ACCELERATION + i] = share * (f.rotors[i] - last[1 + i])
+            last[1 + i] = f.rotors[i]
+        f.waiting = f.hooked
     rotor_wrench(f.body, f.rotors, f.rotor_wrench)
 
 
 @compiled
 def apply_effects(f: Record, position: Array, rotation: Array, velocity: Array, omega: Array) -> None:
-    """Write what the wrench effects say at a state into ``f.effect_wrench``."""
+    """Write what the wrench effects say at a state into ``f.effect_wrench``.
+
+    The first call after ``drive`` also carries the effects' own states over the step: it must be at the state itself,
+    not at a sigma point.
+    """
     if f.wrench_count > 0:
+        if f.waiting > 0:
+            f.waiting = 0
+            fill_state(f.body, position, rotation, velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state)
+            advance(f.wrench_hooks[: f.wrench_count], f.wrench_coefficients, f.constants, f.effect_state, f.rotors)
         effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
                       velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, f.effect_wrench)
+
+
+@compiled
+def rewrite_sample(f: Record, dt: float, parts: int, direction: float) -> None:
+    """Change turn rates and pose, the first 11 of ``f.sample``, from truth to report (``direction`` +1) or back (-1).
+
+    ``parts``: 1 position, 2 attitude, 4 turn rates. Where the attitude is no part of it, it must still be readable.
+    """
+    if f.sense_count > 0:
+        report(f.sense_laws[: f.sense_count], f.sense_coefficients, f.constants, f.memory[_SENSE_ROW:], dt, parts,
+               direction, f.sample)

@@ -101,8 +101,18 @@ def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body:
                   time: float, state: Array, out: Array) -> None:
     """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the body frame.
 
-    ``state`` (STATE_SIZE,) is scratch.
+    ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, which must be there.
     """
+    fill_state(body, position, rotation, velocity, omega, rotor_speeds, wind, voltage, time, state)
+    for i in range(6):
+        out[i] = 0.0
+    add_wrenches(laws, coefficients, constants, state, out)
+
+
+@compiled
+def fill_state(body: Record, position: Array, rotation: Array, velocity: Array, omega: Array, rotor_speeds: Array,
+               wind: Array, voltage: float, time: float, state: Array) -> None:
+    """Lay a state of the flight out for the laws in ``state`` (STATE_SIZE,), all but the rotors' acceleration."""
     for i in range(3):
         state[POSITION + i] = position[i]
         state[VELOCITY + i] = velocity[i]
@@ -115,9 +125,6 @@ def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body:
         state[ROTOR_THRUST + i] = body.k[i] * rotor_speeds[i] * rotor_speeds[i]
     state[VOLTAGE] = voltage
     state[TIME] = time
-    for i in range(6):
-        out[i] = 0.0
-    add_wrenches(laws, coefficients, constants, state, out)
 
 
-__all__ = ["BODY", "STATE_SIZE", "accelerations", "body_record", "effect_wrench", "rotor_wrench"]
+__all__ = ["BODY", "STATE_SIZE", "accelerations", "body_record", "effect_wrench", "fill_state", "rotor_wrench"]

@@ -1,28 +1,17 @@
-"""The jet of a drum fan, and what it does to a vehicle in it.
-
-Axial speed: the momentum of an annular disc spread by a Gaussian that widens with the distance x, a jet still in its
-shear layer: ``u^2 = U0^2 (disc of radius 0.45 less hub of radius 0.10) * Gaussian of width 0.12 x / sqrt 2``. The momentum
-flux is the same at every x, and the radial inflow (entrainment) follows from continuity. The convolution of a disc with
-a Gaussian is a non-central chi-square distribution.
-"""
+"""The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean jet: ``dynamics.jet``."""
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.compiled import Record, compiled
+from ..dynamics.jet import AIR_DENSITY, COUNT_R, COUNT_X, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
 
 Array = NDArray[np.float64]
 
-STATIONS = 12  # where the wind acts on the vehicle: four rotors and a ring of eight on the hull
-HULL_RADIUS = 0.26  # m
-AIR_DENSITY = 1.2  # kg/m3
-_SPREAD = 0.12
-_X = (0.2, 0.05, 137)  # first, step, count of the table's distances, m
-_R = (0.0, 0.02, 151)  # of its radii, m
+STATIONS = 4 + HULL_STATIONS  # where the wind acts on the vehicle: four rotors and a ring on the hull
 
 
 @dataclass(frozen=True)
@@ -50,26 +39,6 @@ FAN = np.dtype([
 ])
 
 
-@cache
-def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
-    """Return axial and radial speed for U0 = 1 over the grid of distances and radii, each (137, 151)."""
-    from scipy.special import chndtr
-
-    x = _X[0] + _X[1] * np.arange(_X[2])
-    r = _R[0] + _R[1] * np.arange(_R[2])
-    # one more distance on either side, so that the derivative along x is central everywhere
-    fine = np.concatenate([[x[0] - _X[1]], x, [x[-1] + _X[1]]])
-    sigma = (_SPREAD * fine / math.sqrt(2.0))[:, None]
-    momentum = chndtr((radius / sigma) ** 2, 2, (r / sigma) ** 2) - chndtr((hub_radius / sigma) ** 2, 2, (r / sigma) ** 2)
-    axial = np.sqrt(np.maximum(momentum, 0.0))
-    slope = (axial[2:] - axial[:-2]) / (2.0 * _X[1])
-    flux = np.concatenate([np.zeros((len(x), 1)), np.cumsum(
-        0.5 * (slope[:, 1:] * r[1:] + slope[:, :-1] * r[:-1]) * _R[1], axis=1)], axis=1)
-    radial = np.zeros_like(flux)
-    radial[:, 1:] = -flux[:, 1:] / r[1:]
-    return np.ascontiguousarray(axial[1:-1]), radial
-
-
 def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
     """Return the fan as an array (1,) of ``FAN``; ``rotor_positions`` is (4, 3) m, ``period`` the tick in s."""
     record = np.zeros(1, dtype=FAN)
@@ -91,8 +60,8 @@ def jet_at(f: Record, axial: Array, radial: Array, x: float, y: float, z: float,
     """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
     dy, dz = y - f.y, z - f.height
     r = math.sqrt(dy * dy + dz * dz)
-    row, column = (x - _X[0]) / _X[1], r / _R[1]
-    if row < 0.0 or row >= _X[2] - 1 or column >= _R[2] - 1:
+    row, column = (x - FIRST_X) / STEP_X, r / STEP_R
+    if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
         wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
         return
     i, j = int(row), int(column)
@@ -163,3 +132,6 @@ def jet_wrench(f: Record, axial: Array, radial: Array, position: Array, rotation
         out[3] += y * fz - z * fy
         out[4] += z * fx - x * fz
         out[5] += x * fy - y * fx
+
+
+__all__ = ["FAN", "HULL_RADIUS", "STATIONS", "Fan", "fan_record", "gust", "jet_at", "jet_table", "jet_wrench"]

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from ..dynamics.compiled import Record, compiled
-from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model, reset_model, rewrite_sample
 from ..dynamics.motion import Array
 from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -102,7 +102,8 @@ def _normal_quantile(probability: float) -> float:
 
 def reset_plant(p: np.void, vehicle: Vehicle) -> None:
     """Put the plant's memory at hover; ``vehicle`` is the true one with its body effects applied."""
-    for name in ("memory", "time", "disturbance", "external", "jet", "applied"):
+    reset_model(p)
+    for name in ("disturbance", "external", "jet", "applied"):
         p[name] = 0.0
     p["speeds"] = vehicle.hover_rate
     p["battery"] = 1.05 * vehicle.voltage_ref
@@ -139,14 +140,19 @@ def load_world(vehicle: Vehicle, load: SuspendedLoad | None = None) -> tuple["mu
 def sense(p: Record, qpos: Array, noise: Array) -> int:
     """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where it is lost).
 
+    Sensing effects change the true pose before its noise comes on.
+
     The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle that faces -x sees the
     sign of its quaternion flip several times a second.
     """
+    for i in range(7):
+        p.sample[4 + i] = qpos[i]
+    rewrite_sample(p, 0.0, 3, 1.0)
     for i in range(3):
-        p.z[4 + i] = qpos[i] + p.sigma_position * noise[_POSE + i]
+        p.z[4 + i] = p.sample[4 + i] + p.sigma_position * noise[_POSE + i]
         p.rho[i] = 0.25 * p.sigma_attitude * noise[_POSE + 3 + i]
     quaternion_from_mrp(p.rho, p.q)
-    quaternion_multiply(p.q, qpos[3:7], p.z[7:11])
+    quaternion_multiply(p.q, p.sample[7:11], p.z[7:11])
     normalise(p.z[7:11])
     if p.z[7] < 0.0:
         for i in range(7, 11):
@@ -164,6 +170,12 @@ def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array,
         p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
         load += p.body.k[i] * p.speeds[i] * p.speeds[i]
         p.z[i] = p.speeds[i] if p.omega_lsb == 0.0 else p.omega_lsb * math.floor(p.speeds[i] / p.omega_lsb + 0.5)
+    if p.sense_count > 0:
+        for i in range(4):
+            p.sample[i] = p.z[i]
+        rewrite_sample(p, TICK, 4, 1.0)
+        for i in range(4):
+            p.z[i] = p.sample[i]
     if p.voltage_ref > 0.0:
         # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
         full = 1.05 - 0.1 * p.time / p.battery_life - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)

@@ -12,7 +12,7 @@ from ..dynamics.motion import effect_wrench
 from .error_state import symmetrise
 from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
-from .sample import check_sample, copy_estimate
+from .sample import check_sample, copy_estimate, undo_sensing
 from .ukf import WrenchUKF, add_noise, correct_parts
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
@@ -220,9 +220,10 @@ def _step_and_copy(record: Record, z: Array, parts: int, dt: float, voltage: flo
     f = record[0]
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
+        sample = undo_sensing(f, z, usable, dt)
         if dt > 0.0:
-            predict(f, z[0:4], dt, voltage)
-        correct_parts(f, z, usable)
+            predict(f, sample[0:4], dt, voltage)
+        correct_parts(f, sample, usable)
     copy_estimate(f, out)
     return usable
 

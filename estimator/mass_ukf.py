@@ -18,7 +18,7 @@ from ..dynamics.vehicle import Vehicle
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, Array, WrenchEstimate
 from .filter_record import N, drive, propagate
-from .sample import check_sample, copy_estimate
+from .sample import check_sample, copy_estimate, undo_sensing
 from .tuning import UKFTuning
 from .ukf import NOISE, WrenchUKF, add_noise
 
@@ -31,10 +31,11 @@ def _step_with_mass(record: Record, z: Array, parts: int, dt: float, voltage: fl
     usable: int = check_sample(f, z, parts)
     if usable < 0:
         return usable
+    sample = undo_sensing(f, z, usable, dt)
     if dt > 0.0:
-        _predict(f, z[0:4], dt, voltage, mass_walk, P)
+        _predict(f, sample[0:4], dt, voltage, mass_walk, P)
     if usable > 0:
-        _correct(f, z, 0 if usable & 2 != 0 else 3, 6 if usable & 1 != 0 else 3, P)
+        _correct(f, sample, 0 if usable & 2 != 0 else 3, 6 if usable & 1 != 0 else 3, P)
     for i in range(N):
         for j in range(N):
             f.P[i, j] = P[i, j]

@@ -28,12 +28,12 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
-from ..dynamics.motion import effect_wrench
+from ..dynamics.model import apply_effects
 from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
 from .estimate import NIS, Array, WrenchEstimate
 from .filter_record import drive
-from .sample import Sample, check_sample, copy_estimate, empty_estimate
+from .sample import Sample, check_sample, copy_estimate, empty_estimate, undo_sensing
 from .ukf import WrenchUKF
 
 _DAMPING = math.sqrt(0.5)  # Butterworth
@@ -321,11 +321,8 @@ def _model(f: Record, o: Record, dt: float) -> None:
     for i in range(3):
         for j in range(3):
             R[i, j] = 0.5 * (o.R_old[i, j] + o.R_new[i, j])
-    for i in range(6):
-        f.effect_wrench[i] = 0.0
     if f.wrench_count > 0:
-        effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, x[0:3], o.R_old,
-                      x[7:10], x[10:13], f.rotors, f.wind, f.voltage, f.time, f.effect_state, f.effect_wrench)
+        apply_effects(f, x[0:3], o.R_old, x[7:10], x[10:13])
     e = f.effect_wrench
     for i in range(3):
         force = R[i, 2] * w[0] + e[i]
@@ -469,6 +466,6 @@ def _step_and_copy(model: Record, record: Record, z: Array, parts: int, dt: floa
     f = model[0]
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
-        step(f, record[0], z, usable, dt, voltage)
+        step(f, record[0], undo_sensing(f, z, usable, dt), usable, dt, voltage)
     copy_estimate(f, out)
     return usable

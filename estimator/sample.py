@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
+from ..dynamics.model import rewrite_sample
 from .estimate import STATE_SIZE, Array
 from .filter_record import N
 
@@ -78,6 +79,35 @@ def check_sample(f: Record, z: Array, parts: int) -> int:
             z[i] = f.last_speeds[i]
         f.last_speeds[i] = z[i]
     return usable
+
+
+@compiled
+def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
+    """Return the checked ``parts`` of ``z`` (11,) as they were before the declared sensing effects.
+
+    Turn rates count where ``dt`` is positive. Where the attitude was not measured, the estimated one stands in for it.
+    """
+    sample: Array = f.sample[0:11]
+    for i in range(11):
+        sample[i] = z[i]
+    if f.sense_count > 0:
+        if parts & 2 == 0:
+            for i in range(4):
+                sample[7 + i] = f.x[3 + i]
+        rewrite_sample(f, dt, parts + 4 if dt > 0.0 else parts, -1.0)
+    return sample
+
+
+@compiled
+def undo_first_pose(record: Record) -> None:
+    """Bring the pose of a new estimate to what it was before the declared sensing effects."""
+    f = record[0]
+    if f.sense_count > 0:
+        for i in range(7):
+            f.sample[4 + i] = f.x[i]
+        rewrite_sample(f, 0.0, 3, -1.0)
+        for i in range(7):
+            f.x[i] = f.sample[4 + i]
 
 
 @compiled

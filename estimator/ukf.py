@@ -18,13 +18,14 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
+from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
 from .filter_record import N, drive, filter_record, propagate
 from .imu import take_in_imu
-from .sample import Sample, check_sample, copy_estimate, empty_estimate
+from .sample import Sample, check_sample, copy_estimate, empty_estimate, undo_first_pose, undo_sensing
 from .tuning import UKFTuning
 
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
@@ -251,9 +252,10 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     """
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
+        sample = undo_sensing(f, z, usable, dt)
         if dt > 0.0:
-            predict(f, z[0:4], dt, voltage)
-        correct_parts(f, z, usable)
+            predict(f, sample[0:4], dt, voltage)
+        correct_parts(f, sample, usable)
     return usable
 
 
@@ -347,7 +349,9 @@ class WrenchUKF:
                 raise InputError("reset: covariance must be positive definite")
         f = self.record[0]
         f["x"], f["P"] = x, P
-        f["memory"], f["time"], f["refused"] = 0.0, 0.0, 0
+        f["refused"] = 0
+        reset_model(f)
+        undo_first_pose(self.record)
 
     @property
     def covariance(self) -> Array:

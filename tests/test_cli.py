@@ -113,7 +113,14 @@ def test_effects_are_listed(tmp_path):
         assert name in text
 
 
+def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
+    succeed(tmp_path, "effects", "--markdown", "effects.md")
+    committed = Path(__file__).parents[1] / "docs" / "effects.md"
+    assert (tmp_path / "effects.md").read_text(encoding="utf-8") == committed.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(("arguments", "words"), [
+    (("effects", "--markdown", "nowhere/effects.md"), "cannot be written"),
     (("fly", "--scenario", "bas"), "Did you mean 'base'"),
     (("fly", "--controller", "admitance"), "Did you mean 'admittance'"),
     (("fly", "--vehicle", "ardrone"), "Did you mean 'ardrone2'"),

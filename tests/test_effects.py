@@ -9,8 +9,10 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
 from windwrench.dynamics.effects import check_setting, compile_effects, get, names, parse_setting
-from windwrench.envs.plant import PlantSettings
-from windwrench.envs.recording import record_flight
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.plant import NOISE, TICK, PlantSettings
+from windwrench.envs.recording import draw_trajectory, record_flight
+from windwrench.envs.suspended_load import SuspendedLoad
 from windwrench.identification.estimate import estimate_log
 from windwrench.identification.flight_log import FlightLog
 
@@ -19,13 +21,18 @@ QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0
 VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0, mocap=Mocap(200.0, 1e-4, 5e-4))
 # where an effect shows; "excite" shows most of them
 FLIGHTS = {"ground_effect": "ground"}
+CEILING = replace(VEHICLE, ceiling_z=2.1)  # "excite" comes near it
 LEAST_GAIN = 3.0  # by how much declaring an effect lowers the RMS of the wrench that is left
+
+
+def vehicle_for(name):
+    return CEILING if name == "ceiling_effect" else VEHICLE
 
 
 @cache
 def flight(name=None, trajectory=None):
     effects = () if name is None else (parse_setting(name, VEHICLE),)
-    columns = record_flight(VEHICLE, effects, trajectory or FLIGHTS.get(name, "excite"), 12.0, 1, QUIET)
+    columns = record_flight(vehicle_for(name), effects, trajectory or FLIGHTS.get(name, "excite"), 12.0, 1, QUIET)
     return FlightLog(**columns)
 
 
@@ -43,6 +50,9 @@ def test_an_effect_says_what_it_is(name):
     assert effect.name == name
     assert effect.kind in ("rotor input", "wrench", "body", "sensing")
     assert effect.source.strip()
+    assert effect.excitation.strip()
+    assert effect.confused_with
+    assert set(effect.confused_with) < set(names()) - {name}
     assert len((sys.modules[f"windwrench.dynamics.effects.{name}"].__doc__ or "").strip()) > 40
     assert 0 < len(effect.coefficients) <= 8
     assert len({c.name for c in effect.coefficients}) == len(effect.coefficients)
@@ -57,13 +67,13 @@ def test_an_effect_says_what_it_is(name):
 @pytest.mark.parametrize("name", names())
 def test_an_effect_has_the_function_of_its_kind(name):
     effect = get(name)
-    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend}
+    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend, "sensing": effect.law}
     assert functions[effect.kind] is not None
     if effect.law is not None:
         assert effect.law.address != 0
         bundle = compile_effects(VEHICLE.with_effects(parse_setting(name)))
-        laws = bundle.wrench_laws if effect.kind == "wrench" else bundle.rotor_laws
-        assert effect.law.address in laws
+        laws = {"wrench": bundle.wrench_laws, "rotor input": bundle.rotor_laws, "sensing": bundle.sense_laws}
+        assert effect.law.address in laws[effect.kind]
 
 
 @pytest.mark.parametrize("name", names())
@@ -76,9 +86,29 @@ def test_the_plant_flies_an_effect(name):
 @pytest.mark.parametrize("name", names())
 def test_the_estimator_explains_an_effect_once_it_is_declared(name):
     log = flight(name)
-    unexplained = remaining(log, VEHICLE)
-    explained = remaining(log, VEHICLE.with_effects(parse_setting(name, VEHICLE)))
+    unexplained = remaining(log, vehicle_for(name))
+    explained = remaining(log, vehicle_for(name).with_effects(parse_setting(name, VEHICLE)))
     assert explained < unexplained / LEAST_GAIN
+
+
+def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
+    """The load and its thread there share nothing with the effect's law."""
+    load, rng = SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03), np.random.default_rng(1)
+    t = TICK * np.arange(2401)
+    setpoints, samples = draw_trajectory("excite", rng, t), np.empty((len(t), 11))
+    loop = ClosedLoop(VEHICLE, settings=QUIET, load=load)
+    loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
+    loop.hang_load()
+    for k in range(len(t)):
+        loop.setpoint[:] = setpoints[k]
+        samples[k, :4] = loop.sample[:4]
+        loop.run(rng.standard_normal((1, NOISE)))
+        samples[k, 4:] = loop.sample[4:]
+    log = FlightLog(t, samples[:, 4:7], samples[:, 7:11], samples[:, :4])
+    swinging = EffectSetting("slung_payload", {"m": load.mass, "l": load.length, "damping": load.drag / load.mass})
+    explained = remaining(log, VEHICLE.with_effects(swinging))
+    assert explained < 0.1 * remaining(log, VEHICLE)
+    assert explained < 0.3 * remaining(log, VEHICLE.with_effects(EffectSetting("mass", {"dm": load.mass})))
 
 
 def test_the_same_flight_comes_out_twice():

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..errors import InputError, unknown_name
 from ..vehicle import EffectSetting, Vehicle
-from .base import VEHICLE_SIZE, Array, Coefficient, Effect
+from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 
 __all__ = ["Bundle", "Coefficient", "Effect", "check_setting", "compile_effects", "get", "names", "parse_setting"]
 
-_NOT_EFFECTS = {"__init__", "base", "call"}
+_NOT_EFFECTS = {"__init__", "base", "call", "parts"}
 
 
 @cache
@@ -90,34 +90,41 @@ class Bundle:
     vehicle: Vehicle  # with the body effects applied
     constants: Array  # (VEHICLE_SIZE,) what laws may know of it
     wrench_laws: np.ndarray  # (n,) int64 addresses
-    wrench_coefficients: Array  # (n, 8)
+    wrench_coefficients: Array  # (n, ROW_SIZE)
+    wrench_hooks: np.ndarray  # (n,) int64 addresses of what carries a law's own state on; 0: it has none
     rotor_laws: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
     rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor laws need
+    sense_laws: np.ndarray  # (k,) int64 addresses
+    sense_coefficients: Array  # (k, 8)
+    sense_memory: int  # columns of the memory (k, sense_memory) that the sensing laws need
 
 
 def compile_effects(vehicle: Vehicle) -> Bundle:
     """Return the effects of a vehicle, ready for compiled code."""
     amended = vehicle
-    wrench: list[tuple[int, Array]] = []
-    rotor: list[tuple[int, Array]] = []
-    memory = 1
+    rows: dict[str, list[tuple[Effect, Array]]] = {"wrench": [], "rotor input": [], "sensing": []}
     for setting in vehicle.effects:
         effect = get(setting.name)
         if effect.amend is not None:
             amended = effect.amend(amended, setting.coefficients)
         if effect.law is not None:
-            column = np.zeros(8)
-            column[: len(effect.coefficients)] = effect.vector(setting.coefficients)
-            (wrench if effect.kind == "wrench" else rotor).append((effect.law.address, column))
-            memory = max(memory, effect.memory)
+            rows[effect.kind].append((effect, effect.vector(setting.coefficients)))
+    rows["wrench"].sort(key=lambda row: not row[0].sets_wind)
     constants = np.concatenate([
         [amended.mass, amended.gravity, amended.rotor_radius, amended.floor_z, amended.ceiling_z, amended.voltage_ref,
-         amended.hover_rate], amended.com, amended.positions.ravel()])
+         amended.hover_rate], amended.com, amended.positions.ravel(), amended.spin])
     assert constants.size == VEHICLE_SIZE
 
-    def stack(laws: list[tuple[int, Array]]) -> tuple[np.ndarray, Array]:
-        return (np.array([address for address, _ in laws], dtype=np.int64),
-                np.array([c for _, c in laws]).reshape(len(laws), 8))
+    def stack(kind: str, width: int) -> tuple[np.ndarray, Array, int]:
+        """Return addresses, coefficients (n, width) and the largest memory of a kind's laws."""
+        coefficients = np.zeros((len(rows[kind]), width))
+        for i, (_, vector) in enumerate(rows[kind]):
+            coefficients[i, : len(vector)] = vector
+        addresses = np.array([effect.law.address for effect, _ in rows[kind]], dtype=np.int64)
+        return addresses, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
 
-    return Bundle(amended, constants, *stack(wrench), *stack(rotor), memory)
+    laws, coefficients, _ = stack("wrench", ROW_SIZE)
+    hooks = np.array([effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]], dtype=np.int64)
+    return Bundle(amended, constants, laws, coefficients, hooks, *stack("rotor input", PARAMETERS),
+                  *stack("sensing", PARAMETERS))

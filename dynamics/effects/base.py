@@ -2,19 +2,25 @@
 
 An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is called through
 its address, so that every user of it (a tick of the plant, a sigma point of the filter, a sample of a log) runs
-the same machine code and a new effect recompiles none of them. There are three kinds:
+the same machine code and a new effect recompiles none of them. There are four kinds:
 
 ``rotor input``
     changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four turn rates in
     ``rotors``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
     adds force (world frame) and torque (body frame, about the centre of mass). Law ``(c, vehicle, state, wrench)``:
-    adds to the six numbers in ``wrench``.
+    adds to the six numbers in ``wrench``. It is asked many times a step. One that has a state of its own keeps it in
+    ``c`` from ``HIDDEN`` on, all zero at the start, and carries it on in ``advance(c, vehicle, state, rotors)``,
+    called once a step before the law is asked; ``rotors[STEP]`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
+``sensing``
+    changes what the log holds. Law ``(c, vehicle, sample, memory)``: rewrites the parts of ``sample`` that are there,
+    from the truth to what is reported where ``sample[DIRECTION]`` is +1 (the plant), and back where it is -1 (an
+    estimator that knows of the effect).
 
-``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state`` and ``rotors`` are
-laid out by the constants below.
+``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state``, ``rotors`` and
+``sample`` are laid out by the constants below.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,7 +43,8 @@ LAW = types.void(_POINTER, _POINTER, _POINTER, _POINTER)
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
 COM = 7  # 3, m
 ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
-VEHICLE_SIZE = 22
+SPIN = 22  # 4, turning sense about body +z
+VEHICLE_SIZE = 26
 
 # state of the flight at which a wrench law is asked
 POSITION = 0  # 3, m, world, of the geometric centre
@@ -49,13 +56,28 @@ ROTOR_THRUST = 22  # 4, N, delivered
 WIND = 26  # 3, m/s, world
 VOLTAGE = 29  # V; 0: not known
 TIME = 30  # s
-STATE_SIZE = 31
+ROTOR_ACCELERATION = 31  # 4, rad/s2, delivered, mean over the step
+STATE_SIZE = 35
 
 # rotors: the turn rates that a rotor-input law rewrites, and what it may know
 SPEED = 0  # 4, rad/s
 STEP = 4  # s, since the law was last called
 ROTOR_VOLTAGE = 5  # V; 0: not known
-ROTORS_SIZE = 6
+ROTOR_TIME = 6  # s, since the start
+ROTORS_SIZE = 7
+
+# sample: what a sensing law rewrites, and what it may know
+SAMPLE_SPEED = 0  # 4, rad/s
+SAMPLE_POSITION = 4  # 3, m, world
+SAMPLE_QUATERNION = 7  # 4, body to world
+SAMPLE_STEP = 11  # s, since the law was last called
+HAS_SPEED, HAS_POSITION, HAS_QUATERNION = 12, 13, 14  # 1 where that part is there; a quaternion is always readable
+DIRECTION = 15  # +1: from truth to report, -1: back
+SAMPLE_SIZE = 16
+
+PARAMETERS = 8  # coefficients that a law may have
+HIDDEN = 8  # where a wrench law's own state starts in ``c``
+ROW_SIZE = 16  # of ``c`` of a wrench law
 
 
 @dataclass(frozen=True)
@@ -72,14 +94,22 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its law, coefficients and source. The docstring of its file states the law."""
+    """A physical effect: its law, coefficients and source. The docstring of its file states the law.
+
+    ``confused_with`` names the effects that can leave much the same traces in a log, and ``excitation`` says what flight
+    tells them apart.
+    """
 
     name: str
     kind: str
     coefficients: tuple[Coefficient, ...]
     source: str
-    law: Any = None  # compiled C function, for rotor input and wrench
-    memory: int = 0  # numbers that a rotor-input law keeps from step to step; all zero before its first
+    confused_with: tuple[str, ...]
+    excitation: str
+    law: Any = None  # compiled C function, for rotor input, wrench and sensing
+    advance: Any = None  # compiled C function, for a wrench that has a state of its own
+    memory: int = 0  # numbers that a rotor-input or sensing law keeps from step to step; all zero before its first
+    sets_wind: bool = False  # a wrench law that changes the wind in ``state``: asked before all others
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
 
     def vector(self, coefficients: Mapping[str, float]) -> Array:

@@ -23,5 +23,7 @@ EFFECT = Effect(
     kind="rotor input",
     coefficients=(Coefficient("n", "1", (1.0, 1.0), "exponent of the voltage ratio", minimum=0.0, maximum=3.0),),
     source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind a regulated drive",
+    confused_with=("thrust_scale", "thrust_fade", "mass"),
+    excitation="a whole battery, with loads that come and go, and the voltage in the log",
     law=law,
 )

@@ -8,7 +8,18 @@ from numba import types
 from numba.extending import intrinsic
 
 from ..compiled import Record, compiled
-from .base import ROTOR_VOLTAGE, ROTORS_SIZE, SPEED, STEP, Array
+from .base import (
+    DIRECTION,
+    HAS_POSITION,
+    HAS_QUATERNION,
+    HAS_SPEED,
+    ROTOR_VOLTAGE,
+    ROTORS_SIZE,
+    SAMPLE_STEP,
+    SPEED,
+    STEP,
+    Array,
+)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -36,11 +47,38 @@ def add_wrenches(laws: np.ndarray, coefficients: Array, vehicle: Array, state: A
 @compiled
 def deliver(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array, dt: float, voltage: float,
             rotors: Array) -> None:
-    """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver; ``rotors`` is (6,)."""
+    """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
+
+    ``rotors`` is (ROTORS_SIZE,) with its time filled in.
+    """
     rotors[STEP] = dt
     rotors[ROTOR_VOLTAGE] = voltage
     for i in range(len(laws)):
         _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, rotors.ctypes.data, memory[i].ctypes.data)
 
 
-__all__ = ["ROTORS_SIZE", "SPEED", "add_wrenches", "deliver"]
+@compiled
+def advance(hooks: np.ndarray, coefficients: Array, vehicle: Array, state: Array, rotors: Array) -> None:
+    """Carry the own states of the wrench laws on by ``rotors[STEP]`` s in a ``state`` that is filled in."""
+    for i in range(len(hooks)):
+        if hooks[i] != 0:
+            _call(hooks[i], coefficients[i].ctypes.data, vehicle.ctypes.data, state.ctypes.data, rotors.ctypes.data)
+
+
+@compiled
+def report(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array, dt: float, parts: int,
+           direction: float, sample: Array) -> None:
+    """Rewrite ``sample`` (SAMPLE_SIZE,) from truth to report (``direction`` +1), or back (-1), in the reverse order.
+
+    ``parts``: 1 position, 2 attitude, 4 turn rates.
+    """
+    sample[SAMPLE_STEP], sample[DIRECTION] = dt, direction
+    sample[HAS_POSITION] = 1.0 if parts & 1 != 0 else 0.0
+    sample[HAS_QUATERNION] = 1.0 if parts & 2 != 0 else 0.0
+    sample[HAS_SPEED] = 1.0 if parts & 4 != 0 else 0.0
+    for n in range(len(laws)):
+        i = n if direction > 0.0 else len(laws) - 1 - n
+        _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, sample.ctypes.data, memory[i].ctypes.data)
+
+
+__all__ = ["ROTORS_SIZE", "SPEED", "add_wrenches", "advance", "deliver", "report"]

@@ -27,5 +27,7 @@ EFFECT = Effect(
         Coefficient(f"c{axis}", "m", (0.005, 0.001), f"along body {axis}", minimum=-1.0, maximum=1.0) for axis in "xyz"
     ),
     source="rigid-body mechanics",
+    confused_with=("constant_torque", "rotor_efficiency", "marker_offset"),
+    excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll and pitch for cz",
     amend=amend,
 )

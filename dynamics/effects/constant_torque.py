@@ -18,5 +18,7 @@ EFFECT = Effect(
         Coefficient(f"t{axis}", "Nm", (0.01, 1e-4), f"about body {axis}") for axis in "xyz"
     ),
     source="definition",
+    confused_with=("com_offset", "rotor_efficiency"),
+    excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows with thrust",
     law=law,
 )

@@ -48,5 +48,7 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(Coefficient("rho", "1", (3.0, 3.0), "strength; 1 for a single helicopter rotor", minimum=0.0, maximum=20.0),),
     source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017",
+    confused_with=("thrust_scale", "mass", "constant_force"),
+    excitation="several heights, the lowest of one to two rotor diameters",
     law=law,
 )

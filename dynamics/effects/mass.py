@@ -24,5 +24,7 @@ EFFECT = Effect(
     kind="body",
     coefficients=(Coefficient("dm", "kg", (0.04, 0.003), "added to the declared mass"),),
     source="definition",
+    confused_with=("thrust_scale", "constant_force", "slung_payload", "battery_sag"),
+    excitation="vertical accelerations of 1 m/s2 and more: in hover a mass, a thrust scale and a vertical force are the same",
     amend=amend,
 )

@@ -26,6 +26,8 @@ EFFECT = Effect(
     coefficients=(Coefficient("tau", "s", (0.035, 0.05), "time constant", minimum=0.0, maximum=0.5),),
     source="Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015; "
     "Faessler et al., Thrust Mixing, Saturation, and Body-Rate Control, RA-L 2017",
+    confused_with=("latency", "clock_offset", "rotor_inertia"),
+    excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight shows neither",
     law=law,
     memory=5,
 )

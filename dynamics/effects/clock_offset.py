@@ -1,0 +1,63 @@
+"""Clock offset: pose and turn rates of one row of the log are not of the same instant.
+
+With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those of -dt earlier than
+the pose. Between two samples by linear interpolation. An estimator that knows of it delays the other of the two, and so
+estimates the flight of dt ago.
+"""
+
+from numba import cfunc
+
+from .base import (
+    DIRECTION,
+    HAS_POSITION,
+    HAS_QUATERNION,
+    HAS_SPEED,
+    LAW,
+    SAMPLE_POSITION,
+    SAMPLE_QUATERNION,
+    SAMPLE_SPEED,
+    SAMPLE_STEP,
+    Coefficient,
+    Effect,
+)
+from .parts import delay
+
+_POSES = 13  # kept, 0.06 s at 200 Hz
+_SPEEDS = 22
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+    wanted = c[0] * sample[DIRECTION]
+    memory[1] += sample[SAMPLE_STEP]
+    if wanted > 0.0:
+        if sample[HAS_POSITION] > 0.0 and sample[HAS_QUATERNION] > 0.0:
+            # a quaternion and its negative are one attitude: keep to the side of the last one
+            dot = 0.0
+            for i in range(4):
+                dot += memory[6 + i] * sample[SAMPLE_QUATERNION + i]
+            if memory[0] > 0.0 and dot < 0.0:
+                for i in range(4):
+                    sample[SAMPLE_QUATERNION + i] *= -1.0
+            delay(memory, 7, _POSES, wanted, sample, SAMPLE_POSITION)
+            square = 0.0
+            for i in range(4):
+                square += sample[SAMPLE_QUATERNION + i] ** 2
+            for i in range(4):
+                sample[SAMPLE_QUATERNION + i] /= square**0.5
+    elif wanted < 0.0 and sample[HAS_SPEED] > 0.0:
+        delay(memory, 4, _SPEEDS, -wanted, sample, SAMPLE_SPEED)
+
+
+EFFECT = Effect(
+    name="clock_offset",
+    kind="sensing",
+    coefficients=(
+        Coefficient("dt", "s", (0.03, 0.02), "by which the pose is older than the turn rates", minimum=-0.06, maximum=0.06),
+    ),
+    source="definition; motion capture reaches the vehicle's clock 5 to 30 ms late",
+    confused_with=("latency", "motor_lag"),
+    excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency leave the same log",
+    law=law,
+    memory=2 + max(8 * _POSES, 5 * _SPEEDS),
+)

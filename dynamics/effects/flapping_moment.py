@@ -1,0 +1,33 @@
+"""Flapping moment: the blades of a moving rotor flap, and their hub turns the vehicle away from the motion.
+
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap W_i (u_i x e_z) in body axes. It is the
+k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
+"""
+
+from numba import cfunc
+
+from .base import LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .parts import air_velocity
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+    for i in range(4):
+        x = vehicle[ROTOR_POSITION + 3 * i]
+        y = vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        ux, uy, _ = air_velocity(state, x, y, z)
+        wrench[3] -= c[0] * state[ROTOR_SPEED + i] * uy
+        wrench[4] += c[0] * state[ROTOR_SPEED + i] * ux
+
+
+EFFECT = Effect(
+    name="flapping_moment",
+    kind="wrench",
+    coefficients=(Coefficient("kflap", "Nm/(rad/s m/s)", (4e-6, 1.5e-9), "per rotor"),),
+    source="Hoffmann, Huang, Waslander and Tomlin, AIAA GNC 2007; form as in Folk, Paulos and Kumar, RotorPy, 2023; "
+    "sizes: a thirtieth of the typical rotor drag times the arm's length",
+    confused_with=("com_offset", "rotor_drag"),
+    excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and changes sign with it",
+    law=law,
+)

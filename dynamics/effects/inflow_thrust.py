@@ -1,0 +1,32 @@
+"""Inflow thrust: a rotor that climbs into its own inflow delivers less thrust, one that sinks delivers more.
+
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_iz along body z, applied at the rotor.
+Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
+"""
+
+from numba import cfunc
+
+from .base import LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .parts import air_velocity, push
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+    for i in range(4):
+        x = vehicle[ROTOR_POSITION + 3 * i]
+        y = vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        uz = air_velocity(state, x, y, z)[2]
+        push(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
+
+
+EFFECT = Effect(
+    name="inflow_thrust",
+    kind="wrench",
+    coefficients=(Coefficient("kz", "N/(rad/s m/s)", (2.3e-4, 7.6e-7), "per rotor", minimum=0.0),),
+    source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter Flight Dynamics and Control, "
+    "AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
+    confused_with=("body_drag", "rate_damping"),
+    excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping torque",
+    law=law,
+)

@@ -1,0 +1,31 @@
+"""Latency: what the rotors do is what was logged a while ago, a pure delay.
+
+The delivered turn rates at t are the logged ones at t - d, between two samples by linear interpolation. In front of the
+first sample the first one holds.
+"""
+
+from numba import cfunc
+
+from .base import LAW, STEP, Coefficient, Effect
+from .parts import delay
+
+_KEPT = 22  # samples, 0.105 s at 200 Hz
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    memory[1] += rotors[STEP]
+    delay(memory, 4, _KEPT, c[0], rotors, 0)
+
+
+EFFECT = Effect(
+    name="latency",
+    kind="rotor input",
+    coefficients=(Coefficient("d", "s", (0.03, 0.02), "delay", minimum=0.0, maximum=0.1),),
+    source="definition; radio link and electronic speed controllers take 5 to 30 ms",
+    confused_with=("motor_lag", "clock_offset"),
+    excitation="quick manoeuvres: a lag smooths what a latency only moves. A log of turn rates and poses cannot tell it from "
+    "poses that are stamped late (clock_offset): that takes a second clock",
+    law=law,
+    memory=2 + 5 * _KEPT,
+)

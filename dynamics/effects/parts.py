@@ -1,0 +1,87 @@
+"""Parts that several laws share, on the pointers that a law is given."""
+
+import math
+from typing import Any
+
+from ..compiled import compiled
+from .base import COM, RATE, ROTATION, SAMPLE_QUATERNION, VELOCITY, WIND
+
+_SPACING = 0.0045  # s, least time between two kept entries of a delay line
+
+# An array of a C function, in the layout of base.py
+Pointer = Any
+
+
+@compiled
+def air_velocity(state: Pointer, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return the velocity through the air, in body axes, of the body's point (x, y, z) m from the geometric centre."""
+    ax = state[VELOCITY] - state[WIND]
+    ay = state[VELOCITY + 1] - state[WIND + 1]
+    az = state[VELOCITY + 2] - state[WIND + 2]
+    wx, wy, wz = state[RATE], state[RATE + 1], state[RATE + 2]
+    ux = state[ROTATION] * ax + state[ROTATION + 3] * ay + state[ROTATION + 6] * az + wy * z - wz * y
+    uy = state[ROTATION + 1] * ax + state[ROTATION + 4] * ay + state[ROTATION + 7] * az + wz * x - wx * z
+    uz = state[ROTATION + 2] * ax + state[ROTATION + 5] * ay + state[ROTATION + 8] * az + wx * y - wy * x
+    return ux, uy, uz
+
+
+@compiled
+def push(vehicle: Pointer, state: Pointer, wrench: Pointer, x: float, y: float, z: float, fx: float, fy: float,
+         fz: float) -> None:
+    """Add a force (fx, fy, fz) N in body axes at the body's point (x, y, z) m from the geometric centre to ``wrench``."""
+    for i in range(3):
+        wrench[i] += state[ROTATION + 3 * i] * fx + state[ROTATION + 3 * i + 1] * fy + state[ROTATION + 3 * i + 2] * fz
+    x -= vehicle[COM]
+    y -= vehicle[COM + 1]
+    z -= vehicle[COM + 2]
+    wrench[3] += y * fz - z * fy
+    wrench[4] += z * fx - x * fz
+    wrench[5] += x * fy - y * fx
+
+
+@compiled
+def turn_attitude(sample: Pointer, rx: float, ry: float, rz: float) -> None:
+    """Turn the attitude of a sample about the world's axes by the rotation vector (rx, ry, rz) rad."""
+    angle = math.sqrt(rx * rx + ry * ry + rz * rz)
+    scale = math.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    a, x, y, z = math.cos(0.5 * angle), scale * rx, scale * ry, scale * rz
+    q = SAMPLE_QUATERNION
+    b, u, v, w = sample[q], sample[q + 1], sample[q + 2], sample[q + 3]
+    sample[q] = a * b - x * u - y * v - z * w
+    sample[q + 1] = a * u + x * b + y * w - z * v
+    sample[q + 2] = a * v - x * w + y * b + z * u
+    sample[q + 3] = a * w + x * v - y * u + z * b
+
+
+@compiled
+def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Pointer, at: int) -> None:
+    """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
+
+    ``memory`` is the delay line: how many entries there are, the time since the last was added (the caller adds to it),
+    and the entries, each an age and its numbers, the newest first. Between two entries it interpolates linearly; before
+    the oldest it holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
+    """
+    size = width + 1
+    count = int(memory[0])
+    for j in range(count):
+        memory[2 + j * size] += memory[1]
+    memory[1] = 0.0
+    if count < 2 or memory[2 + size] >= _SPACING:
+        count = min(count + 1, capacity)
+        for j in range(count - 1, 0, -1):
+            for i in range(size):
+                memory[2 + j * size + i] = memory[2 + (j - 1) * size + i]
+        memory[0] = count
+    memory[2] = 0.0
+    for i in range(width):
+        memory[3 + i] = values[at + i]
+    j = 0
+    while j < count - 1 and memory[2 + j * size] < wanted:
+        j += 1
+    here = 2 + j * size
+    share = 0.0
+    if j > 0 and memory[here] >= wanted:
+        share = (memory[here] - wanted) / (memory[here] - memory[here - size])
+    for i in range(width):
+        late = memory[here + 1 + i]
+        values[at + i] = late if share == 0.0 else late + share * (memory[here - size + 1 + i] - late)

@@ -1,0 +1,31 @@
+"""Rotor efficiency: single rotors deliver more or less than declared at the same turn rate.
+
+Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered turn rate is W_i sqrt(1 + e_i).
+"""
+
+import math
+
+from numba import cfunc
+
+from .base import LAW, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    for i in range(4):
+        rotors[i] *= math.sqrt(max(1.0 + c[i], 0.0))
+
+
+EFFECT = Effect(
+    name="rotor_efficiency",
+    kind="rotor input",
+    coefficients=tuple(
+        Coefficient(f"e{i}", "1", (-0.08 if i == 1 else 0.0,) * 2, f"relative change of rotor {i}", minimum=-1.0, maximum=2.0)
+        for i in (1, 2, 3, 4)
+    ),
+    source="definition; a chipped or badly seated propeller loses several per cent",
+    confused_with=("com_offset", "constant_torque", "thrust_scale", "mass"),
+    excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady torque stays, and an offset "
+    "centre of mass makes no yaw torque",
+    law=law,
+)

@@ -1,0 +1,31 @@
+"""Rotor inertia: the torque that it takes to spin rotors up and to turn them with the body.
+
+With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z - omega x h e_z in body axes, W being
+delivered turn rates and dW/dt their mean over the step.
+"""
+
+from numba import cfunc
+
+from .base import LAW, RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+    momentum = 0.0
+    for i in range(4):
+        momentum += c[0] * vehicle[SPIN + i] * state[ROTOR_SPEED + i]
+        wrench[5] -= c[0] * vehicle[SPIN + i] * state[ROTOR_ACCELERATION + i]
+    wrench[3] -= state[RATE + 1] * momentum
+    wrench[4] += state[RATE] * momentum
+
+
+EFFECT = Effect(
+    name="rotor_inertia",
+    kind="wrench",
+    coefficients=(Coefficient("jr", "kg m2", (2e-5, 7e-8), "of one rotor about its axis", minimum=0.0),),
+    source="rigid-body mechanics; sizes: a thin rod of the propeller's mass and span (4 g, 0.2 m and a geared drive; 0.4 g, "
+    "0.046 m)",
+    confused_with=("motor_lag", "inertia", "latency"),
+    excitation="quick changes of yaw rate: rotors that speed up turn the body at once, before their drag does",
+    law=law,
+)

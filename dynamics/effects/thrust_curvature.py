@@ -1,0 +1,30 @@
+"""Thrust curvature: thrust does not grow exactly with the square of the turn rate.
+
+Thrust and reaction torque are those declared times 1 + a (W^2 / W_hover^2 - 1), no less than zero, so that nothing changes
+at the turn rate of hover. The delivered turn rate is W times the root of that.
+"""
+
+import math
+
+from numba import cfunc
+
+from .base import HOVER_RATE, LAW, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    for i in range(4):
+        ratio = rotors[i] / vehicle[HOVER_RATE]
+        rotors[i] *= math.sqrt(max(1.0 + c[0] * (ratio * ratio - 1.0), 0.0))
+
+
+EFFECT = Effect(
+    name="thrust_curvature",
+    kind="rotor input",
+    coefficients=(Coefficient("a", "1", (-0.1, -0.1), "relative change at twice the hover thrust", minimum=-0.9, maximum=2.0),),
+    source="a fit to second order about hover, as thrust stands of small propellers show: Foerster, System Identification of "
+    "the Crazyflie 2.0, ETH Zurich 2015",
+    confused_with=("thrust_scale", "inertia", "mass"),
+    excitation="thrusts from half to one and a half times hover: fast climbs, drops and turns",
+    law=law,
+)

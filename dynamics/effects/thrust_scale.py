@@ -1,0 +1,29 @@
+"""Thrust scale: all rotors deliver more or less than declared at the same turn rate.
+
+Thrust and reaction torque scale by 1 + s: the delivered turn rate is W sqrt(1 + s).
+"""
+
+import math
+
+from numba import cfunc
+
+from .base import LAW, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    scale = math.sqrt(max(1.0 + c[0], 0.0))
+    for i in range(4):
+        rotors[i] *= scale
+
+
+EFFECT = Effect(
+    name="thrust_scale",
+    kind="rotor input",
+    coefficients=(Coefficient("s", "1", (-0.05, -0.05), "relative change", minimum=-0.9, maximum=2.0),),
+    source="definition; air density and propeller wear change thrust by several per cent",
+    confused_with=("mass", "battery_sag", "thrust_curvature", "constant_force", "thrust_fade"),
+    excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at hover) and a steady force; "
+    "a whole battery tells it from sag",
+    law=law,
+)
