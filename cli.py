@@ -140,7 +140,7 @@ def estimate(
 
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
-    from .dynamics.vehicle import load_vehicle
+    from .dynamics.vehicle_file import load_vehicle
     from .identification.estimate import estimate_log, plot_wrench, truth_rmse, write_wrench
     from .identification.flight_log import read_log
 
@@ -182,7 +182,7 @@ def record(
     Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out drag.csv
     """
     from .dynamics.effects import parse_setting
-    from .dynamics.vehicle import load_vehicle
+    from .dynamics.vehicle_file import load_vehicle
     from .envs.recording import record_flight
     from .identification.files import file_kind
     from .identification.flight_log import FlightLog, write_log
@@ -277,11 +277,10 @@ def effects(
 
     if markdown is not None:
         from .dynamics.effect_page import effects_page
+        from .dynamics.files import replaced
 
-        try:
-            markdown.write_text(effects_page(), encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"--markdown {markdown}: cannot be written: {error.strerror or error}") from error
+        with replaced(markdown) as partial:
+            partial.write_text(effects_page(), encoding="utf-8")
         _say(markdown)
         return
     name_column, coefficient_column = Column("effect", no_wrap=True), Column("coefficient", no_wrap=True)

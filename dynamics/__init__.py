@@ -1,6 +1,7 @@
 """What a quadrotor is: rotations, the vehicle as data, how it moves, and the physical effects on it."""
 
 from .errors import InputError
-from .vehicle import EffectSetting, Mocap, Vehicle, dump_vehicle, load_vehicle, preset_names
+from .vehicle import EffectSetting, Mocap, Vehicle
+from .vehicle_file import dump_vehicle, load_vehicle, preset_names
 
 __all__ = ["EffectSetting", "InputError", "Mocap", "Vehicle", "dump_vehicle", "load_vehicle", "preset_names"]

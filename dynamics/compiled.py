@@ -22,6 +22,11 @@ def compiled(function: F) -> F:
     return cast(F, njit(cache=True)(function))
 
 
+def is_compiled(function: Callable[..., Any]) -> bool:
+    """Return whether a compiled function's machine code is in memory already."""
+    return bool(cast(Any, function).signatures)
+
+
 @contextmanager
 def announced(patience: float = 2.0) -> Iterator[None]:
     """Say on stderr what takes so long if the block, a first call of compiled code, lasts longer than ``patience`` s."""

@@ -6,8 +6,9 @@ from .effects import get, names
 
 _HEAD = """# The effects
 
-One effect, three uses: the plant flies it, the estimator's model includes it once it is declared, and the diagnosis fits it
-to a log. Each is one file in `dynamics/effects/`, in which its law is written once. This page is made from those files:
+One effect, three uses: the plant flies it, the estimator's model includes it once it is declared, and the residual wrench of
+a log is taken against it. Each is one file in `dynamics/effects/`, in which its law is written once. This page is made from
+those files:
 
     windwrench effects --markdown docs/effects.md
 

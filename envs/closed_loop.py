@@ -1,12 +1,13 @@
 """Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the wind."""
 
 import math
+from contextlib import nullcontext
 
 import mujoco
 import numpy as np
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
-from ..dynamics.compiled import compiled
+from ..dynamics.compiled import announced, compiled, is_compiled
 from ..dynamics.errors import InputError
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
@@ -158,11 +159,12 @@ class ClosedLoop:
     def run(self, noise: Array, fan_y: Array | None = None) -> None:
         """Run one tick for each row of ``noise`` (n, NOISE), with the fan at ``fan_y`` (n,) m."""
         axial, radial = self.jet_table
-        for k in range(len(noise)):
-            tick(self.record, 0, axial, radial, self._qpos, self._qvel, self._xfrc, noise[k],
-                 0.0 if fan_y is None else fan_y[k])
-            mujoco.mj_step(self.model, self.data, SUBSTEPS)
-            self._steps += 1
+        with nullcontext() if is_compiled(tick) else announced():
+            for k in range(len(noise)):
+                tick(self.record, 0, axial, radial, self._qpos, self._qvel, self._xfrc, noise[k],
+                     0.0 if fan_y is None else fan_y[k])
+                mujoco.mj_step(self.model, self.data, SUBSTEPS)
+                self._steps += 1
 
     def healthy(self) -> bool:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than a vehicle can be.

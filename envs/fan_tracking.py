@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
 from ..dynamics.effects import check_setting
 from ..dynamics.errors import InputError
-from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle, load_vehicle
+from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
 from .closed_loop import ClosedLoop
 from .jet import Fan

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from ..dynamics.vehicle import Mocap, Vehicle, load_vehicle
+from ..dynamics.vehicle import Mocap, Vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..envs.closed_loop import ClosedLoop
 from ..envs.plant import NOISE, TICK, PlantSettings
 from ..envs.recording import record_flight

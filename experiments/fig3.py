@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from ..dynamics.errors import InputError
-from ..dynamics.vehicle import Vehicle, load_vehicle
+from ..dynamics.vehicle import Vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from ..envs.suspended_load import SuspendedLoad
 from .hanging_mass import CALM, CENTRE_LOAD, FORCE, ROTOR_LOAD, TORQUE, hover

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.vehicle import Vehicle, load_vehicle
+from ..dynamics.vehicle import Vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from .fig4_picture import draw
 from .hanging_mass import CALM, ROTOR_LOAD, hover, with_noise

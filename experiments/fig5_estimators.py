@@ -164,5 +164,5 @@ def _best(build: Callable[[Array], Runner], start: Sequence[float], flights: Seq
     simplex = np.vstack([np.zeros_like(centre), np.log(_FACTOR) * np.eye(len(centre))])
     options: Any = {"initial_simplex": simplex, "maxfev": evaluations, "xatol": 0.01, "fatol": 1e-5}
     result = minimize(lambda offset: cost(build(parameters(offset)), flights), np.zeros(len(centre)),
-                      method="Nelder-Mead", options=options)  # type: ignore[call-overload]
+                      method="Nelder-Mead", options=options)
     return parameters(result.x)

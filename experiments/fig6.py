@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.errors import InputError
-from ..dynamics.vehicle import load_vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..envs.closed_loop import ClosedLoop
 from ..envs.jet import Fan
 from ..envs.plant import NOISE, TICK

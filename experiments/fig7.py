@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..controllers import Admittance
 from ..controllers.observation import MAX_COMMAND
 from ..dynamics.errors import InputError
-from ..dynamics.vehicle import load_vehicle
+from ..dynamics.vehicle_file import load_vehicle
 from ..envs.fan_tracking import DISTANCE, FanTrackingEnv
 from ..envs.jet import Fan
 from ..envs.plant import PlantSettings

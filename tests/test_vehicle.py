@@ -6,7 +6,7 @@ import yaml
 from data_paths import data_file
 
 from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
-from windwrench.dynamics.vehicle import parse_vehicle
+from windwrench.dynamics.vehicle_file import parse_vehicle
 
 GOOD = {
     "name": "mine", "mass": 0.5, "inertia": [0.002, 0.003, 0.004], "arm_l": 0.12,

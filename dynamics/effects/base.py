@@ -1,4 +1,4 @@
-"""The form of a physical effect, written once and used by the plant, the estimator and the diagnosis.
+"""The form of a physical effect, written once and used by the plant, the estimator and the residual of a log.
 
 An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is called through
 its address, so that every user of it (a tick of the plant, a sigma point of the filter, a sample of a log) runs

@@ -38,7 +38,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.errors import InputError
-from ...dynamics.vehicle import Vehicle, load_vehicle
+from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle
 from ..files import open_table
 from ..flight_log import FlightLog, Mask, check_finite, check_times, log_name, time_notes, unit_quaternions
 

@@ -1,0 +1,30 @@
+"""A first call that compiles says so; the next one does not."""
+
+import os
+import subprocess
+import sys
+import time
+
+from windwrench.dynamics.compiled import announced
+
+CODE = ("import gymnasium, windwrench\nenv = gymnasium.make('windwrench/FanTracking-v0')\nenv.reset(seed=0)\n"
+        "print(env.step([0.1])[0].tobytes().hex())")
+
+
+def test_a_wait_is_explained_and_a_short_one_is_not(capsys):
+    with announced(patience=0.05):
+        time.sleep(0.3)
+    assert "compiling" in capsys.readouterr().err
+    with announced(patience=5.0):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_a_cold_and_a_warm_start_give_the_same_bits(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    cold, warm = (subprocess.run([sys.executable, "-c", CODE], cwd=tmp_path, env=environment, capture_output=True, text=True)
+                  for _ in range(2))
+    assert cold.returncode == 0, cold.stderr
+    assert "compiling" in cold.stderr
+    assert "compiling" not in warm.stderr
+    assert cold.stdout == warm.stdout
