@@ -120,7 +120,7 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (("effects", "--markdown", "nowhere/effects.md"), "cannot be written"),
+    (("effects", "--markdown", "/dev/null/effects.md"), "cannot be written"),
     (("fly", "--scenario", "bas"), "Did you mean 'base'"),
     (("fly", "--controller", "admitance"), "Did you mean 'admittance'"),
     (("fly", "--vehicle", "ardrone"), "Did you mean 'ardrone2'"),
