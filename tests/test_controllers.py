@@ -140,4 +140,16 @@ def test_a_moving_set_point_waits_for_the_vehicle():
     c["setpoint"][4] = 1.0
     for _ in range(400):
         move_setpoint(c, np.zeros(3), 0.005)
-    assert c["setpoint"][1] == pytest.approx(c["leash"])
+    # it stops within one step of 5 mm of the leash's end
+    assert c["leash"] - 0.0051 <= c["setpoint"][1] <= c["leash"]
+    c["setpoint"][4] = -1.0
+    move_setpoint(c, np.zeros(3), 0.005)
+    assert c["setpoint"][1] < c["leash"] - 0.005
+
+
+def test_a_set_point_at_rest_is_not_dragged_along():
+    """A vehicle that a gust has thrown off must find its way back."""
+    c = flight_record(VEHICLE)[0]
+    for _ in range(400):
+        move_setpoint(c, np.array([3.0, -2.0, 1.0]), 0.005)
+    np.testing.assert_array_equal(c["setpoint"], np.zeros(len(c["setpoint"])))
