@@ -132,6 +132,8 @@ def test_the_benchmark_solves_the_same_problem_as_its_peer(capsys):
     run = simulate_model(VEHICLE, UKFTuning(), np.full((60, 4), VEHICLE.hover_rate), seed=1, **YAWED,
                          covariance=1e-6 * np.eye(18))
     ours = WrenchUKF(VEHICLE, UKFTuning())
-    force, torque = filter_step.agreement(run, ours, filter_step.PeerFilter(VEHICLE, UKFTuning(), 0.005), 60)
-    assert force < 1e-6
-    assert torque < 1e-7
+    for by_component in (True, False):
+        peer = filter_step.PeerFilter(VEHICLE, UKFTuning(), 0.005, by_component)
+        force, torque = filter_step.agreement(run, ours, peer, 60)
+        assert force < 1e-6
+        assert torque < 1e-7
