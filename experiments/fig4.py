@@ -3,6 +3,9 @@
 The filter's tuning trades rise time against noise; the sweep gives the curve from which a user chooses. Every flight is
 paired with one that sees the same noise but has no mass hung on: the difference of the two is the response to the mass
 alone, and the second tells the noise.
+
+The thread really pulls sideways when the vehicle tips and slides. The lateral estimate itself is held against the bound;
+what it has beyond that true pull, as the filter would show it, is the lateral force that the filter makes up.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +19,7 @@ from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from .fig4_picture import draw
-from .hanging_mass import CALM, ROTOR_LOAD, hover, with_noise
+from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover, with_noise
 from .result import Comparison, Progress, Result
 
 TITLE = "Fig. 4: step response to a known mass"
@@ -49,6 +52,8 @@ class Step:
     rise_error: tuple[float, float]  # s, their standard errors over the flights; NaN for one flight
     peak: float  # N, of ``lateral`` in the transient
     peak_error: float  # N, its standard error
+    unpaired_peak: float  # N, of the mean of the flights with the mass as they are, with what is left of their noise
+    made_up: float  # N, largest lateral force in the transient beyond the thread's true pull as the filter would show it
     std: tuple[float, float]  # N, Nm, of a hover without the mass
     worst_lateral: float  # N, largest lateral estimate of any flight in the transient
     calm_lateral: float  # N, the same of the flights without the mass
@@ -69,7 +74,7 @@ def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Resul
     figures = {
         "rise_within_bounds": all(abs(row[name] - _RISE) <= _RISE_BOUND for row in held if row["tuned_rise_s"] == _RISE
                                   for name in ("force_rise_s", "torque_rise_s")),
-        "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in held if row["tuned_rise_s"] in _SHOWN),
+        "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in rows),
         "sweep": rows,
     }
     columns = [_columns(step) for step in shown]
@@ -95,16 +100,18 @@ def fly_step(vehicle: Vehicle, noise: tuple[float, float], actuator: bool, tuned
     time = hung[0].time
     force, torque = np.array([f.force for f in hung]), np.array([f.torque for f in hung])
     bare_force, bare_torque = np.array([f.force for f in bare]), np.array([f.torque for f in bare])
-    pull = np.array([f.pull for f in hung]).mean(axis=0)
+    pull: Array = np.array([f.pull for f in hung]).mean(axis=0)
     settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + _TRANSIENT)
     rise, rise_error = zip(*(_with_error(lambda mean: rise_time(time, mean), response) for response in (
         force[..., 2] - bare_force[..., 2], torque[..., 1] - bare_torque[..., 1])), strict=True)
     response = force[..., :2] - bare_force[..., :2]
     peak, peak_error = _with_error(lambda mean: float(_size(mean)[transient].max()), response)
+    made_up = response.mean(axis=0) - as_shown(time, (force - bare_force)[..., 2].mean(axis=0), pull[:, :2])
     return Step(
         noise, actuator, tuned, time, force[..., 2].mean(axis=0), torque[..., 1].mean(axis=0), _size(response.mean(axis=0)),
         np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1), (rise[0], rise[1]), (rise_error[0], rise_error[1]),
-        peak, peak_error, (float(bare_force[:, settled, 2].std()), float(bare_torque[:, settled, 1].std())),
+        peak, peak_error, float(_size(force.mean(axis=0))[transient].max()), float(_size(made_up)[transient].max()),
+        (float(bare_force[:, settled, 2].std()), float(bare_torque[:, settled, 1].std())),
         float(_size(force)[:, transient].max()), float(_size(bare_force)[:, transient].max()),
     )
 
@@ -122,6 +129,19 @@ def rise_time(time: Array, response: Array) -> float:
     # noise may cross 10 % more than once: the last time before 90 %
     first = int(np.flatnonzero(share[:last] < 0.1)[-1]) + 1
     return _cross(time, share, last, 0.9) - _cross(time, share, first, 0.1)
+
+
+def as_shown(time: Array, response: Array, pull: Array) -> Array:
+    """Return what a filter shows of a true pull (n, m) N, from its response (n,) N along z to the mass hung on at ``HANG``.
+
+    To the filter the axes are alike as far as it knows its attitude: a pull is smoothed by the slope of the step response.
+    """
+    after = time >= HANG
+    slope = np.diff(response[after] / response[time >= time[-1] - 5.0].mean(), prepend=0.0)
+    shown = np.zeros_like(pull)
+    for axis in range(pull.shape[1]):
+        shown[after, axis] = np.convolve(pull[after, axis], slope)[:len(slope)]
+    return shown
 
 
 def _cross(time: Array, share: Array, i: int, level: float) -> float:
@@ -147,6 +167,7 @@ def _row(step: Step) -> dict[str, Any]:
         "torque_rise_s": step.rise[1], "torque_rise_error_s": errors[1],
         "force_std_N": step.std[0], "torque_std_Nm": step.std[1],
         "lateral_N": step.peak, "lateral_error_N": errors[2],
+        "unpaired_lateral_N": step.unpaired_peak, "made_up_lateral_N": step.made_up,
         "true_lateral_N": float(step.pull[after, 2].max()),
         "worst_flight_lateral_N": step.worst_lateral, "worst_flight_lateral_without_mass_N": step.calm_lateral,
     }
@@ -165,29 +186,40 @@ def _compare(rows: Sequence[dict[str, Any]]) -> list[Comparison]:
                                     f"{row['force_rise_s']:.2f}, {row['torque_rise_s']:.2f}"))
             lines.append(Comparison(f"standard deviation (N, Nm) at {_name(row)}", "-",
                                     f"{row['force_std_N']:.3f}, {row['torque_std_Nm']:.4f}"))
-    if held:
-        worst = max(held, key=lambda row: float(row["lateral_N"]))
-        lines.append(Comparison("largest lateral-force transient (N), tuned to "
-                                f"{min(_SHOWN):g} to {max(_SHOWN):g} s", "-",
+    if rows:
+        worst = max(rows, key=lambda row: float(row["lateral_N"]))
+        tuned = [float(row["tuned_rise_s"]) for row in rows]
+        lines.append(Comparison(f"largest lateral-force transient (N), tuned to {min(tuned):g} to {max(tuned):g} s", "-",
                                 f"{worst['lateral_N']:.3f} ({worst['tuned_rise_s']:g} s, {_name(worst)})"))
+        lines.append(Comparison("of it beyond the thread's true sideways pull, largest (N)", "-",
+                                f"{max(row['made_up_lateral_N'] for row in rows):.3f}"))
     return lines
 
 
 def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
-    worst = max(rows, key=lambda row: float(row["worst_flight_lateral_N"]))
+    worst, lateral = (max(rows, key=lambda row, name=name: float(row[name]))  # type: ignore[misc]
+                      for name in ("worst_flight_lateral_N", "lateral_N"))
     over = [row for row in rows if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND]
     listed = "; ".join(f"{row['lateral_N']:.3f} (standard error {row['lateral_error_N'] or 0.0:.3f}) N tuned to "
                        f"{row['tuned_rise_s']:g} s at {_name(row)} "
                        f"{'with' if row['actuator_noise'] else 'without'} actuator noise" for row in over)
     remarks = [
-        "The mass tips the vehicle until the flight loop has trimmed it out, the vehicle slides sideways and the mass swings: "
-        f"the thread then pulls sideways for real, up to {max(row['true_lateral_N'] for row in rows):.2f} N in the mean of the "
-        "flights, and the filter is right to show it. The flights use a stiffer attitude loop than the benchmark's, which "
-        "has no integral and would tip twice as far. In a single flight the lateral estimate reached "
-        f"{worst['worst_flight_lateral_N']:.2f} N (tuned to {worst['tuned_rise_s']:g} s, {_name(worst)}); without the mass "
-        f"noise alone makes {worst['worst_flight_lateral_without_mass_N']:.2f} N of it.",
-        f"Lateral transients not clearly below {_LATERAL_BOUND:g} N (value plus two standard errors): {listed or 'none'}. "
-        "Tuned to 0.5 s at the higher noise it is at the bound: over 24 seeds 0.102 N, in groups of six 0.089 to 0.121 N.",
+        f"How the mass is hung on: at 7 s, all at once, at rest on a taut thread of {THREAD:g} m below the front rotors' axis. "
+        "The lateral force is the size of the level part of the estimate, with the flight of the same noise without the mass "
+        f"subtracted, in the mean of the flights; its transient is its largest value in the {_TRANSIENT:g} s after. Without "
+        f"that subtraction it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, noise and all.",
+        "Part of it is real: the mass tips the vehicle until the flight loop has trimmed it out, the vehicle slides from over "
+        f"the mass, and the thread pulls sideways by up to {max(row['true_lateral_N'] for row in rows):.2f} N in the mean of "
+        "the flights; the filter is right to show that, smoothed by its rise time. Beyond the true pull, smoothed by the "
+        "step response that the filter showed along z, the lateral estimate never had more than "
+        f"{max(row['made_up_lateral_N'] for row in rows):.3f} N. The flights use stiffer attitude and yaw loops than the "
+        "benchmark's. On a thread of 0.25 m, which swings in 1 s as the position loop does, the pull reached 0.24 N and the "
+        "estimate tuned to 0.5 s at the higher noise about 0.1 N.",
+        "Lateral transients not clearly below "
+        f"{_LATERAL_BOUND:g} N (value plus two standard errors, every tuning): {listed or 'none'}. The largest is "
+        f"{lateral['lateral_N']:.3f} (standard error {lateral['lateral_error_N'] or 0.0:.3f}) N. Single flights are noisier: "
+        f"in one the lateral estimate reached {worst['worst_flight_lateral_N']:.2f} N (tuned to {worst['tuned_rise_s']:g} s, "
+        f"{_name(worst)}), where without the mass noise alone makes {worst['worst_flight_lateral_without_mass_N']:.2f} N.",
     ]
     pair = {(row["tuned_rise_s"], row["position_noise_m"]): row for row in rows if not row["actuator_noise"]}
     clean, noisy = (pair.get((_RISE, noise[0])) for noise in NOISES)

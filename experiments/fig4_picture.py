@@ -55,8 +55,9 @@ def draw(steps: Sequence[Step], shown: Sequence[float], bound: float) -> Figure:
         grid[0, column].set_title(f"53 g hung on at 7 s; pose noise {labels[noise]}", loc="left", fontsize=10)
     for row in range(2):
         _share_limits(grid[row, :2])
-    grid[2, 0].set_ylim(0, None)
     _share_limits(grid[2, :2])
+    for axes in grid[2, :2]:
+        axes.set_ylim(0, 1.55 * axes.get_ylim()[1])  # room for the names above the bound
     _draw_choice(grid[:, 2], steps, labels, bound)
     for axes in grid.flat:
         axes.spines[["top", "right"]].set_visible(False)
