@@ -2,6 +2,7 @@
 
 from .errors import InputError
 from .vehicle import EffectSetting, Mocap, Vehicle
-from .vehicle_file import dump_vehicle, load_vehicle, preset_names
+from .vehicle_file import dump_vehicle, load_vehicle, preset_names, save_vehicle
 
-__all__ = ["EffectSetting", "InputError", "Mocap", "Vehicle", "dump_vehicle", "load_vehicle", "preset_names"]
+__all__ = ["EffectSetting", "InputError", "Mocap", "Vehicle", "dump_vehicle", "load_vehicle", "preset_names",
+           "save_vehicle"]

@@ -11,6 +11,7 @@ import yaml
 
 from .effects import check_setting
 from .errors import InputError, unknown_name
+from .files import replaced
 from .vehicle import Array, EffectSetting, Mocap, Vehicle
 
 _ROTOR_STEPS = 255  # an 8-bit turn rate
@@ -108,11 +109,23 @@ def dump_vehicle(vehicle: Vehicle) -> str:
         if f.name == "mocap":
             value = {m.name: getattr(value, m.name) for m in fields(Mocap)}
         elif f.name == "effects":
-            value = [{"name": e.name, "coefficients": dict(e.coefficients)} for e in value]
+            value = [{"name": e.name, "coefficients": {c: float(v) for c, v in e.coefficients.items()}} for e in value]
         elif isinstance(value, np.ndarray):
             value = value.tolist()
+        elif isinstance(value, np.generic):
+            value = value.item()
         data[f.name] = value
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+
+
+def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
+    """Write a vehicle to a YAML file, whole or not at all: ``load_vehicle`` of it gives the vehicle again.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    with replaced(Path(path)) as partial:
+        partial.write_text(dump_vehicle(vehicle), encoding="utf-8")
 
 
 def _number(value: object, where: str, key: str, positive: bool = False) -> float:

@@ -1,12 +1,14 @@
 """Vehicles as data: presets, the YAML form and its errors, rotor geometry and mixing."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 import yaml
 from data_paths import data_file
 
 from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
-from windwrench.dynamics.vehicle_file import parse_vehicle
+from windwrench.dynamics.vehicle_file import parse_vehicle, save_vehicle
 
 GOOD = {
     "name": "mine", "mass": 0.5, "inertia": [0.002, 0.003, 0.004], "arm_l": 0.12,
@@ -162,6 +164,20 @@ def test_a_dumped_vehicle_is_the_vehicle_again(tmp_path):
 def test_presets_survive_dumping(name):
     text = dump_vehicle(load_vehicle(name))
     assert dump_vehicle(parse_vehicle(text)) == text
+
+
+def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
+    vehicle = replace(load_vehicle("crazyflie"), name="Möwe: 1", mass=np.float64(0.0331)).with_effects(
+        EffectSetting("rotor_drag", {"kdx": np.float64(1 / 3e5), "kdy": 2e-6}), EffectSetting("mass", {"dm": 0.001}))
+    path = tmp_path / "new" / "vehicle.yaml"
+    save_vehicle(vehicle, path)
+    again = load_vehicle(path)
+    assert again.effects == vehicle.effects
+    for f in fields(vehicle):
+        np.testing.assert_array_equal(getattr(again, f.name), getattr(vehicle, f.name), f.name)
+    assert [p.name for p in path.parent.iterdir()] == ["vehicle.yaml"]
+    with pytest.raises(InputError, match=r"vehicle\.yaml.*cannot be written"):
+        save_vehicle(vehicle, path / "vehicle.yaml")
 
 
 def test_mixing_is_the_paper_s():

@@ -1,0 +1,109 @@
+"""What a diagnosis finds, as plain data: ``diagnosis.py`` fills it, ``report.py`` writes it down.
+
+Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in the world frame, torque
+about the centre of mass in the body frame.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that the model lacked."""
+
+    name: str
+    coefficients: Mapping[str, float]
+    std: Mapping[str, float]  # standard deviation of each coefficient
+    units: Mapping[str, str]
+    tentative: bool  # something has the name that may be another's: see ``Diagnosis.structure``
+    indistinguishable_from: tuple[str, ...]  # effects that would explain these logs as well
+    evidence: Mapping[str, float]  # e.g. share of the residual on held-out blocks that it alone explains
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How wrong a model is on the held-out blocks; NaN where it could not be worked out."""
+
+    force_rms: float  # N, all three axes
+    torque_rms: float  # Nm
+    nis_without_wrench_state: float  # mean, 6 in a perfect filter
+    rollout_1s_position_rms: float  # m
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that was tried first, alone, against the bare model."""
+
+    name: str
+    gain: float  # share of the residual's whitened energy on blocks left out in turn that it explains; may be negative
+    named: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The residual of one unbroken piece of a log, over time (n samples)."""
+
+    log: str
+    period: float  # s
+    t: Array  # (n,) s
+    before: Array  # (n, 6) N and Nm, by the declared vehicle
+    after: Array  # (n, 6) with the named effects
+    held_out: Mask  # (n,) the fit never saw it
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """Residual against what drives a named effect (n points), with the effect's own share of it."""
+
+    effect: str
+    channel: str  # one of CHANNELS
+    regressor: str  # what x is, with its unit
+    x: Array  # (n,)
+    residual: Array  # (n,) by the model with all named effects but this one
+    fitted: Array  # (n,) by this effect
+
+
+@dataclass(frozen=True)
+class Structure:
+    """One sign that the remainder after all named effects still has a law in it."""
+
+    test: str  # what was tried, in words
+    where: str  # channel and regressor, in words
+    gain: float  # share of the remainder's whitened energy that it explains on blocks left out
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What logs of one vehicle say about its model."""
+
+    verdict: str  # explained, partly explained, unexplained, nothing to explain
+    remainder: str  # none, random, structured
+    effects: tuple[NamedEffect, ...]
+    held_out_segments: tuple[tuple[str, float, float], ...]  # log, from, to (s)
+    before: Errors
+    after: Errors
+    floor_force_rms: float  # N, what sensors alone leave
+    floor_torque_rms: float  # Nm
+    advice: tuple[str, ...]  # what to fly to separate what these logs cannot
+    notes: tuple[str, ...]  # doubts about the logs, thrust models of readers, corrections that were made
+    candidates: tuple[Candidate, ...]  # best first
+    traces: tuple[Trace, ...]
+    signatures: tuple[Signature, ...]
+    structure: tuple[Structure, ...]  # strongest first
+    cutoff_hz: float
+    declared: Vehicle
+    amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment
+    logs: tuple[str, ...]
+    test_logs: tuple[str, ...]  # those the error is on, if they were given apart
+    seconds: float  # of flight in all

@@ -1,0 +1,57 @@
+"""A page as a real browser shows it: what it complains about, what overflows, which pictures are missing."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium, chromium-browser or google-chrome is installed")
+
+# A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is looked at is kept.
+_FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
+<iframe id="page" style="border:0;width:{width}px;height:1000px" srcdoc="{page}"></iframe><pre id="found"></pre>
+<script>{script}</script>"""
+_LOOK = """
+addEventListener("load", () => {
+  const page = document.getElementById("page").contentDocument, root = page.documentElement;
+  const box = element => element.getBoundingClientRect();
+  const name = element => element.tagName + " " + element.textContent.trim().slice(0, 40);
+  const svgs = [...page.querySelectorAll("svg")];
+  document.getElementById("found").textContent = JSON.stringify({
+    width: root.clientWidth, scroll_width: root.scrollWidth, height: root.scrollHeight,
+    wide: [...page.body.querySelectorAll("*")].filter(e => box(e).right > root.clientWidth + 1).map(name),
+    missing: [...page.images].filter(i => !i.naturalWidth).map(i => i.src),
+    pictures: svgs.map(s => ({alt: s.getAttribute("aria-label"), width: box(s).width, height: box(s).height})),
+    cut: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).width > 0 && (box(t).left < box(s).left - 1 ||
+      box(t).right > box(s).right + 1 || box(t).top < box(s).top - 1 || box(t).bottom > box(s).bottom + 1)).map(name)),
+    small: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).height < 8).map(name)),
+    background: getComputedStyle(page.body).backgroundColor, ink: getComputedStyle(page.body).color,
+    text: page.body.innerText,
+  });
+});
+"""
+
+
+def look(page, width, folder, dark=False):
+    """Show a page (HTML text) ``width`` pixels wide; return what was found in it, with the browser's ``complaints``."""
+    path = Path(folder) / "frame.html"
+    path.write_text(_FRAME.format(width=width, page=html.escape(page), script=_LOOK), encoding="utf-8")
+    for attempt in range(3):  # on a busy machine a browser may die before it has shown anything
+        shown = subprocess.run(
+            [BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
+             "--no-first-run", f"--user-data-dir={Path(folder) / f'profile{attempt}'}", "--enable-logging=stderr",
+             f"--blink-settings=preferredColorScheme={0 if dark else 1}", f"--window-size={max(width, 500)},1000",
+             "--dump-dom", path.resolve().as_uri()],
+            capture_output=True, text=True, timeout=120)
+        dumped = re.search(r'<pre id="found">(.+?)</pre>', shown.stdout, re.DOTALL)
+        if dumped:
+            break
+    assert dumped, f"{BROWSER} ended with {shown.returncode}: {shown.stderr[-2000:]}"
+    found = json.loads(html.unescape(dumped[1]))
+    found["complaints"] = [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
+    return found
