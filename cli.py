@@ -173,7 +173,8 @@ def record(
     out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path("results/flight.csv"),
     vehicle: VehicleOption = "ardrone2",
     effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect, NAME or NAME:coef=value,...")] = None,
-    trajectory: Annotated[str, typer.Option(help="hover, gentle, excite, ground, yaw or circle.")] = "excite",
+    trajectory: Annotated[
+        str, typer.Option(help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast or jet.")] = "excite",
     seconds: Annotated[float, typer.Option(help="Length of the flight.")] = 60.0,
     seed: Annotated[int, typer.Option(min=0)] = 0,
 ) -> None:

@@ -1,0 +1,275 @@
+"""Practice flights: what was added is what acts, and RotorPy's flights are told in our conventions."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics.effects import check_setting, get, names
+from windwrench.dynamics.rotation import matrix_of
+from windwrench.envs.plant import TICK
+from windwrench.experiments.outsiders import OUTSIDERS, Moment
+from windwrench.experiments.practice_flights import KINDS, SIZES, draw_effect, fly_practice, practice_set, practise
+from windwrench.experiments.rotorpy_flights import (
+    aero_settings,
+    available,
+    hummingbird_aero,
+    hummingbird_vehicle,
+    rotorpy_flight,
+)
+from windwrench.identification.residual import residual_wrench
+from windwrench.identification.signals import log_signals, low_pass
+
+VEHICLE = load_vehicle("ardrone2")
+WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l
+HOVER = np.full(4, VEHICLE.hover_rate)
+# a path that goes out to x = y = 1 m, 1.5 m above the floor
+PATH = np.linspace([-1.0, -1.0, 1.5], [1.0, 1.0, 1.5], 101)
+LEVEL = np.eye(3)
+LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
+CUTOFF, EDGE = 4.0, 200  # Hz, samples
+
+needs_rotorpy = pytest.mark.skipif(not available(), reason="RotorPy is not installed (pip install rotorpy)")
+
+
+def left_over(log, vehicle):
+    """Residual (n, 6) through the low-pass, and the true wrench in the world frame through the same."""
+    (signals,) = log_signals(log)
+    r = residual_wrench(signals, vehicle)
+    r[:, 3:] = np.einsum("nij,nj->ni", signals.rotation, r[:, 3:])
+    truth = np.column_stack([log.force, log.torque])
+    return tuple(low_pass(x, CUTOFF, signals.period)[EDGE:-EDGE] for x in (r, truth))
+
+
+def law(name, vehicle=VEHICLE, seed=0):
+    return OUTSIDERS[name](vehicle, np.random.default_rng(seed), PATH)
+
+
+def moment(t=1.0, position=(0, 0, 1.5), velocity=(0, 0, 0), rotation=LEVEL, rate=(0, 0, 0), speeds=HOVER):
+    return Moment(t, *(np.asarray(x, dtype=float) for x in (position, velocity, rotation, rate, speeds)))
+
+
+@pytest.mark.parametrize("name", sorted(OUTSIDERS))
+def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
+    assert OUTSIDERS[name].__doc__
+    trajectory = {"vortex_ring": "vertical", "thrust_saturation": "vertical", "thermal_column": "gentle",
+                  "wall_attraction": "gentle"}.get(name, "excite")
+    log = fly_practice(VEHICLE, (), trajectory, 8.0, 3, name, turbulence=0.0, sensor=0.0)
+    r, truth = left_over(log, VEHICLE)
+    scale = np.repeat([WEIGHT, WEIGHT * ARM], 3)
+    assert np.abs(truth / scale).max() < LARGEST
+    axis = int(np.argmax(truth.std(axis=0) / scale))
+    assert truth[:, axis].std() > 0.003 * scale[axis]
+    assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("name", sorted(OUTSIDERS))
+def test_a_disturbance_is_in_proportion_to_the_vehicle(name):
+    heavy = replace(VEHICLE, mass=2 * VEHICLE.mass, k=2 * VEHICLE.k, p=2 * VEHICLE.p)
+    one, two = law(name), law(name, heavy)
+    for i in range(400):
+        t = TICK * i
+        m = moment(t, (0.9 * np.sin(t), 0.3, 1.8), (0.9 * np.cos(t), 0.5, -0.8), LEVEL, (0.3, 0.2, 0.9), 1.2 * HOVER)
+        np.testing.assert_allclose(two(m), 2.0 * one(m), rtol=1e-9, atol=1e-15)
+
+
+def test_friction_has_one_size_and_drag_grows_with_the_cube():
+    slow, fast = moment(velocity=(0.5, 0, 0)), moment(velocity=(1.0, 0, 0))
+    np.testing.assert_allclose(law("dry_friction")(fast)[:3], [-0.04 * WEIGHT, 0, 0], rtol=2e-3, atol=1e-15)
+    assert law("dry_friction")(slow)[0] == pytest.approx(law("dry_friction")(fast)[0], rel=0.01)
+    assert law("cubic_drag")(fast)[0] == pytest.approx(8.0 * law("cubic_drag")(slow)[0])
+    assert np.all(law("dry_friction")(moment()) == 0.0)
+
+
+def test_side_force_and_precession_do_no_work():
+    m = moment(velocity=(0.7, -0.4, 0.2), rate=(0.5, -0.3, 0.8), rotation=matrix_of(np.array([0.8, 0.36, 0.0, 0.48])))
+    side, turn = law("magnus_force")(m), law("flywheel")(m)
+    assert np.linalg.norm(side[:3]) > 1e-3
+    assert side[:3] @ m.velocity == pytest.approx(0.0, abs=1e-15)
+    assert np.linalg.norm(turn[3:]) > 1e-4
+    assert turn[3:] @ (m.rotation @ m.rate) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_tether_is_slack_within_its_length_and_pulls_down_and_back_beyond():
+    pull = law("tether")
+    assert np.all(pull(moment(position=(0, 0, 1.4))) == 0.0)
+    wrench = pull(moment(position=(1.0, 0, 1.5)))
+    assert wrench[0] < 0
+    assert wrench[2] < 0
+    assert wrench[0] / wrench[2] == pytest.approx(1.0 / 1.5)
+
+
+def test_a_wall_draws_by_the_inverse_square():
+    wall = law("wall_attraction")  # at x = 1.4 m
+    near, far = (wall(moment(position=(x, 0, 1.5)))[0] for x in (0.9, 0.4))
+    assert near == pytest.approx(4.0 * far)
+    assert near > 0
+
+
+def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
+    dropouts = law("rotor_dropouts")
+    wrenches = [dropouts(moment(TICK * i)) for i in range(4000)]
+    lost = [wrench for wrench in wrenches if np.any(wrench)]
+    assert 0.1 < len(lost) / 4000 < 0.5
+    share = 0.1 * WEIGHT / 4
+    # it turns about +z and drags the body backwards, less so now
+    yaw = share * VEHICLE.p[1] / VEHICLE.k[1]
+    np.testing.assert_allclose(lost, np.tile([0, 0, -share, -ARM * share, -ARM * share, yaw], (len(lost), 1)), rtol=1e-12,
+                               atol=1e-15)
+
+
+def test_wash_costs_thrust_only_in_a_descent_and_saturation_only_at_high_rates():
+    assert np.all(law("vortex_ring")(moment(velocity=(1.0, 0.0, -0.29))) == 0.0)
+    assert law("vortex_ring")(moment(velocity=(0.0, 0.0, -0.8)))[2] < -0.02 * WEIGHT
+    assert np.all(law("thrust_saturation")(moment(speeds=1.04 * HOVER)) == 0.0)
+    assert law("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(-0.3 * (1.44 - 1.1) * WEIGHT)
+
+
+def test_the_liquid_sloshes_most_at_its_own_frequency():
+    force = {}
+    for hertz in (0.3, 1.2, 4.0):
+        slosh, w = law("sloshing"), 2 * np.pi * hertz
+        run = [slosh(moment(TICK * i, velocity=(np.sin(w * TICK * i) / w, 0, 0)))[0] for i in range(4000)]
+        force[hertz] = np.abs(run[2000:]).max()
+    assert force[1.2] > 4 * max(force[0.3], force[4.0])
+    # far below it, the liquid moves with the tank: its mass times the acceleration of 1 m/s2
+    assert force[0.3] == pytest.approx(0.1 * VEHICLE.mass, rel=0.1)
+
+
+def test_the_same_seed_gives_the_same_log_and_another_one_another():
+    drag = (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),)
+    logs = [fly_practice(VEHICLE, drag, "excite", 2.0, seed, "contact_pushes") for seed in (1, 1, 2)]
+    for field in ("position", "quaternion", "rotor_speeds", "voltage", "force", "torque"):
+        np.testing.assert_array_equal(getattr(logs[0], field), getattr(logs[1], field))
+        assert not np.array_equal(getattr(logs[0], field), getattr(logs[2], field))
+
+
+def test_noise_and_turbulence_are_as_asked():
+    noisy, calm = (fly_practice(VEHICLE, (), "hover", 6.0, 0, sensor=s, turbulence=u) for s, u in ((2.0, 3.0), (0.5, 0.0)))
+
+    def sigma(log):
+        return np.diff(log.position, axis=0).std() / np.sqrt(2)
+
+    assert sigma(noisy) == pytest.approx(2.0 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
+    assert sigma(calm) == pytest.approx(0.5 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
+    assert np.abs(calm.force).max() == 0.0
+    assert 0.5 < noisy.force.std() / (3 * 0.015 * WEIGHT / 4.5126) < 1.5
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_drawn_effects_are_in_range_and_grow_with_the_size(size):
+    for name in names():
+        setting = check_setting(draw_effect(name, VEHICLE, size, np.random.default_rng(1)))
+        assert set(setting.coefficients) == {c.name for c in get(name).coefficients}
+        typical = max(abs(c.typical[0]) for c in get(name).coefficients)
+        if name not in ("fan_jet", "slung_payload", "wind", "clock_offset", "latency"):
+            drawn = max(abs(value) for value in setting.coefficients.values())
+            assert 0.8 * SIZES[size] <= drawn / typical * 1.0000001
+            assert drawn / typical <= 1.2500001 * SIZES[size]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_practice_flight_says_what_it_has(kind):
+    flight = practise(VEHICLE, kind, seed=5, seconds=1.0, size="small")
+    count = {"nothing": 0, "effect": 1, "pair": 2, "hover": 1, "outsider": 0}[kind]
+    assert len(flight.truth) == count == len(set(flight.truth))
+    assert (flight.outsider is not None) == (kind == "outsider")
+    assert len(flight.log.t) == 201
+    assert flight.vehicle.effects == ()
+    assert np.isfinite(flight.vehicle.ceiling_z)
+    if kind == "hover":
+        assert flight.trajectory == "hover"
+
+
+def test_a_set_flies_every_effect_and_every_disturbance():
+    flights = practice_set(VEHICLE, ("effect", "outsider"), ("small",), 1, seconds=0.2)
+    flown = list(flights)
+    assert {f.truth[0] for f in flown if f.truth} == set(names())
+    assert {f.outsider for f in flown if f.outsider} == set(OUTSIDERS)
+    assert len({f.name for f in flown}) == len(flown)
+    assert len({f.log.position.tobytes() for f in flown}) == len(flown)
+
+
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: fly_practice(VEHICLE, outsider="ghost"), "disturbance"),
+    (lambda: fly_practice(VEHICLE, sensor=-1.0), "sensor"),
+    (lambda: fly_practice(VEHICLE, trajectory="loop", outsider="tether"), "trajectory"),
+    (lambda: practise(VEHICLE, "ghost"), "kind"),
+    (lambda: practise(VEHICLE, "effect", size="huge"), "size"),
+    (lambda: list(itertools.islice(practice_set(VEHICLE, ("ghost",)), 1)), "kind"),
+])
+def test_a_wrong_word_is_named(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+@pytest.fixture(scope="module")
+def flights():
+    if not available():
+        pytest.skip("RotorPy is not installed (pip install rotorpy)")
+    return {aero: rotorpy_flight("fast", 5.0, 0, aero, noise=0.0) for aero in (False, True)}
+
+
+@needs_rotorpy
+def test_rotorpy_s_hummingbird_is_told_in_our_conventions():
+    vehicle, preset = hummingbird_vehicle(eight_bit=True), load_vehicle("hummingbird")
+    np.testing.assert_allclose(vehicle.mixing, preset.mixing, rtol=1e-4)
+    np.testing.assert_allclose(vehicle.inertia, preset.inertia)
+    np.testing.assert_array_equal(vehicle.spin, preset.spin)
+    assert vehicle.mass == preset.mass
+    assert vehicle.omega_lsb == pytest.approx(1500.0 / 255)
+    assert vehicle.effects == ()
+    for setting in aero_settings():
+        check_setting(setting)
+    assert {"rotor_drag", "inflow_thrust", "translational_lift", "body_drag"} == set(hummingbird_aero())
+
+
+def test_without_aerodynamics_our_model_explains_rotorpy_s_flight(flights):
+    r, truth = left_over(flights[False], hummingbird_vehicle())
+    assert np.all(truth == 0.0)
+    assert r[:, :3].std(axis=0).max() < 0.01
+    assert r[:, 3:].std(axis=0).max() < 2e-3
+
+
+def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
+    vehicle = hummingbird_vehicle()
+    r, truth = left_over(flights[True], vehicle)
+    for axis in range(3):
+        assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.999
+    whole, _ = left_over(flights[True], vehicle.with_effects(*aero_settings()))
+    assert whole[:, :3].std(axis=0).max() < 0.01
+    assert whole[:, 3:].std(axis=0).max() < 2e-3
+    # each of them is needed
+    for left_out in range(4):
+        rest = [s for i, s in enumerate(aero_settings()) if i != left_out]
+        without, _ = left_over(flights[True], vehicle.with_effects(*rest))
+        assert without[:, :3].std(axis=0).max() > 0.02
+
+
+@needs_rotorpy
+def test_rotorpy_s_log_has_the_noise_and_the_steps_that_are_asked_for(flights):
+    log = rotorpy_flight("fast", 0.5, 0, True, eight_bit=True)
+    steps = log.rotor_speeds / hummingbird_vehicle(eight_bit=True).omega_lsb
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+    error = log.position - flights[True].position[: len(log.t)]
+    # what the flight does in half a second does not depend on the trajectory's later part
+    assert error[:20].std() == pytest.approx(0.001, rel=0.3)
+
+
+@needs_rotorpy
+def test_a_rotorpy_flight_out_of_range_is_refused():
+    with pytest.raises(InputError, match="seconds"):
+        rotorpy_flight(seconds=0.0)
+    with pytest.raises(InputError, match="trajectory"):
+        rotorpy_flight("loop", 1.0)
+
+
+def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
+    from windwrench.experiments import rotorpy_flights
+
+    monkeypatch.setattr(rotorpy_flights, "available", lambda: False)
+    rotorpy_flights._parameters.cache_clear()
+    with pytest.raises(InputError, match="pip install rotorpy"):
+        rotorpy_flight("hover", 1.0)
