@@ -40,8 +40,6 @@ def residual_wrench(signals: Signals, vehicle: Vehicle) -> Array:
     voltage = np.zeros(count) if signals.voltage is None else signals.voltage
     _run_model(models, signals.period, signals.rotor_speeds, voltage, signals.position,
                np.ascontiguousarray(signals.rotation), signals.velocity, signals.rate, rotors, effects)
-    # a turn rate holds over the interval that ends at its sample: at the sample itself acts the mean of two intervals
-    rotors[:-1] = 0.5 * (rotors[:-1] + rotors[1:])
     R, omega, alpha = signals.rotation, signals.rate, signals.angular_acceleration
     acceleration = signals.acceleration + np.array([0.0, 0.0, vehicle.gravity])
     if np.any(body.com):

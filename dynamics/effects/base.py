@@ -80,6 +80,10 @@ HIDDEN = 8  # where a wrench law's own state starts in ``c``
 ROW_SIZE = 16  # of ``c`` of a wrench law
 
 
+# what the coefficient ``central`` means in laws that act rotor by rotor: it draws the rotors towards the centre
+CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the geometric centre"
+
+
 @dataclass(frozen=True)
 class Coefficient:
     """One coefficient of an effect, with its typical size for a 0.45 kg and for a 0.03 kg vehicle."""

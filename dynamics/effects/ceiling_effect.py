@@ -7,7 +7,7 @@ the factor reaches 2. Nothing changes where the vehicle states no ceiling.
 
 from numba import cfunc
 
-from .base import CEILING, LAW, POSITION, ROTATION, ROTOR_POSITION, ROTOR_RADIUS, ROTOR_THRUST, Coefficient, Effect
+from .base import CEILING, CENTRAL, LAW, POSITION, ROTATION, ROTOR_POSITION, ROTOR_RADIUS, ROTOR_THRUST, Coefficient, Effect
 from .parts import push
 
 
@@ -17,9 +17,9 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         return
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
+        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         distance = vehicle[CEILING] - state[POSITION + 2]
         distance -= state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
         ratio = min(scale / (distance * distance), 0.5) if distance > 1e-3 else 0.5
@@ -29,7 +29,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="ceiling_effect",
     kind="wrench",
-    coefficients=(Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=50.0),),
+    coefficients=(
+        Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=50.0),
+        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+    ),
     source="form: the ground effect's (Cheeseman and Bennett, ARC R&M 3021, 1955) mirrored; a ceiling raises thrust too: "
     "Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; size assumed as near the ground",
     confused_with=("thrust_scale", "mass", "constant_force"),

@@ -8,6 +8,7 @@ torque. The height is taken as no less than where the factor reaches 2, as the l
 from numba import cfunc
 
 from .base import (
+    CENTRAL,
     COM,
     FLOOR,
     LAW,
@@ -28,9 +29,9 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
     total = 0.0
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
+        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         height = state[POSITION + 2] - vehicle[FLOOR]
         height += state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
         ratio = scale / (height * height) if height > 1e-3 else 0.5
@@ -46,7 +47,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="ground_effect",
     kind="wrench",
-    coefficients=(Coefficient("rho", "1", (3.0, 3.0), "strength; 1 for a single helicopter rotor", minimum=0.0, maximum=20.0),),
+    coefficients=(
+        Coefficient("rho", "1", (3.0, 3.0), "strength; 1 for a single helicopter rotor", minimum=0.0, maximum=20.0),
+        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+    ),
     source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017",
     confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several heights, the lowest of one to two rotor diameters",

@@ -6,16 +6,16 @@ Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .base import CENTRAL, LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
 from .parts import air_velocity, push
 
 
 @cfunc(LAW, cache=True)
 def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
+        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         uz = air_velocity(state, x, y, z)[2]
         push(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
 
@@ -23,7 +23,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="inflow_thrust",
     kind="wrench",
-    coefficients=(Coefficient("kz", "N/(rad/s m/s)", (2.3e-4, 7.6e-7), "per rotor", minimum=0.0),),
+    coefficients=(
+        Coefficient("kz", "N/(rad/s m/s)", (2.3e-4, 7.6e-7), "per rotor", minimum=0.0),
+        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+    ),
     source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter Flight Dynamics and Control, "
     "AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
     confused_with=("body_drag", "rate_damping"),

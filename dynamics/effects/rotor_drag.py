@@ -5,7 +5,7 @@ At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(k
 
 from numba import cfunc
 
-from .base import COM, LAW, RATE, ROTATION, ROTOR_POSITION, ROTOR_SPEED, VELOCITY, WIND, Coefficient, Effect
+from .base import CENTRAL, COM, LAW, RATE, ROTATION, ROTOR_POSITION, ROTOR_SPEED, VELOCITY, WIND, Coefficient, Effect
 
 
 @cfunc(LAW, cache=True)
@@ -19,9 +19,9 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     total_x = 0.0
     total_y = 0.0
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i]
+        y = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = (1.0 - c[2]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         fx = -c[0] * state[ROTOR_SPEED + i] * (ux + wy * z - wz * y)
         fy = -c[1] * state[ROTOR_SPEED + i] * (uy + wz * x - wx * z)
         x -= vehicle[COM]
@@ -42,6 +42,7 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("kdx", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body x", minimum=0.0),
         Coefficient("kdy", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body y", minimum=0.0),
+        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
     source="Martin and Salaun, The True Role of Accelerometer Feedback in Quadrotor Control, ICRA 2010; "
     "sizes: Svacha et al., ICUAS 2017 (0.5 kg), Foerster, ETH Zurich 2015 (0.03 kg)",

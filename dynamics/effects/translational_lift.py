@@ -6,16 +6,16 @@ rotor. It is the k_h of RotorPy.
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_POSITION, Coefficient, Effect
+from .base import CENTRAL, LAW, ROTOR_POSITION, Coefficient, Effect
 from .parts import air_velocity, push
 
 
 @cfunc(LAW, cache=True)
 def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
-        x = vehicle[ROTOR_POSITION + 3 * i]
-        y = vehicle[ROTOR_POSITION + 3 * i + 1]
-        z = vehicle[ROTOR_POSITION + 3 * i + 2]
+        x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
+        y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
+        z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         ux, uy, _ = air_velocity(state, x, y, z)
         push(vehicle, state, wrench, x, y, z, 0.0, 0.0, c[0] * (ux * ux + uy * uy))
 
@@ -23,7 +23,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="translational_lift",
     kind="wrench",
-    coefficients=(Coefficient("kh", "N/(m/s)^2", (3.4e-3, 1e-4), "per rotor"),),
+    coefficients=(
+        Coefficient("kh", "N/(m/s)^2", (3.4e-3, 1e-4), "per rotor"),
+        Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
+    ),
     source="Leishman, Principles of Helicopter Aerodynamics, 2006; size: Folk, Paulos and Kumar, RotorPy, 2023 (0.5 kg), "
     "in proportion to the disc area for 0.03 kg",
     confused_with=("thrust_scale", "mass"),

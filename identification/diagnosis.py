@@ -1,0 +1,197 @@
+"""From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
+
+The residual wrench is regressed on whole effects of the library (``search``), every name is asked what else it could be
+(``equivalence``) and the remainder whether a law is still in it (``structure``). Structure and coefficients are chosen on the
+fit's blocks of flight; the errors before and after are those of blocks, or logs, that the fit never saw.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.effects import get, names
+from ..dynamics.errors import InputError, unknown_name
+from ..dynamics.vehicle import Vehicle
+from .equivalence import equivalents
+from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
+from .flight_log import FlightLog
+from .prediction import nis_without_wrench_state, rollout_error
+from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
+from .screening import screen_log
+from .search import Fit, Gain, Search
+from .structure import drives, structure
+
+Array = NDArray[np.float64]
+
+AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
+_FAINT = 0.1  # share of the remainder's energy: a name that explains less beside a large remainder is tentative
+_POINTS = 600  # of a signature
+
+
+def diagnose(
+    logs: Sequence[FlightLog],
+    vehicle: Vehicle,
+    test: Sequence[FlightLog] = (),
+    without: Sequence[str] = (),
+    report: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Return what the logs of one vehicle say about its model.
+
+    Args:
+        logs: flights to learn from.
+        vehicle: as it is declared. An effect that it declares with some coefficients left out has those fitted.
+        test: flights on which alone the error is reported; default: every fourth 3 s of ``logs``, which the fit never sees.
+        without: effects that are taken out of the library.
+        report: called with a line of progress.
+
+    Raises:
+        InputError: a log that is not what it claims to be, or an unknown effect.
+    """
+    for name in without:
+        if name not in names():
+            raise unknown_name("effect", name, names(), "--without")
+    if not logs:
+        raise InputError("diagnose: no log was given; expected at least one")
+    report("looking at the logs")
+    notes = [f"{log.name}: {note}" for log in (*logs, *test) for note in (*log.notes, *screen_log(log, vehicle))]
+    flights = Flights(logs, vehicle, test)
+    search = Search(flights, [n for n in names() if n not in without], report)
+    fit, first = search.forward()
+    report("asking whether every effect is needed")
+    fit = search.prune(fit)
+    report("asking what else it could be")
+    classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
+    report("looking for what is left")
+    signs = structure(search, fit)
+
+    before, after = flights.residual({}), flights.residual(fit.setting)
+    held = ~flights.fit
+    floor = _rms(flights.sensor_noise)
+    error_before, error_after = _rms(before[held]), _rms(after[held])
+    noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
+    remainder = "structured" if signs else "random" if noisy else "none"
+    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs), noisy) for effect in fit.effects)
+    verdict = ("explained" if remainder == "none" else "partly explained") if effects else (
+        "nothing to explain" if remainder == "none" else "unexplained")
+    report("predicting the flights")
+    amended = flights.amended({k: v for k, v in fit.setting.items() if k})
+    segments = _segments(flights)
+    shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
+    if abs(shift) > 0.001:
+        notes.append(f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than at their sample")
+    return Diagnosis(
+        verdict=verdict,
+        remainder=remainder,
+        effects=effects,
+        held_out_segments=tuple((flights.logs[i].name, a, b) for i, a, b in segments),
+        before=_errors(flights, vehicle, segments, error_before),
+        after=_errors(flights, amended, segments, error_after),
+        floor_force_rms=floor[0],
+        floor_torque_rms=floor[1],
+        advice=tuple(_advice(effects, sorted(flights.drowned), remainder)),
+        notes=tuple(dict.fromkeys(notes)),
+        candidates=_candidates(first, fit, search),
+        traces=tuple(_traces(flights, before, after)),
+        signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
+        structure=tuple(signs[:12]),
+        cutoff_hz=CUTOFF_HZ,
+        declared=vehicle,
+        amended=amended,
+        logs=tuple(log.name for log in logs),
+        test_logs=tuple(log.name for log in test),
+        seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
+    )
+
+
+def _rms(wrench: Array) -> tuple[float, float]:
+    """Return the RMS of force (N) and torque (Nm) over rows and axes."""
+    return float(np.sqrt(np.mean(np.square(wrench[:, :3])))), float(np.sqrt(np.mean(np.square(wrench[:, 3:]))))
+
+
+def _named(search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool) -> NamedEffect:
+    error = search.error(fit)
+    gain = search.error_without(fit, effect) - error
+    values = {k: v for k, v in fit.setting[effect].items() if k != CENTRAL or fit.std.get((effect, k), np.inf) < 0.4}
+    sizes = [abs(v) / typical((effect, k), search.flights.vehicle) for k, v in values.items() if k != CENTRAL]
+    return NamedEffect(
+        name=effect,
+        coefficients=values,
+        std={k: fit.std.get((effect, k), 0.0) for k in values},
+        units={k: coefficient((effect, k)).unit for k in values},
+        tentative=structured or (noisy and gain < _FAINT * error),
+        indistinguishable_from=others,
+        evidence={"energy_explained": gain / (gain + error), "energy_explained_in_noise_units": gain,
+                  "largest_coefficient_in_typical_sizes": max(sizes, default=0.0)},
+    )
+
+
+def _segments(flights: Flights) -> list[tuple[int, float, float]]:
+    """Return the held-out stretches of flight: log, from, to (s)."""
+    held = ~flights.fit
+    begins = np.flatnonzero(held & (flights.start | np.concatenate([[True], flights.fit[:-1]])
+                                    | (np.diff(flights.block, prepend=-1) != 0)))
+    ends = [int(np.flatnonzero(flights.block == flights.block[b])[-1]) for b in begins]
+    return [(int(flights.log[b]), float(flights.t[b]), float(flights.t[e])) for b, e in zip(begins, ends, strict=True)]
+
+
+def _errors(flights: Flights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]],
+            rms: tuple[float, float]) -> Errors:
+    nis, distance, weight = [], [], []
+    for i, log in enumerate(flights.logs):
+        own = [(a, b) for k, a, b in segments if k == i]
+        if own:
+            nis.append(nis_without_wrench_state(log, vehicle, own))
+            distance.append(rollout_error(log, vehicle, own))
+            weight.append(sum(b - a for a, b in own))
+    return Errors(*rms, _mean(np.array(nis), weight), float(np.sqrt(_mean(np.square(distance), weight))))
+
+
+def _mean(values: Array, weight: Sequence[float]) -> float:
+    good = np.isfinite(values)
+    return float(np.average(values[good], weights=np.array(weight)[good])) if good.any() else float("nan")
+
+
+def _candidates(first: Sequence[Gain], fit: Fit, search: Search) -> tuple[Candidate, ...]:
+    return tuple(Candidate(x.effect, x.share, x.effect in fit.effects) for x in first)
+
+
+def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
+    begins = np.flatnonzero(flights.start)
+    out = []
+    for a, b in zip(begins, [*begins[1:], len(flights.t)], strict=True):
+        out.append(Trace(flights.logs[flights.log[a]].name, flights.period, flights.t[a:b], before[a:b], after[a:b],
+                         ~flights.fit[a:b]))
+    return out
+
+
+def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signature:
+    """Return the channel in which an effect is largest, against what it follows most closely."""
+    share = flights.residual(fit.without(effect).setting) - after
+    noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
+    channel = int(np.argmax(share.std(axis=0) / noise)) if np.any(share.std(axis=0) > 0.3 * noise) else int(
+        np.argmax(np.abs(share).mean(axis=0) / noise))
+    y = share[:, channel]
+    known = drives(flights, fit.setting)
+    name, x = max(known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0)
+    thin = slice(None, None, max(1, len(y) // _POINTS))
+    return Signature(effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin])
+
+
+def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: str) -> list[str]:
+    out = []
+    for effect in effects:
+        if effect.indistinguishable_from:
+            group = (effect.name, *effect.indistinguishable_from)
+            out.append(f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
+                       + "; ".join(f"{name}: {get(name).excitation}" for name in group))
+    if remainder == "structured":
+        out.append("A law is left in the remainder that no effect of the library fits: the names are tentative. Fly one thing at "
+                   "a time (hover, climbs, level flight at several speeds, turns) to see what the remainder follows.")
+    if drowned:
+        out.append("These flights could not show: " + ", ".join(drowned) + ". To look for one of them, fly: "
+                   + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4]))
+    return out
+
+
+__all__ = ["Diagnosis", "Structure", "diagnose"]

@@ -1,0 +1,259 @@
+"""The residual of flights as a regression on the coefficients of effects.
+
+Rows are samples of all flights, low-passed with zero phase and thinned out; the six channels are force in the world frame and
+torque in the body frame. A column is the change of the residual with one coefficient. Residual and columns come from the
+same laws that plant and estimator run, through the same filter.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..dynamics.effects import compile_effects, get, names
+from ..dynamics.effects.base import Coefficient
+from ..dynamics.vehicle import EffectSetting, Vehicle
+from .floor import noisy_logs
+from .flight_log import FlightLog
+from .residual import residual_wrench
+from .sensing import undo_log_sensing
+from .signals import Signals, log_signals, low_pass
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Index = NDArray[np.int64]
+
+CUTOFF_HZ = 5.0
+_RATE_HZ = 25.0  # of the rows
+_EDGE = 0.6  # s at either end of a piece, where the filters have only half of what they need
+# share of noise in an effect's column that is too much; a gain of the attitude could cancel the attitude's own noise
+_DROWNED = {"attitude_gain": 0.004}
+_DROWNED_ELSE = 0.1
+# effects whose force is no sum over their coefficients
+STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
+BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
+_HELD_OUT = 4  # every fourth block
+
+# Coefficients by effect: what is added to the declared vehicle
+Setting = Mapping[str, Mapping[str, float]]
+# A column: an effect's coefficient, or ``moment`` of it, the torque part of that column alone
+Column = tuple[str, str]
+MOMENT = "moment of "
+CENTRAL = "central"  # the coefficient of laws that act rotor by rotor
+START = "start "  # a whole effect at coefficients of its own; the column is a multiple of it
+SHIFT_RANGE = (-0.0075, 0.0075)  # s
+SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
+LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
+NUISANCES = (SHIFT, LEAN)
+
+
+def coefficient(column: Column) -> Coefficient:
+    """Return the declaration of a column's coefficient."""
+    return next(c for c in get(column[0]).coefficients if c.name == column[1].removeprefix(MOMENT))
+
+
+def typical(column: Column, vehicle: Vehicle) -> float:
+    """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the library's two."""
+    if column in NUISANCES:
+        return 0.0025
+    if column[1].startswith(START) or column[1] == CENTRAL:
+        return 1.0
+    c = coefficient(column)
+    large, small = (abs(x) for x in c.typical)
+    if large == 0 or small == 0:
+        others = [abs(o.typical[0]) for o in get(column[0]).coefficients if o.unit == c.unit and o.typical[0]]
+        return max(others, default=1.0)
+    share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
+    return float(small * (large / small) ** share)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One unbroken piece of a flight, and what of it the fit may see."""
+
+    log: int  # which log
+    signals: Signals
+    rows: Index  # the samples that are rows
+
+
+class Flights:
+    """Flights of one vehicle, ready to be regressed.
+
+    Args:
+        logs: of the fit.
+        vehicle: as it is declared.
+        test: further logs, which the fit never sees; without any, every fourth block of 3 s is held out.
+    """
+
+    def __init__(self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()) -> None:
+        self.vehicle = vehicle
+        self.logs = (*logs, *test)
+        self._pieces: dict[tuple[object, ...], list[Piece]] = {}
+        self._first: list[Piece] = []
+        self._first = pieces = self.pieces({})
+        log, block, fit, start, t = [], [], [], [], []
+        count = 0
+        for piece in pieces:
+            time = piece.signals.t[piece.rows]
+            number = ((time - time[0]) // BLOCK).astype(np.int64)
+            log.append(np.full(len(time), piece.log))
+            block.append(number + count)
+            seen = np.full(len(time), piece.log < len(logs)) if test else number % _HELD_OUT != _HELD_OUT - 1
+            fit.append(seen)
+            start.append(np.arange(len(time)) == 0)
+            t.append(time)
+            count += int(number[-1]) + 1
+        self.log: Index = np.concatenate(log)  # (rows,) which log
+        self.block: Index = np.concatenate(block)  # (rows,)
+        self.fit: Mask = np.concatenate(fit)  # (rows,)
+        self.start: Mask = np.concatenate(start)  # (rows,) first row of a piece
+        self.t: Array = np.concatenate(t)
+        self.period = float(np.median(np.diff(self.t)))
+        self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
+        self.drowned: frozenset[str]  # effects whose columns are noise in good part: these flights do not excite them
+        self.column_noise: dict[Column, Array]  # (rows, 6) a sample of it in each column
+        self.sensor_noise, self.drowned, self.column_noise = self._listen()
+
+    def _listen(self) -> tuple[Array, frozenset[str], dict[Column, Array]]:
+        """Add the sensors' noise once more and see what changes.
+
+        An effect whose column is noise in good part is not excited; fitted all the same, it would come out too small, or
+        explain the noise of the residual by taking it out of the pose.
+        """
+        noisy = object.__new__(Flights)
+        noisy.vehicle, noisy._pieces, noisy._first = self.vehicle, {}, self._first
+        noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
+        floor = noisy.residual({}) - self.residual({})
+        weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
+        drowned = set()
+        own: list[Column] = [(e, c.name) for e in names() if e not in STRANGE for c in get(e).coefficients if c.name != CENTRAL]
+        smooth = own + [(e, MOMENT + n) for e, n in own if any(c.name == CENTRAL for c in get(e).coefficients)]
+        quiet, loud = self.columns({}, smooth), noisy.columns({}, smooth)
+        for effect in dict.fromkeys(e for e, _ in smooth):
+            noise = whole = 0.0
+            for c in (c for c in own if c[0] == effect):
+                scale = weight * typical(c, self.vehicle) ** 2
+                noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
+                whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
+            if noise > _DROWNED.get(effect, _DROWNED_ELSE) * whole:
+                drowned.add(effect)
+        return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}
+    def pieces(self, setting: Setting) -> list[Piece]:
+        """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
+        vehicle = self.amended(setting)
+        sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in vehicle.effects if get(e.name).kind == "sensing")
+        if sensing not in self._pieces:
+            if len(self._pieces) > 40:
+                self._pieces.clear()
+            self._pieces[sensing] = self._cut(vehicle)
+        return self._pieces[sensing]
+
+    def _cut(self, vehicle: Vehicle) -> list[Piece]:
+        found = [(i, s) for i, log in enumerate(self.logs) for s in log_signals(undo_log_sensing(log, vehicle))]
+        if not self._first:
+            return [Piece(i, s, _rows(s)) for i, s in found]
+        pieces = []  # a clock offset moves the start of a piece: the rows stay where they are in time
+        for first in self._first:
+            wanted = first.signals.t[first.rows]
+            s = next(s for i, s in found if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1])
+            pieces.append(Piece(first.log, s, np.rint((wanted - s.t[0]) / s.period).astype(np.int64)))
+        return pieces
+
+    def amended(self, setting: Setting) -> Vehicle:
+        """Return the vehicle with these effects; one that it declares already is replaced."""
+        effects = tuple(EffectSetting(name, dict(values)) for name, values in setting.items() if name)
+        return replace(self.vehicle, effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects))
+
+    def residual(self, setting: Setting, smooth: "Sequence[Signals] | None" = None) -> Array:
+        """Return the residual (rows, 6) with these effects; ``smooth``: on these signals instead of the logs' own.
+
+        It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and all, with the mass; and no
+        noise of differentiation is multiplied by a coefficient.
+        """
+        vehicle = self.amended(setting)
+        body = compile_effects(vehicle).vehicle
+        lightness = self.vehicle.mass / body.mass
+        slimness = self.vehicle.inertia @ np.linalg.inv(body.inertia)
+        shifts = setting.get(SHIFT[0], {})
+        out = []
+        for i, piece in enumerate(self.pieces(setting)):
+            signals = piece.signals if smooth is None else smooth[i]
+            wrench = residual_wrench(_shifted(signals, shifts), vehicle)
+            wrench[:, :3] *= lightness
+            wrench[:, 3:] = wrench[:, 3:] @ slimness.T
+            out.append(low_pass(wrench, CUTOFF_HZ, signals.period)[piece.rows])
+        return np.concatenate(out)
+
+    def model_motion(self, setting: Setting) -> list[Signals]:
+        """Return the signals with the accelerations that the model gives in place of the differentiated ones.
+
+        They are free of the noise that differentiation makes, which would bias the coefficients of whatever is
+        multiplied by them (mass, inertia) towards no model at all.
+        """
+        vehicle = self.amended(setting)
+        shifts = setting.get(SHIFT[0], {})
+        out = []
+        for piece in self.pieces(setting):
+            s = piece.signals
+            wrench = residual_wrench(_shifted(s, shifts), vehicle)
+            turning = np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T
+            out.append(replace(s, acceleration=s.acceleration - wrench[:, :3] / vehicle.mass,
+                               angular_acceleration=s.angular_acceleration - turning))
+        return out
+
+    def columns(self, setting: Setting, wanted: Iterable[Column], step: float = 0.5) -> dict[Column, Array]:
+        """Return what each unit of a coefficient adds to the residual that the model leaves, (rows, 6) each.
+
+        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step`` typical sizes.
+        """
+        smooth = self.model_motion(setting)
+        base = self.residual(setting, smooth)
+        plain: Array | None = None
+        out: dict[Column, Array] = {}
+        for column in wanted:
+            effect, name = column
+            if name.startswith(MOMENT):
+                continue
+            delta = step * typical(column, self.vehicle)
+            value = setting.get(effect, {}).get(name, 0.0)
+            if column not in NUISANCES:
+                c = coefficient(column)
+                if c.typical[0] < 0:
+                    delta = -delta
+                if not c.minimum <= value + delta <= c.maximum:
+                    delta = -delta
+            changed = {**setting, effect: {**setting.get(effect, {}), name: value + delta}}
+            if column not in NUISANCES and get(effect).kind == "sensing":
+                if plain is None:
+                    plain = self.residual(setting)
+                out[column] = (plain - self.residual(changed)) / delta
+            else:
+                out[column] = (base - self.residual(changed, smooth)) / delta
+        for column in wanted:
+            if column[1].startswith(MOMENT):
+                part = out[column[0], column[1].removeprefix(MOMENT)].copy()
+                part[:, :3] = 0.0
+                out[column] = part
+        return out
+
+
+def _rows(signals: Signals) -> Index:
+    step = max(1, round(1.0 / (_RATE_HZ * signals.period)))
+    edge = round(_EDGE / signals.period)
+    return np.arange(edge, len(signals.t) - edge, step)
+
+
+def _shifted(signals: Signals, shifts: Mapping[str, float]) -> Signals:
+    """Return the signals with turn rates and attitude moved to when they act."""
+    late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
+    if late != 0.0:
+        n = len(signals.t)
+        at = np.clip(np.arange(n) - late / signals.period, 0, n - 1)
+        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
+        signals = replace(signals, rotor_speeds=speeds)
+    if lean != 0.0:
+        turn = Rotation.from_rotvec(-lean * signals.rate).as_matrix()
+        signals = replace(signals, rotation=signals.rotation @ turn)
+    return signals

@@ -1,0 +1,326 @@
+"""The search for the effects that a model lacks: whole effects are added, refitted, removed and swapped.
+
+Effects are judged on blocks of the fit that are left out in turn; nothing here looks at the held-out rows.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.effects import get
+from ..dynamics.errors import InputError
+from .regression import CENTRAL, LEAN, MOMENT, NUISANCES, SHIFT, SHIFT_RANGE, START, Column, Flights, Setting, coefficient, typical
+from .selection import Gram, columns_of, gram
+from .starts import STARTS
+from .whitening import Whitener
+
+Array = NDArray[np.float64]
+
+LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
+LEAST_SHARE = 0.01  # and as a share of what is left unexplained
+LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
+SWAP_GAIN = 12.0
+MOST_EFFECTS = 4
+_TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
+_REFITS = 6
+_MOVES = 6
+_COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
+_DROWNED = 0.3  # share of noise in what a column adds that is too much
+_SHORTLIST = 2
+
+
+@dataclass(eq=False)
+class Fit:
+    """A set of effects with fitted coefficients."""
+
+    setting: dict[str, dict[str, float]]
+    std: dict[Column, float] = field(default_factory=dict)
+
+    @property
+    def effects(self) -> list[str]:
+        """Names of the effects, in the order in which they were found."""
+        return [name for name in self.setting if name]
+
+    def without(self, *effects: str) -> "Fit":
+        """Return this fit less some effects."""
+        return Fit({k: v for k, v in self.setting.items() if k not in effects})
+
+
+class Search:
+    """The search on some flights, with a library of effects.
+
+    Args:
+        flights: whose residual is to be explained.
+        library: names of effects that may be named.
+        report: called with a line of progress.
+    """
+
+    def __init__(self, flights: Flights, library: Sequence[str], report: Callable[[str], None] = lambda text: None) -> None:
+        self.flights = flights
+        self.library = tuple(e for e in library if e not in flights.drowned)
+        self._report = report
+        self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
+        self.noise: Array = np.zeros((0, 6))
+        self.whiten: Whitener
+
+    # ---- columns ---------------------------------------------------------------------------------------------------
+
+    def columns_of(self, effect: str, fitted: bool) -> list[Column]:
+        """Return the columns of an effect, less the coefficients that the vehicle's file states for it."""
+        stated, every = self._stated.get(effect, {}), columns_of(effect, fitted)
+        return [c for c in every if c[1].removeprefix(MOMENT) not in stated] or every
+
+    def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
+        """Return the columns of a model: its effects', those of effects that are tried, and the shift that any log may have."""
+        return [*([] if _TIMING & {*effects, *tried} else [SHIFT]), LEAN, *(c for e in effects for c in self.columns_of(e, True)),
+                *(c for e in tried for c in self.columns_of(e, False))]
+
+    def linearise(self, fit: Fit) -> "Regression":
+        """Return the regression on the whole library at a fit."""
+        linear = [e for e in self.library if e not in STARTS and e not in fit.effects]
+        wanted = self.base(fit.effects, linear)
+        columns = self.flights.columns(fit.setting, wanted if SHIFT in wanted else [SHIFT, *wanted])
+        residual = self.flights.residual(fit.setting)
+        begun: dict[Column, dict[str, float]] = {}
+        for effect in self.library:
+            if effect in STARTS and effect not in fit.effects:
+                stated = self._stated.get(effect, {})
+                for i, start in enumerate(STARTS[effect](self.flights, residual, stated)):
+                    column = (effect, f"{START}{i}")
+                    begun[column] = {**start, **stated}
+                    changed = {**fit.setting, effect: begun[column]}
+                    columns[column] = residual - self.flights.residual(changed)
+        return Regression(columns, residual, begun)
+
+    def gram(self, fit: Fit, regression: "Regression") -> Gram:
+        """Return the whitened sums of a regression."""
+        return gram(self.flights, fit.setting, self.whiten, regression.columns, regression.residual)
+
+    def _whitener(self, noise: Array) -> Whitener:
+        return Whitener(noise, self.flights.sensor_noise, self.flights.start, self.flights.fit)
+
+    def set_noise(self, fit: Fit, regression: "Regression") -> None:
+        """Take as noise what the whole library, kept to plausible sizes, cannot explain at a fit."""
+        noise = regression.residual
+        columns = {c: x for c, x in regression.columns.items() if not c[1].startswith(START)}
+        for _ in range(3):
+            self.whiten = self._whitener(noise)
+            g = gram(self.flights, fit.setting, self.whiten, columns, regression.residual)
+            change = g.solve(g.blocks.sum(axis=0), np.arange(len(g.columns)))
+            noise = regression.residual - np.tensordot(np.stack(list(columns.values()), axis=2), change, axes=(2, 0))
+        self.noise = noise
+        self.whiten = self._whitener(noise)
+
+    # ---- fitting ---------------------------------------------------------------------------------------------------
+
+    def energy(self, setting: Setting) -> float:
+        """Return the whitened energy of the fit's rows at a setting; infinite where no vehicle can be like that."""
+        try:
+            residual = self.flights.residual(setting)
+        except InputError:
+            return np.inf
+        return self.whitened_energy(residual)
+
+    def whitened_energy(self, residual: Array) -> float:
+        """Return the energy of the fit's rows of a residual (rows, 6) once it is whitened."""
+        return float(np.sum(np.square(self.whiten(residual)[self.flights.fit])))
+
+    def refit(self, fit: Fit) -> Fit:
+        """Return the fit with all its coefficients at the least squares of the fit's rows (Gauss-Newton)."""
+        setting = {k: dict(v) for k, v in fit.setting.items()}
+        wanted = self.base(fit.effects)
+        if SHIFT not in wanted:
+            setting.get(SHIFT[0], {}).pop(SHIFT[1], None)
+        out = Fit(setting)
+        if not wanted:
+            return out
+        before = self.energy(setting)
+        for _ in range(_REFITS):
+            columns = self.flights.columns(setting, wanted, 0.1)
+            g = gram(self.flights, setting, self.whiten, columns, self.flights.residual(setting))
+            index = g.index(wanted)
+            total = g.blocks.sum(axis=0)
+            change = g.solve(total, index)
+            covariance = np.linalg.inv(total[np.ix_(index, index)] + np.diag(g.precision[index]))
+            out.std = dict(zip(wanted, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+            for scale in (1.0, 0.5, 0.25, 0.1):
+                trial = _moved(setting, wanted, scale * change)
+                after = self.energy(trial)
+                if after < 1.02 * before + 5.0:
+                    break
+            else:
+                break
+            moved = max(abs(d) / s for d, s in zip(change, out.std.values(), strict=True))
+            setting, before = trial, after
+            if moved < 0.05:
+                break
+        out.setting = setting
+        return out
+
+    # ---- selection -------------------------------------------------------------------------------------------------
+
+    def gains(self, fit: Fit, regression: "Regression", g: Gram) -> "list[Gain]":
+        """Return what each other effect of the library explains beyond a fit, the best first."""
+        base = self.base(fit.effects)
+        error = g.error(g.index(base))
+        total = g.blocks.sum(axis=0)
+        out = []
+        for effect in self.library:
+            if effect in fit.effects:
+                continue
+            if effect in STARTS:
+                tries = [[*base, c] for c in regression.begun if c[0] == effect]
+            else:
+                tries = [self.base(fit.effects, [effect])]
+            best = Gain(effect, -np.inf, 0.0, np.inf, 0.0, fit)
+            for wanted in tries:
+                index = g.index(wanted)
+                gain = error - g.error(index)
+                if gain <= best.energy:
+                    continue
+                change = g.solve(total, index)
+                size = max((abs(d) / typical(c, self.flights.vehicle) for c, d in zip(wanted, change, strict=True)
+                            if c[0] == effect and not c[1].startswith(MOMENT) and typical(c, self.flights.vehicle)),
+                           default=0.0)
+                start = _moved(fit.setting, wanted, change)
+                if any(c[0] == effect and c[1].startswith(MOMENT) for c in wanted):
+                    start[effect][CENTRAL] = _central(wanted, change, effect)
+                last = wanted[-1]
+                if last in regression.begun:
+                    start[effect] = dict(regression.begun[last])
+                elif self._drowned(g, total, base, wanted, change, effect):
+                    continue
+                best = Gain(effect, gain, gain / error, error - gain, size, Fit(start))
+            out.append(best)
+        return sorted((x for x in out if np.isfinite(x.energy)), key=lambda x: _COMPLEXITY * len(get(x.effect).coefficients) - x.energy)
+
+    def _drowned(self, g: Gram, total: Array, base: Sequence[Column], wanted: Sequence[Column], change: Array,
+                 effect: str) -> bool:
+        """Return whether what an effect adds to the columns of ``base`` is noise of the sensors in good part."""
+        own = [c for c in wanted if c[0] == effect]
+        shape = change[[wanted.index(c) for c in own]]
+        at, rest = g.index(own), g.index(base)
+        cross = total[np.ix_(rest, at)] @ shape
+        energy = shape @ total[np.ix_(at, at)] @ shape
+        if len(rest):
+            energy -= cross @ np.linalg.lstsq(total[np.ix_(rest, rest)] + np.diag(g.precision[rest]), cross, rcond=None)[0]
+        noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in own], axis=2), shape, axes=(2, 0))
+        return self.whitened_energy(noise) > _DROWNED * energy
+
+    def forward(self) -> tuple[Fit, "list[Gain]"]:
+        """Return the effects that are worth adding one after the other, and what each explained at first, alone."""
+        fit = Fit({})
+        first: list[Gain] = []
+        for count in range(MOST_EFFECTS + 1):
+            regression = self.linearise(fit)
+            if count == 0:
+                self.set_noise(fit, regression)
+                fit = self.refit(fit)
+            else:
+                self.set_noise(fit, regression)
+            g = self.gram(fit, regression)
+            gains = self.gains(fit, regression, g)
+            first = first or gains
+            least = max(LEAST_GAIN, LEAST_SHARE * g.error(g.index(self.base(fit.effects))))
+            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZE]
+            if not better or count == MOST_EFFECTS:
+                break
+            self._report(f"trying {better[0].effect}")
+            fit = self.refit(better[0].fit)
+        return fit, first
+
+    def prune(self, fit: Fit) -> Fit:
+        """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced by one."""
+        error = self.error(fit)
+        for _ in range(_MOVES):
+            better = self._best_move(fit, error)
+            if better is None:
+                break
+            fit, error = better
+        return fit
+
+    def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
+        least = max(LEAST_GAIN, LEAST_SHARE * error)
+        for effect in fit.effects:
+            if self.error_without(fit, effect) < error + least:
+                self._report(f"{effect} is not needed")
+                less = self.refit(fit.without(effect))
+                return less, self.error(less)
+        for size, allowed in ((2, least), (1, -SWAP_GAIN)):
+            for group in itertools.combinations(fit.effects, size):
+                less = fit.without(*group)
+                regression = self.linearise(less)
+                tries = [x for x in self.gains(less, regression, self.gram(less, regression)) if x.effect not in group]
+                for other in tries[:_SHORTLIST]:
+                    if other.size <= LEAST_SIZE:
+                        continue
+                    swapped = self.refit(other.fit)
+                    more = len(get(other.effect).coefficients) - sum(len(get(e).coefficients) for e in group)
+                    if (after := self.error(swapped)) < error + allowed - _COMPLEXITY * more:
+                        self._report(f"{other.effect} in place of {' and '.join(group)}")
+                        return swapped, after
+        return None
+
+    def error_without(self, fit: Fit, effect: str) -> float:
+        """Return the whitened energy on blocks left out once an effect is taken away and all others are fitted anew."""
+        g = self.at(fit.without(effect))
+        return g.error(np.arange(len(g.columns)))
+
+    def at(self, fit: Fit) -> Gram:
+        """Return the regression on a fit's own columns."""
+        columns = self.flights.columns(fit.setting, self.base(fit.effects), 0.1)
+        return gram(self.flights, fit.setting, self.whiten, columns, self.flights.residual(fit.setting))
+
+    def error(self, fit: Fit) -> float:
+        """Return the whitened energy of a fit on blocks left out in turn; infinite where the fit did not converge."""
+        g = self.at(fit)
+        error = g.error(np.arange(len(g.columns)))
+        return error if self.energy(fit.setting) < 1.05 * error + LEAST_GAIN else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """Residual and columns at a fit, (rows, 6) each; those of starts are whole effects."""
+
+    columns: dict[Column, Array]
+    residual: Array
+    begun: Mapping[Column, dict[str, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """What an effect explains beyond a fit."""
+
+    effect: str
+    energy: float  # whitened, on blocks left out
+    share: float  # of what the fit leaves
+    left: float  # energy that is then still left
+    size: float  # of its largest coefficient, in typical sizes
+    fit: Fit  # with it added, before it is refitted
+
+
+def _moved(setting: Setting, columns: Sequence[Column], change: Array) -> dict[str, dict[str, float]]:
+    """Return a setting with changes added, kept in range."""
+    out = {k: dict(v) for k, v in setting.items()}
+    for (effect, name), delta in zip(columns, change, strict=True):
+        if name.startswith((MOMENT, START)):
+            continue
+        value = out.get(effect, {}).get(name, 0.0) + float(delta)
+        if (effect, name) in NUISANCES:
+            value = float(np.clip(value, *SHIFT_RANGE))
+        else:
+            c = coefficient((effect, name))
+            value = float(np.clip(value, c.minimum, c.maximum))
+        out.setdefault(effect, {})[name] = value
+    return out
+
+
+def _central(columns: Sequence[Column], change: Array, effect: str) -> float:
+    """Return the share of a law's moment that free moment parts take away."""
+    found = dict(zip(columns, change, strict=True))
+    whole = sum(abs(d) for (e, name), d in found.items() if e == effect and not name.startswith(MOMENT))
+    taken = -sum(d for (e, name), d in found.items() if e == effect and name.startswith(MOMENT))
+    return float(np.clip(taken / whole, 0.0, 1.0)) if whole > 0 else 0.0

@@ -1,0 +1,77 @@
+"""Where to start with effects whose force is no sum over their coefficients: each start is tried as one fixed shape."""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import EffectSetting
+from .regression import Flights, typical
+from .residual import residual_wrench
+from .signals import Signals
+
+Array = NDArray[np.float64]
+
+_LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of a cable
+_HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
+_THINNED = 20  # every so many samples of a flight are enough for a map of the jet
+_KEPT = 4
+
+
+def slung_payload(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return loads of typical mass on cables of several lengths, or of the one that is stated."""
+    mass = typical(("slung_payload", "m"), flights.vehicle)
+    lengths = (stated["l"],) if "l" in stated else _LENGTHS
+    return [{"m": mass, "l": length, "damping": stated.get("damping", damping)} for length in lengths
+            for damping in ((0.3, 2.0) if "damping" not in stated else (0.0,))]
+
+
+def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return winds along the mean force and across it."""
+    speed = typical(("wind", "wx"), flights.vehicle)
+    drag = typical(("wind", "cd"), flights.vehicle)
+    mean = residual[flights.fit, :2].mean(axis=0)
+    heading = math.atan2(mean[1], mean[0])
+    return [{"wx": scale * speed * math.cos(heading), "wy": scale * speed * math.sin(heading), "wz": 0.0, "cd": drag}
+            for scale in (0.5, 1.0, 2.0)]
+
+
+def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return the fans around the flight whose jets' maps of force resemble the residual the most."""
+    thin, wanted = [], []
+    row = 0
+    for piece in flights.pieces({}):
+        s = piece.signals
+        at = piece.rows[:: max(1, _THINNED // max(1, int(piece.rows[1] - piece.rows[0])))]
+        wanted.append(row + np.searchsorted(piece.rows, at))
+        row += len(piece.rows)
+        thin.append(Signals(s.t[at], s.period, s.position[at], s.rotation[at], s.velocity[at], s.acceleration[at], s.rate[at],
+                            s.angular_acceleration[at], s.rotor_speeds[at], None if s.voltage is None else s.voltage[at]))
+    rows = np.concatenate(wanted)
+    seen = flights.fit[rows]
+    target = residual[rows][seen]
+    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
+    bare = replace(flights.vehicle, effects=())
+    base = [residual_wrench(s, bare) for s in thin]
+    centre = np.concatenate([s.position for s in thin]).mean(axis=0)
+    speed, kd, area = (typical(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area"))
+    found = []
+    for heading, distance, across in itertools.product(_HEADINGS, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)):
+        along = np.array([math.cos(heading), math.sin(heading)])
+        x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
+        start = {"u0": speed, "x": float(x), "y": float(y), "z": float(centre[2]), "heading": heading, "kd": kd, "area": area}
+        vehicle = bare.with_effects(EffectSetting("fan_jet", start))
+        shape = np.concatenate([b - residual_wrench(s, vehicle) for b, s in zip(base, thin, strict=True)])[seen] * scale
+        size = float(np.sum(shape * shape))
+        if size > 0:
+            found.append((float(np.sum(shape * target * scale)) / math.sqrt(size), len(found), start))
+    found.sort(reverse=True)
+    return [start for _, _, start in found[:_KEPT]]
+
+
+STARTS: dict[str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]] = {
+    "slung_payload": slung_payload, "wind": wind, "fan_jet": fan_jet,
+}
