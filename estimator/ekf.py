@@ -9,11 +9,12 @@ import math
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import effect_wrench
+from .covariance import add_noise
 from .error_state import symmetrise
 from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
-from .sample import check_sample, copy_estimate, undo_sensing
-from .ukf import WrenchUKF, add_noise, correct_parts
+from .sample import check_sample, undo_sensing
+from .ukf import WrenchUKF, correct_parts
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
 _STEP = 1e-5  # m, m/s and rad/s
@@ -216,15 +217,14 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 
 
 @compiled
-def _step_and_copy(record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
+def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     f = record[0]
-    usable: int = check_sample(f, z, parts)
+    usable: int = check_sample(f, f.z, parts)
     if usable >= 0:
-        sample = undo_sensing(f, z, usable, dt)
+        sample = undo_sensing(f, f.z, usable, dt)
         if dt > 0.0:
             predict(f, sample[0:4], dt, voltage)
         correct_parts(f, sample, usable)
-    copy_estimate(f, out)
     return usable
 
 
@@ -235,4 +235,4 @@ class WrenchEKF(WrenchUKF):
     is well known the two agree closely; it serves as a check of the other, and where a step must cost less.
     """
 
-    _compiled_step = staticmethod(_step_and_copy)
+    _compiled_step = staticmethod(_step_record)

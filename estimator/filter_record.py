@@ -14,7 +14,7 @@ N = 18  # error state (rho, omega, x, v, torque, force)
 
 FILTER = np.dtype([
     *MODEL_FIELDS,
-    # the estimate
+    # the estimate, in one piece
     ("x", "f8", (STATE_SIZE,)),
     ("P", "f8", (N, N)),
     # tuning, as variances
@@ -30,6 +30,7 @@ FILTER = np.dtype([
     ("patience", "i8"),  # measurements that may be refused in a row
     ("refused", "i8"),
     # the step in progress
+    ("z", "f8", (11,)),  # turn rates, position and quaternion, where they come from Python
     ("acceleration", "f8", (6,)),
     ("rotation", "f8", (3, 3)),  # of the sigma point in hand
     ("centre_rotation", "f8", (3, 3)),
@@ -41,6 +42,12 @@ FILTER = np.dtype([
     ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
     ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
     ("error", "f8", (2, N)),
+    # twelve sigma points side by side, one a column
+    ("points", "f8", (19, 12)),
+    ("accelerations", "f8", (6, 12)),
+    ("turns", "f8", (3, 12)),  # in a step: square of half the angle, its cosine, rate to quaternion
+    ("errors", "f8", (N, 12)),
+    ("rows", "f8", (12, N)),  # the errors, one point a row
     ("B", "f8", (6, N)),  # scaled noise inputs, one a row
     ("mean", "f8", (N,)),
     ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
@@ -49,9 +56,11 @@ FILTER = np.dtype([
     ("q", "f8", (4,)),
     ("rho", "f8", (3,)),
     ("L", "f8", (6, 6)),
+    ("scales", "f8", (6,)),  # inverse diagonal of a root
     ("W", "f8", (6, N)),
     ("innovation", "f8", (6,)),
 ])
+ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P
 
 
 def filter_record(vehicle: Vehicle, tuning: UKFTuning, period: float, gate: float, patience: int) -> np.ndarray:
@@ -88,4 +97,4 @@ def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
     turn_body(x[3:7], x[10], x[11], x[12], dt, out[3:7])
 
 
-__all__ = ["FILTER", "N", "drive", "filter_record", "propagate"]
+__all__ = ["ESTIMATE", "FILTER", "N", "drive", "filter_record", "propagate"]

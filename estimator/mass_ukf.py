@@ -15,12 +15,13 @@ from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from .covariance import add_noise
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, Array, WrenchEstimate
 from .filter_record import N, drive, propagate
 from .sample import check_sample, copy_estimate, undo_sensing
 from .tuning import UKFTuning
-from .ukf import NOISE, WrenchUKF, add_noise
+from .ukf import NOISE, WrenchUKF
 
 
 @compiled

@@ -12,6 +12,7 @@ The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,11 +22,23 @@ from ..dynamics.errors import InputError
 from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from .covariance import (
+    add_more_pairs,
+    add_noise,
+    add_pairs,
+    carry_linear_part,
+    root_of_six,
+    root_of_twelve,
+    subtract_squares,
+    whiten,
+)
+from .direct import direct
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
-from .filter_record import N, drive, filter_record, propagate
+from .filter_record import ESTIMATE, N, drive, filter_record, propagate
 from .imu import take_in_imu
-from .sample import Sample, check_sample, copy_estimate, empty_estimate, undo_first_pose, undo_sensing
+from .sample import Sample, check_sample, undo_first_pose, undo_sensing
+from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
 
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
@@ -33,128 +46,12 @@ _PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
 
 
 @compiled
-def _root(f: Record, columns: int) -> None:
-    """Factor P: the first columns of its lower root into ``S``, the rest's Schur complement into ``M``."""
-    P, S, M = f.P, f.S, f.M
-    for j in range(columns):
-        pivot = P[j, j]
-        for k in range(j):
-            pivot -= S[k, j] * S[k, j]
-        # rounding may eat the smallest pivots; a tiny positive one keeps the filter alive and changes nothing
-        pivot = max(pivot, 1e-14 * P[j, j] + 1e-300)
-        scale = 1.0 / math.sqrt(pivot)
-        for i in range(N):
-            S[j, i] = P[j, i]
-        for k in range(j):
-            a = S[k, j]
-            for i in range(j, N):
-                S[j, i] -= a * S[k, i]
-        for i in range(j):
-            S[j, i] = 0.0
-        for i in range(j, N):
-            S[j, i] *= scale
-    # the Schur complement, six columns at once; rows of x and v have none where they are among the columns
-    last = 0 if columns == 6 else 6
-    for i in range(12):
-        for j in range(12):
-            M[i, j] = P[6 + i, 6 + j] if i >= last and j >= last else 0.0
-    for k in range(0, columns, 6):
-        for i in range(last, 12):
-            a0, a1, a2 = S[k, 6 + i], S[k + 1, 6 + i], S[k + 2, 6 + i]
-            a3, a4, a5 = S[k + 3, 6 + i], S[k + 4, 6 + i], S[k + 5, 6 + i]
-            for j in range(last, 12):
-                M[i, j] -= ((a0 * S[k, 6 + j] + a1 * S[k + 1, 6 + j]) + (a2 * S[k + 2, 6 + j] + a3 * S[k + 3, 6 + j])
-                            + (a4 * S[k + 4, 6 + j] + a5 * S[k + 5, 6 + j]))
-
-
-@compiled
-def _linear_rows(f: Record, rotation: Array, dt: float, source: Array, out: Array) -> None:
-    """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n): ``out`` (18, n)."""
-    columns = source.shape[1]
-    J, c, mass = f.body.inverse_inertia, f.body.com, f.body.mass
-    offset = c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0
-    for i in range(3):
-        a0 = J[i, 0] * rotation[0, 0] + J[i, 1] * rotation[0, 1] + J[i, 2] * rotation[0, 2]
-        a1 = J[i, 0] * rotation[1, 0] + J[i, 1] * rotation[1, 1] + J[i, 2] * rotation[1, 2]
-        a2 = J[i, 0] * rotation[2, 0] + J[i, 1] * rotation[2, 1] + J[i, 2] * rotation[2, 2]
-        for j in range(columns):
-            out[i, j] = 0.0
-            out[3 + i, j] = dt * (a0 * source[6, j] + a1 * source[7, j] + a2 * source[8, j])
-            out[9 + i, j] = dt / mass * source[9 + i, j]
-            out[12 + i, j] = source[6 + i, j]
-            out[15 + i, j] = source[9 + i, j]
-    if offset:
-        # the geometric centre also moves with the angular acceleration: com x alpha
-        for j in range(columns):
-            ax, ay, az = out[3, j], out[4, j], out[5, j]
-            px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
-            for i in range(3):
-                out[9 + i, j] += rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz
-    for i in range(3):
-        for j in range(columns):
-            gain = out[9 + i, j]
-            out[6 + i, j] = source[i, j] + dt * (source[3 + i, j] + 0.5 * gain)
-            out[9 + i, j] = source[3 + i, j] + gain
-
-
-@compiled
-def _add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
-    """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for speed."""
-    b0, b1, b2, b3, b4, b5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
-    for i in range(N):
-        a0, a1, a2 = sign * rows[b0, i], sign * rows[b1, i], sign * rows[b2, i]
-        a3, a4, a5 = sign * rows[b3, i], sign * rows[b4, i], sign * rows[b5, i]
-        for j in range(N):
-            P[i, j] += ((a0 * rows[b0, j] + a1 * rows[b1, j]) + (a2 * rows[b2, j] + a3 * rows[b3, j])
-                        + (a4 * rows[b4, j] + a5 * rows[b5, j]))
-
-
-@compiled
-def add_noise(f: Record, rotation: Array, dt: float) -> None:
-    """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (16)."""
-    P, J, c, B = f.P, f.body.inverse_inertia, f.body.com, f.B
-    # stated per period: white noise averages over a longer step, a walk grows with it
-    white, walk = f.period / dt, dt / f.period
-    for n in range(3):
-        P[12 + n, 12 + n] += walk * f.torque_walk[n]
-        P[15 + n, 15 + n] += walk * f.force_walk[n]
-        torque, thrust = dt * math.sqrt(white * f.motor_torque[n]), dt * math.sqrt(white * f.thrust[n]) / f.body.mass
-        ax, ay, az = J[0, n], J[1, n], J[2, n]
-        px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
-        for i in range(3):
-            B[n, 3 + i] = torque * J[i, n]
-            B[n, 9 + i] = torque * (rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz)
-            B[n, 6 + i] = 0.5 * dt * B[n, 9 + i]
-            B[3 + n, 9 + i] = thrust * rotation[i, n]
-            B[3 + n, 6 + i] = 0.5 * dt * B[3 + n, 9 + i]
-    _add_squares(P, B, 0, 1.0)
-
-
-@compiled
-def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
-    x, P, H, E, mean, error = f.x, f.P, f.H, f.E, f.mean, f.error
-    drive(f, rotor_speeds, dt, voltage)
-    columns = 6 if f.wrench_count == 0 else 12
-    _root(f, columns)
-    propagate(f, x, dt, f.centre)
-    for i in range(3):
-        for j in range(3):
-            f.centre_rotation[i, j] = f.rotation[i, j]
-    _linear_rows(f, f.centre_rotation, dt, f.M, f.Y)
-    for i in range(12):
-        for j in range(N):
-            f.Z[i, j] = f.Y[j, i]
-    _linear_rows(f, f.centre_rotation, dt, f.Z, P)
-    add_noise(f, f.centre_rotation, dt)
-    spread = math.sqrt(N + NOISE + f.kappa)
-    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
-    # there where the model is nonlinear, in the first 12 rows
-    scale = math.sqrt(0.5 * weight)
+def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weight: float) -> None:
+    """Do what ``sigma_points`` does with six pairs of points with twelve, one point at a time: effects are called so."""
+    x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
     for i in range(N):
         mean[i] = 0.0
-    for j in range(columns):
+    for j in range(12):
         for sign in range(2):
             displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
             propagate(f, f.point, dt, f.next)
@@ -165,9 +62,39 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
             total = error[0, i] + error[1, i]
             E[j, i] = scale * total
             mean[i] += weight * total  # (25)
-    for first in range(0, columns, 6):
-        _add_squares(P, H, first, 1.0)
-        _add_squares(P, E, first, 1.0)
+
+
+@compiled
+def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
+    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
+    x, P, mean = f.x, f.P, f.mean
+    drive(f, rotor_speeds, dt, voltage)
+    plain = f.wrench_count == 0
+    if plain:
+        root_of_six(f)
+    else:
+        root_of_twelve(f)
+    propagate(f, x, dt, f.centre)
+    for i in range(3):
+        for j in range(3):
+            f.centre_rotation[i, j] = f.rotation[i, j]
+    carry_linear_part(f, dt)
+    add_noise(f, f.centre_rotation, dt)
+    spread = math.sqrt(N + NOISE + f.kappa)
+    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
+    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
+    # there where the model is nonlinear, in the first 12 rows
+    scale = math.sqrt(0.5 * weight)
+    if plain:
+        spread_points(f, spread)
+        propagate_points(f, dt)
+        errors_of_points(f)
+        halve_pairs(f, scale, weight)
+        add_pairs(f)
+    else:
+        _pairs_with_effects(f, dt, spread, scale, weight)
+        add_pairs(f)
+        add_more_pairs(f)
     for i in range(12):
         a = mean[i]
         for j in range(12):
@@ -181,55 +108,44 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 @compiled
 def correct(f: Record, position: Array, quaternion: Array, first: int, last: int) -> bool:
     """Take in rows ``first`` to ``last`` of the measurement (rho, x), (27)-(37), unless the gate refuses it."""
-    x, P, L, W, y = f.x, f.P, f.L, f.W, f.innovation
+    x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
     attitude_error(quaternion, x[3:7], y[0:3])
     for i in range(3):
         y[3 + i] = position[i] - x[i]
-    # rows of (rho, x) in the error state are 0-2 and 6-8
-    for i in range(first, last):
-        a = i if i < 3 else i + 3
-        for j in range(first, i + 1):
-            b = j if j < 3 else j + 3
-            total = P[a, b]
-            if i == j:
-                total += f.noise[i]
-            for k in range(first, j):
-                total -= L[i, k] * L[j, k]
-            L[i, j] = math.sqrt(total) if i == j else total / L[j, j]
-    # y becomes the whitened innovation, W the whitened cross covariance
+    # y becomes the whitened innovation
     nis = 0.0
-    for i in range(first, last):
-        for k in range(first, i):
-            y[i] -= L[i, k] * y[k]
-        y[i] /= L[i, i]
-        nis += y[i] * y[i]
+    for i in range(6):
+        measured = first <= i < last
+        a = i if i < 3 else i + 3  # rows of (rho, x) in the error state are 0-2 and 6-8
+        for j in range(i):
+            if measured and j >= first:
+                total = P[a, j if j < 3 else j + 3]
+                for k in range(first, j):
+                    total -= L[i, k] * L[j, k]
+                L[i, j] = total / L[j, j]
+                y[i] -= L[i, j] * y[j]
+            else:
+                L[i, j] = 0.0
+        if measured:
+            total = P[a, a] + f.noise[i]
+            for k in range(first, i):
+                total -= L[i, k] * L[i, k]
+            L[i, i] = math.sqrt(total)
+            scales[i] = 1.0 / L[i, i]
+            y[i] /= L[i, i]
+            nis += y[i] * y[i]
+        else:
+            scales[i] = y[i] = 0.0
     x[NIS] = nis
     if f.gate > 0.0 and nis > f.gate and f.refused < f.patience:
         f.refused += 1
         return False
     f.refused = 0
-    mean = f.mean
-    for j in range(N):
-        mean[j] = 0.0
-    for i in range(first, last):
-        a = i if i < 3 else i + 3
-        for j in range(N):
-            W[i, j] = P[a, j]
-        for k in range(first, i):
-            b = L[i, k]
-            for j in range(N):
-                W[i, j] -= b * W[k, j]
-        b = 1.0 / L[i, i]
-        for j in range(N):
-            W[i, j] *= b
-            mean[j] += W[i, j] * y[i]
-    for i in range(6):
-        if i < first or i >= last:
-            W[i, :] = 0.0
-    _add_squares(P, W, 0, -1.0)
+    whiten(f)
+    subtract_squares(f)
     for i in range(NIS):
         f.centre[i] = x[i]
-    fold(f, f.centre, mean)
+    fold(f, f.centre, f.mean)
     return True
 
 
@@ -260,11 +176,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
 
 
 @compiled
-def _step_and_copy(record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
+def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     f = record[0]
-    usable: int = step(f, z, parts, dt, voltage)
-    copy_estimate(f, out)
-    return usable
+    return step(f, f.z, parts, dt, voltage)
 
 
 class WrenchUKF:
@@ -286,7 +200,7 @@ class WrenchUKF:
         InputError: period or gate out of range.
     """
 
-    _compiled_step = staticmethod(_step_and_copy)
+    _compiled_step = staticmethod(_step_record)
 
     def __init__(
         self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005, gate: float | None = None
@@ -301,8 +215,21 @@ class WrenchUKF:
         largest = 0.0 if gate is None else _chi2_quantile(gate)
         patience = max(1, round(_PATIENCE / period))
         self.record = filter_record(vehicle, self.tuning, self.period, largest, patience)
-        self._sample = Sample()
         self._voltage = vehicle.voltage_ref
+        self._bind()
+
+    def _bind(self) -> None:
+        """Lay what Python reads and writes in a step over the record."""
+        self._sample = Sample(self.record["z"][0])
+        self._now: Array = np.ndarray(STATE_SIZE + N * N, buffer=self.record, offset=ESTIMATE)
+        self._call: Callable[..., int] | None = None
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_sample", "_now", "_call")}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._bind()
 
     def reset(
         self,
@@ -361,8 +288,7 @@ class WrenchUKF:
     @property
     def estimate(self) -> WrenchEstimate:
         """What the filter believes now."""
-        f = self.record[0]
-        return WrenchEstimate(np.concatenate([f["x"], f["P"].ravel()]))
+        return WrenchEstimate(self._now.copy())
 
     def step(
         self,
@@ -417,11 +343,12 @@ class WrenchUKF:
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
-        out = empty_estimate()
-        volts = self._voltage if voltage is None else voltage
-        if self._compiled_step(self.record, self._sample.z, parts, dt, volts, out) < 0:
+        call = self._call
+        if call is None:
+            call = self._call = direct(self._compiled_step, self.record, parts, dt, 0.0)
+        if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
-        return WrenchEstimate(out)
+        return WrenchEstimate(self._now.copy())
 
 
 def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:
