@@ -8,6 +8,7 @@ import numpy as np
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
 from ..dynamics.compiled import announced, compiled, is_compiled
+from ..dynamics.effects import compile_effects
 from ..dynamics.errors import InputError
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
@@ -70,7 +71,8 @@ class ClosedLoop:
         loop = self.record[0]
         loop["plant"] = plant[0]
         loop["filter"] = self.ukf.record[0]
-        loop["flight"] = flight_record(declared, gains)[0]
+        # the flight loop's model has no effects but those of the body: mass, inertia and its centre
+        loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
         self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
@@ -89,7 +91,9 @@ class ClosedLoop:
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
         self.external: Array = loop["plant"]["external"]  # (6,) true external wrench, world
-        self.applied: Array = loop["plant"]["applied"]  # (6,) wrench that a user applies, world; zero after a reset
+        self.jet: Array = loop["plant"]["jet"]  # (6,) parts of it: of the jet,
+        self.disturbance: Array = loop["plant"]["disturbance"]  # (6,) of the actuators' unmodelled disturbance,
+        self.applied: Array = loop["plant"]["applied"]  # (6,) and that a user applies; zero after a reset
         self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
 
     @property

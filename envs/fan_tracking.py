@@ -94,6 +94,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `scenario`    | `"base"`     | one of `windwrench.envs.SCENARIOS`, or a `Scenario`                        |
     | `vehicle`     | `"ardrone2"` | preset, YAML path or `Vehicle`: what filter and flight loop know            |
     | `effects`     | `()`         | effects of the true vehicle that nobody declared                           |
+    | `truth`       | `None`       | the true vehicle, before `effects`; default: as declared                    |
     | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
@@ -117,11 +118,14 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         fan_path: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         width: int = 640,
         height: int = 480,
+        truth: str | Vehicle | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}")
         self.scenario = scenario if isinstance(scenario, Scenario) else get_scenario(scenario)
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        # a declared vehicle whose model was amended must not bring its effects into the world a second time
+        self.truth = self.vehicle if truth is None else truth if isinstance(truth, Vehicle) else load_vehicle(truth)
         self.effects = tuple(check_setting(e, "FanTracking: effects") for e in effects)
         self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
         self.settings = settings
@@ -139,7 +143,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         declared = replace(self.vehicle, mocap=mocap)
         true = replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects))
         tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
-        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.vehicle))
+        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.truth))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -153,11 +157,11 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             fan = replace(self.fan, speed=self.fan.speed * float(rng.uniform(0.85, 1.25)),
                           rotor_drag=self.fan.rotor_drag * float(rng.uniform(0.8, 1.2)),
                           hull_area=self.fan.hull_area * float(rng.uniform(0.8, 1.2)))
-            vehicle = replace(self.vehicle, mass=self.vehicle.mass * float(rng.uniform(0.93, 1.07)),
-                              inertia=self.vehicle.inertia * float(rng.uniform(0.9, 1.1)))
+            vehicle = replace(self.truth, mass=self.truth.mass * float(rng.uniform(0.93, 1.07)),
+                              inertia=self.truth.inertia * float(rng.uniform(0.9, 1.1)))
             self.loop = self._make_loop(vehicle, fan)
         elif self.loop is None:
-            self.loop = self._make_loop(self.vehicle, self.fan)
+            self.loop = self._make_loop(self.truth, self.fan)
         loop = self.loop
         ticks = round(EPISODE_SECONDS / TICK)
         t = TICK * np.arange(ticks + 2, dtype=np.float64)

@@ -125,6 +125,11 @@ def fly_practice(
                      name=f"{added}_{trajectory}_{seed}", source="flown in MuJoCo by fly_practice")
 
 
+def shown_in(name: str) -> tuple[str, ...]:
+    """Return the trajectories in which an effect, or a disturbance outside the library, shows; the first shows it best."""
+    return _SHOWN.get(name, _FREE)
+
+
 def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator) -> EffectSetting:
     """Return an effect near the library's typical size for the vehicle, with signs and a factor of 0.8 to 1.25 at random.
 
@@ -187,7 +192,7 @@ def practise(
     outsider = added[0] if kind == "outsider" else None
     effects = () if outsider else tuple(draw_effect(name, vehicle, size, rng) for name in added)
     if trajectory is None:
-        shown = [_SHOWN.get(name, _FREE) for name in added] or [_FREE]
+        shown = [shown_in(name) for name in added] or [_FREE]
         both = [name for name in shown[0] if all(name in others for others in shown)]
         trajectory = "hover" if kind == "hover" else str(rng.choice(both or ["excite"]))
     turbulence = float(rng.integers(2)) if turbulence is None else turbulence
@@ -221,4 +226,4 @@ def practice_set(vehicle: Vehicle, kinds: tuple[str, ...] = KINDS, sizes: tuple[
 
 def _in_the_open(effects: tuple[str, ...]) -> tuple[str, ...]:
     """Return the effects that show away from floor, ceiling and fan."""
-    return tuple(name for name in effects if set(_SHOWN.get(name, _FREE)) & set(_FREE))
+    return tuple(name for name in effects if set(shown_in(name)) & set(_FREE))
