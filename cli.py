@@ -1,6 +1,7 @@
 """The ``windwrench`` command."""
 
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Mapping
@@ -169,6 +170,56 @@ def estimate(
 
 
 @app.command()
+def diagnose(
+    logs: Annotated[list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")],
+    test: Annotated[list[Path] | None, typer.Option(help="Log on which alone the error is reported; may be repeated.")] = None,
+    reader: Annotated[str | None, typer.Option(help="For logs of another form: nanobench, crazyswarm2, px4_ulog, rosbag or "
+                                                    "rosbag:TOPICS.yaml.")] = None,
+    without: Annotated[list[str] | None, typer.Option(help="Effect to take out of the library; may be repeated.")] = None,
+    vehicle: VehicleOption = "ardrone2",
+    out: Out = Path("results/diagnose"),
+) -> None:
+    """Find the physical effects that a vehicle's model lacks; write report.json, report.html and vehicle.yaml.
+
+    Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
+    """
+    from .dynamics.vehicle_file import load_vehicle
+    from .identification.diagnosis import diagnose as run
+    from .identification.flight_log import read_log
+    from .identification.report import write_report
+    from .identification.report_words import error_sentences, headline, remainder_sentence
+
+    model = load_vehicle(vehicle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        flights = [read_log(path, reader, model) for path in logs]
+        unseen = [read_log(path, reader, model) for path in test or []]
+    folder = _folder(out)
+    with console.status("looking at the logs") as status:
+        found = run(flights, model, unseen, without or (), lambda text: status.update(text))
+    for note in found.notes:
+        _errors.print(note, style="dim", highlight=False, markup=False)
+    for sentence in (headline(found), *error_sentences(found), remainder_sentence(found)):
+        console.print(sentence, highlight=False, markup=False)
+    if found.effects:
+        table = Table("effect", "coefficient", "value", "+-", "unit", box=box.SIMPLE_HEAD)
+        for effect in found.effects:
+            for i, (name, value) in enumerate(effect.coefficients.items()):
+                title = effect.name + (" (tentative)" if effect.tentative else "") if i == 0 else ""
+                table.add_row(title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name])
+        console.print(table)
+    table = Table("held-out", "before", "after", "floor", box=box.SIMPLE_HEAD)
+    before, after = found.before, found.after
+    table.add_row("force (N)", f"{before.force_rms:.3g}", f"{after.force_rms:.3g}", f"{found.floor_force_rms:.3g}")
+    table.add_row("torque (Nm)", f"{before.torque_rms:.3g}", f"{after.torque_rms:.3g}", f"{found.floor_torque_rms:.3g}")
+    table.add_row("1 s prediction (m)", f"{before.rollout_1s_position_rms:.3g}", f"{after.rollout_1s_position_rms:.3g}", "")
+    console.print(table)
+    for line in found.advice:
+        console.print(line, highlight=False, markup=False)
+    _say(*write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]])))
+
+
+@app.command()
 def record(
     out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path("results/flight.csv"),
     vehicle: VehicleOption = "ardrone2",
@@ -242,6 +293,35 @@ def reproduce(
 
 
 @app.command()
+def trials(
+    seeds: Annotated[int, typer.Option(min=1, help="How often everything is flown, each time anew.")] = 1,
+    quick: Annotated[bool, typer.Option("--quick", help="A part of it only, some minutes long.")] = False,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")] = None,
+    out: Out = Path("results/trials"),
+) -> None:
+    """Diagnose flights whose cause is known, and score it; what a run has finished, the next does not repeat.
+
+    Example: windwrench trials --quick --out results/trials
+    """
+    from .experiments.diagnosis_scores import judge, rules
+    from .experiments.diagnosis_trials import plan, run_trials
+    from .experiments.diagnosis_trials_page import write_results
+
+    wanted = plan(seeds, quick)
+    folder = _folder(out)
+    with _progress() as progress:
+        task = progress.add_task("diagnosing flights", total=len(wanted))
+        outcomes = run_trials(wanted, folder, jobs, lambda done: progress.update(task, completed=done))
+    paths = write_results(outcomes, folder, folder / "trials.md" if markdown is None else markdown, seeds, quick)
+    for rule in rules(j for outcome in outcomes for j in judge(outcome)):
+        met = {True: "met", False: "not met", None: "-"}[rule.met]
+        console.print(f"{met:8}{rule.subject}: {rule.measured}; target: {rule.target}", highlight=False, markup=False,
+                      soft_wrap=True)
+    _say(*paths)
+
+
+@app.command()
 def speed(
     rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
     markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
@@ -292,6 +372,58 @@ def effects(
             table.add_row(name if i == 0 else "", one.kind if i == 0 else "", c.name, c.unit,
                           f"{c.typical[0]:g} / {c.typical[1]:g}", c.meaning, end_section=i + 1 == len(one.coefficients))
     console.print(table)
+
+
+@app.command("close-loop")
+def close_loop(
+    effect: Annotated[list[str] | None, typer.Option(help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten "
+                                                          "of typical size.")] = None,
+    vehicle: VehicleOption = "ardrone2",
+    episodes: Annotated[int, typer.Option(min=1, help="Paired episodes an effect and model.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of flights and episodes.")] = 0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Also write the results as a page.")] = None,
+    out: Out = Path("results/close-loop"),
+) -> None:
+    """Fly an undeclared effect, name it from the log, declare it, and follow the fan before and after.
+
+    What a run has finished, the next does not repeat.
+
+    Example: windwrench close-loop --effect com_offset --effect mass:dm=0.06 --episodes 20
+    """
+    from .dynamics.effects import parse_setting
+    from .dynamics.vehicle_file import load_vehicle
+    from .experiments.close_loop import DEFAULT_EFFECTS, MEASURES, Request, check_requests, close_loops
+    from .experiments.close_loop_page import conclusions, write_page
+    from .experiments.close_loop_picture import write_picture
+
+    model = load_vehicle(vehicle)
+    requests = [Request(parse_setting(e, model), model, episodes, seed) for e in effect or DEFAULT_EFFECTS]
+    check_requests(requests)
+    folder = _folder(out)
+    columns = (TextColumn("{task.description:18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
+    with Progress(*columns, console=_errors, transient=True) as progress:
+        tasks = {r.name: progress.add_task(r.name, total=1.0) for r in requests}
+
+        def report(shares: Mapping[str, float]) -> None:
+            for name, share in shares.items():
+                progress.update(tasks[name], completed=share)
+
+        results = close_loops(requests, folder, jobs, report)
+    picture = write_picture(results, folder)
+    table = Table(Column("added", no_wrap=True), "named", *(m.title for m in MEASURES), box=box.SIMPLE_HEAD)
+    for r in results:
+        ratios = [r["summary"][m.key] for m in MEASURES]
+        found = [e["name"] for e in r["diagnosis"]["effects"]]
+        table.add_row(r["name"], "the same" if found == [r["request"]["effect"]] else ", ".join(found) or "nothing",
+                      *(f"x{s['ratio']:.2f}\n{s['ratio_ci95'][0]:.2f}-{s['ratio_ci95'][1]:.2f}" for s in ratios))
+    console.print(table)
+    console.print(f"after by before (95 %), {episodes} paired episodes an effect, seed {seed}", highlight=False)
+    for sentence in conclusions(results):
+        console.print(sentence.replace("**", ""), highlight=False, markup=False)
+    if markdown is not None:
+        write_page(results, folder, markdown)
+    _say(picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else []))
 
 
 def _names(text: str, option: str) -> list[str]:

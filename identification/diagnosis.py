@@ -13,18 +13,20 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get, names
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import Vehicle
-from .equivalence import equivalents
+from .commanded import shared
+from .equivalence import composites, equivalents
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
-from .screening import screen_log
+from .screening import LEAST_SECONDS, screen_log
 from .search import Fit, Gain, Search
 from .structure import drives, structure
 
 Array = NDArray[np.float64]
 
 AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
+LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
 _FAINT = 0.1  # share of the remainder's energy: a name that explains less beside a large remainder is tentative
 _POINTS = 600  # of a signature
 
@@ -54,7 +56,9 @@ def diagnose(
     if not logs:
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
-    notes = [f"{log.name}: {note}" for log in (*logs, *test) for note in (*log.notes, *screen_log(log, vehicle))]
+    every = (*logs, *test)
+    least = LEAST_SECONDS if len(every) == 1 else LEAST_SECONDS_EACH
+    notes = [f"{log.name}: {note}" for log in every for note in (*log.notes, *screen_log(log, vehicle, least))]
     flights = Flights(logs, vehicle, test)
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = search.forward()
@@ -64,16 +68,18 @@ def diagnose(
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")
     signs = structure(search, fit)
+    mimics = composites(flights, fit)
 
-    before, after = flights.residual({}), flights.residual(fit.setting)
+    before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
     held = ~flights.fit
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held]), _rms(after[held])
     noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
     remainder = "structured" if signs else "random" if noisy else "none"
-    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs), noisy) for effect in fit.effects)
+    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), noisy) for effect in fit.effects)
     verdict = ("explained" if remainder == "none" else "partly explained") if effects else (
         "nothing to explain" if remainder == "none" else "unexplained")
+    notes += mimics
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
@@ -186,8 +192,8 @@ def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: s
             out.append(f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
                        + "; ".join(f"{name}: {get(name).excitation}" for name in group))
     if remainder == "structured":
-        out.append("A law is left in the remainder that no effect of the library fits: the names are tentative. Fly one thing at "
-                   "a time (hover, climbs, level flight at several speeds, turns) to see what the remainder follows.")
+        out.append("A law is left in the remainder that no effect of the library fits: the names are tentative. Fly one thing "
+                   "at a time (hover, climbs, level flight at several speeds, turns) to see what the remainder follows.")
     if drowned:
         out.append("These flights could not show: " + ", ".join(drowned) + ". To look for one of them, fly: "
                    + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4]))

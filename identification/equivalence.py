@@ -4,12 +4,20 @@ An effect's own part of the residual is projected on the columns of another one.
 the noise, by which the flights can tell the two apart.
 """
 
+import numpy as np
+
+from .regression import Flights
 from .search import Fit, Search
 from .selection import PRIOR, gram
 
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
 _NEAR = 40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
+_MOST_SURE = 2  # effects at once
+# a vehicle that is declared without aerodynamics lacks all of these together
+_AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
+_COINCIDE = 0.7  # least of the largest coefficient that all others reach
+_EVEN = 0.95  # correlation of voltage and time
 _PLAUSIBLE = 1.2 * PRIOR  # typical sizes
 
 
@@ -31,3 +39,29 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         if search.whitened_energy(flights.residual(swapped.setting) - whole) < limit:
             out.append(other.effect)
     return out
+
+
+def composites(flights: Flights, fit: Fit) -> list[str]:
+    """Return in words which single effect the named ones could be instead, where together they are its exact equivalent.
+
+    Mass is thrust_scale with inertia, thrust_scale is mass with inertia (coefficients that coincide give them away); a
+    battery that falls evenly is a thrust that is off and fades.
+    """
+    found = []
+    names = set(fit.effects)
+    if len(names - _AERODYNAMICS) + bool(names & _AERODYNAMICS) > _MOST_SURE:
+        found.append(f"{len(names)} effects at once may stand for one that the library lacks")
+    if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
+        relative = list(fit.setting["inertia"].values())
+        relative += [v / flights.vehicle.mass for v in fit.setting.get("mass", {}).values()]
+        relative += list(fit.setting.get("thrust_scale", {}).values())
+        relative += list(fit.setting.get("rotor_efficiency", {}).values())
+        sizes = np.abs(relative)
+        if sizes.min() > _COINCIDE * sizes.max():
+            found.append("coefficients of inertia and thrust or mass coincide: a single other effect may be behind them")
+    if "thrust_fade" in names and names & {"mass", "thrust_scale", "rotor_efficiency", "constant_force"}:
+        drop = [(p.signals.t, p.signals.voltage) for p in flights.pieces({}) if p.signals.voltage is not None]
+        even = all(abs(float(np.corrcoef(t, v)[0, 1])) > _EVEN for t, v in drop if v.std() > 0)
+        if drop and even:
+            found.append("the battery's voltage falls evenly: thrust that is off and fades may be battery_sag")
+    return found

@@ -55,6 +55,7 @@ class FlightLog:
     notes: tuple[str, ...] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
     valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # (N,) the pose is there
     extra: Mapping[str, Array] = field(default_factory=dict)  # (N,) or (N, ...) SI; what a reader found besides
+    commanded: bool = False  # turn rates are worked out from commands: scale of thrust unknown, moments not to be trusted
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):

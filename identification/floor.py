@@ -31,7 +31,8 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     The turn rates' is the step to which they are rounded, as the log shows it (no more than the vehicle's file says).
     """
     seen = np.flatnonzero(log.valid)
-    whole = np.flatnonzero(np.diff(log.t[seen]) < 1.5 * log.period)
+    steps = np.diff(log.t[seen])
+    whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = _high(log.position[seen])[whole]
     turned = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
     angle = (turned[:-1].inv() * turned[1:]).as_rotvec()  # white noise differenced: twice its power, and a known shape

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..dynamics.effects import compile_effects, get, names
+from ..dynamics.effects import get, names
 from ..dynamics.effects.base import Coefficient
 from ..dynamics.vehicle import EffectSetting, Vehicle
-from .floor import noisy_logs
+from .commanded import LEAN_X, LEAN_Y, NOT_FROM_COMMANDS, SCALE, commanded, deviation, deviations, in_flight, size_of, thinned
 from .flight_log import FlightLog
-from .residual import residual_wrench
+from .floor import noisy_logs
+from .residual import centre_acceleration, model_wrench
 from .sensing import undo_log_sensing
 from .signals import Signals, log_signals, low_pass
 
@@ -29,7 +30,7 @@ CUTOFF_HZ = 5.0
 _RATE_HZ = 25.0  # of the rows
 _EDGE = 0.6  # s at either end of a piece, where the filters have only half of what they need
 # share of noise in an effect's column that is too much; a gain of the attitude could cancel the attitude's own noise
-_DROWNED = {"attitude_gain": 0.004}
+_DROWNED = {"attitude_gain": 0.01}
 _DROWNED_ELSE = 0.1
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
@@ -43,7 +44,7 @@ Column = tuple[str, str]
 MOMENT = "moment of "
 CENTRAL = "central"  # the coefficient of laws that act rotor by rotor
 START = "start "  # a whole effect at coefficients of its own; the column is a multiple of it
-SHIFT_RANGE = (-0.0075, 0.0075)  # s
+SHIFT_RANGE = (-0.006, 0.006)  # s
 SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
 LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
 NUISANCES = (SHIFT, LEAN)
@@ -58,6 +59,8 @@ def typical(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the library's two."""
     if column in NUISANCES:
         return 0.0025
+    if not column[0]:
+        return size_of(column[1])[0]
     if column[1].startswith(START) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
@@ -67,6 +70,12 @@ def typical(column: Column, vehicle: Vehicle) -> float:
         return max(others, default=1.0)
     share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
     return float(small * (large / small) ** share)
+
+
+def range_of(column: Column) -> tuple[float, float]:
+    """Return the least and the greatest value of a nuisance's column."""
+    size = size_of(column[1])
+    return SHIFT_RANGE if size is None else (-size[1], size[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +99,15 @@ class Flights:
     def __init__(self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()) -> None:
         self.vehicle = vehicle
         self.logs = (*logs, *test)
+        self.commanded = commanded(self.logs)  # torque is left out, and only the time in the air counts
+        if self.commanded:
+            self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
+        self.own = len(logs) if self.commanded else 0  # flights that have a thrust scale and a lean of their own
+        self.deviations: tuple[Column, ...] = tuple(deviations(self.own))
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
+        self._needs: dict[int, tuple[Piece, Array]] = {}
+        self._moved: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
+        self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
         self._first: list[Piece] = []
         self._first = pieces = self.pieces({})
         log, block, fit, start, t = [], [], [], [], []
@@ -123,7 +140,9 @@ class Flights:
         explain the noise of the residual by taking it out of the pose.
         """
         noisy = object.__new__(Flights)
-        noisy.vehicle, noisy._pieces, noisy._first = self.vehicle, {}, self._first
+        noisy.vehicle, noisy._pieces, noisy._columns, noisy._first = self.vehicle, {}, {}, self._first
+        noisy._needs, noisy._moved = {}, {}
+        noisy.commanded, noisy.own = self.commanded, self.own
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
@@ -139,7 +158,10 @@ class Flights:
                 whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
             if noise > _DROWNED.get(effect, _DROWNED_ELSE) * whole:
                 drowned.add(effect)
+        if self.commanded:
+            drowned |= NOT_FROM_COMMANDS
         return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}
+
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
         vehicle = self.amended(setting)
@@ -152,6 +174,8 @@ class Flights:
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
         found = [(i, s) for i, log in enumerate(self.logs) for s in log_signals(undo_log_sensing(log, vehicle))]
+        if self.commanded:
+            found = [(i, thinned(s)) for i, s in found]
         if not self._first:
             return [Piece(i, s, _rows(s)) for i, s in found]
         pieces = []  # a clock offset moves the start of a piece: the rows stay where they are in time
@@ -166,71 +190,94 @@ class Flights:
         effects = tuple(EffectSetting(name, dict(values)) for name, values in setting.items() if name)
         return replace(self.vehicle, effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects))
 
-    def residual(self, setting: Setting, smooth: "Sequence[Signals] | None" = None) -> Array:
-        """Return the residual (rows, 6) with these effects; ``smooth``: on these signals instead of the logs' own.
+    def residual(self, setting: Setting) -> Array:
+        """Return the residual (rows, 6) with these effects.
 
         It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and all, with the mass; and no
         noise of differentiation is multiplied by a coefficient.
         """
         vehicle = self.amended(setting)
-        body = compile_effects(vehicle).vehicle
-        lightness = self.vehicle.mass / body.mass
-        slimness = self.vehicle.inertia @ np.linalg.inv(body.inertia)
-        shifts = setting.get(SHIFT[0], {})
-        out = []
-        for i, piece in enumerate(self.pieces(setting)):
-            signals = piece.signals if smooth is None else smooth[i]
-            wrench = residual_wrench(_shifted(signals, shifts), vehicle)
-            wrench[:, :3] *= lightness
-            wrench[:, 3:] = wrench[:, 3:] @ slimness.T
-            out.append(low_pass(wrench, CUTOFF_HZ, signals.period)[piece.rows])
-        return np.concatenate(out)
-
-    def model_motion(self, setting: Setting) -> list[Signals]:
-        """Return the signals with the accelerations that the model gives in place of the differentiated ones.
-
-        They are free of the noise that differentiation makes, which would bias the coefficients of whatever is
-        multiplied by them (mass, inertia) towards no model at all.
-        """
-        vehicle = self.amended(setting)
         shifts = setting.get(SHIFT[0], {})
         out = []
         for piece in self.pieces(setting):
+            scale, *lean = (deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y))
+            s = self._shifted(piece, shifts, scale)
+            rotors, effects, body = model_wrench(s, vehicle)
+            model = np.empty_like(effects)
+            model[:, :3] = (self.vehicle.mass / body.mass) * (s.rotation[:, :, 2] * rotors[:, :1] + effects[:, :3])
+            model[:, :2] += self.vehicle.weight * np.array(lean)
+            if np.any(body.com):
+                model[:, :3] -= self.vehicle.mass * centre_acceleration(s, body)
+            if self.commanded:
+                model[:, 3:] = 0.0
+            else:
+                turning = np.cross(s.rate, s.rate @ body.inertia.T)
+                model[:, 3:] = (rotors[:, 1:] + effects[:, 3:] - turning) @ np.linalg.solve(body.inertia.T,
+                                                                                         self.vehicle.inertia.T)
+            out.append(self._needed(piece) - low_pass(model, CUTOFF_HZ, s.period)[piece.rows])
+        return np.concatenate(out)
+
+    def _needed(self, piece: Piece) -> Array:
+        """Return what the measured motion of a piece needs (rows, 6), by the declared mass and inertia."""
+        if id(piece) not in self._needs:
             s = piece.signals
-            wrench = residual_wrench(_shifted(s, shifts), vehicle)
-            turning = np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T
-            out.append(replace(s, acceleration=s.acceleration - wrench[:, :3] / vehicle.mass,
-                               angular_acceleration=s.angular_acceleration - turning))
-        return out
+            force = self.vehicle.mass * (s.acceleration + np.array([0.0, 0.0, self.vehicle.gravity]))
+            torque = 0.0 * force if self.commanded else s.angular_acceleration @ self.vehicle.inertia.T
+            needed = low_pass(np.column_stack([force, torque]), CUTOFF_HZ, s.period)[piece.rows]
+            self._needs[id(piece)] = piece, needed
+        return self._needs[id(piece)][1]
+
+    def _shifted(self, piece: Piece, shifts: Mapping[str, float], scale: float) -> Signals:
+        key = (id(piece), shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0), scale)
+        if key not in self._moved:
+            if len(self._moved) > 4 * len(self._first):
+                self._moved.clear()
+            self._moved[key] = piece, _shifted(piece.signals, shifts, scale)
+        return self._moved[key][1]
+
+    def _kept(self, setting: Setting) -> dict[Column, Array]:
+        """Return the columns of effects that were worked out before and hardly change with this setting.
+
+        A law asks for the motion and for what the rotors deliver, not for other laws (but for the wind). Shifts of a few
+        milliseconds, and small changes of what the rotors deliver, make no difference to a column that is only tried.
+        """
+        key = tuple((name, c, round(value / (0.05 * typical((name, c), self.vehicle))))
+                    for name, values in sorted(setting.items()) if name == "wind" or (name and get(name).kind != "wrench")
+                    for c, value in sorted(values.items()))
+        if key not in self._columns:
+            if len(self._columns) > 12:
+                self._columns.clear()
+            self._columns[key] = {}
+        return self._columns[key]
 
     def columns(self, setting: Setting, wanted: Iterable[Column], step: float = 0.5) -> dict[Column, Array]:
         """Return what each unit of a coefficient adds to the residual that the model leaves, (rows, 6) each.
 
         So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step`` typical sizes.
         """
-        smooth = self.model_motion(setting)
-        base = self.residual(setting, smooth)
-        plain: Array | None = None
+        base = self.residual(setting)
         out: dict[Column, Array] = {}
+        kept = self._kept(setting)
         for column in wanted:
             effect, name = column
             if name.startswith(MOMENT):
                 continue
+            keep = effect not in setting and effect != ""
+            if keep and column in kept:
+                out[column] = kept[column]
+                continue
             delta = step * typical(column, self.vehicle)
             value = setting.get(effect, {}).get(name, 0.0)
-            if column not in NUISANCES:
+            if effect:
                 c = coefficient(column)
                 if c.typical[0] < 0:
                     delta = -delta
                 if not c.minimum <= value + delta <= c.maximum:
                     delta = -delta
             changed = {**setting, effect: {**setting.get(effect, {}), name: value + delta}}
-            if column not in NUISANCES and get(effect).kind == "sensing":
-                if plain is None:
-                    plain = self.residual(setting)
-                out[column] = (plain - self.residual(changed)) / delta
-            else:
-                out[column] = (base - self.residual(changed, smooth)) / delta
+            out[column] = (base - self.residual(changed)) / delta
+            if keep:
+                kept[column] = out[column]
         for column in wanted:
             if column[1].startswith(MOMENT):
                 part = out[column[0], column[1].removeprefix(MOMENT)].copy()
@@ -245,8 +292,10 @@ def _rows(signals: Signals) -> Index:
     return np.arange(edge, len(signals.t) - edge, step)
 
 
-def _shifted(signals: Signals, shifts: Mapping[str, float]) -> Signals:
-    """Return the signals with turn rates and attitude moved to when they act."""
+def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) -> Signals:
+    """Return the signals with turn rates and attitude moved to when they act, and thrust scaled by 1 + ``scale``."""
+    if scale != 0.0:
+        signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
     late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
     if late != 0.0:
         n = len(signals.t)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
-from .regression import CENTRAL, LEAN, MOMENT, NUISANCES, SHIFT, SHIFT_RANGE, START, Column, Flights, Setting, coefficient, typical
+from .commanded import mates
+from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .selection import Gram, columns_of, gram
 from .starts import STARTS
 from .whitening import Whitener
@@ -22,14 +23,18 @@ Array = NDArray[np.float64]
 LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
 LEAST_SHARE = 0.01  # and as a share of what is left unexplained
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
+LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
 SWAP_GAIN = 12.0
 MOST_EFFECTS = 4
+LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explain up to 18, and 0.012, of real flights
+MOST_OF_COMMANDS = 6  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 _REFITS = 6
 _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
 _SHORTLIST = 2
+_HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
 
 
 @dataclass(eq=False)
@@ -60,7 +65,12 @@ class Search:
 
     def __init__(self, flights: Flights, library: Sequence[str], report: Callable[[str], None] = lambda text: None) -> None:
         self.flights = flights
-        self.library = tuple(e for e in library if e not in flights.drowned)
+        declared = {e.name for e in flights.vehicle.effects}
+        # a law with a place or a swing of its own imitates too much where thrust itself is a guess: it must be declared
+        self.library = tuple(e for e in library if e not in flights.drowned
+                             and (e not in STARTS or e in declared or not flights.commanded))
+        self._most = MOST_OF_COMMANDS if flights.commanded else MOST_EFFECTS
+        self._least_gain, self._least_share = LEAST_OF_COMMANDS if flights.commanded else (LEAST_GAIN, LEAST_SHARE)
         self._report = report
         self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
         self.noise: Array = np.zeros((0, 6))
@@ -75,8 +85,9 @@ class Search:
 
     def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: its effects', those of effects that are tried, and the shift that any log may have."""
-        return [*([] if _TIMING & {*effects, *tried} else [SHIFT]), LEAN, *(c for e in effects for c in self.columns_of(e, True)),
-                *(c for e in tried for c in self.columns_of(e, False))]
+        shift = [] if self.flights.commanded or _TIMING & {*effects, *tried} else [SHIFT]
+        return [*shift, LEAN, *self.flights.deviations,
+                *(c for e in effects for c in self.columns_of(e, True)), *(c for e in tried for c in self.columns_of(e, False))]
 
     def linearise(self, fit: Fit) -> "Regression":
         """Return the regression on the whole library at a fit."""
@@ -100,7 +111,8 @@ class Search:
         return gram(self.flights, fit.setting, self.whiten, regression.columns, regression.residual)
 
     def _whitener(self, noise: Array) -> Whitener:
-        return Whitener(noise, self.flights.sensor_noise, self.flights.start, self.flights.fit)
+        flights = self.flights
+        return Whitener(noise, flights.sensor_noise, flights.start, flights.fit, flights.period, flights.commanded)
 
     def set_noise(self, fit: Fit, regression: "Regression") -> None:
         """Take as noise what the whole library, kept to plausible sizes, cannot explain at a fit."""
@@ -169,7 +181,7 @@ class Search:
         total = g.blocks.sum(axis=0)
         out = []
         for effect in self.library:
-            if effect in fit.effects:
+            if effect in fit.effects or (self.flights.commanded and mates(effect) & set(fit.effects)):
                 continue
             if effect in STARTS:
                 tries = [[*base, c] for c in regression.begun if c[0] == effect]
@@ -191,18 +203,18 @@ class Search:
                 last = wanted[-1]
                 if last in regression.begun:
                     start[effect] = dict(regression.begun[last])
-                elif self._drowned(g, total, base, wanted, change, effect):
+                elif self._drowned(g, total, wanted, change, effect):
                     continue
                 best = Gain(effect, gain, gain / error, error - gain, size, Fit(start))
             out.append(best)
-        return sorted((x for x in out if np.isfinite(x.energy)), key=lambda x: _COMPLEXITY * len(get(x.effect).coefficients) - x.energy)
+        found = [x for x in out if np.isfinite(x.energy)]
+        return sorted(found, key=lambda x: _COMPLEXITY * _freedom(x.effect) - x.energy)
 
-    def _drowned(self, g: Gram, total: Array, base: Sequence[Column], wanted: Sequence[Column], change: Array,
-                 effect: str) -> bool:
-        """Return whether what an effect adds to the columns of ``base`` is noise of the sensors in good part."""
+    def _drowned(self, g: Gram, total: Array, wanted: Sequence[Column], change: Array, effect: str) -> bool:
+        """Return whether what an effect adds to the other columns is noise of the sensors in good part."""
         own = [c for c in wanted if c[0] == effect]
         shape = change[[wanted.index(c) for c in own]]
-        at, rest = g.index(own), g.index(base)
+        at, rest = g.index(own), g.index([c for c in wanted if c[0] != effect])
         cross = total[np.ix_(rest, at)] @ shape
         energy = shape @ total[np.ix_(at, at)] @ shape
         if len(rest):
@@ -214,7 +226,7 @@ class Search:
         """Return the effects that are worth adding one after the other, and what each explained at first, alone."""
         fit = Fit({})
         first: list[Gain] = []
-        for count in range(MOST_EFFECTS + 1):
+        for count in range(self._most + 1):
             regression = self.linearise(fit)
             if count == 0:
                 self.set_noise(fit, regression)
@@ -224,9 +236,9 @@ class Search:
             g = self.gram(fit, regression)
             gains = self.gains(fit, regression, g)
             first = first or gains
-            least = max(LEAST_GAIN, LEAST_SHARE * g.error(g.index(self.base(fit.effects))))
-            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZE]
-            if not better or count == MOST_EFFECTS:
+            least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
+            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZES.get(x.effect, LEAST_SIZE)]
+            if not better or count == self._most:
                 break
             self._report(f"trying {better[0].effect}")
             fit = self.refit(better[0].fit)
@@ -243,22 +255,25 @@ class Search:
         return fit
 
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
-        least = max(LEAST_GAIN, LEAST_SHARE * error)
+        least = max(self._least_gain, self._least_share * error)
         for effect in fit.effects:
             if self.error_without(fit, effect) < error + least:
                 self._report(f"{effect} is not needed")
                 less = self.refit(fit.without(effect))
                 return less, self.error(less)
-        for size, allowed in ((2, least), (1, -SWAP_GAIN)):
+        for size, allowed in ((1, -SWAP_GAIN),) if self.flights.commanded else ((2, least), (1, -SWAP_GAIN)):
             for group in itertools.combinations(fit.effects, size):
                 less = fit.without(*group)
                 regression = self.linearise(less)
                 tries = [x for x in self.gains(less, regression, self.gram(less, regression)) if x.effect not in group]
                 for other in tries[:_SHORTLIST]:
-                    if other.size <= LEAST_SIZE:
+                    # what is far from linear may do better than it looks here, but not by any amount
+                    if other.left > error + allowed + _HOPE * (other.left + other.energy - error):
+                        continue
+                    if other.size <= LEAST_SIZES.get(other.effect, LEAST_SIZE):
                         continue
                     swapped = self.refit(other.fit)
-                    more = len(get(other.effect).coefficients) - sum(len(get(e).coefficients) for e in group)
+                    more = _freedom(other.effect) - sum(_freedom(e) for e in group)
                     if (after := self.error(swapped)) < error + allowed - _COMPLEXITY * more:
                         self._report(f"{other.effect} in place of {' and '.join(group)}")
                         return swapped, after
@@ -309,13 +324,21 @@ def _moved(setting: Setting, columns: Sequence[Column], change: Array) -> dict[s
         if name.startswith((MOMENT, START)):
             continue
         value = out.get(effect, {}).get(name, 0.0) + float(delta)
-        if (effect, name) in NUISANCES:
-            value = float(np.clip(value, *SHIFT_RANGE))
+        if not effect:
+            value = float(np.clip(value, *range_of((effect, name))))
         else:
             c = coefficient((effect, name))
             value = float(np.clip(value, c.minimum, c.maximum))
         out.setdefault(effect, {})[name] = value
     return out
+
+
+def _freedom(effect: str) -> float:
+    """Return how many coefficients an effect brings with it.
+
+    One that sets the timing takes the shift's place. Of exact equivalents a change of the log comes last.
+    """
+    return len(get(effect).coefficients) - (effect in _TIMING) + 0.1 * (get(effect).kind == "sensing")
 
 
 def _central(columns: Sequence[Column], change: Array, effect: str) -> float:

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .regression import CENTRAL, MOMENT, NUISANCES, SHIFT_RANGE, START, Column, Flights, Setting, coefficient, typical
+from .regression import CENTRAL, MOMENT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
+# what a law allows and nobody believes: a rotor that delivers far more than it should (all four together are thrust_scale)
+_BELIEVED = {"rotor_efficiency": 0.05}
 PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anything is seen
 
 
@@ -50,38 +52,47 @@ class Gram:
         at = {c: i for i, c in enumerate(self.columns)}
         return np.array([at[c] for c in wanted if c in at], dtype=np.int64)
 
-    def solve(self, gram: Array, index: NDArray[np.int64], bounded: bool = True) -> Array:
+    def solve(self, gram: Array, index: NDArray[np.int64]) -> Array:
         """Return the changes (len(index),) of least squares over these columns within their bounds."""
+        return self._solve(gram, index)[0]
+
+    def _solve(self, gram: Array, index: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the changes and which of them are free of their bounds."""
+        normal = gram[np.ix_(index, index)] + np.diag(self.precision[index])
+        right = gram[index, -1] - self.precision[index] * self.value[index]
+        low, high = self.lower[index], self.upper[index]
         change = np.zeros(len(index))
-        free = np.arange(len(index))
-        for _ in range(len(index) + 1):
-            if not len(free):
-                break
-            at = index[free]
-            normal = gram[np.ix_(at, at)] + np.diag(self.precision[at])
-            held = np.setdiff1d(np.arange(len(index)), free)
-            right = gram[at, -1] - self.precision[at] * self.value[at] - gram[np.ix_(at, index[held])] @ change[held]
-            change[free] = np.linalg.solve(normal, right)
-            if not bounded:
-                break
-            low, high = self.lower[index], self.upper[index]
-            out = free[(change[free] < low[free]) | (change[free] > high[free])]
-            if not len(out):
+        free = np.ones(len(index), dtype=bool)
+        while free.any():
+            held = right[free] - normal[np.ix_(free, ~free)] @ change[~free]
+            change[free] = np.linalg.solve(normal[np.ix_(free, free)], held)
+            out = free & ((change < low) | (change > high))
+            if not out.any():
                 break
             change = np.clip(change, low, high)
-            free = np.setdiff1d(free, out)
-        return change
+            free &= ~out
+        return change, free
 
     def error(self, index: NDArray[np.int64]) -> float:
-        """Return the whitened energy on each block of the fit when it is predicted from all others."""
+        """Return the whitened energy on each block of the fit when it is predicted from all others.
+
+        A coefficient that the whole fit holds at a bound is held there for every block.
+        """
         total = self.blocks.sum(axis=0)
         if not len(index):
             return float(total[-1, -1])
-        out = 0.0
-        for block in self.blocks:
-            change = self.solve(total - block, index)
-            out += float(block[-1, -1] - 2 * change @ block[index, -1] + change @ block[np.ix_(index, index)] @ change)
-        return out
+        held, free = self._solve(total, index)
+        change = np.tile(held, (len(self.blocks), 1))
+        if free.any():
+            at, fixed = index[free], index[~free]
+            rest = total - self.blocks
+            normal = rest[:, at[:, None], at] + np.diag(self.precision[at])
+            right = rest[:, at, -1] - self.precision[at] * self.value[at]
+            if len(fixed):
+                right = right - rest[:, at[:, None], fixed] @ held[~free]
+            change[:, free] = np.linalg.solve(normal, right[..., None])[..., 0]
+        square = np.einsum("bi,bij,bj->", change, self.blocks[:, index[:, None], index], change)
+        return float(total[-1, -1] - 2.0 * np.sum(change * self.blocks[:, index, -1]) + square)
 
 
 def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Column, Array], residual: Array) -> Gram:
@@ -96,14 +107,14 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
     value = np.array([setting.get(c[0], {}).get(c[1], 0.0) for c in names])
     low, high = np.empty(len(names)), np.empty(len(names))
     for i, c in enumerate(names):
-        if c in NUISANCES:
-            low[i], high[i] = SHIFT_RANGE
+        if not c[0]:
+            low[i], high[i] = range_of(c)
         elif c[1].startswith(MOMENT):
             low[i], high[i] = -np.inf, np.inf
         elif c[1].startswith(START):
             low[i], high[i] = 0.0, PRIOR
         else:
-            low[i], high[i] = coefficient(c).minimum, coefficient(c).maximum
+            low[i], high[i] = coefficient(c).minimum, min(coefficient(c).maximum, _BELIEVED.get(c[0], np.inf))
     prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return Gram(names, x, begins, blocks, prior, value, low - value, high - value)

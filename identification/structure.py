@@ -28,6 +28,8 @@ _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "tur
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
 _STEPS = 3.0  # rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its own
 
+_BATCH = 64  # columns at a time
+
 Drive = tuple[str, Array]  # in words, (rows,)
 
 
@@ -109,26 +111,30 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
         return []
     regression = search.at(fit)
     error = regression.error(np.arange(len(regression.columns)))
-    found: list[Structure] = []
-
-    def test(words: str, where: str, column: Array) -> None:
-        gain, share = _gain(search, regression, column)
-        if gain > max(LEAST_GAIN, LEAST_SHARE * error) and share >= LEAST_BLOCKS:
-            found.append(Structure(words, where, gain / error))
-
-    for channel, drive, column in dictionary(flights, fit):
-        test("a general dictionary", f"{channel} with {drive}", column)
+    unit = max(1.0, error / regression.design[..., 0].size)  # of chance, where gusts are not what they are taken to be
+    words: list[tuple[str, str]] = []
+    columns: list[Array] = []
+    for channel_words, drive, column in dictionary(flights, fit):
+        words.append(("a general dictionary", f"{channel_words} with {drive}"))
+        columns.append(column)
     residual = flights.residual(fit.setting)
     known = scaled(drives(flights, fit.setting))
     for effect in fit.effects:
         share = flights.residual(fit.without(effect).setting) - residual
         for name, x in known.items():
-            test(f"{effect}'s coefficient is not constant", f"it changes with {name}", share * x[:, None])
+            words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
+            columns.append(share * x[:, None])
         rotorwise = any(c.name == CENTRAL for c in get(effect).coefficients)  # whose moment is free as it is
         for channel in range(3 if rotorwise else 6):
-            column = np.zeros_like(share)
-            column[:, channel] = share[:, channel]
-            test(f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs", column)
+            words.append((f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs"))
+            columns.append(np.zeros_like(share))
+            columns[-1][:, channel] = share[:, channel]
+    found = []
+    for at in range(0, len(columns), _BATCH):
+        gains, shares = _gains(search, regression, np.stack(columns[at : at + _BATCH], axis=2))
+        for (test, where), gain, share_of_blocks in zip(words[at : at + _BATCH], gains, shares, strict=True):
+            if gain > max(LEAST_GAIN * unit, LEAST_SHARE * error) and share_of_blocks >= LEAST_BLOCKS:
+                found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
 
 
@@ -138,27 +144,24 @@ def _lively(flights: Flights) -> bool:
     return float(np.median(speeds.std(axis=0))) > _STEPS * flights.vehicle.omega_lsb
 
 
-def _gain(search: Search, g: Gram, column: Array) -> tuple[float, float]:
-    """Return the energy that one more column (rows, 6) explains on blocks left out, and on what share of the blocks it does."""
-    x = search.whiten(column)[search.flights.fit]
-    cross = np.add.reduceat(np.einsum("nc,nck->nk", x, g.design), g.begins)  # (blocks, columns + 1)
-    own = np.add.reduceat(np.einsum("nc,nc->n", x, x), g.begins)
-    total, all_cross, all_own = g.blocks.sum(axis=0), cross.sum(axis=0), own.sum()
+def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
+    """Return the energy that each of more columns (rows, 6, c), alone, explains on blocks left out, and its share of blocks."""
+    x = search.whiten(columns)[search.flights.fit]
     k = len(g.columns)
-    if not all_own > 0:
-        return 0.0, 0.0
-    gains = np.zeros(len(own))
-    for b, block in enumerate(g.blocks):
-        # the column less what the base's columns make of it, fitted without this block
-        normal = (total - block)[:k, :k] + np.diag(g.precision)
-        rest = np.linalg.solve(normal, np.column_stack([(all_cross - cross[b])[:k], (total - block)[:k, -1]])) if k else None
-        weights = rest[:, 0] if rest is not None else np.zeros(0)
-        change = rest[:, 1] if rest is not None else np.zeros(0)
-        left = all_own - own[b] - weights @ (all_cross - cross[b])[:k]
-        if left <= 1e-9 * all_own:
-            continue
-        slope = ((all_cross - cross[b])[-1] - weights @ (total - block)[:k, -1]) / left
-        size = own[b] - 2 * weights @ cross[b][:k] + weights @ block[:k, :k] @ weights
-        part = cross[b][-1] - weights @ block[:k, -1] - change @ cross[b][:k] + change @ block[:k, :k] @ weights
-        gains[b] = slope * (2 * part - slope * size)
-    return float(gains.sum()), float(np.mean(gains > 0))
+    parts = zip(np.split(x, g.begins[1:]), np.split(g.design, g.begins[1:]), strict=True)
+    cross = np.array([np.tensordot(a, b, axes=([0, 1], [0, 1])) for a, b in parts])  # (blocks, c, k + 1)
+    own = np.add.reduceat(np.einsum("nic,nic->nc", x, x), g.begins)  # (blocks, c)
+    rest = g.blocks.sum(axis=0) - g.blocks
+    rest_cross, rest_own = cross.sum(axis=0) - cross, own.sum(axis=0) - own
+    # each column less what the base's columns make of it, and the base's own change, fitted without the block
+    normal = rest[:, :k, :k] + np.diag(g.precision)
+    weights = np.linalg.solve(normal, np.swapaxes(rest_cross[..., :k], 1, 2))  # (blocks, k, c)
+    change = np.linalg.solve(normal, rest[:, :k, -1:])  # (blocks, k, 1)
+    left = rest_own - np.einsum("bkc,bck->bc", weights, rest_cross[..., :k])
+    slope = (rest_cross[..., -1] - np.einsum("bkc,bk->bc", weights, rest[:, :k, -1])) / np.maximum(left, 1e-12)
+    inner = g.blocks[:, :k, :k] @ weights  # (blocks, k, c)
+    size = own - 2.0 * np.einsum("bkc,bck->bc", weights, cross[..., :k]) + np.einsum("bkc,bkc->bc", weights, inner)
+    part = (cross[..., -1] - np.einsum("bkc,bk->bc", weights, g.blocks[:, :k, -1])
+            - np.einsum("bk,bck->bc", change[..., 0], cross[..., :k]) + np.einsum("bk,bkc->bc", change[..., 0], inner))
+    gains = np.where(left > 1e-9 * own.sum(axis=0), slope * (2.0 * part - slope * size), 0.0)
+    return gains.sum(axis=0), np.mean(gains > 0.0, axis=0)

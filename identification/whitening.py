@@ -1,54 +1,53 @@
-"""What noise a residual has, from the log itself: the floor that sensors leave, and a filter that makes the noise white."""
+"""A filter that makes the noise of a residual white, so that least squares weigh it as it deserves.
+
+The noise has two parts: what the sensors leave, known from the log itself, and gusts, of which only the strength is not known:
+their spectrum is flat up to a corner and falls beyond it. Whatever else is in a remainder is no noise but something that no
+effect explains, and must not be taken for noise: a filter free to follow the remainder would hide it.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
+from scipy.signal import lfilter, welch
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _ORDER = 8  # of the autoregression
 _LOADING = 1e-3  # share of the variance added as white noise, so that what the low-pass took away is not blown up
-
-
-def _autocovariance(noise: Array, start: Mask) -> Array:
-    """Return the autocovariance (p + 1,) of a channel (rows,); ``start`` (rows,) marks the first rows of unbroken pieces."""
-    lags = np.zeros(_ORDER + 1)
-    for part in np.split(noise, np.flatnonzero(start)[1:]):
-        n = len(part)
-        if n > 2 * _ORDER:
-            spectrum = np.fft.rfft(part, 2 * n)
-            lags += np.fft.irfft(np.abs(spectrum) ** 2)[: _ORDER + 1]
-    return lags / len(noise)
-
-
-def _predictor(lags: Array) -> tuple[Array, float]:
-    """Return the prediction filter (p,) of noise with this autocovariance, and the standard deviation of its innovation."""
-    lags = lags.copy()
-    lags[0] = lags[0] * (1.0 + _LOADING) + 1e-30
-    a = solve_toeplitz(lags[:_ORDER], lags[1:])
-    return a, float(np.sqrt(max(lags[0] - a @ lags[1:], 1e-12 * lags[0])))
+_SEGMENT = 256  # rows of a spectrum's segment
+_GUST_HZ = 0.6  # corner: a correlation time of a quarter of a second
+_GUST_BAND = (0.3, 1.5)  # Hz, where their strength is read
+_FLAT = (0.2, 0.5)  # Hz; noise of commanded flights is taken to be no less than here, or noise in the commands looks like lag
+_SPARE = 1.1  # on the sensors' part
 
 
 class Whitener:
     """A filter for each channel after which the noise is white with variance one.
 
     Args:
-        noise: (rows, 6), what is taken to be noise.
-        least: (rows, 6), what sensors alone make; the noise is taken to be no less.
+        remainder: (rows, 6), what no effect explains; its level in the gusts' band gives their strength.
+        sensors: (rows, 6), a sample of what sensors alone make.
         start: (rows,) first rows of unbroken pieces.
-        fit: (rows,) the rows that may be looked at.
+        fit: (rows,) the rows of the remainder that may be looked at.
+        period: s, from row to row.
+        free: take all of the remainder for noise, as it is: of flights whose rotors are known from commands alone.
     """
 
-    def __init__(self, noise: Array, least: Array, start: Mask, fit: Mask) -> None:
+    def __init__(self, remainder: Array, sensors: Array, start: Mask, fit: Mask, period: float, free: bool = False) -> None:
         # blocks apart in time are pieces apart
         begins = start | np.concatenate([[True], fit[1:] != fit[:-1]])
         self._filters = []
-        for i in range(noise.shape[1]):
-            lags, floor = (_autocovariance(x[fit, i], begins[fit]) for x in (noise, least))
-            missing = max(0.0, 1.0 - lags[0] / floor[0]) if floor[0] > 0 else 0.0
-            self._filters.append(_predictor(lags + missing * floor))
+        for i in range(remainder.shape[1]):
+            frequency, own = _spectrum(sensors[:, i], start, period)
+            _, whole = _spectrum(remainder[fit, i], begins[fit], period)
+            if free:
+                noise = np.maximum(np.maximum(whole, own), whole[(frequency >= _FLAT[0]) & (frequency <= _FLAT[1])].mean())
+            else:
+                shape = 1.0 / (1.0 + np.square(frequency / _GUST_HZ))
+                band = (frequency >= _GUST_BAND[0]) & (frequency <= _GUST_BAND[1])
+                noise = _SPARE * own + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
+            self._filters.append(_predictor(noise))
         ends = np.flatnonzero(start)
         self._lost = np.unique(np.concatenate([np.arange(k, min(k + _ORDER, len(start))) for k in ends]))
 
@@ -59,3 +58,26 @@ class Whitener:
             out[:, i] = lfilter(np.concatenate([[1.0], -a]) / deviation, [1.0], x[:, i], axis=0)
         out[self._lost] = 0.0
         return out
+
+
+def _spectrum(x: Array, start: Mask, period: float) -> tuple[Array, Array]:
+    """Return frequencies (Hz) and the power at each, averaged over unbroken pieces; it sums to the variance."""
+    total, weight = np.zeros(_SEGMENT // 2 + 1), 0
+    frequency = np.fft.rfftfreq(_SEGMENT, period)
+    for part in np.split(x, np.flatnonzero(start)[1:]):
+        if len(part) >= 2 * _ORDER:
+            length = min(_SEGMENT, len(part))
+            at, power = welch(part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=False)
+            total += len(part) * np.interp(frequency, at, power)
+            weight += len(part)
+    return frequency, total / max(weight, 1) * frequency[1]
+
+
+def _predictor(power: Array) -> tuple[Array, float]:
+    """Return the prediction filter (p,) of noise with this spectrum, and the standard deviation of its innovation."""
+    two_sided = power.copy()
+    two_sided[1:-1] *= 0.5
+    lags = np.fft.irfft(two_sided, _SEGMENT)[: _ORDER + 1] * _SEGMENT
+    lags[0] = lags[0] * (1.0 + _LOADING) + 1e-30
+    a = solve_toeplitz(lags[:_ORDER], lags[1:])
+    return a, float(np.sqrt(max(lags[0] - a @ lags[1:], 1e-12 * lags[0])))

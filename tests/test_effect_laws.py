@@ -183,15 +183,27 @@ def test_rotor_inertia_is_the_rate_of_change_of_the_rotors_momentum():
     np.testing.assert_array_equal(force, 0.0)
 
 
-def test_a_tilted_thrust_axis_turns_thrust_and_keeps_its_size():
+def test_a_tilted_frame_of_the_rotors_turns_their_thrust_and_their_torque():
     ax, ay = 0.03, -0.05
-    thrusts = VEHICLE.k * W**2
-    n = Rotation.from_rotvec([ax, ay, 0]).apply([0, 0, 1])
+    turn = Rotation.from_rotvec([ax, ay, 0])
+    thrust = np.array([0.0, 0.0, np.sum(VEHICLE.k * W**2)])
+    torque_there = VEHICLE.rotor_wrench(W)[1:]  # about the geometric centre
+    added = turn.apply(thrust) - thrust
     force, torque = wrench(setting("thrust_axis_tilt", ax=ax, ay=ay))
-    np.testing.assert_allclose(force, R @ (thrusts.sum() * (n - [0, 0, 1])), rtol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(force + R[:, 2] * thrusts.sum()), thrusts.sum(), rtol=1e-14)
-    moments = [np.cross(r, T * (n - [0, 0, 1])) for r, T in zip(VEHICLE.positions, thrusts, strict=True)]
-    np.testing.assert_allclose(torque, np.sum(moments, axis=0), rtol=1e-10, atol=1e-17)
+    np.testing.assert_allclose(force, R @ added, rtol=1e-12)
+    expected = turn.apply(torque_there) - torque_there - np.cross(VEHICLE.com, added)
+    np.testing.assert_allclose(torque, expected, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize(("name", "size"), [("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}), ("inflow_thrust", {"kz": 2e-4}),
+                                            ("translational_lift", {"kh": 3e-3}), ("ground_effect", {"rho": 3.0})])
+def test_a_central_law_is_that_of_rotors_drawn_into_the_centre(name, size):
+    drawn = replace(VEHICLE, rotor_positions=np.zeros((4, 3)))
+    vehicle = setting(name, **size)
+    expected = wrench(drawn.with_effects(*vehicle.effects))
+    got = wrench(setting(name, **size, central=1.0))
+    for a, b in zip(got, expected, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15)
 
 
 def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():

@@ -113,7 +113,7 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
     rows["wrench"].sort(key=lambda row: not row[0].sets_wind)
     constants = np.concatenate([
         [amended.mass, amended.gravity, amended.rotor_radius, amended.floor_z, amended.ceiling_z, amended.voltage_ref,
-         amended.hover_rate], amended.com, amended.positions.ravel(), amended.spin])
+         amended.hover_rate], amended.com, amended.positions.ravel(), amended.spin, amended.p])
     assert constants.size == VEHICLE_SIZE
 
     def stack(kind: str, width: int) -> tuple[np.ndarray, Array, int]:

@@ -44,7 +44,8 @@ MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
 COM = 7  # 3, m
 ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
 SPIN = 22  # 4, turning sense about body +z
-VEHICLE_SIZE = 26
+REACTION = 26  # 4, Nm/(rad/s)^2
+VEHICLE_SIZE = 30
 
 # state of the flight at which a wrench law is asked
 POSITION = 0  # 3, m, world, of the geometric centre

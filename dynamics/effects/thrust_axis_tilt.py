@@ -1,33 +1,43 @@
-"""Thrust axis tilt: the rotors' thrust does not point along body z.
+"""Thrust axis tilt: the frame of the rotors is turned against the body's axes, so that thrust does not point along body z.
 
-With n = R(ax, ay) e_z, e_z turned by the rotation vector (ax, ay, 0) rad, thrust T_i acts along n instead of e_z: the
-force T_i (n - e_z) in body axes at each rotor is added. Reaction torques stay about body z.
+With Q the turn by the rotation vector (ax, ay, 0) rad, the rotors' thrust T e_z and torque tau about the geometric centre
+act as T Q e_z and Q tau: the differences to T e_z and tau are added.
 """
 
 import math
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_POSITION, ROTOR_THRUST, Coefficient, Effect
+from .base import LAW, REACTION, ROTOR_POSITION, ROTOR_SPEED, ROTOR_THRUST, SPIN, Coefficient, Effect
 from .parts import push
 
 
 @cfunc(LAW, cache=True)
 def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     angle = math.sqrt(c[0] * c[0] + c[1] * c[1])
-    scale = math.sin(angle) / angle if angle > 1e-12 else 1.0
-    nx, ny, nz = scale * c[1], -scale * c[0], math.cos(angle) - 1.0
+    if angle < 1e-12:
+        return
+    thrust, tx, ty, tz = 0.0, 0.0, 0.0, 0.0
     for i in range(4):
-        thrust = state[ROTOR_THRUST + i]
-        push(vehicle, state, wrench, vehicle[ROTOR_POSITION + 3 * i], vehicle[ROTOR_POSITION + 3 * i + 1],
-             vehicle[ROTOR_POSITION + 3 * i + 2], thrust * nx, thrust * ny, thrust * nz)
+        lift, speed = state[ROTOR_THRUST + i], state[ROTOR_SPEED + i]
+        thrust += lift
+        tx += vehicle[ROTOR_POSITION + 3 * i + 1] * lift
+        ty -= vehicle[ROTOR_POSITION + 3 * i] * lift
+        tz -= vehicle[SPIN + i] * vehicle[REACTION + i] * speed * speed
+    # Rodrigues' formula about the axis (x, y, 0)
+    x, y, sine, rest = c[0] / angle, c[1] / angle, math.sin(angle), 1.0 - math.cos(angle)
+    push(vehicle, state, wrench, 0.0, 0.0, 0.0, thrust * sine * y, -thrust * sine * x, -thrust * rest)
+    along = rest * (x * tx + y * ty)
+    wrench[3] += sine * y * tz + along * x - rest * tx
+    wrench[4] += -sine * x * tz + along * y - rest * ty
+    wrench[5] += sine * (x * ty - y * tx) - rest * tz
 
 
 EFFECT = Effect(
     name="thrust_axis_tilt",
     kind="wrench",
     coefficients=tuple(
-        Coefficient(f"a{axis}", "rad", (0.02, 0.02), f"about body {axis}", minimum=-0.8, maximum=0.8) for axis in "xy"
+        Coefficient(f"a{axis}", "rad", (0.02, 0.02), f"turn about body {axis}", minimum=-0.8, maximum=0.8) for axis in "xy"
     ),
     source="definition; also markers put on the body at a small angle",
     confused_with=("world_tilt", "constant_force", "com_offset"),

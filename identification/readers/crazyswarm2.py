@@ -98,6 +98,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         notes=(*notes, *time_notes(t)),
         valid=valid,
         extra=extra,
+        commanded=True,
     )
 
 

@@ -51,6 +51,7 @@ _POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
 _MOTORS = ("motor_motor_m4", "motor_motor_m3", "motor_motor_m2", "motor_motor_m1")  # in the kit's order of rotors
 _FULL_COUNT = 65535.0
 _FULL_VOLTAGE = 4.2  # V
+_VOLTAGE_LATE = 0.075  # s
 _THRUST = (2.130295e-11, 1.032633e-6, 5.484560e-4)  # N per motor, powers 2, 1, 0 of the counts
 
 
@@ -73,10 +74,12 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         check_finite(table, name, columns[name], valid if name in _POSE else None)
     check_times(table, columns["t"])
     voltage = columns["pwr_pm_vbat"]
+    sooner = np.interp(columns["t"] + _VOLTAGE_LATE, columns["t"], voltage)
     if np.any(voltage <= 0):
         i = int(np.flatnonzero(voltage <= 0)[0])
         raise InputError(f"{path}: column pwr_pm_vbat, {table.row(i)}: {voltage[i]:g} V; expected a positive voltage")
     pwm = np.column_stack([columns[name] for name in _MOTORS])
+    reference = vehicle.voltage_ref if vehicle.voltage_ref > 0 else _FULL_VOLTAGE
     notes = [
         "motors renumbered: rotors 1, 2, 3, 4 are the log's m4, m3, m2, m1; time counts from the first sample",
         "thrust model: 2.130e-11 u^2 + 1.033e-6 u + 5.48e-4 N per motor (Foerster 2015) at u = PWM * V / 4.2 V, "
@@ -96,12 +99,13 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         t=columns["t"] - columns["t"][0],
         position=pose[:, :3].copy(),
         quaternion=unit_quaternions(table, pose[:, 3:], valid, "qw, qx, qy, qz"),
-        rotor_speeds=np.sqrt(motor_thrust(pwm, voltage) / vehicle.k),
-        voltage=voltage,
+        rotor_speeds=np.sqrt(motor_thrust(pwm, np.full(len(pwm), reference)) / vehicle.k),
+        voltage=sooner,
         name=log_name(path),
         source=f"{path} (reader nanobench)",
         notes=(*notes, *time_notes(columns["t"])),
         valid=valid,
+        commanded=True,
     )
 
 

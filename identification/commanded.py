@@ -1,0 +1,104 @@
+"""Logs whose turn rates are worked out from commands (PWM, thrust): what of them a regression may use, and what it must allow.
+
+Such a flight's thrust is known but for a factor that changes from one flight to the next (propellers, cells), its motion
+capture may have been set up anew in between, and its rotors' moments are those that somebody asked for. So only the time in
+the air counts, torque is left out, and each of several flights has a thrust scale and a lean of its own. They are
+deviations: their mean over the flights is zero, so that what the flights have in common remains for effects to explain.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Vehicle
+from .flight_log import FlightLog
+from .phases import FLIGHT, flight_phases
+from .signals import WIDE_HZ, Signals, low_pass
+
+Array = NDArray[np.float64]
+
+_PERIOD = 0.02  # s
+SCALE, LEAN_X, LEAN_Y = "thrust scale", "lean x", "lean y"
+# typical size and range of a deviation: relative, and rad
+# effects of which force alone says nothing, or of which a law of thrust that is itself a guess says nothing
+NOT_FROM_COMMANDS = frozenset({"rotor_efficiency", "com_offset", "inertia", "constant_torque", "rate_damping",
+                               "flapping_moment", "rotor_inertia", "thrust_curvature", "thrust_fade"})
+# effects that say nearly the same of a flight in closed loop that hardly turns in yaw: one of each kind is enough
+_ALIKE = (frozenset({"world_tilt", "thrust_axis_tilt", "constant_force"}), frozenset({"motor_lag", "latency", "clock_offset"}),
+          frozenset({"rotor_drag", "body_drag"}), frozenset({"thrust_scale", "mass"}))
+# typical size and range of a deviation: relative, and rad
+SIZES = {SCALE: (0.02, 0.5), LEAN_X: (0.01, 0.2), LEAN_Y: (0.01, 0.2)}
+
+
+def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
+    """Return the rows of a log between take-off and landing; the log itself where it shows neither, or no flight at all."""
+    seen = log.valid
+    if not seen.any():
+        return log
+    height = np.interp(log.t, log.t[seen], log.position[seen, 2])
+    flight = [p for p in flight_phases(log.t, height, log.rotor_speeds, vehicle) if p.name == FLIGHT]
+    if not flight:
+        return log
+    keep = (log.t >= flight[0].start) & (log.t <= flight[0].end)
+    if keep.all():
+        return log
+
+    def cut(x: Array | None) -> Array | None:
+        return None if x is None else x[keep]
+
+    return replace(log, t=log.t[keep], position=log.position[keep], quaternion=log.quaternion[keep],
+                   rotor_speeds=log.rotor_speeds[keep], voltage=cut(log.voltage), force=cut(log.force), torque=cut(log.torque),
+                   valid=log.valid[keep], extra={name: x[keep] for name, x in log.extra.items()})
+
+
+def thinned(signals: Signals) -> Signals:
+    """Return signals at 50 Hz or a little more, with the turn rates through the filter that the pose went through."""
+    step = max(1, int(_PERIOD / signals.period + 1e-6))
+    if step == 1:
+        return signals
+    at = np.arange(0, len(signals.t), step)
+    smooth = np.maximum(low_pass(signals.rotor_speeds, WIDE_HZ, signals.period), 0.0)
+    # a turn rate is that of the step that ends at the sample: a command as it stood in the middle of the step
+    middle = signals.t[at] - 0.5 * step * signals.period
+    speeds = np.column_stack([np.interp(middle, signals.t, column) for column in smooth.T])
+    return Signals(signals.t[at], step * signals.period, signals.position[at], signals.rotation[at], signals.velocity[at],
+                   signals.acceleration[at], signals.rate[at], signals.angular_acceleration[at],
+                   speeds, None if signals.voltage is None else signals.voltage[at])
+
+
+def mates(effect: str) -> frozenset[str]:
+    """Return the effects that say nearly the same as this one."""
+    return next((group - {effect} for group in _ALIKE if effect in group), frozenset())
+
+
+def deviations(count: int) -> list[tuple[str, str]]:
+    """Return the columns of the deviations of ``count`` flights; none of a single one."""
+    return [("", f"{kind} {i}") for kind in SIZES for i in range(1, count)]
+
+
+def deviation(setting: Mapping[str, Mapping[str, float]], kind: str, log: int, count: int) -> float:
+    """Return by how much flight ``log`` of ``count`` deviates from what they have in common; 0 for a flight that is no part."""
+    values = setting.get("", {})
+    if log >= count or count < 2:
+        return 0.0
+    # coefficient i sets flight i apart from those before it: the columns are orthogonal and each sums to zero
+    return float(sum(values.get(f"{kind} {i}", 0.0) * (1.0 if log == i else -1.0 / i if log < i else 0.0)
+                     for i in range(1, count)))
+
+
+def size_of(name: str) -> tuple[float, float] | None:
+    """Return typical size and range of a deviation, None for any other column."""
+    return next((size for kind, size in SIZES.items() if name.startswith(kind + " ")), None)
+
+
+def shared(setting: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """Return a setting without deviations: what holds for any flight of the vehicle."""
+    return {effect: {name: x for name, x in values.items() if effect or size_of(name) is None}
+            for effect, values in setting.items()}
+
+
+def commanded(logs: Sequence[FlightLog]) -> bool:
+    """Return whether any log's turn rates are worked out from commands."""
+    return any(log.commanded for log in logs)

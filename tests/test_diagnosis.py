@@ -1,0 +1,116 @@
+"""A diagnosis names what was added to a flight, and nothing where nothing was added."""
+
+import json
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from data_paths import data_file
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.errors import InputError
+from windwrench.experiments.practice_flights import fly_practice
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.findings import Diagnosis
+from windwrench.identification.floor import sensor_noise, with_noise
+from windwrench.identification.flight_log import FlightLog, read_log
+from windwrench.identification.regression import Flights
+from windwrench.identification.whitening import Whitener
+
+
+@cache
+def fly(name: str = "", trajectory: str = "excite", seconds: float = 40.0, **coefficients: float) -> FlightLog:
+    effects = (EffectSetting(name, coefficients),) if name else ()
+    return fly_practice(load_vehicle("ardrone2"), effects, trajectory, seconds, seed=3)
+
+
+def named(found: Diagnosis) -> list[str]:
+    return [e.name for e in found.effects]
+
+
+def test_nothing_is_named_where_nothing_was_added():
+    found = diagnose([fly()], load_vehicle("ardrone2"))
+    assert named(found) == []
+    assert found.verdict == "nothing to explain"
+    assert found.remainder == "none"
+
+
+@pytest.mark.parametrize(("name", "trajectory", "coefficients", "ratio"), [
+    ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 0.9e-4}, 0.4),
+    ("mass", "excite", {"dm": 0.04}, 0.4),
+])
+def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficients, ratio):
+    found = diagnose([fly(name, trajectory, **coefficients)], load_vehicle("ardrone2"))
+    assert named(found) == [name]
+    assert found.verdict == "explained"
+    assert not found.effects[0].tentative
+    for key, value in coefficients.items():
+        assert found.effects[0].coefficients[key] == pytest.approx(value, rel=0.05)
+    assert found.after.force_rms < 1.2 * found.floor_force_rms
+    assert found.after.torque_rms < 1.2 * found.floor_torque_rms
+    assert found.before.force_rms > 1.5 * found.after.force_rms
+    assert found.after.rollout_1s_position_rms < ratio * found.before.rollout_1s_position_rms
+    assert [e.name for e in found.amended.effects] == [name]
+
+
+def test_a_neighbour_of_the_missing_effect_is_tentative_or_not_alone():
+    log = fly("flapping_moment", "fast", kflap=4e-6)
+    found = diagnose([log], load_vehicle("ardrone2"), without=["flapping_moment"])
+    assert "flapping_moment" not in named(found)
+    assert all(e.tentative for e in found.effects)
+    assert found.verdict in ("unexplained", "partly explained")
+
+
+def test_the_error_is_that_of_test_logs_where_they_are_given():
+    found = diagnose([fly()], load_vehicle("ardrone2"), [fly("mass", "excite", dm=0.04)])
+    assert named(found) == []
+    assert {name for name, _, _ in found.held_out_segments} == {fly("mass", "excite", dm=0.04).name}
+    assert found.before.force_rms > 0.2
+
+
+def test_an_unknown_effect_and_no_log_are_refused():
+    with pytest.raises(InputError, match="rotor_drag"):
+        diagnose([fly()], load_vehicle("ardrone2"), without=["rotor_drg"])
+    with pytest.raises(InputError, match="at least one"):
+        diagnose([], load_vehicle("ardrone2"))
+
+
+def test_sensor_noise_is_read_off_the_log():
+    log, rng = fly(), np.random.default_rng(0)
+    vehicle = load_vehicle("ardrone2")
+    noise = sensor_noise(log, vehicle)
+    assert noise.position == pytest.approx(0.001, rel=0.05)
+    assert noise.attitude == pytest.approx(0.005, rel=0.05)
+    louder = sensor_noise(with_noise(log, noise, rng), vehicle)
+    assert louder.position == pytest.approx(math.sqrt(2) * noise.position, rel=0.05)
+
+
+def test_whitened_noise_is_white():
+    flights = Flights([fly()], load_vehicle("ardrone2"))
+    remainder = flights.residual({})
+    white = Whitener(remainder, flights.sensor_noise, flights.start, flights.fit, flights.period)(remainder)[20:]
+    assert np.all(np.abs(white.std(axis=0) - 1.0) < 0.15)
+    lag = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white * white, axis=0)
+    assert np.all(np.abs(lag) < 0.2)
+
+
+@pytest.mark.parametrize("name", ["labelled_01", "labelled_02", "labelled_04", "labelled_06", "labelled_07"])
+def test_flights_of_another_simulator(name):
+    folder = data_file("flights")
+    label = json.loads((folder / "labels.json").read_text())[f"{name}.csv.gz"]
+    vehicle = load_vehicle(folder / "vehicle.yaml")
+    found = diagnose([read_log(folder / f"{name}.csv.gz", None, vehicle)], vehicle)
+    truth = {e["name"]: e for e in label["effects"] if e["name"] != "OUT_OF_LIBRARY"}
+    if label["trajectory"] == "hover":
+        assert all({e.name, *e.indistinguishable_from} & set(truth) for e in found.effects)
+        return
+    if len(truth) < len(label["effects"]):
+        assert found.verdict in ("unexplained", "partly explained")
+        assert all(e.tentative for e in found.effects)
+        return
+    assert set(named(found)) == set(truth)
+    assert found.verdict == "explained"
+    for effect in found.effects:
+        for key, value in effect.coefficients.items():
+            if key in truth[effect.name]:
+                assert value == pytest.approx(truth[effect.name][key], rel=0.05)
