@@ -271,8 +271,11 @@ def outside_push(name: str, vehicle: Vehicle, rng: np.random.Generator, path: Ar
     """
     if name not in OUTSIDERS:
         raise unknown_name("disturbance", name, OUTSIDERS)
-    law = OUTSIDERS[name](vehicle, rng, path)
+    return pushing(OUTSIDERS[name](vehicle, rng, path), size)
 
+
+def pushing(law: Law, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
+    """Return what gives a loop its wrench (6,) of a law at each tick, times ``size``."""
     def push(loop: ClosedLoop) -> Array:
         return size * law(Moment(loop.time, loop.position, loop.velocity.copy(), matrix_of(loop.quaternion),
                                  loop.data.qvel[3:6], loop.record[0]["plant"]["speeds"]))

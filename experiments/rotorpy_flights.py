@@ -134,8 +134,8 @@ def rotorpy_flight(
         wind: m/s, steady, world; it blows only where ``aero`` is on.
 
     Returns:
-        The log; its turn rates are the true ones, in the root mean square over the interval that ends at the sample.
-        Force and torque are what acted beyond rotors and weight, at the sample.
+        The log. Pose, the true turn rates, and force and torque beyond rotors and weight are all those at the instant of
+        the sample.
 
     Raises:
         InputError: RotorPy is not installed, the trajectory is unknown, a length is out of range, or it crashed.
@@ -158,19 +158,15 @@ def rotorpy_flight(
     # RotorPy's integrator, spared the search for its first step
     simulator = Multirotor(parameters, state, aero=aero, integrator_kwargs={"first_step": TICK})
     controller = SE3Control(parameters)
-    lag = simulator.tau_m
     position, quaternion, speeds = np.empty((len(t), 3)), np.empty((len(t), 4)), np.empty((len(t), 4))
     wrench = np.zeros((len(t), 6))
-    speeds[0] = state["rotor_speeds"]
     for k, s in enumerate(setpoints):
         if k > 0:
             wanted = {"x": setpoints[k - 1, :3], "x_dot": setpoints[k - 1, 3:6], "x_ddot": setpoints[k - 1, 6:9],
                       "yaw": setpoints[k - 1, 9], "yaw_dot": setpoints[k - 1, 10]}
             command = controller.update(t[k - 1], state, wanted)
-            target = np.clip(command["cmd_motor_speeds"], simulator.rotor_speed_min, simulator.rotor_speed_max)
-            speeds[k] = _mean_square(state["rotor_speeds"], target, lag)
             state = simulator.step(state, command, TICK)
-        position[k], quaternion[k] = state["x"], state["q"]
+        position[k], quaternion[k], speeds[k] = state["x"], state["q"], state["rotor_speeds"]
         if not np.linalg.norm(position[k] - s[:3]) < 10.0:
             raise InputError(f"rotorpy_flight: the Hummingbird left its path after {t[k]:.1f} s of {trajectory}")
         if aero:
@@ -182,15 +178,6 @@ def rotorpy_flight(
     return FlightLog(t, position + noise * SIGMA_POSITION * rng.standard_normal((len(t), 3)), seen, speeds[:, _ORDER],
                      force=wrench[:, :3], torque=wrench[:, 3:],
                      name=f"rotorpy_{'aero' if aero else 'plain'}_{trajectory}_{seed}", source="flown in RotorPy")
-
-
-def _mean_square(start: Array, target: Array, lag: float) -> Array:
-    """Return the root of the mean square over one tick of turn rates that go from ``start`` to ``target`` with ``lag`` s."""
-    keep = math.exp(-TICK / lag)
-    first, second = lag / TICK * (1.0 - keep), 0.5 * lag / TICK * (1.0 - keep * keep)
-    gap = start - target
-    mean: Array = np.sqrt(target * target + 2.0 * first * target * gap + second * gap * gap)
-    return mean
 
 
 def _beyond_rotors(simulator: Any, vehicle: Vehicle, state: dict[str, Any]) -> Array:

@@ -21,13 +21,15 @@ Array = NDArray[np.float64]
 
 _PERIOD = 0.02  # s
 SCALE, LEAN_X, LEAN_Y = "thrust scale", "lean x", "lean y"
-# typical size and range of a deviation: relative, and rad
 # effects of which force alone says nothing, or of which a law of thrust that is itself a guess says nothing
 NOT_FROM_COMMANDS = frozenset({"rotor_efficiency", "com_offset", "inertia", "constant_torque", "rate_damping",
                                "flapping_moment", "rotor_inertia", "thrust_curvature", "thrust_fade"})
 # effects that say nearly the same of a flight in closed loop that hardly turns in yaw: one of each kind is enough
 _ALIKE = (frozenset({"world_tilt", "thrust_axis_tilt", "constant_force"}), frozenset({"motor_lag", "latency", "clock_offset"}),
           frozenset({"rotor_drag", "body_drag"}), frozenset({"thrust_scale", "mass"}))
+# of those alike, what must explain a little more than the others: a force beside an error of measurement, and a mass beside
+# the scale of thrust, which is known to be unknown
+SECOND, SECOND_SHARE = frozenset({"constant_force", "thrust_axis_tilt", "mass"}), 0.9
 # typical size and range of a deviation: relative, and rad
 SIZES = {SCALE: (0.02, 0.5), LEAN_X: (0.01, 0.2), LEAN_Y: (0.01, 0.2)}
 

@@ -118,7 +118,8 @@ def _rms(wrench: Array) -> tuple[float, float]:
 def _named(search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool) -> NamedEffect:
     error = search.error(fit)
     gain = search.error_without(fit, effect) - error
-    values = {k: v for k, v in fit.setting[effect].items() if k != CENTRAL or fit.std.get((effect, k), np.inf) < 0.4}
+    # that a law acts at the rotors, as it is written, is nothing to report
+    values = {k: v for k, v in fit.setting[effect].items() if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)}
     sizes = [abs(v) / typical((effect, k), search.flights.vehicle) for k, v in values.items() if k != CENTRAL]
     return NamedEffect(
         name=effect,

@@ -12,6 +12,7 @@ from .selection import PRIOR, gram
 
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
+SHARE_OF_COMMANDS = 0.02  # the same where thrust is a guess
 _NEAR = 40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
 _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
@@ -29,7 +30,7 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     whole = flights.residual(fit.setting)
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
-    limit = max(APART, APART_SHARE * search.whitened_energy(part))
+    limit = max(APART, (SHARE_OF_COMMANDS if flights.commanded else APART_SHARE) * search.whitened_energy(part))
     out = []
     for other in search.gains(less, regression, g):
         if other.effect == effect or other.size > _PLAUSIBLE or other.left > _NEAR * limit:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
-from .commanded import mates
+from .commanded import SECOND, SECOND_SHARE, mates
 from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .selection import Gram, columns_of, gram
 from .starts import STARTS
@@ -26,7 +26,9 @@ LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
 SWAP_GAIN = 12.0
 MOST_EFFECTS = 4
-LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explain up to 18, and 0.012, of real flights
+LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explain up to 25, and 0.01, of real flights
+LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
+FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 6  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 _REFITS = 6
@@ -69,6 +71,7 @@ class Search:
         # a law with a place or a swing of its own imitates too much where thrust itself is a guess: it must be declared
         self.library = tuple(e for e in library if e not in flights.drowned
                              and (e not in STARTS or e in declared or not flights.commanded))
+        self._band = FINDING
         self._most = MOST_OF_COMMANDS if flights.commanded else MOST_EFFECTS
         self._least_gain, self._least_share = LEAST_OF_COMMANDS if flights.commanded else (LEAST_GAIN, LEAST_SHARE)
         self._report = report
@@ -112,7 +115,7 @@ class Search:
 
     def _whitener(self, noise: Array) -> Whitener:
         flights = self.flights
-        return Whitener(noise, flights.sensor_noise, flights.start, flights.fit, flights.period, flights.commanded)
+        return Whitener(noise, flights.sensor_noise, flights.start, flights.fit, flights.period, self._band if flights.commanded else None)
 
     def set_noise(self, fit: Fit, regression: "Regression") -> None:
         """Take as noise what the whole library, kept to plausible sizes, cannot explain at a fit."""
@@ -208,7 +211,8 @@ class Search:
                 best = Gain(effect, gain, gain / error, error - gain, size, Fit(start))
             out.append(best)
         found = [x for x in out if np.isfinite(x.energy)]
-        return sorted(found, key=lambda x: _COMPLEXITY * _freedom(x.effect) - x.energy)
+        return sorted(found, key=lambda x: _COMPLEXITY * _freedom(x.effect)
+                      - x.energy * (SECOND_SHARE if self.flights.commanded and x.effect in SECOND else 1.0))
 
     def _drowned(self, g: Gram, total: Array, wanted: Sequence[Column], change: Array, effect: str) -> bool:
         """Return whether what an effect adds to the other columns is noise of the sensors in good part."""
@@ -237,7 +241,8 @@ class Search:
             gains = self.gains(fit, regression, g)
             first = first or gains
             least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
-            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZES.get(x.effect, LEAST_SIZE)]
+            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZES.get(x.effect, LEAST_SIZE)
+                      and (x.size < LARGEST_OF_COMMANDS or count == 0 or not self.flights.commanded)]
             if not better or count == self._most:
                 break
             self._report(f"trying {better[0].effect}")
@@ -252,6 +257,10 @@ class Search:
             if better is None:
                 break
             fit, error = better
+        if self.flights.commanded:
+            self._band = MEASURING
+            self.whiten = self._whitener(self.noise)
+            fit = self.refit(self.refit(fit))
         return fit
 
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
@@ -261,7 +270,9 @@ class Search:
                 self._report(f"{effect} is not needed")
                 less = self.refit(fit.without(effect))
                 return less, self.error(less)
-        for size, allowed in ((1, -SWAP_GAIN),) if self.flights.commanded else ((2, least), (1, -SWAP_GAIN)):
+        if self.flights.commanded:  # whose effects are far apart: no two of those that are alike are ever named
+            return None
+        for size, allowed in ((2, least), (1, -SWAP_GAIN)):
             for group in itertools.combinations(fit.effects, size):
                 less = fit.without(*group)
                 regression = self.linearise(less)

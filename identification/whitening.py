@@ -18,7 +18,6 @@ _LOADING = 1e-3  # share of the variance added as white noise, so that what the 
 _SEGMENT = 256  # rows of a spectrum's segment
 _GUST_HZ = 0.6  # corner: a correlation time of a quarter of a second
 _GUST_BAND = (0.3, 1.5)  # Hz, where their strength is read
-_FLAT = (0.2, 0.5)  # Hz; noise of commanded flights is taken to be no less than here, or noise in the commands looks like lag
 _SPARE = 1.1  # on the sensors' part
 
 
@@ -31,18 +30,20 @@ class Whitener:
         start: (rows,) first rows of unbroken pieces.
         fit: (rows,) the rows of the remainder that may be looked at.
         period: s, from row to row.
-        free: take all of the remainder for noise, as it is: of flights whose rotors are known from commands alone.
+        free: of flights whose rotors are known from commands alone: take all of the remainder for noise, nowhere less than
+            its mean in this band (Hz).
     """
 
-    def __init__(self, remainder: Array, sensors: Array, start: Mask, fit: Mask, period: float, free: bool = False) -> None:
+    def __init__(self, remainder: Array, sensors: Array, start: Mask, fit: Mask, period: float,
+                 free: tuple[float, float] | None = None) -> None:
         # blocks apart in time are pieces apart
         begins = start | np.concatenate([[True], fit[1:] != fit[:-1]])
         self._filters = []
         for i in range(remainder.shape[1]):
             frequency, own = _spectrum(sensors[:, i], start, period)
             _, whole = _spectrum(remainder[fit, i], begins[fit], period)
-            if free:
-                noise = np.maximum(np.maximum(whole, own), whole[(frequency >= _FLAT[0]) & (frequency <= _FLAT[1])].mean())
+            if free is not None:
+                noise = np.maximum(np.maximum(whole, own), whole[(frequency >= free[0]) & (frequency <= free[1])].mean())
             else:
                 shape = 1.0 / (1.0 + np.square(frequency / _GUST_HZ))
                 band = (frequency >= _GUST_BAND[0]) & (frequency <= _GUST_BAND[1])

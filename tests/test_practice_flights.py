@@ -248,6 +248,17 @@ def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
         assert without[:, :3].std(axis=0).max() > 0.02
 
 
+def test_rotorpy_s_turn_rates_are_those_at_the_instant_of_the_pose(flights):
+    log, vehicle = flights[False], hummingbird_vehicle()
+    up = np.array([matrix_of(q)[:, 2] for q in log.quaternion[1:-1]])
+    acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [0.0, 0.0, vehicle.gravity]
+    thrust = np.array([vehicle.rotor_wrench(speeds)[0] for speeds in log.rotor_speeds])
+    gap = vehicle.mass * np.einsum("ni,ni->n", up, acceleration) - thrust[1:-1]
+    slope = np.gradient(thrust, TICK)[1:-1]
+    # of the mean over the interval that ends there it would be 3 ms and more
+    assert abs(gap @ slope) / (slope @ slope) < 0.0015
+
+
 @needs_rotorpy
 def test_rotorpy_s_log_has_the_noise_and_the_steps_that_are_asked_for(flights):
     log = rotorpy_flight("fast", 0.5, 0, True, eight_bit=True)

@@ -1,0 +1,140 @@
+"""Disturbances that no threshold of the diagnosis was tuned on: they are flown for its score alone.
+
+They are of other kinds than ``outsiders.OUTSIDERS``: do not look at them while the diagnosis is being changed.
+"""
+
+import math
+import zlib
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.errors import unknown_name
+from ..dynamics.vehicle import Vehicle
+from ..envs.plant import TICK
+from ..envs.recording import background, draw_trajectory, record_flight
+from ..identification.flight_log import FlightLog
+from .outsiders import Law, Maker, Moment, pushing
+from .practice_flights import SIZES, Practice
+
+Array = NDArray[np.float64]
+
+_CEILING = 2.6  # m, of the room where the vehicle does not say
+
+
+def _wrench(force: Array, torque: Array) -> Array:
+    return np.concatenate([force, torque])
+
+
+def wind_shear(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A wind that grows with height, by 1.2 m/s a metre from the lowest point on, on a linear drag of 0.05 weights at 1 m/s."""
+    low, heading = float(path[:, 2].min()), rng.uniform(-math.pi, math.pi)
+    along = np.array([math.cos(heading), math.sin(heading), 0.0])
+
+    def law(m: Moment) -> Array:
+        air = 1.2 * (m.position[2] - low) * along
+        return _wrench(-0.05 * vehicle.weight * (m.velocity - air), np.zeros(3))
+
+    return law
+
+
+def lifted_cable(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A supply cable hangs from the tail: 0.1 weights for each metre off the floor, and it drags, 0.04 weights at 1 m/s."""
+    tail = np.array([-0.5, 0.0, -0.2]) * vehicle.arm_l
+
+    def law(m: Moment) -> Array:
+        force = -0.04 * vehicle.weight * m.velocity - [0.0, 0.0, 0.1 * vehicle.weight * max(m.position[2], 0.0)]
+        return _wrench(force, np.cross(m.rotation @ tail, force))
+
+    return law
+
+
+def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A magnet on board in a strong field: it turns the nose into one direction of the room, 0.03 weights times the arm."""
+    heading = rng.uniform(-math.pi, math.pi)
+    field = 0.03 * vehicle.weight * vehicle.arm_l * np.array([math.cos(heading), math.sin(heading), -0.5])
+
+    def law(m: Moment) -> Array:
+        return _wrench(np.zeros(3), np.cross(m.rotation[:, 0], field))
+
+    return law
+
+
+def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A battery cell fails and comes back: every rotor loses 6 % of its thrust for 2 to 6 s, several times."""
+    change, weak = 0.0, False
+
+    def law(m: Moment) -> Array:
+        nonlocal change, weak
+        if m.t >= change:
+            weak, change = not weak, m.t + rng.uniform(2.0, 6.0)
+        if not weak:
+            return np.zeros(6)
+        thrust = -0.06 * vehicle.k * m.speeds**2
+        torque = np.array([0.0, 0.0, -(vehicle.spin * vehicle.p / vehicle.k) @ thrust])
+        return _wrench(m.rotation[:, 2] * thrust.sum(), m.rotation @ torque)
+
+    return law
+
+
+def high_hull(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A tall hull: quadratic drag, 0.03 weights at 1 m/s, 0.25 weights at most, that acts half an arm above the centre."""
+    def law(m: Moment) -> Array:
+        speed = math.sqrt(m.velocity @ m.velocity)
+        force = -vehicle.weight * min(0.03 * speed, 0.25 / max(speed, 1e-6)) * m.velocity
+        return _wrench(force, np.cross(m.rotation[:, 2] * 0.5 * vehicle.arm_l, force))
+
+    return law
+
+
+def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """One arm twists under its rotor's load: that thrust leans aside by 0.08 rad at hover, in proportion to itself."""
+    rotor = int(rng.integers(4))
+    arm = vehicle.positions[rotor] - vehicle.com
+    aside = np.cross([0.0, 0.0, 1.0], arm) / np.linalg.norm(arm[:2])
+
+    def law(m: Moment) -> Array:
+        thrust = vehicle.k[rotor] * m.speeds[rotor] ** 2
+        force = thrust * 0.08 * thrust / (vehicle.weight / 4.0) * aside
+        return _wrench(m.rotation @ force, m.rotation @ np.cross(arm, force))
+
+    return law
+
+
+HELD_BACK: dict[str, Maker] = {
+    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm)
+}
+
+
+def practise_held_back(vehicle: Vehicle, name: str, size: str = "typical", seed: int = 0, seconds: float = 60.0) -> Practice:
+    """Fly one practice flight, as ``practice_flights.practise`` does, with a disturbance of ``HELD_BACK``.
+
+    Args:
+        vehicle: as declared; without a ceiling it gets one at 2.6 m.
+        name: one of ``HELD_BACK``.
+        size: one of ``practice_flights.SIZES``, factor on the wrench.
+        seed: of everything random.
+        seconds: length of the log.
+
+    Raises:
+        InputError: an unknown name, or a crash.
+    """
+    if name not in HELD_BACK:
+        raise unknown_name("disturbance", name, HELD_BACK)
+    if size not in SIZES:
+        raise unknown_name("size", size, SIZES)
+    vehicle = vehicle if np.isfinite(vehicle.ceiling_z) else replace(vehicle, ceiling_z=_CEILING)
+    rng = np.random.default_rng((seed, zlib.crc32(f"{name}+{size}".encode())))
+    trajectory = str(rng.choice(["excite", "fast"]))
+    turbulence, sensor = float(rng.integers(2)), float(rng.choice([0.5, 1.0, 2.0]))
+    noise = vehicle.mocap
+    flown = replace(vehicle, mocap=replace(noise, sigma_pos_m=sensor * noise.sigma_pos_m,
+                                           sigma_att_rad=sensor * noise.sigma_att_rad))
+    t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
+    path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
+    push = pushing(HELD_BACK[name](vehicle, rng, path), SIZES[size])
+    c = record_flight(flown, (), trajectory, seconds, seed, background(vehicle, turbulence), push)
+    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), c["force"], c["torque"],
+                    name=f"held_back_{name}_{size}_{trajectory}_{seed}", source="flown in MuJoCo by practise_held_back")
+    return Practice(log.name, "outsider", size, trajectory, seed, (), name, turbulence, sensor, log, vehicle)

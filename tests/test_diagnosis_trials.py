@@ -1,0 +1,291 @@
+"""Trials of the diagnosis: what is flown, what an outcome is worth, and that a run goes on where it stopped."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+from windwrench.cli import main
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.effects import names
+from windwrench.experiments.diagnosis_scores import (
+    FAILED,
+    RIGHT,
+    RIGHT_TENTATIVE,
+    SILENT,
+    TENTATIVE,
+    UNEXPLAINED,
+    WRONG,
+    judge,
+    left_out,
+    match,
+    rules,
+)
+from windwrench.experiments.diagnosis_trials import EQUIVALENTS, Trial, fly_and_diagnose, plan, run_trials
+from windwrench.experiments.diagnosis_trials_page import write_results
+from windwrench.experiments.held_back_outsiders import HELD_BACK, practise_held_back
+from windwrench.experiments.outsiders import OUTSIDERS
+from windwrench.identification.residual import residual_wrench
+from windwrench.identification.signals import log_signals, low_pass
+
+SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, seconds=20.0)
+
+
+def name(effect, tentative=False, like=(), **coefficients):
+    return {"name": effect, "coefficients": coefficients, "std": {k: 0.01 * abs(v) for k, v in coefficients.items()},
+            "tentative": tentative, "indistinguishable_from": list(like), "evidence": {}}
+
+
+def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more):
+    verdict = ("explained" if remainder == "none" else "partly explained") if effects else (
+        "nothing to explain" if remainder == "none" else "unexplained")
+    return {"without": list(without), "verdict": verdict, "remainder": remainder, "effects": list(effects),
+            "before": {"force_rms": 0.2, "torque_rms": 2e-3, "rollout_1s_position_rms": 1.0},
+            "after": {"force_rms": 0.02 * after, "torque_rms": 1e-3, "rollout_1s_position_rms": rollout},
+            "floor": {"force_rms": 0.02, "torque_rms": 1e-3}, "structure": [], "notes": [], "seconds": 1.0, **more}
+
+
+def outcome(group, truth, *diagnoses, outsider=None, size="typical", vehicle="ardrone2"):
+    trial = {"group": group, "added": [outsider] if outsider else list(truth), "size": size, "vehicle": vehicle}
+    flown = {"trajectory": "excite", "turbulence": 1.0, "sensor": 1.0, "truth": truth, "outsider": outsider}
+    key = f"{group}/{outsider or '+'.join(truth)}/{size}/{vehicle}"
+    return {"key": key, "code": "x", "trial": trial, "flown": flown, "seconds": 1.0, "diagnoses": list(diagnoses)}
+
+
+def outcomes_of(*diagnoses, truth, group="typical", outsider=None):
+    return [j.outcome for j in judge(outcome(group, truth, *diagnoses, outsider=outsider))]
+
+
+def rule(judged, start):
+    (one,) = (r for r in rules(judged) if r.subject.startswith(start))
+    return one
+
+
+MASS = {"mass": {"dm": 0.04}}
+PAIR = {"mass": {"dm": 0.04}, "latency": {"d": 0.03}}
+
+
+def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
+    trials = plan()
+    by_key = {t.key: t for t in trials}
+    assert len(by_key) == len(trials)
+    for group in ("typical", "third"):
+        mine = {t.added[0]: t for t in trials if t.group == group}
+        assert set(mine) == set(names())
+        for effect, trial in mine.items():
+            assert trial.libraries[0] == ()
+            assert trial.libraries[-1] == (effect, *EQUIVALENTS.get(effect, ()))
+    assert {t.added[0] for t in trials if t.group == "outsider"} == set(OUTSIDERS)
+    assert {t.added[0] for t in trials if t.group == "held back"} == set(HELD_BACK)
+    assert len({t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}) == 10
+    assert {t.key for t in plan(quick=True)} < set(by_key)
+    twice = plan(2)
+    assert len({t.key for t in twice}) == len(twice) == 2 * len(trials)
+    assert len({t.flight_seed for t in twice}) == len(twice)
+    with pytest.raises(InputError, match="seeds"):
+        plan(0)
+
+
+def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell():
+    assert outcomes_of(found(name("mass", dm=0.041)), truth=MASS) == [RIGHT]
+    assert outcomes_of(found(name("mass", tentative=True, dm=0.041)), truth=MASS) == [RIGHT_TENTATIVE]
+    assert outcomes_of(found(name("thrust_scale", like=["mass"], s=-0.08)), truth=MASS) == [RIGHT]
+    assert outcomes_of(found(name("thrust_scale", s=-0.08)), truth=MASS) == [WRONG]
+    assert outcomes_of(found(name("thrust_scale", tentative=True, s=-0.08)), truth=MASS) == [TENTATIVE]
+    assert outcomes_of(found(name("mass", dm=0.04), name("wind", wx=1.0)), truth=MASS) == [WRONG]
+    assert outcomes_of(found(name("mass", dm=0.04), name("wind", tentative=True, wx=1.0)), truth=MASS) == [TENTATIVE]
+    assert outcomes_of(found(), truth=MASS) == [SILENT]
+    assert outcomes_of(found(remainder="random"), truth=MASS) == [UNEXPLAINED]
+    assert outcomes_of({"without": [], "error": "ValueError: no", "seconds": 1.0}, truth=MASS) == [FAILED]
+    # one name cannot stand for two effects
+    assert match([name("motor_lag", like=["latency", "mass"])], list(PAIR)) is None
+    assert match([name("mass"), name("motor_lag", like=["latency", "mass"])], list(PAIR)) == [
+        ("mass", "mass"), ("motor_lag", "latency")]
+
+
+def test_where_nothing_is_in_the_library_only_doubt_or_silence_is_good():
+    assert outcomes_of(found(), truth={}, group="nothing") == [RIGHT]
+    assert outcomes_of(found(remainder="structured"), truth={}, group="nothing") == [RIGHT_TENTATIVE]
+    assert outcomes_of(found(name("wind", tentative=True)), truth={}, group="nothing") == [TENTATIVE]
+    assert outcomes_of(found(name("wind")), truth={}, group="nothing") == [WRONG]
+    assert outcomes_of(found(name("wind")), truth={}, group="outsider", outsider="tether") == [WRONG]
+    assert outcomes_of(found(remainder="structured"), truth={}, group="outsider", outsider="tether") == [UNEXPLAINED]
+
+
+def test_coefficients_are_compared_where_the_truth_is_not_zero():
+    truth = {"wind": {"wx": 2.0, "wy": -1.0, "wz": 0.0}}
+    (j,) = judge(outcome("typical", truth, found(name("wind", wx=2.1, wy=-0.99, wz=0.4))))
+    assert {k: round(e, 6) for k, (e, _) in j.errors.items()} == {"wind.wx": 0.05, "wind.wy": 0.01}
+    assert j.errors["wind.wx"][1] == pytest.approx(0.1 / 0.021)
+    # a latency and a clock offset are the same number; a mass and a thrust scale are not
+    (j,) = judge(outcome("typical", {"latency": {"d": 0.03}}, found(name("clock_offset", like=["latency"], dt=0.033))))
+    assert j.errors["latency.d"][0] == pytest.approx(0.1)
+    assert not j.exact
+    (j,) = judge(outcome("typical", MASS, found(name("thrust_scale", like=["mass"], s=0.04))))
+    assert j.errors == {}
+
+
+def test_the_rules_count_what_they_say():
+    def typical(effect, *diagnoses):
+        return outcome("typical", {effect: {"x": 1.0}}, *diagnoses)
+
+    outcomes = [
+        typical("mass", found(name("mass", x=1.01), rollout=0.3), found(name("wind"), without=("mass",))),
+        typical("wind", found(name("wind", tentative=True, x=1.2)), found(remainder="structured", without=("wind",))),
+        typical("latency", found(), found(name("clock_offset"), without=("latency",)),
+                found(name("motor_lag", tentative=True), without=("latency", "clock_offset"))),
+        outcome("held back", {}, found(name("wind")), outsider="soft_arm"),
+        outcome("nothing", {}, found(remainder="random")),
+        outcome("hover", MASS, found(name("thrust_scale", like=["mass"]))),
+    ]
+    judged = [j for o in outcomes for j in judge(o)]
+    one = rule(judged, "1. one effect of typical size")
+    assert (one.count, one.met) == (3, False)
+    assert one.measured.startswith("66.7%")
+    coefficients = rule(judged, "1. every coefficient")
+    assert coefficients.count == 2
+    assert coefficients.measured.startswith("50.0%")
+    assert "20.0% at most" in coefficients.measured
+    # by kind: mass wrong, wind and latency not, the held-back disturbance wrong
+    assert {j.cause for j in left_out(judged, "typical")} == {"mass", "wind", "latency", "soft_arm"}
+    assert rule(judged, "5. left out of the library, typical").measured == "50.0% (2 of 4 kinds)"
+    doubt = rule(judged, "5. right answers, or")
+    assert (doubt.count, doubt.met, doubt.measured) == (3, False, "33.3% (1 of 3)")
+    assert rule(judged, "3. no effect").met
+    assert rule(judged, "3. outside the library, typical").met is False
+    assert rule(judged, "3. outside the library, a third").met is None
+    assert rule(judged, "4. hover: no name").met
+    assert rule(judged, "6. one-second prediction error after over before, mass").measured == "0.30 at worst"
+    assert rule(judged, "6. one-second prediction error after over before, rotor_drag").met is None
+    assert rule(judged, "2. two effects").measured == "not flown"
+    assert rule(judged, "6. residual").measured == "1.10 at worst"
+
+
+def test_what_a_flight_cannot_tell_is_told_apart_from_what_the_diagnosis_overlooks():
+    cannot = outcome("typical", MASS, found(name("mass", like=["thrust_scale"], dm=0.04)),
+                     found(name("thrust_scale", like=["battery_sag"]), without=("mass",)))
+    could = outcome("typical", {"latency": {"d": 0.03}}, found(name("latency", d=0.03)),
+                    found(name("motor_lag"), without=("latency", "clock_offset")))
+    judged = [j for o in (cannot, could) for j in judge(o)]
+    assert rule(judged, "5. of those confidently wrong").measured == "50.0% (1 of 2)"
+
+
+def test_coefficients_of_rotorpy_are_held_to_the_bar():
+    truth = {"rotor_drag": {"kdx": 1e-4, "kdy": 1e-4}, "inflow_thrust": {"kz": 2e-4}, "translational_lift": {"kh": 3e-3},
+             "body_drag": {"cx": 5e-3}}
+    near = [name("rotor_drag", kdx=1.01e-4, kdy=0.98e-4), name("inflow_thrust", kz=2e-4), name("translational_lift", kh=3e-3)]
+    good = [j for o in (outcome("rotorpy", truth, found(*near)), outcome("rotorpy", {}, found())) for j in judge(o)]
+    assert all(r.met for r in rules(good) if r.subject.startswith("7."))
+    assert rule(good, "7. RotorPy, aerodynamics on: k_d").measured == "2.0% at worst"
+    bad = judge(outcome("rotorpy", truth, found(*near[:2], name("wind"))))
+    assert [r.met for r in rules(bad) if r.subject.startswith("7.")] == [False, False, None]
+
+
+def test_the_page_lists_every_miss(tmp_path):
+    outcomes = [
+        outcome("typical", MASS, found(name("mass", dm=0.05)), found(name("wind"), without=("mass",))),
+        outcome("third", MASS, found(), found(without=("mass",)), size="small"),
+        outcome("outsider", {}, found(name("wind", tentative=True), remainder="structured"), outsider="tether"),
+        outcome("nothing", {}, found()),
+        {"key": "pair/-/typical/-/ardrone2/0", "trial": {}, "code": "x", "error": "it crashed", "diagnoses": []},
+    ]
+    data, picture, page = write_results(outcomes, tmp_path, tmp_path / "docs" / "page.md", 1, quick=True)
+    text = page.read_text(encoding="utf-8")
+    missed = text.split("## What was missed")[1]
+    assert "mass.dm by 25.0%" in missed
+    assert "without mass): confidently wrong: wind" in missed
+    assert "* mass (third" in missed
+    assert "pair/-/typical/-/ardrone2/0: not flown: it crashed" in missed
+    assert "tether" not in missed
+    assert "nothing (" not in missed
+    assert "(../trials.png)" in text
+    assert "RotorPy" in text
+    assert image.imread(picture).shape[2] == 4
+    kept = json.loads(data.read_text(encoding="utf-8"))
+    assert len(kept["trials"]) == 5
+    assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. one effect")] == [True]
+    assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. every coef")] == [False]
+
+
+def timeless(outcome):
+    return {**outcome, "seconds": 0, "diagnoses": [{**d, "seconds": 0} for d in outcome["diagnoses"]]}
+
+
+def test_a_flight_is_diagnosed_and_not_again(tmp_path):
+    whole = fly_and_diagnose(SHORT)
+    # in a process of its own it comes out the same
+    (again,) = run_trials([SHORT], tmp_path, 1)
+    assert timeless(again) == timeless(whole)
+    (judged,) = judge(whole)
+    assert judged.right
+    assert judged.cause == "mass"
+    json.dumps(whole)
+    path = tmp_path / "trials.jsonl"
+    other = json.dumps({**whole, "key": "of/other/code", "code": "other"})
+    path.write_text(f"{other}\n{json.dumps(whole)}\n{json.dumps(whole)[:100]}", encoding="utf-8")
+    unknown = Trial("outsider", ("gremlins",))
+    counts = []
+    kept, refused = run_trials([SHORT, unknown], tmp_path, 1, counts.append)
+    assert kept == whole
+    assert "gremlins" in refused["error"]
+    assert judge(refused) == []
+    assert counts == [1, 2]
+    lines = [json.loads(line)["key"] for line in path.read_text(encoding="utf-8").splitlines()]
+    assert lines == [SHORT.key, unknown.key]
+    # what has been flown under the same key but otherwise is flown anew
+    run_trials([replace(unknown, seconds=30.0)], tmp_path, 1, counts.append)
+    assert counts == [1, 2, 0, 1]
+    with pytest.raises(InputError, match="cannot be written"):
+        run_trials([unknown], path)
+
+
+def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, capfd):
+    asked = []
+
+    def planned(seeds, quick):
+        asked.append((seeds, quick))
+        return [Trial("outsider", ("gremlins",))]
+
+    monkeypatch.setattr("windwrench.experiments.diagnosis_trials.plan", planned)
+    page = tmp_path / "page.md"
+    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--quick", "--jobs", "1", "--out",
+                                     str(tmp_path / "out"), "--markdown", str(page)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code in (0, None)
+    assert asked == [(3, True)]
+    assert "1. one effect of typical size" in capfd.readouterr().out
+    assert "`windwrench trials --seeds 3 --quick`" in page.read_text(encoding="utf-8")
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"trials.json", "trials.jsonl", "trials.png"}
+
+
+def test_a_diagnosis_that_falls_over_is_an_outcome():
+    (judged,) = judge(fly_and_diagnose(replace(SHORT, libraries=(("gremlins",),), seconds=5.0)))
+    assert judged.outcome == FAILED
+    assert "gremlins" in judged.problem
+    assert rule([replace(judged, without=())], "1. one effect of typical").met is False
+
+
+@pytest.mark.parametrize("disturbance", sorted(HELD_BACK))
+def test_a_held_back_disturbance_acts_in_flight_and_is_what_the_residual_shows(disturbance):
+    assert HELD_BACK[disturbance].__doc__
+    p = practise_held_back(load_vehicle("ardrone2"), disturbance, "typical", 1, 10.0)
+    (signals,) = log_signals(p.log)
+    r = residual_wrench(signals, p.vehicle)
+    r[:, 3:] = np.einsum("nij,nj->ni", signals.rotation, r[:, 3:])
+    truth = np.column_stack([p.log.force, p.log.torque])
+    r, truth = (low_pass(x, 2.0, signals.period)[200:-200] for x in (r, truth))
+    scale = np.repeat([p.vehicle.weight, p.vehicle.weight * p.vehicle.arm_l], 3)
+    assert np.abs(truth / scale).max() < 0.3
+    axis = int(np.argmax(truth.std(axis=0) / scale))
+    assert truth[:, axis].std() > 0.003 * scale[axis]
+    assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.9
+
+
+def test_a_held_back_disturbance_must_exist():
+    with pytest.raises(InputError, match="gremlins"):
+        practise_held_back(load_vehicle("ardrone2"), "gremlins")
+    with pytest.raises(InputError, match="huge"):
+        practise_held_back(load_vehicle("ardrone2"), "soft_arm", "huge")
