@@ -135,9 +135,9 @@ def record_flight(
             mass, world frame; None leaves the last one on. Default: nothing pushes.
 
     Returns:
-        ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at the
-        instant of the sample, ``voltage`` (n,) V, and the true external ``force`` (n, 3) N and ``torque`` (n, 3) Nm (world frame,
-        about the centre of mass) over that interval.
+        ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at the instant
+        of the sample, ``voltage`` (n,) V, and the true external ``force`` (n, 3) N and ``torque`` (n, 3) Nm (world frame, about
+        the centre of mass) over the interval that ends there.
 
     Raises:
         InputError: an unknown trajectory, or a length out of range.

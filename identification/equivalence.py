@@ -6,14 +6,16 @@ the noise, by which the flights can tell the two apart.
 
 import numpy as np
 
-from .regression import Flights
+from .regression import SHIFT, SHIFT_RANGE, Flights
 from .search import Fit, Search
-from .selection import PRIOR, gram
+from .selection import BELIEVED, PRIOR, gram
 
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
 SHARE_OF_COMMANDS = 0.02  # the same where thrust is a guess
+_MOST = 0.4  # of what is left without the effect
 _NEAR = 40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
+_OUT_OF_STEP = 0.98  # share of what is allowed
 _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
@@ -31,6 +33,9 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
     limit = max(APART, (SHARE_OF_COMMANDS if flights.commanded else APART_SHARE) * search.whitened_energy(part))
+    if flights.commanded:  # little of such flights is beyond doubt: the other one must explain most of it
+        alone = search.refit(less)
+        limit = min(limit, _MOST * search.whitened_energy(flights.residual(alone.setting) - whole))
     out = []
     for other in search.gains(less, regression, g):
         if other.effect == effect or other.size > _PLAUSIBLE or other.left > _NEAR * limit:
@@ -52,6 +57,11 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     names = set(fit.effects)
     if len(names - _AERODYNAMICS) + bool(names & _AERODYNAMICS) > _MOST_SURE:
         found.append(f"{len(names)} effects at once may stand for one that the library lacks")
+    shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
+    if "motor_lag" in names and ("inertia" in names or abs(shift) > _OUT_OF_STEP * SHIFT_RANGE[1]):
+        found.append("motor_lag with inertia, or with turn rates out of step, may be a latency")
+    if max(fit.setting.get("rotor_efficiency", {"": 0.0}).values()) > _OUT_OF_STEP * BELIEVED["rotor_efficiency"]:
+        found.append("a rotor would have to deliver far more than declared: rotor_efficiency may stand for another effect")
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
         relative = list(fit.setting["inertia"].values())
         relative += [v / flights.vehicle.mass for v in fit.setting.get("mass", {}).values()]

@@ -59,8 +59,8 @@ def typical(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the library's two."""
     if column in NUISANCES:
         return 0.0025
-    if not column[0]:
-        return size_of(column[1])[0]
+    if not column[0] and (size := size_of(column[1])) is not None:
+        return size[0]
     if column[1].startswith(START) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)

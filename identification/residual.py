@@ -42,8 +42,9 @@ def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehi
     count = len(signals.t)
     rotors, effects = np.empty((count, 4)), np.empty((count, 6))
     voltage = np.zeros(count) if signals.voltage is None else signals.voltage
-    _run_model(models, signals.period, *(np.ascontiguousarray(x) for x in (
-        signals.rotor_speeds, voltage, signals.position, signals.rotation, signals.velocity, signals.rate)), rotors, effects)
+    speeds, volts, position, rotation, velocity, rate = (np.ascontiguousarray(x) for x in (
+        signals.rotor_speeds, voltage, signals.position, signals.rotation, signals.velocity, signals.rate))
+    _run_model(models, signals.period, speeds, volts, position, rotation, velocity, rate, rotors, effects)
     return rotors, effects, body
 
 

@@ -71,7 +71,6 @@ class Search:
         # a law with a place or a swing of its own imitates too much where thrust itself is a guess: it must be declared
         self.library = tuple(e for e in library if e not in flights.drowned
                              and (e not in STARTS or e in declared or not flights.commanded))
-        self._band = FINDING
         self._most = MOST_OF_COMMANDS if flights.commanded else MOST_EFFECTS
         self._least_gain, self._least_share = LEAST_OF_COMMANDS if flights.commanded else (LEAST_GAIN, LEAST_SHARE)
         self._report = report
@@ -113,9 +112,10 @@ class Search:
         """Return the whitened sums of a regression."""
         return gram(self.flights, fit.setting, self.whiten, regression.columns, regression.residual)
 
-    def _whitener(self, noise: Array) -> Whitener:
+    def _whitener(self, noise: Array, band: tuple[float, float] = FINDING) -> Whitener:
         flights = self.flights
-        return Whitener(noise, flights.sensor_noise, flights.start, flights.fit, flights.period, self._band if flights.commanded else None)
+        return Whitener(noise, flights.sensor_noise, flights.start, flights.fit, flights.period,
+                        band if flights.commanded else None)
 
     def set_noise(self, fit: Fit, regression: "Regression") -> None:
         """Take as noise what the whole library, kept to plausible sizes, cannot explain at a fit."""
@@ -145,6 +145,14 @@ class Search:
 
     def refit(self, fit: Fit) -> Fit:
         """Return the fit with all its coefficients at the least squares of the fit's rows (Gauss-Newton)."""
+        if not self.flights.commanded:
+            return self._refit(fit)
+        finding, self.whiten = self.whiten, self._whitener(self.noise, MEASURING)
+        out = self._refit(fit)
+        self.whiten = finding
+        return out
+
+    def _refit(self, fit: Fit) -> Fit:
         setting = {k: dict(v) for k, v in fit.setting.items()}
         wanted = self.base(fit.effects)
         if SHIFT not in wanted:
@@ -224,7 +232,7 @@ class Search:
         if len(rest):
             energy -= cross @ np.linalg.lstsq(total[np.ix_(rest, rest)] + np.diag(g.precision[rest]), cross, rcond=None)[0]
         noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in own], axis=2), shape, axes=(2, 0))
-        return self.whitened_energy(noise) > _DROWNED * energy
+        return bool(self.whitened_energy(noise) > _DROWNED * energy)
 
     def forward(self) -> tuple[Fit, "list[Gain]"]:
         """Return the effects that are worth adding one after the other, and what each explained at first, alone."""
@@ -258,9 +266,8 @@ class Search:
                 break
             fit, error = better
         if self.flights.commanded:
-            self._band = MEASURING
-            self.whiten = self._whitener(self.noise)
-            fit = self.refit(self.refit(fit))
+            fit = self.refit(fit)
+            self.whiten = self._whitener(self.noise, MEASURING)
         return fit
 
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
@@ -304,7 +311,8 @@ class Search:
         """Return the whitened energy of a fit on blocks left out in turn; infinite where the fit did not converge."""
         g = self.at(fit)
         error = g.error(np.arange(len(g.columns)))
-        return error if self.energy(fit.setting) < 1.05 * error + LEAST_GAIN else np.inf
+        # a fit to commands is not weighed as it is judged: it need not be at its least
+        return error if self.flights.commanded or self.energy(fit.setting) < 1.05 * error + LEAST_GAIN else np.inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from .whitening import Whitener
 Array = NDArray[np.float64]
 
 # what a law allows and nobody believes: a rotor that delivers far more than it should (all four together are thrust_scale)
-_BELIEVED = {"rotor_efficiency": 0.05}
+BELIEVED = {"rotor_efficiency": 0.05}
 PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anything is seen
 
 
@@ -114,7 +114,7 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
         elif c[1].startswith(START):
             low[i], high[i] = 0.0, PRIOR
         else:
-            low[i], high[i] = coefficient(c).minimum, min(coefficient(c).maximum, _BELIEVED.get(c[0], np.inf))
+            low[i], high[i] = coefficient(c).minimum, min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf))
     prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return Gram(names, x, begins, blocks, prior, value, low - value, high - value)

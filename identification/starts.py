@@ -58,7 +58,7 @@ def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> l
     base = [residual_wrench(s, bare) for s in thin]
     centre = np.concatenate([s.position for s in thin]).mean(axis=0)
     speed, kd, area = (typical(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area"))
-    found = []
+    found: list[tuple[float, int, dict[str, float]]] = []
     for heading, distance, across in itertools.product(_HEADINGS, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)):
         along = np.array([math.cos(heading), math.sin(heading)])
         x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 LEAST_GAIN = 30.0  # whitened energy on blocks left out; the largest of all columns on flights without any effect is some 12
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
-LEAST_BLOCKS = 0.55  # share of the blocks that must gain: a law acts everywhere, a push once
+LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
 
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
@@ -131,9 +131,9 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
             columns[-1][:, channel] = share[:, channel]
     found = []
     for at in range(0, len(columns), _BATCH):
-        gains, shares = _gains(search, regression, np.stack(columns[at : at + _BATCH], axis=2))
-        for (test, where), gain, share_of_blocks in zip(words[at : at + _BATCH], gains, shares, strict=True):
-            if gain > max(LEAST_GAIN * unit, LEAST_SHARE * error) and share_of_blocks >= LEAST_BLOCKS:
+        gains, spreads = _gains(search, regression, np.stack(columns[at : at + _BATCH], axis=2))
+        for (test, where), gain, spread in zip(words[at : at + _BATCH], gains, spreads, strict=True):
+            if gain > max(LEAST_GAIN * unit, LEAST_SHARE * error) and spread >= LEAST_SPREAD:
                 found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
 
@@ -145,7 +145,7 @@ def _lively(flights: Flights) -> bool:
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
-    """Return the energy that each of more columns (rows, 6, c), alone, explains on blocks left out, and its share of blocks."""
+    """Return the energy that each of more columns (rows, 6, c) explains alone on blocks left out, and how it spreads."""
     x = search.whiten(columns)[search.flights.fit]
     k = len(g.columns)
     parts = zip(np.split(x, g.begins[1:]), np.split(g.design, g.begins[1:]), strict=True)
@@ -164,4 +164,4 @@ def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
     part = (cross[..., -1] - np.einsum("bkc,bk->bc", weights, g.blocks[:, :k, -1])
             - np.einsum("bk,bck->bc", change[..., 0], cross[..., :k]) + np.einsum("bk,bkc->bc", change[..., 0], inner))
     gains = np.where(left > 1e-9 * own.sum(axis=0), slope * (2.0 * part - slope * size), 0.0)
-    return gains.sum(axis=0), np.mean(gains > 0.0, axis=0)
+    return gains.sum(axis=0), gains.sum(axis=0) / np.maximum(np.sqrt(np.sum(gains * gains, axis=0)), 1e-30)

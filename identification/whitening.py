@@ -38,10 +38,11 @@ class Whitener:
                  free: tuple[float, float] | None = None) -> None:
         # blocks apart in time are pieces apart
         begins = start | np.concatenate([[True], fit[1:] != fit[:-1]])
-        self._filters = []
+        self._filters: list[tuple[Array, float]] = []
         for i in range(remainder.shape[1]):
             frequency, own = _spectrum(sensors[:, i], start, period)
-            _, whole = _spectrum(remainder[fit, i], begins[fit], period)
+            # a mean that nothing explains is no noise: it would make an offset count for little
+            _, whole = _spectrum(remainder[fit, i], begins[fit], period, "constant" if free is not None else False)
             if free is not None:
                 noise = np.maximum(np.maximum(whole, own), whole[(frequency >= free[0]) & (frequency <= free[1])].mean())
             else:
@@ -50,7 +51,7 @@ class Whitener:
                 noise = _SPARE * own + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
             self._filters.append(_predictor(noise))
         ends = np.flatnonzero(start)
-        self._lost = np.unique(np.concatenate([np.arange(k, min(k + _ORDER, len(start))) for k in ends]))
+        self._lost = np.unique(np.concatenate([np.arange(int(k), min(int(k) + _ORDER, len(start))) for k in ends]))
 
     def __call__(self, x: Array) -> Array:
         """Return ``x`` (rows, 6) or (rows, 6, columns) whitened; the first rows of each piece become zero."""
@@ -61,17 +62,18 @@ class Whitener:
         return out
 
 
-def _spectrum(x: Array, start: Mask, period: float) -> tuple[Array, Array]:
+def _spectrum(x: Array, start: Mask, period: float, detrend: str | bool = False) -> tuple[Array, Array]:
     """Return frequencies (Hz) and the power at each, averaged over unbroken pieces; it sums to the variance."""
     total, weight = np.zeros(_SEGMENT // 2 + 1), 0
     frequency = np.fft.rfftfreq(_SEGMENT, period)
     for part in np.split(x, np.flatnonzero(start)[1:]):
         if len(part) >= 2 * _ORDER:
             length = min(_SEGMENT, len(part))
-            at, power = welch(part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=False)
+            at, power = welch(part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=detrend)
             total += len(part) * np.interp(frequency, at, power)
             weight += len(part)
-    return frequency, total / max(weight, 1) * frequency[1]
+    total *= frequency[1] / max(weight, 1)
+    return np.asarray(frequency, dtype=np.float64), total
 
 
 def _predictor(power: Array) -> tuple[Array, float]:

@@ -7,13 +7,14 @@ from functools import cache
 import numpy as np
 import pytest
 from data_paths import data_file
+
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.errors import InputError
 from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
-from windwrench.identification.floor import sensor_noise, with_noise
 from windwrench.identification.flight_log import FlightLog, read_log
+from windwrench.identification.floor import sensor_noise, with_noise
 from windwrench.identification.regression import Flights
 from windwrench.identification.whitening import Whitener
 
