@@ -10,7 +10,7 @@ demo: $(VENV)/.installed
 	$(BIN)/windwrench fly --scenario static --out results/demo
 
 test: $(VENV)/.tested
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .

@@ -22,9 +22,10 @@ def test_a_wait_is_explained_and_a_short_one_is_not(capsys):
 
 def test_a_cold_and_a_warm_start_give_the_same_bits(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    cold, warm = (subprocess.run([sys.executable, "-c", CODE], cwd=tmp_path, env=environment, capture_output=True, text=True)
-                  for _ in range(2))
+    cold, *warm = (subprocess.run([sys.executable, "-c", CODE], cwd=tmp_path, env=environment, capture_output=True, text=True)
+                   for _ in range(4))
     assert cold.returncode == 0, cold.stderr
     assert "compiling" in cold.stderr
-    assert "compiling" not in warm.stderr
-    assert cold.stdout == warm.stdout
+    # on a busy machine even loading may take longer than the patience; compiling would take longer every time
+    assert any("compiling" not in run.stderr for run in warm)
+    assert all(cold.stdout == run.stdout for run in warm)
