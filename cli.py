@@ -346,6 +346,27 @@ def speed(
         _say(markdown)
 
 
+@app.command("real-flights")
+def real_flights(
+    data: Annotated[Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")],
+    markdown: Annotated[Path, typer.Option(help="The page; pictures and numbers go to a folder of its name beside it.")] = Path(
+        "results/real-flights.md"),
+) -> None:
+    """Diagnose measured flights, each judged on flights that the fit never saw, and write the page.
+
+    Example: windwrench real-flights --data ../shared/data --markdown docs/real-flights.md
+    """
+    from .dynamics.files import replaced
+    from .experiments.real_flights import page, run
+
+    folder = _folder(markdown.with_suffix(""))
+    with console.status("diagnosing") as status:
+        result = run(folder, data / "nanobench", data / "crazyswarm2_payload" / "csv", status.update)
+    with replaced(markdown) as partial:
+        partial.write_text(page(result, folder.name), encoding="utf-8")
+    _say(folder / "real_flights.json", folder / "nanobench.png", markdown)
+
+
 @app.command()
 def effects(
     markdown: Annotated[Path | None, typer.Option(help="Write the page of all effects to this file instead.")] = None,

@@ -29,7 +29,7 @@ _ALIKE = (frozenset({"world_tilt", "thrust_axis_tilt", "constant_force"}), froze
           frozenset({"rotor_drag", "body_drag"}), frozenset({"thrust_scale", "mass"}))
 # of those alike, what must explain a little more than the others: a force beside an error of measurement, and a mass beside
 # the scale of thrust, which is known to be unknown
-SECOND, SECOND_SHARE = frozenset({"constant_force", "thrust_axis_tilt", "mass"}), 0.9
+SECOND, SECOND_SHARE = frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"}), 0.8
 # typical size and range of a deviation: relative, and rad
 SIZES = {SCALE: (0.02, 0.5), LEAN_X: (0.01, 0.2), LEAN_Y: (0.01, 0.2)}
 

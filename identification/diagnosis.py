@@ -57,7 +57,7 @@ def diagnose(
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
     every = (*logs, *test)
-    least = LEAST_SECONDS if len(every) == 1 else LEAST_SECONDS_EACH
+    least = LEAST_SECONDS if len(every) == 1 and not every[0].commanded else LEAST_SECONDS_EACH
     notes = [f"{log.name}: {note}" for log in every for note in (*log.notes, *screen_log(log, vehicle, least))]
     flights = Flights(logs, vehicle, test)
     search = Search(flights, [n for n in names() if n not in without], report)

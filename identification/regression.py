@@ -34,6 +34,7 @@ _DROWNED = {"attitude_gain": 0.01}
 _DROWNED_ELSE = 0.1
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
+SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
 BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
 _HELD_OUT = 4  # every fourth block
 
@@ -112,9 +113,11 @@ class Flights:
         self._first = pieces = self.pieces({})
         log, block, fit, start, t = [], [], [], [], []
         count = 0
+        seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
+        length = SHORT_BLOCK if self.commanded and seconds < 8 * BLOCK else BLOCK
         for piece in pieces:
             time = piece.signals.t[piece.rows]
-            number = ((time - time[0]) // BLOCK).astype(np.int64)
+            number = ((time - time[0]) // length).astype(np.int64)
             log.append(np.full(len(time), piece.log))
             block.append(number + count)
             seen = np.full(len(time), piece.log < len(logs)) if test else number % _HELD_OUT != _HELD_OUT - 1

@@ -27,6 +27,7 @@ LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of nois
 SWAP_GAIN = 12.0
 MOST_EFFECTS = 4
 LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explain up to 25, and 0.01, of real flights
+LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
 LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 6  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
@@ -250,12 +251,17 @@ class Search:
             first = first or gains
             least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
             better = [x for x in gains if x.energy > least and x.size > LEAST_SIZES.get(x.effect, LEAST_SIZE)
-                      and (x.size < LARGEST_OF_COMMANDS or count == 0 or not self.flights.commanded)]
+                      and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
             self._report(f"trying {better[0].effect}")
             fit = self.refit(better[0].fit)
         return fit, first
+
+    @staticmethod
+    def _plausible(gain: "Gain", count: int) -> bool:
+        """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""
+        return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (gain.effect not in STARTS or gain.share > LEAST_OF_STARTS)
 
     def prune(self, fit: Fit) -> Fit:
         """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced by one."""

@@ -75,6 +75,7 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
     for a, b in (("x", "y"), ("y", "z"), ("x", "z")):
         if f"turn rate {a}" in known and f"turn rate {b}" in known:
             shapes[f"turn rates {a} and {b}"] = known[f"turn rate {a}"] * known[f"turn rate {b}"]
+        if f"body velocity {a}" in known and f"body velocity {b}" in known:
             shapes[f"body velocities {a} and {b}"] = known[f"body velocity {a}"] * known[f"body velocity {b}"]
     pieces = flights.pieces(fit.setting)
     rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
