@@ -137,7 +137,7 @@ def test_page_of_a_result():
             "swing": {"log202": {"law_std": [0.01, 0.02], "tracked_std": [0.01, 0.03]}}}
     text = page({"cutoff_hz": 4.0, "nanobench": [fold], "slung_payload": [load]}, "pictures")
     assert "| B | all others | 6.00 | 0.125 | 0.100 | 0.200 | 2.0 | 4.0 | 3.0 | 0.100 / 0.200 |" in text
-    assert "* B from all others: battery_sag named; delay of 30 to 55 ms" in text
+    assert "* B from all others: all three axes down 4 times; battery_sag named; delay of 30 to 55 ms" in text
     assert "| 202 | yes | slung_payload (tentative) | m = 0.005 kg | mass |" in text
     assert "| 202 | log202 | 10.0, 20.0 | 10.0, 30.0 |" in text
 
