@@ -50,6 +50,7 @@ class Sample:
                 return POSITION
             self._quaternion[:] = quaternion  # type: ignore[assignment]
             return POSITION + ATTITUDE
+        # a list, another shape, memory out of order, another type of number: each a different error of a memory view
         except (TypeError, ValueError, BufferError, NotImplementedError):
             return self._convert(rotor_speeds, position, quaternion)
 

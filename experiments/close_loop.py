@@ -266,29 +266,29 @@ def close_loops(
     """
     check_requests(requests)
     folder.mkdir(parents=True, exist_ok=True)
-    todo = [r for r in requests if _kept(r, folder) is None]
-    shares = {r.name: float(r not in todo) for r in requests}
-    jobs = min(jobs or os.cpu_count() or 1, len(todo))
+    pending = [r for r in requests if _kept(r, folder) is None]
+    shares = {r.name: float(r not in pending) for r in requests}
+    jobs = min(jobs or os.cpu_count() or 1, len(pending))
     report(shares)
     if jobs == 1:
-        for request in todo:
+        for request in pending:
             def progress(share: float, name: str = request.name) -> None:
                 shares[name] = share
                 report(shares)
 
             _close_and_keep(request, folder, progress)
     elif jobs > 1:
-        _side_by_side(todo, folder, jobs, shares, report)
+        _side_by_side(pending, folder, jobs, shares, report)
     report({r.name: 1.0 for r in requests})
     results = [_kept(r, folder) for r in requests]
     return [result for result in results if result is not None]
 
 
-def _side_by_side(todo: Sequence[Request], folder: Path, jobs: int, shares: dict[str, float],
+def _side_by_side(pending: Sequence[Request], folder: Path, jobs: int, shares: dict[str, float],
                   report: Callable[[Mapping[str, float]], None]) -> None:
     with Manager() as manager, ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         shared = manager.dict(shares)
-        waiting: set[Future[None]] = {pool.submit(_close_and_share, request, folder, shared) for request in todo}
+        waiting: set[Future[None]] = {pool.submit(_close_and_share, request, folder, shared) for request in pending}
         try:
             while waiting:
                 done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)

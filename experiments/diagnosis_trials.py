@@ -227,12 +227,12 @@ def run_trials(
     with replaced(path) as partial:  # drops what a cut-off run or other code has left
         partial.write_text("".join(_line(kept) for kept in done.values()), encoding="utf-8")
     report(len(done))
-    todo = [trial for key, trial in wanted.items() if key not in done]
-    if todo:
-        workers = min(jobs or os.cpu_count() or 1, len(todo))
+    pending = [trial for key, trial in wanted.items() if key not in done]
+    if pending:
+        workers = min(jobs or os.cpu_count() or 1, len(pending))
         with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool, \
                 path.open("a", encoding="utf-8") as kept_file:
-            waiting = [pool.submit(fly_and_diagnose, trial) for trial in todo]
+            waiting = [pool.submit(fly_and_diagnose, trial) for trial in pending]
             try:
                 for future in as_completed(waiting):
                     outcome = future.result()

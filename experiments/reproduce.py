@@ -62,11 +62,12 @@ def reproduce(
         raise InputError(f"reproduce: --seeds must be at least 1, got {seeds}")
     wanted = {name: seeds or int(_module(name).SEEDS) for name in names}
     done = {name: _is_done(folder, name, count) for name, count in wanted.items()}
-    todo = [name for name in names if not done[name]]
+    pending = [name for name in names if not done[name]]
     with Manager() as manager:
         shares = manager.dict({name: float(done[name]) for name in names})
-        with ProcessPoolExecutor(min(jobs or os.cpu_count() or 1, max(len(todo), 1)), mp_context=get_context("spawn")) as pool:
-            waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in todo}
+        workers = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending}
             while waiting:
                 finished = {future for future in waiting if future.done()}
                 waiting -= finished
@@ -83,7 +84,7 @@ def reproduce(
                         future.cancel()
                     raise
         report(dict(shares))
-    return {name: name in todo for name in names}
+    return {name: name in pending for name in names}
 
 
 def _module(name: str) -> Any:

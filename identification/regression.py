@@ -6,6 +6,7 @@ same laws that plant and estimator run, through the same filter.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -142,10 +143,8 @@ class Flights:
         An effect whose column is noise in good part is not excited; fitted all the same, it would come out too small, or
         explain the noise of the residual by taking it out of the pose.
         """
-        noisy = object.__new__(Flights)
-        noisy.vehicle, noisy._pieces, noisy._columns, noisy._first = self.vehicle, {}, {}, self._first
-        noisy._needs, noisy._moved = {}, {}
-        noisy.commanded, noisy.own = self.commanded, self.own
+        noisy = copy(self)  # the same rows of louder logs
+        noisy._pieces, noisy._columns, noisy._needs, noisy._moved = {}, {}, {}, {}
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)

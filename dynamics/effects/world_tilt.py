@@ -37,7 +37,7 @@ EFFECT = Effect(
     ),
     source="definition; the ground plane of a motion capture is set with a square on a floor that is level to some mrad",
     confused_with=("constant_force", "thrust_axis_tilt", "wind"),
-    excitation="yaw through half a turn and more tells it from a tilted thrust axis; a steady force differs only in climbs "
-    "and drops, when thrust is not the weight",
+    excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady force nothing does: a level "
+    "frame that is tilted leaves just a constant force, of the weight times the tilt",
     law=law,
 )
