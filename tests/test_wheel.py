@@ -45,7 +45,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()
     sources = {str(p.relative_to(ROOT)) for folder in ("dynamics", "estimator", "controllers", "envs", "identification",
-                                                       "training", "experiments", "benchmarks")
+                                                       "training", "experiments", "benchmarks", "commands")
                for p in (ROOT / folder).rglob("*.py")}
     assert sources <= {str(p.relative_to(package)) for p in package.rglob("*.py")}
     entry = next(installed.glob("*.dist-info")) / "entry_points.txt"

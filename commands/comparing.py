@@ -1,0 +1,71 @@
+"""Comparing: controllers on the same episodes, and the speed of it all."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+
+from .terminal import Out, console, names_in, progress_bar, results_folder, say
+
+
+def benchmark(
+    controllers: Annotated[str, typer.Option(help="Names, with commas.")] = "hover,admittance,ratio,oracle",
+    scenarios: Annotated[str, typer.Option(help="Names, with commas.")] = "static,base",
+    episodes: Annotated[int, typer.Option(min=1, help="Paired episodes a scenario.")] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    out: Out = Path("results/benchmark"),
+) -> None:
+    """Fly controllers through the same episodes; write the leaderboard.
+
+    Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
+    """
+    from ..training.benchmark import check_request, count_flights, fly_all, leaderboard, write_leaderboard
+    from ..training.pictures import draw_leaderboard
+
+    names, worlds = names_in(controllers, "--controllers"), names_in(scenarios, "--scenarios")
+    check_request(names, worlds, episodes, seed)
+    folder = results_folder(out)
+    with progress_bar() as progress:
+        task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
+        results = fly_all(names, worlds, episodes, seed, jobs, lambda count: progress.advance(task, count))
+    rows = leaderboard(results, names, seed)
+    path = write_leaderboard(rows, folder)
+    draw_leaderboard(rows, results, folder / "leaderboard.png")
+    table = Table("scenario", "controller", "RMSE (m), 95 %", "median", "lost", "score", "wins*", box=box.SIMPLE_HEAD)
+    for i, row in enumerate(rows):
+        low, high = row.rmse_ci95_m
+        last = i + 1 == len(rows) or rows[i + 1].scenario != row.scenario
+        table.add_row(row.scenario, row.controller, f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
+                      f"{row.median_rmse_m:.3f}", f"{row.lost_fraction:.1%}", f"{row.score:.2f}",
+                      f"{row.wins_over_admittance:.1%}", end_section=last)
+    console.print(table)
+    console.print(f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over admittance",
+                  highlight=False)
+    say(path, folder / "leaderboard.png")
+
+
+def speed(
+    rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
+    markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
+) -> None:
+    """Measure a filter step, flights against real time, and start-up, beside peers that are installed.
+
+    Example: windwrench speed --rounds 7
+    """
+    from ..benchmarks.speed import HEADER, filters, flights, measure, rows_of, starts, write_markdown
+
+    with progress_bar() as progress:
+        task = progress.add_task("measuring", total=None)
+        contenders = [*filters(), *flights(), *starts()]
+        progress.update(task, total=rounds * len(contenders))
+        figures = measure(contenders, rounds, lambda: progress.advance(task))
+    table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
+    for row in rows_of(figures):
+        table.add_row(*row[:-1])
+    console.print(table)
+    if markdown is not None:
+        write_markdown(figures, rounds, markdown)
+        say(markdown)

@@ -1,0 +1,37 @@
+"""The effect library, listed."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Column, Table
+
+from .terminal import console, say
+
+
+def effects(
+    markdown: Annotated[Path | None, typer.Option(help="Write the page of all effects to this file instead.")] = None,
+) -> None:
+    """List the physical effects that plant and estimator know.
+
+    Example: windwrench effects --markdown docs/effects.md
+    """
+    from ..dynamics.effects import get, names
+
+    if markdown is not None:
+        from ..dynamics.effect_page import effects_page
+        from ..dynamics.files import replaced
+
+        with replaced(markdown) as partial:
+            partial.write_text(effects_page(), encoding="utf-8")
+        say(markdown)
+        return
+    name_column, coefficient_column = Column("effect", no_wrap=True), Column("coefficient", no_wrap=True)
+    table = Table(name_column, "kind", coefficient_column, "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
+    for name in names():
+        one = get(name)
+        for i, c in enumerate(one.coefficients):
+            table.add_row(name if i == 0 else "", one.kind if i == 0 else "", c.name, c.unit,
+                          f"{c.typical[0]:g} / {c.typical[1]:g}", c.meaning, end_section=i + 1 == len(one.coefficients))
+    console.print(table)
