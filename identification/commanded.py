@@ -23,10 +23,13 @@ _PERIOD = 0.02  # s
 SCALE, LEAN_X, LEAN_Y = "thrust scale", "lean x", "lean y"
 # effects of which force alone says nothing, or of which a law of thrust that is itself a guess says nothing
 NOT_FROM_COMMANDS = frozenset({"rotor_efficiency", "com_offset", "inertia", "constant_torque", "rate_damping",
-                               "flapping_moment", "rotor_inertia", "thrust_curvature", "thrust_fade"})
+                               "flapping_moment", "rotor_inertia"})
 # effects that say nearly the same of a flight in closed loop that hardly turns in yaw: one of each kind is enough
 _ALIKE = (frozenset({"world_tilt", "thrust_axis_tilt", "constant_force"}), frozenset({"motor_lag", "latency", "clock_offset"}),
           frozenset({"rotor_drag", "body_drag"}), frozenset({"thrust_scale", "mass"}))
+# what bends the law of thrust further, once it is known to follow the battery's voltage: without that they would take up
+# whatever thrust lacks
+AFTER_SAG = frozenset({"thrust_curvature", "thrust_fade"})
 # of those alike, what must explain a little more than the others: a force beside an error of measurement, and a mass beside
 # the scale of thrust, which is known to be unknown
 SECOND, SECOND_SHARE = frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"}), 0.8
@@ -62,12 +65,9 @@ def thinned(signals: Signals) -> Signals:
         return signals
     at = np.arange(0, len(signals.t), step)
     smooth = np.maximum(low_pass(signals.rotor_speeds, WIDE_HZ, signals.period), 0.0)
-    # a turn rate is that of the step that ends at the sample: a command as it stood in the middle of the step
-    middle = signals.t[at] - 0.5 * step * signals.period
-    speeds = np.column_stack([np.interp(middle, signals.t, column) for column in smooth.T])
     return Signals(signals.t[at], step * signals.period, signals.position[at], signals.rotation[at], signals.velocity[at],
                    signals.acceleration[at], signals.rate[at], signals.angular_acceleration[at],
-                   speeds, None if signals.voltage is None else signals.voltage[at])
+                   smooth[at], None if signals.voltage is None else signals.voltage[at])
 
 
 def mates(effect: str) -> frozenset[str]:

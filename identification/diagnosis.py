@@ -22,6 +22,7 @@ from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
 from .screening import LEAST_SECONDS, screen_log
 from .search import Fit, Gain, Search
 from .structure import drives, structure
+from .turning import COEFFICIENT
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,8 @@ def diagnose(
     noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
     remainder = "structured" if signs else "random" if noisy else "none"
     effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), noisy) for effect in fit.effects)
-    verdict = ("explained" if remainder == "none" else "partly explained") if effects else (
+    sure = remainder == "none" and not any(effect.tentative for effect in effects)
+    verdict = ("explained" if sure else "partly explained") if effects else (
         "nothing to explain" if remainder == "none" else "unexplained")
     notes += mimics
     report("predicting the flights")
@@ -118,13 +120,16 @@ def _rms(wrench: Array) -> tuple[float, float]:
 def _named(search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool) -> NamedEffect:
     error = search.error(fit)
     gain = search.error_without(fit, effect) - error
+    std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
+    if search.delay is not None and search.held(effect):
+        gain, std = search.delay.evidence, {COEFFICIENT: search.delay.std}
     # that a law acts at the rotors, as it is written, is nothing to report
     values = {k: v for k, v in fit.setting[effect].items() if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)}
     sizes = [abs(v) / typical((effect, k), search.flights.vehicle) for k, v in values.items() if k != CENTRAL]
     return NamedEffect(
         name=effect,
         coefficients=values,
-        std={k: fit.std.get((effect, k), 0.0) for k in values},
+        std={k: std[k] for k in values},
         units={k: coefficient((effect, k)).unit for k in values},
         tentative=structured or (noisy and gain < _FAINT * error),
         indistinguishable_from=others,

@@ -9,10 +9,11 @@ import numpy as np
 from .regression import SHIFT, SHIFT_RANGE, Flights
 from .search import Fit, Search
 from .selection import BELIEVED, PRIOR, gram
+from .turning import ALIKE
 
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
-SHARE_OF_COMMANDS = 0.02  # the same where thrust is a guess
+SHARE_OF_COMMANDS = 0.005  # the same where thrust is a guess
 _HOPEFUL = 0.3  # share of it that it must explain where it is linear, to be worth a fit
 _NEAR_OF_COMMANDS = 6.0
 _MOST = 0.4  # of what is left without the effect
@@ -29,6 +30,8 @@ _PLAUSIBLE = 1.2 * PRIOR  # typical sizes
 def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     """Return the effects of the library that would explain what ``effect`` explains, given all others of the fit."""
     flights = search.flights
+    if search.held(effect):
+        return [other for other in ALIKE if other in search.library]
     less = fit.without(effect)
     regression = search.linearise(less)
     whole = flights.residual(fit.setting)

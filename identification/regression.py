@@ -33,6 +33,9 @@ _EDGE = 0.6  # s at either end of a piece, where the filters have only half of w
 # share of noise in an effect's column that is too much; a gain of the attitude could cancel the attitude's own noise
 _DROWNED = {"attitude_gain": 0.01}
 _DROWNED_ELSE = 0.1
+_STEPS = 1.4  # rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its own
+# effects of which a flight with less than that says nothing: they would explain the rounding
+_QUICK = frozenset({"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"})
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
@@ -162,7 +165,15 @@ class Flights:
                 drowned.add(effect)
         if self.commanded:
             drowned |= NOT_FROM_COMMANDS
+        if not self.lively:
+            drowned |= _QUICK
         return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}
+
+    @property
+    def lively(self) -> bool:
+        """Whether the turn rates vary by enough of the steps to which they are rounded."""
+        speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in self._first])
+        return float(np.median(speeds.std(axis=0))) > _STEPS * self.vehicle.omega_lsb
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""

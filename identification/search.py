@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
-from .commanded import SECOND, SECOND_SHARE, mates
+from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
 from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .selection import Gram, columns_of, gram
-from .starts import STARTS
+from .starts import STARTS, barely_swings
+from .turning import EFFECT, turning_delay
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
 LEAST_SHARE = 0.01  # and as a share of what is left unexplained
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
+PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
 SWAP_GAIN = 12.0
 MOST_EFFECTS = 4
@@ -30,7 +32,7 @@ LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explai
 LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
 LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
-MOST_OF_COMMANDS = 6  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
+MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 _REFITS = 6
 _MOVES = 6
@@ -76,6 +78,9 @@ class Search:
         self._least_gain, self._least_share = LEAST_OF_COMMANDS if flights.commanded else (LEAST_GAIN, LEAST_SHARE)
         self._report = report
         self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
+        # how late commands come true shows in how the vehicle turns; the search takes it as it is
+        delay = turning_delay([p.signals for p in flights.pieces({}) if p.log < flights.own], flights.vehicle)
+        self.delay = delay if flights.commanded and EFFECT in self.library else None
         self.noise: Array = np.zeros((0, 6))
         self.whiten: Whitener
 
@@ -83,8 +88,14 @@ class Search:
 
     def columns_of(self, effect: str, fitted: bool) -> list[Column]:
         """Return the columns of an effect, less the coefficients that the vehicle's file states for it."""
+        if self.held(effect):
+            return []
         stated, every = self._stated.get(effect, {}), columns_of(effect, fitted)
         return [c for c in every if c[1].removeprefix(MOMENT) not in stated] or every
+
+    def held(self, effect: str) -> bool:
+        """Return whether an effect is known from elsewhere than the residual: it is neither fitted nor taken away."""
+        return self.delay is not None and effect == EFFECT
 
     def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: its effects', those of effects that are tried, and the shift that any log may have."""
@@ -193,7 +204,7 @@ class Search:
         total = g.blocks.sum(axis=0)
         out = []
         for effect in self.library:
-            if effect in fit.effects or (self.flights.commanded and mates(effect) & set(fit.effects)):
+            if effect in fit.effects or (self.flights.commanded and not _follows(effect, fit.effects)):
                 continue
             if effect in STARTS:
                 tries = [[*base, c] for c in regression.begun if c[0] == effect]
@@ -237,7 +248,7 @@ class Search:
 
     def forward(self) -> tuple[Fit, "list[Gain]"]:
         """Return the effects that are worth adding one after the other, and what each explained at first, alone."""
-        fit = Fit({})
+        fit = Fit(self.delay.setting if self.delay else {})
         first: list[Gain] = []
         for count in range(self._most + 1):
             regression = self.linearise(fit)
@@ -250,12 +261,17 @@ class Search:
             gains = self.gains(fit, regression, g)
             first = first or gains
             least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
-            better = [x for x in gains if x.energy > least and x.size > LEAST_SIZES.get(x.effect, LEAST_SIZE)
-                      and (not self.flights.commanded or self._plausible(x, count))]
+            better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
-            self._report(f"trying {better[0].effect}")
-            fit = self.refit(better[0].fit)
+            for gain in better:
+                self._report(f"trying {gain.effect}")
+                more = self.refit(gain.fit)
+                if not (self.flights.commanded and barely_swings(more.setting, self.flights.vehicle.gravity)):
+                    break
+            else:
+                break
+            fit = more
         return fit, first
 
     @staticmethod
@@ -279,7 +295,7 @@ class Search:
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
         least = max(self._least_gain, self._least_share * error)
         for effect in fit.effects:
-            if self.error_without(fit, effect) < error + least:
+            if not self.held(effect) and self.error_without(fit, effect) < error + least:
                 self._report(f"{effect} is not needed")
                 less = self.refit(fit.without(effect))
                 return less, self.error(less)
@@ -340,6 +356,17 @@ class Gain:
     left: float  # energy that is then still left
     size: float  # of its largest coefficient, in typical sizes
     fit: Fit  # with it added, before it is refitted
+
+
+def _worth(gain: Gain, least: float) -> bool:
+    """Return whether an effect explains enough, and is large enough, to be named."""
+    size = LEAST_SIZES.get(gain.effect, LEAST_SIZE)
+    return gain.energy > least and gain.size > (size if gain.energy < PLAIN * least else 0.5 * size)
+
+
+def _follows(effect: str, named: Sequence[str]) -> bool:
+    """Return whether an effect may join those that are named of flights known from commands."""
+    return not mates(effect) & set(named) and (effect not in AFTER_SAG or "battery_sag" in named)
 
 
 def _moved(setting: Setting, columns: Sequence[Column], change: Array) -> dict[str, dict[str, float]]:

@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 
 # what a law allows and nobody believes: a rotor that delivers far more than it should (all four together are thrust_scale)
 BELIEVED = {"rotor_efficiency": 0.05}
+_MOST_MISSING = 0.9  # of the declared mass
+_TURNS = 4  # of the search for which bounds hold, a column
+_SMALL_PULL = 1e-6  # in standard deviations
 PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anything is seen
 
 
@@ -57,20 +60,35 @@ class Gram:
         return self._solve(gram, index)[0]
 
     def _solve(self, gram: Array, index: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the changes and which of them are free of their bounds."""
+        """Return the changes and which of them are free of their bounds.
+
+        An active set, as in Stark and Parker, Bounded-Variable Least-Squares, Computational Statistics 10 (1995).
+        """
         normal = gram[np.ix_(index, index)] + np.diag(self.precision[index])
         right = gram[index, -1] - self.precision[index] * self.value[index]
         low, high = self.lower[index], self.upper[index]
-        change = np.zeros(len(index))
+        change = np.zeros(len(index))  # allowed: bounds lie on either side of the value now
         free = np.ones(len(index), dtype=bool)
-        while free.any():
-            held = right[free] - normal[np.ix_(free, ~free)] @ change[~free]
-            change[free] = np.linalg.solve(normal[np.ix_(free, free)], held)
-            out = free & ((change < low) | (change > high))
-            if not out.any():
+        scale = 1.0 / np.sqrt(np.diagonal(normal))
+        for _ in range(_TURNS * len(index)):
+            if free.any():
+                step = np.linalg.solve(normal[np.ix_(free, free)], (right - normal @ change)[free])
+                room = np.where(step > 0, high[free] - change[free], change[free] - low[free])
+                share = np.where(np.abs(step) > _SMALL_PULL * scale[free], room / np.maximum(np.abs(step), 1e-300), np.inf)
+                first = float(share.min())
+                change[free] += min(first, 1.0) * step
+                if first < 1.0:  # the first to reach its bound stays there for now
+                    i = int(np.argmin(share))
+                    at = np.flatnonzero(free)[i]
+                    change[at], free[at] = high[at] if step[i] > 0 else low[at], False
+                    continue
+            # one that is held and would rather come back from its bound is let go
+            pull = (right - normal @ change) * scale
+            inwards = np.where(change >= high, -pull, pull)
+            inwards[free | (low >= high)] = 0.0
+            if inwards.max(initial=0.0) < _SMALL_PULL:
                 break
-            change = np.clip(change, low, high)
-            free &= ~out
+            free[int(np.argmax(inwards))] = True
         return change, free
 
     def error(self, index: NDArray[np.int64]) -> float:
@@ -115,6 +133,8 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
             low[i], high[i] = 0.0, PRIOR
         else:
             low[i], high[i] = coefficient(c).minimum, min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf))
+            if c[0] == "mass":
+                low[i] = max(low[i], -_MOST_MISSING * flights.vehicle.mass)
     prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return Gram(names, x, begins, blocks, prior, value, low - value, high - value)

@@ -19,6 +19,7 @@ _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of a cable
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
 _THINNED = 20  # every so many samples of a flight are enough for a map of the jet
 _KEPT = 4
+_RINGS = 0.2  # damping ratio of a swing, at most
 
 
 def slung_payload(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
@@ -27,6 +28,12 @@ def slung_payload(flights: Flights, residual: Array, stated: Mapping[str, float]
     lengths = (stated["l"],) if "l" in stated else _LENGTHS
     return [{"m": mass, "l": length, "damping": stated.get("damping", damping)} for length in lengths
             for damping in ((0.3, 2.0) if "damping" not in stated else (0.0,))]
+
+
+def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) -> bool:
+    """Return whether a fitted load hardly swings: it imitates a drag then, and no load in air is damped like that."""
+    load = setting.get("slung_payload")
+    return load is not None and load["l"] > 0 and load["damping"] > 2.0 * _RINGS * math.sqrt(gravity / load["l"])
 
 
 def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:

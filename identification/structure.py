@@ -22,12 +22,12 @@ Array = NDArray[np.float64]
 
 LEAST_GAIN = 30.0  # whitened energy on blocks left out; the largest of all columns on flights without any effect is some 12
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
+LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
+LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one part of the flight, but strongly
 
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
-_STEPS = 3.0  # rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its own
-
 _BATCH = 64  # columns at a time
 
 Drive = tuple[str, Array]  # in words, (rows,)
@@ -108,7 +108,7 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
 def structure(search: Search, fit: Fit) -> list[Structure]:
     """Return the signs of a law in what a fit leaves, the strongest first; none for a fit that explains it all."""
     flights = search.flights
-    if not _lively(flights):
+    if not flights.lively:
         return []
     regression = search.at(fit)
     error = regression.error(np.arange(len(regression.columns)))
@@ -130,19 +130,15 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
             words.append((f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs"))
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
+    named = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
+    least = max(LEAST_GAIN * unit, LEAST_SHARE * error, LEAST_OF_NAMED * named)
     found = []
     for at in range(0, len(columns), _BATCH):
         gains, spreads = _gains(search, regression, np.stack(columns[at : at + _BATCH], axis=2))
         for (test, where), gain, spread in zip(words[at : at + _BATCH], gains, spreads, strict=True):
-            if gain > max(LEAST_GAIN * unit, LEAST_SHARE * error) and spread >= LEAST_SPREAD:
+            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE):
                 found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
-
-
-def _lively(flights: Flights) -> bool:
-    """Return whether the turn rates vary by enough of their rounding steps."""
-    speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in flights.pieces({})])
-    return float(np.median(speeds.std(axis=0))) > _STEPS * flights.vehicle.omega_lsb
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

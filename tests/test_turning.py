@@ -1,0 +1,41 @@
+"""The delay between commands and rotors, from how a vehicle turns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification.flight_log import FlightLog
+from windwrench.identification.signals import log_signals
+from windwrench.identification.turning import turning_delay
+
+
+def flown(vehicle, *effects):
+    c = record_flight(vehicle, effects, "excite", 20.0, seed=3)
+    return log_signals(FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage")))
+
+
+@pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie"])
+def test_the_delay_that_was_flown(vehicle):
+    model = load_vehicle(vehicle)
+    found = turning_delay(flown(model, EffectSetting("latency", {"d": 0.035})), model)
+    assert found is not None
+    assert found.setting == {"latency": {"d": found.seconds}}
+    assert found.seconds == pytest.approx(0.035, abs=0.004)
+    assert found.std < 0.004
+
+
+def test_a_lag_shows_as_the_latency_of_what_it_delays():
+    model = load_vehicle("ardrone2")
+    found = turning_delay(flown(model, EffectSetting("motor_lag", {"tau": 0.04})), model)
+    assert found is not None
+    assert 0.025 < found.seconds < 0.042
+
+
+def test_moments_of_another_flight_show_no_delay():
+    model = load_vehicle("ardrone2")
+    pieces = [replace(s, rotor_speeds=np.ascontiguousarray(s.rotor_speeds[::-1])) for s in flown(model)]
+    assert turning_delay(pieces, model) is None
+    assert turning_delay([], model) is None
