@@ -21,14 +21,16 @@ from importlib.metadata import version
 import numpy as np
 
 from ..dynamics import Vehicle, load_vehicle
-from ..estimator import UKFTuning, WrenchUKF
+from ..estimator import ConstantGainFilter, UKFTuning, WrenchUKF, WrenchUKFBatch
 from ..estimator.consistency import ModelRun, simulate_model
+from ..estimator.direct import released
 from ..estimator.ekf import WrenchEKF
 from ..estimator.estimate import Array
 from ..estimator.observer import NonlinearObserver
 from ..estimator.ukf import default_covariance
+from ..estimator.ukf import step as ukf_step
 
-Estimator = WrenchUKF | NonlinearObserver  # WrenchEKF is a WrenchUKF
+Estimator = WrenchUKF | NonlinearObserver  # WrenchEKF and ConstantGainFilter are WrenchUKFs
 
 PERIOD = 0.005  # s
 STEPS = 2000  # a round of the compiled estimators
@@ -154,6 +156,48 @@ def time_step(estimator: Estimator | PeerFilter, run: ModelRun, steps: int) -> f
     return (time.perf_counter() - begin) / steps
 
 
+def compiled_loop(run: ModelRun) -> Callable[[], float]:
+    """Return what steps a filter through a flight in a compiled loop and returns the time of a step in us."""
+    ukf = WrenchUKF(load_vehicle("ardrone2"), UKFTuning(), PERIOD)
+    samples = np.concatenate([run.rotor_speeds, run.measured_position, run.measured_quaternion], axis=1)
+
+    def measure() -> float:
+        _start(ukf, run)
+        begin = time.perf_counter()
+        _step_through(ukf.record, samples, PERIOD)
+        return 1e6 * (time.perf_counter() - begin) / len(samples)
+
+    _start(ukf, run)
+    _step_through(ukf.record, samples[:1], PERIOD)  # compiles
+    return measure
+
+
+@released
+def _step_through(record: np.ndarray, samples: Array, dt: float) -> None:
+    f = record[0]
+    for k in range(len(samples)):
+        ukf_step(f, samples[k], 3, dt, 0.0)
+
+
+def time_batch(run: ModelRun, count: int, filter_steps: int = 4096) -> Callable[[], float]:
+    """Return what steps ``count`` filters side by side through a flight and returns the time of one filter's step in us."""
+    batch = WrenchUKFBatch(load_vehicle("ardrone2"), count, UKFTuning(), PERIOD)
+    steps = max(1, filter_steps // count)
+    samples = [tuple(np.tile(values[k], (count, 1)) for values in (run.rotor_speeds, run.measured_position,
+                                                                  run.measured_quaternion)) for k in range(min(steps, 8))]
+    batch.reset(run.initial_position, run.initial_quaternion, run.initial_covariance, run.initial_velocity,
+                run.initial_angular_velocity)
+    batch.step(*samples[0])
+
+    def measure() -> float:
+        begin = time.perf_counter()
+        for k in range(steps):
+            batch.step(*samples[k % len(samples)])
+        return 1e6 * (time.perf_counter() - begin) / (steps * count)
+
+    return measure
+
+
 def agreement(run: ModelRun, ours: WrenchUKF, peer: PeerFilter, steps: int = PEER_STEPS) -> tuple[float, float]:
     """Return the largest difference in force (N) and torque (Nm) between the two over a flight."""
     _start(ours, run)
@@ -185,6 +229,7 @@ def main(rounds: int = ROUNDS, steps: int = STEPS, peer_steps: int = PEER_STEPS)
     ukf, peer = WrenchUKF(vehicle, tuning, PERIOD), PeerFilter(vehicle, tuning, PERIOD)
     entries: list[tuple[str, Estimator | PeerFilter, int]] = [
         ("WrenchUKF", ukf, steps),
+        ("ConstantGainFilter", ConstantGainFilter(vehicle, tuning, PERIOD), steps),
         ("WrenchEKF", WrenchEKF(vehicle, tuning, PERIOD), steps),
         ("NonlinearObserver", NonlinearObserver(vehicle, None, PERIOD), steps),
         ("filterpy's UKF, by component", peer, peer_steps),

@@ -5,22 +5,20 @@ medians over rounds, and ratios are taken round by round. One process, one threa
 """
 
 import importlib.util
+import os
 import platform
 import statistics
 import subprocess
 import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-
 from ..dynamics import load_vehicle
 from ..dynamics.files import replaced
-from ..estimator import NonlinearObserver, UKFTuning, WrenchEKF, WrenchUKF
-from .filter_step import PERIOD, PeerFilter, make_run, time_step
+from ..estimator import ConstantGainFilter, NonlinearObserver, UKFTuning, WrenchEKF, WrenchUKF
+from .filter_step import PERIOD, PeerFilter, compiled_loop, make_run, time_batch, time_step
 
 
 @dataclass(frozen=True)
@@ -49,80 +47,23 @@ def filters() -> list[Contender]:
     out = []
     for name, estimator, includes in (
         ("WrenchUKF", WrenchUKF(vehicle, tuning, PERIOD), "predict, correct, copy of state and covariance"),
-        ("WrenchEKF", WrenchEKF(vehicle, tuning, PERIOD), "the same"),
+        ("ConstantGainFilter", ConstantGainFilter(vehicle, tuning, PERIOD), "the same with a constant covariance"),
+        ("WrenchEKF", WrenchEKF(vehicle, tuning, PERIOD), "as WrenchUKF"),
         ("NonlinearObserver", NonlinearObserver(vehicle, None, PERIOD), "no covariance"),
     ):
         time_step(estimator, run, 3)  # compiles
         out.append(Contender(name, "us a step", includes, lambda e=estimator: 1e6 * time_step(e, run, 2000),  # type: ignore[misc]
                              reference=name == "WrenchUKF"))
+    out.append(Contender("WrenchUKF in a compiled loop", "us a step", "predict and correct", compiled_loop(run)))
+    for count in (16, 256):
+        out.append(Contender(f"WrenchUKFBatch, {count} filters", "us a step", "predict, correct, copy of state",
+                             time_batch(run, count)))
     if importlib.util.find_spec("filterpy"):
         for words, by_component in (("numpy.cross", False), ("by component", True)):
             peer = PeerFilter(vehicle, tuning, PERIOD, by_component)
             out.append(Contender(f"filterpy {version('filterpy')} UKF, {words}", "us a step", "the same state and model",
                                  lambda p=peer: 1e6 * time_step(p, run, 60)))  # type: ignore[misc]
     return out
-
-
-def flights() -> list[Contender]:
-    """Return what flies, in simulated seconds a second; peers have no wind, no sensors and no estimator."""
-    import gymnasium as gym
-
-    from ..envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
-    from ..envs.plant import TICK
-    from ..envs.vector import FanTrackingVectorEnv
-
-    def ours(decisions: int = 120) -> float:
-        single.reset(seed=0)
-        action = np.zeros(1, dtype=np.float32)
-        begin = time.perf_counter()
-        for _ in range(decisions):
-            single.step(action)
-        return decisions * DECISION_TICKS * TICK / (time.perf_counter() - begin)
-
-    def many(decisions: int = 12) -> float:
-        several.reset(seed=0)
-        actions = np.zeros((16, 1), dtype=np.float32)
-        begin = time.perf_counter()
-        for _ in range(decisions):
-            several.step(actions)
-        return 16 * decisions * DECISION_TICKS * TICK / (time.perf_counter() - begin)
-
-    single, several = FanTrackingEnv("base"), FanTrackingVectorEnv(16, scenario="base")
-    everything = "jet at 12 stations, gusts, motors, sensors, 200 Hz UKF, flight loop, MuJoCo at 400 Hz"
-    ours(2)
-    out = [Contender("FanTracking, 1 environment", "x real time", everything, ours, reference=True),
-           Contender("FanTracking, 16 in one process", "x real time", "the same, all of them together", many)]
-    ant = gym.make("Ant-v5")
-
-    def ant_run(steps: int = 60) -> float:
-        ant.reset(seed=0)
-        action = np.zeros(ant.action_space.shape or (), dtype=np.float32)
-        begin = time.perf_counter()
-        for _ in range(steps):
-            ant.step(action)
-        return steps * float(ant.unwrapped.dt) / (time.perf_counter() - begin)  # type: ignore[attr-defined]
-
-    out.append(Contender("Gymnasium Ant-v5", "x real time", "MuJoCo at 100 Hz with contacts", ant_run))
-    if importlib.util.find_spec("rotorpy"):
-        out.append(_rotorpy())
-    return out
-
-
-def _rotorpy() -> Contender:
-    from rotorpy.vehicles.hummingbird_params import quad_params
-    from rotorpy.vehicles.multirotor import Multirotor
-
-    vehicle = Multirotor(quad_params)
-    command = {"cmd_motor_speeds": np.full(4, load_vehicle("hummingbird").hover_rate)}
-
-    def run(steps: int = 60) -> float:
-        state = vehicle.initial_state
-        begin = time.perf_counter()
-        for _ in range(steps):
-            state = vehicle.step(state, command, 0.01)
-        return steps * 0.01 / (time.perf_counter() - begin)
-
-    return Contender(f"RotorPy {version('rotorpy')}", "x real time", "rigid body, motors and aerodynamics at 100 Hz", run)
 
 
 def starts() -> list[Contender]:
@@ -165,19 +106,36 @@ def rows_of(figures: list[Figure]) -> list[list[str]]:
     return out
 
 
+@dataclass(frozen=True)
+class Section:
+    """A table beside the contenders', and what it shows in words."""
+
+    title: str
+    header: list[str]
+    rows: list[list[str]]
+    words: str = ""
+
+
 HEADER = ["what", "median", "least - largest", "ratio to the first of its kind", "includes"]
 
 
-def write_markdown(figures: list[Figure], rounds: int, path: Path) -> None:
+def write_markdown(figures: list[Figure], rounds: int, path: Path, sections: Sequence[Section] = ()) -> None:
     """Write a run as a page."""
     lines = ["# Speed", "", f"One run of `windwrench speed --rounds {rounds} --markdown docs/speed.md`: one process, all "
-             "contenders in turn in every round; medians, with ratios taken round by round. Peers are measured where they are "
-             "installed.", "",
+             "contenders in turn in every round; medians, with ratios taken round by round. One thread, where no other number "
+             "is given. Peers are measured where they are installed (`pip install 'windwrench[peers]'`).", "",
              f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in ("numpy", "numba", "mujoco"))
-             + f", {platform.machine()}.", "", f"| {' | '.join(HEADER)} |", f"|{' --- |' * len(HEADER)}"]
-    lines += [f"| {' | '.join(row)} |" for row in rows_of(figures)]
-    lines += ["", "filterpy's filter has 37 sigma points and additive noise; its model is measured as one writes it down, with "
-              "vectors and `numpy.cross`, and with every product by component in plain Python numbers. "
-              "`python -m windwrench.benchmarks.filter_step` prints how far it agrees with `WrenchUKF`.", ""]
+             + f", {platform.machine()}, {os.cpu_count()} cores.", "", *_table(HEADER, rows_of(figures)), "",
+             "`x real time` is simulated seconds a second, summed over the environments. A filter of a batch and one in a "
+             "compiled loop are the same compiled step. filterpy's filter has 37 sigma points and additive noise; its model is "
+             "measured as one writes it down, with vectors and `numpy.cross`, and with every product by component in plain "
+             "Python numbers. `python -m windwrench.benchmarks.filter_step` prints how far it agrees with `WrenchUKF`.", ""]
+    for section in sections:
+        lines += [f"## {section.title}", "", *_table(section.header, section.rows), ""]
+        lines += [section.words, ""] if section.words else []
     with replaced(path) as partial:
         partial.write_text("\n".join(lines), encoding="utf-8")
+
+
+def _table(header: list[str], rows: list[list[str]]) -> list[str]:
+    return [f"| {' | '.join(header)} |", f"|{' --- |' * len(header)}", *(f"| {' | '.join(row)} |" for row in rows)]

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
 from ..dynamics.effects import check_setting
-from ..dynamics.errors import InputError
+from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
+from ..estimator.direct import direct
 from ..estimator.tuning import UKFTuning
-from .closed_loop import ClosedLoop
+from .closed_loop import ESTIMATORS, ClosedLoop
 from .jet import Fan
+from .outcome import INFO, LIMITS, LOST_OFFSET, OUTCOME, look
 from .plant import NOISE, TICK, PlantSettings
 from .scenarios import Scenario, draw_fan_path, get_scenario
 
@@ -24,12 +26,8 @@ DECISION_TICKS = 16  # 12.5 Hz
 EPISODE_SECONDS = 20.0
 SETTLE_TICKS = 300  # the filter settles in the jet before an episode starts
 DISTANCE = 2.3  # m, from the fan
-LOST_OFFSET = 2.5  # m
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
 CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
-
-# largest size of an observation's numbers
-_LIMITS = np.array([10, 10, 10, 1, 1, 1, 5, MAX_COMMAND], dtype=np.float32)
 
 
 class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -98,6 +96,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `fan`         | `None`       | a `Fan`, in place of the standard one                                      |
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
+    | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain, for faster training |
     | `render_mode` | `None`       | `"human"` or `"rgb_array"`                                                 |
 
     ## Version history
@@ -119,6 +118,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         width: int = 640,
         height: int = 480,
         truth: str | Vehicle | None = None,
+        estimator: str = "ukf",
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}")
@@ -129,12 +129,19 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.effects = tuple(check_setting(e, "FanTracking: effects") for e in effects)
         self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
         self.settings = settings
+        if estimator not in ESTIMATORS:
+            raise unknown_name("estimator", estimator, ESTIMATORS)
+        self.estimator = estimator
         self.fan_path = fan_path
         self.render_mode, self.width, self.height = render_mode, width, height
         self.action_space = gym.spaces.Box(-MAX_COMMAND, MAX_COMMAND, (1,), np.float32)
-        self.observation_space = gym.spaces.Box(-_LIMITS, _LIMITS, (OBSERVATION_SIZE,), np.float32)
+        limits = np.array(LIMITS, dtype=np.float32)
+        self.observation_space = gym.spaces.Box(-limits, limits, (OBSERVATION_SIZE,), np.float32)
         self._viewer: Any = None
         self.loop: ClosedLoop | None = None
+        self.fan_motion = ""
+        self.outcome = np.zeros(1, dtype=OUTCOME)  # of the last decision
+        self._call: Callable[..., None] | None = None
 
     def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
         """Return the closed loop for a true vehicle (before the undeclared effects); the filter knows the declared one."""
@@ -143,7 +150,8 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         declared = replace(self.vehicle, mocap=mocap)
         true = replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects))
         tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
-        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.truth))
+        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.truth),
+                          drawn=self.render_mode is not None, estimator=self.estimator)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -165,77 +173,70 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         loop = self.loop
         ticks = round(EPISODE_SECONDS / TICK)
         t = TICK * np.arange(ticks + 2, dtype=np.float64)
-        self._motion, self._fan_speed, self._fan_y = draw_fan_path(scenario, rng, t)
+        self.fan_motion, self._fan_speed, self._fan_y = draw_fan_path(scenario, rng, t)
         if self.fan_path is not None:
-            self._motion, self._fan_y = "given", np.asarray(self.fan_path(t), dtype=np.float64)
+            self.fan_motion, self._fan_y = "given", np.ascontiguousarray(self.fan_path(t), dtype=np.float64)
             if self._fan_y.shape != t.shape or not np.all(np.isfinite(self._fan_y)):
                 raise InputError(f"FanTracking: fan_path must return {t.size} finite numbers for {t.size} times")
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         loop.reset(rng, np.array([distance, self._fan_y[0] + offset, self.fan.height]), math.pi)
-        loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), np.full(SETTLE_TICKS, self._fan_y[0]))
-        self._start = np.array([distance, 0.0, self.fan.height])
-        self._tick, self._command = 0, 0.0
+        loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y[:1])
+        self._distance, self._tick, self._command = distance, 0, 0.0
+        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
+        self._look()
+        self.outcome["lost"] = False
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._info(0.0, 0.0)
+        return self._observation(), self._info()
 
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Fly 80 ms with a commanded velocity (1,) m/s along y."""
-        loop = self.loop
-        if loop is None:
-            raise InputError("FanTracking: call reset before step")
         command = np.asarray(action, dtype=np.float64)
         if command.shape != (1,) or not math.isfinite(command[0]):
             raise InputError(f"FanTracking: action must be one finite number in m/s, shape (1,), got {action!r}")
-        value = min(max(float(command[0]), -MAX_COMMAND), MAX_COMMAND)
-        change, self._command = value - self._command, value
-        loop.setpoint[4] = value
-        first, last = self._tick, self._tick + DECISION_TICKS
-        path = self._fan_y[np.minimum(np.arange(first, last), len(self._fan_y) - 1)]
-        loop.run(self.np_random.standard_normal((DECISION_TICKS, NOISE)), path)
-        self._tick = last
-        offset = loop.position[1] - path[-1]
-        tracking = 1.0 / (1.0 + (offset / TRACKING_WIDTH) ** 2)
-        cost = -CHANGE_COST * change * change
-        lost = self._lost(offset)
+        self.fly(command.item())
         if self.render_mode == "human":
             self.render()
-        return self._observation(), tracking + cost, lost, False, self._info(tracking, cost, lost)
+        info = self._info()
+        return self._observation(), info["reward_tracking"] + info["reward_change"], info["lost"], False, info
 
-    def _lost(self, offset: float) -> bool:
-        assert self.loop is not None
-        away = self.loop.position - self._start
-        _, x, y, _ = self.loop.quaternion
-        upright = 1.0 - 2.0 * (x * x + y * y)
-        return bool(abs(offset) > LOST_OFFSET or abs(away[0]) > 1.0 or abs(away[2]) > 1.0 or upright < 0.34
-                    or not self.loop.healthy())
+    def fly(self, command: float) -> None:
+        """Do what ``step`` does at a finite ``command``, and leave what came of it in ``outcome``."""
+        loop = self.loop
+        if loop is None:
+            raise InputError("FanTracking: call reset before step")
+        value = min(max(command, -MAX_COMMAND), MAX_COMMAND)
+        change, self._command = value - self._command, value
+        loop.setpoint[4] = value
+        loop.run(self.np_random.standard_normal((DECISION_TICKS, NOISE)), self._fan_y, self._tick)
+        self._tick += DECISION_TICKS
+        self._look()
+        out = self.outcome
+        out["reward_tracking"] = 1.0 / (1.0 + (out["offset"].item() / TRACKING_WIDTH) ** 2)
+        out["reward_change"] = -CHANGE_COST * change * change
+        if loop.was_reset:
+            out["lost"] = True
 
-    def _observation(self) -> NDArray[np.float32]:
-        assert self.loop is not None
-        x = self.loop.state
-        frame = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
-        return np.clip(np.nan_to_num(frame), -_LIMITS, _LIMITS)
-
-    def _info(self, tracking: float, change: float, lost: bool = False) -> dict[str, Any]:
-        """Return the reward's terms and the truth that the agent does not see."""
+    def _look(self) -> None:
         loop = self.loop
         assert loop is not None
-        k = min(self._tick, len(self._fan_y) - 1)
-        return {
-            "reward_tracking": tracking,
-            "reward_change": change,
-            "fan_y": float(self._fan_y[max(k - 1, 0)]),
-            "fan_velocity": float(self._fan_y[k] - self._fan_y[k - 1]) / TICK if k > 0 else 0.0,
-            "fan_motion": self._motion,
-            "y": float(loop.position[1]),
-            "offset": float(loop.position[1] - self._fan_y[max(k - 1, 0)]),
-            "force": loop.external[:3].copy(),
-            "torque": loop.external[3:].copy(),
-            "time": self._tick * TICK,
-            "lost": lost,
-        }
+        seen = (loop.record, *loop.motion, self._fan_y, self._tick, self._distance, self.fan.height, self._command,
+                self.outcome)
+        if self._call is None:
+            self._call = direct(look, *seen)
+        self._call(*seen)
+
+    def _observation(self) -> NDArray[np.float32]:
+        observation: NDArray[np.float32] = self.outcome["observation"][0].copy()
+        return observation
+
+    def _info(self) -> dict[str, Any]:
+        """Return the reward's terms and the truth that the agent does not see."""
+        info = dict(zip(INFO, self.outcome[0].item()[1:], strict=True))
+        info["force"], info["torque"], info["fan_motion"] = info["force"].copy(), info["torque"].copy(), self.fan_motion
+        return info
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a window.
@@ -257,3 +258,6 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
+
+
+__all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

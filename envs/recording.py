@@ -14,6 +14,7 @@ from .plant import NOISE, TICK, PlantSettings
 
 Array = NDArray[np.float64]
 _RAMP = 2.0  # s, over which a trajectory fades in
+_REPORTED = 4_000  # ticks between two reports of progress
 _CEILING = 2.6  # m, of a room that does not say
 
 # Weak background turbulence: 15 mN and 0.3 mNm over 0.25 s for a 0.46 kg vehicle
@@ -121,6 +122,7 @@ def record_flight(
     seed: int = 0,
     settings: PlantSettings | None = None,
     push: Callable[[ClosedLoop], Array | None] | None = None,
+    report: Callable[[float], None] = lambda share: None,
 ) -> dict[str, Array]:
     """Fly a vehicle with effects that it does not declare; return the columns of a flight log.
 
@@ -133,6 +135,7 @@ def record_flight(
         settings: of the plant; default: weak background turbulence in proportion to the vehicle.
         push: asked before each tick for a wrench (6,) that acts over it: force in N and torque in Nm about the centre of
             mass, world frame; None leaves the last one on. Default: nothing pushes.
+        report: called now and then with the share that is done.
 
     Returns:
         ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at the instant
@@ -154,6 +157,8 @@ def record_flight(
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     samples, external, voltage = np.empty((count, 11)), np.zeros((count, 6)), np.empty(count)
     for k in range(count):
+        if k % _REPORTED == 0:
+            report(k / count)
         loop.setpoint[:] = setpoints[k]
         wrench = None if push is None else push(loop)
         if wrench is not None:

@@ -1,39 +1,139 @@
 """Many fan-tracking environments in one process."""
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers import TimeLimit
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..dynamics.errors import InputError
 from .fan_tracking import FanTrackingEnv
+from .outcome import INFO, OUTCOME
 
 Frames = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+Infos = dict[str, Any]
 
 
-class FanTrackingVectorEnv(SyncVectorEnv):
+class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose episode has ended
-    starts its next one at the following step, whose action it ignores (``AutoresetMode.NEXT_STEP``).
+    starts its next one at the following step, whose action it ignores (``AutoresetMode.NEXT_STEP``). Each entry of
+    ``infos`` is an array with a row for each environment; all environments have all of them.
 
     Args:
         num_envs: how many.
         max_episode_steps: decisions after which an episode is truncated.
+        threads: over which the environments are spread; the results do not depend on it.
         **kwargs: of ``FanTrackingEnv``.
 
     Raises:
-        InputError: ``num_envs`` is not positive, or what ``FanTrackingEnv`` refuses.
+        InputError: ``num_envs`` or ``threads`` is not positive, or what ``FanTrackingEnv`` refuses.
     """
 
-    def __init__(self, num_envs: int = 1, max_episode_steps: int = 250, **kwargs: Any) -> None:
-        if num_envs < 1:
-            raise InputError(f"FanTracking: num_envs must be at least 1, got {num_envs}")
+    def __init__(self, num_envs: int = 1, max_episode_steps: int = 250, threads: int = 1, **kwargs: Any) -> None:
+        for name, value in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps), ("threads", threads)):
+            if value < 1:
+                raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
+        self.envs = [FanTrackingEnv(**kwargs) for _ in range(num_envs)]
+        self.num_envs, self.max_episode_steps, self.threads = num_envs, max_episode_steps, min(threads, num_envs)
+        first = self.envs[0]
+        self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self.render_mode = first.render_mode
+        self.single_action_space, self.single_observation_space = first.action_space, first.observation_space
+        self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
+        self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
+        self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
+        self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
+        self._outcomes = np.zeros(num_envs, dtype=OUTCOME)
+        for i, env in enumerate(self.envs):
+            env.outcome = self._outcomes[i : i + 1]
+        self._all = np.ones(num_envs, dtype=np.bool_)
+        self._pool: ThreadPoolExecutor | None = None
 
-        def make() -> gym.Env[Frames, Frames]:
-            return TimeLimit(FanTrackingEnv(**kwargs), max_episode_steps)
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Frames, Infos]:
+        """Start an episode in every environment, or in those of ``options["reset_mask"]`` (num_envs,), booleans.
 
-        super().__init__([make] * num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)
+        Raises:
+            InputError: a list of seeds, or a mask, of another length.
+        """
+        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if seed is None or isinstance(
+            seed, int | np.integer) else list(seed)
+        mask = np.asarray((options or {}).get("reset_mask", self._all))
+        if len(seeds) != self.num_envs or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise InputError(f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
+                             f"got {len(seeds)} and {mask!r}")
+
+        def start(i: int) -> None:
+            if mask[i]:
+                self.envs[i].reset(seed=seeds[i])
+
+        self._each(start)
+        self._decisions[mask], self._over[mask] = 0, False
+        return self._frames(), self._infos()
+
+    def step(self, actions: Frames) -> tuple[Frames, NDArray[np.float64], Flags, Flags, Infos]:
+        """Fly 80 ms in every environment with commanded velocities (num_envs, 1) m/s along y.
+
+        Raises:
+            InputError: another shape, or a number that is not finite; nothing has flown then.
+        """
+        actions = np.asarray(actions, dtype=np.float64)
+        if actions.shape != (self.num_envs, 1) or not np.all(np.isfinite(actions)):
+            raise InputError(f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), got {actions!r}")
+        commands, over = actions[:, 0].tolist(), self._over.tolist()
+
+        def fly(i: int) -> None:
+            if over[i]:
+                self.envs[i].reset()
+            else:
+                self.envs[i].fly(commands[i])
+
+        self._each(fly)
+        self._decisions = np.where(self._over, 0, self._decisions + 1)
+        out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
+        lost = out["lost"].copy()
+        self._over = lost | truncated
+        return self._frames(), out["reward_tracking"] + out["reward_change"], lost, truncated, self._infos()
+
+    def _each(self, do: Callable[[int], None]) -> None:
+        """Call ``do`` for every environment, on the threads if there are several: they overlap in compiled code."""
+        if self.threads == 1:
+            for i in range(self.num_envs):
+                do(i)
+            return
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads)
+
+        def part(first: int) -> None:
+            for i in range(first, self.num_envs, self.threads):
+                do(i)
+
+        list(self._pool.map(part, range(self.threads)))
+
+    def _frames(self) -> Frames:
+        frames: Frames = self._outcomes["observation"].copy()
+        return frames
+
+    def _infos(self) -> Infos:
+        """Return what the environments say as Gymnasium's vector environments do: an array and a mask for each entry."""
+        infos: Infos = {name: self._outcomes[name].copy() for name in INFO}
+        infos["fan_motion"] = np.array([env.fan_motion for env in self.envs], dtype=object)
+        return infos | {f"_{name}": self._all.copy() for name in infos}
+
+    def render(self) -> tuple[Any, ...]:
+        """Return a picture (height, width, 3) of each environment."""
+        return tuple(env.render() for env in self.envs)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close all environments and end the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+        for env in self.envs:
+            env.close()

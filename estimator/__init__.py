@@ -1,13 +1,15 @@
 """Sensing: estimators of the external force and torque on a quadrotor, and how to check that they are consistent."""
 
+from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
 from .mass_ukf import WrenchMassUKF
 from .observer import NonlinearObserver, ObserverTuning
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
+from .ukf_batch import WrenchEstimates, WrenchUKFBatch
 
 __all__ = [
-    "NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate", "WrenchEstimator", "WrenchMassUKF",
-    "WrenchUKF",
+    "ConstantGainFilter", "NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate",
+    "WrenchEstimates", "WrenchEstimator", "WrenchMassUKF", "WrenchUKF", "WrenchUKFBatch",
 ]

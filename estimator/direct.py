@@ -1,9 +1,16 @@
-"""Calling compiled code from Python without the look at its arguments' types."""
+"""Calling compiled code from Python without the look at its arguments' types, and beside other threads."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from numba import typeof
+from numba import njit, typeof
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def released(function: F) -> F:
+    """Compile like ``compiled``; other threads run Python while a call from Python lasts."""
+    return cast(F, njit(cache=True, nogil=True)(function))
 
 
 def direct(function: Callable[..., Any], *arguments: object) -> Callable[..., Any]:

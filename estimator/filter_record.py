@@ -59,6 +59,9 @@ FILTER = np.dtype([
     ("scales", "f8", (6,)),  # inverse diagonal of a root
     ("W", "f8", (6, N)),
     ("innovation", "f8", (6,)),
+    # of the filter with a constant gain, facing along x: the gain, and the inverse covariance of the innovation
+    ("gain", "f8", (N, 6)),
+    ("information", "f8", (6, 6)),
 ])
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P
 

@@ -39,7 +39,10 @@ class UKFTuning:
         for f in fields(self):
             value = getattr(self, f.name)
             try:
-                array = np.asarray(value, dtype=np.float64)
+                array = np.asarray(value)
+                if array.dtype.kind not in "iuf":
+                    raise TypeError
+                array = array.astype(np.float64)
             except (TypeError, ValueError) as error:
                 raise InputError(f"UKFTuning: {f.name} must be a number or three, got {value!r}") from error
             if array.shape not in ((), (3,)) or not np.all(np.isfinite(array)) or np.any(array <= 0):

@@ -254,3 +254,50 @@ def test_an_undeclared_effect_changes_the_flight_and_a_vehicle_may_be_given():
     np.testing.assert_array_equal(fly(FanTrackingEnv(), 0, 5), plain)
     heavy = fly(FanTrackingEnv(effects=[EffectSetting("mass", {"dm": 0.03})]), 0, 5)
     assert heavy[-1, 2] < plain[-1, 2] - 0.15  # the filter reads the extra weight as a force down
+
+
+def test_the_constant_gain_flies_much_the_same():
+    full, constant = fly(FanTrackingEnv(), 7, 25), fly(FanTrackingEnv(estimator="constant-gain"), 7, 25)
+    assert not np.array_equal(full, constant)
+    np.testing.assert_allclose(constant[:, :3], full[:, :3], atol=0.02)  # N
+    np.testing.assert_allclose(constant[:, 3:6], full[:, 3:6], atol=0.003)  # Nm
+    np.testing.assert_allclose(constant[:, 9], full[:, 9], atol=0.005)  # m
+    with pytest.raises(InputError, match="Did you mean 'constant-gain'"):
+        FanTrackingEnv(estimator="constant")
+
+
+@pytest.mark.parametrize("what", ["plant", "filter"])
+def test_a_state_that_is_no_number_is_lost(what, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
+    env = FanTrackingEnv()
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    if what == "plant":
+        env.loop.data.qvel[0] = np.nan
+    else:
+        env.loop.state[16] = np.nan
+    observation, _, lost, _, info = env.step(np.zeros(1, np.float32))
+    assert lost
+    assert info["lost"]
+    assert observation in env.observation_space
+
+
+def test_what_is_there_to_be_drawn_does_not_change_the_flight():
+    np.testing.assert_array_equal(fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3))
+    assert FanTrackingEnv(render_mode="rgb_array").render_mode == "rgb_array"
+
+
+def test_a_fan_path_in_any_memory_order_is_followed():
+    env = FanTrackingEnv("static", fan_path=lambda t: np.stack([0.1 * np.sin(t), t], axis=1)[:, 0])
+    env.reset(seed=0)
+    _, _, _, _, info = env.step(np.zeros(1, np.float32))
+    assert info["fan_y"] == pytest.approx(0.1 * np.sin(0.075), abs=1e-9)
+
+
+def test_without_a_time_limit_it_flies_on_and_the_fan_stands_still_after_20_s():
+    env = FanTrackingEnv("static", fan_path=lambda t: 0.01 * t)
+    env.reset(seed=0)
+    seen = [env.step(np.zeros(1, np.float32))[4]["fan_y"] for _ in range(260)]
+    assert seen[248] == pytest.approx(0.01 * (249 * 0.08 - 0.005))
+    assert seen[-1] == pytest.approx(0.01 * 20.0)
+    assert len(set(seen[-5:])) == 1

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
+from windwrench.dynamics.errors import InputError
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.jet import Fan, fan_record, jet_table
 from windwrench.envs.plant import (
@@ -99,6 +100,11 @@ def test_a_free_spin_keeps_energy_and_angular_momentum():
     np.testing.assert_allclose(momentum[-1], inertia @ start, atol=0.03 * np.linalg.norm(inertia @ start))
     energy = np.einsum("ni,ij,nj->n", omega, inertia, omega)
     np.testing.assert_allclose(energy, start @ inertia @ start, rtol=0.03)
+
+
+def test_an_inertia_that_no_body_has_is_refused():
+    with pytest.raises(InputError, match="no body has the principal moments"):
+        load_world(replace(VEHICLE, inertia=np.diag([1e-3, 1e-3, 3e-3])))
 
 
 def test_the_motors_follow_their_commands_with_the_stated_lag():

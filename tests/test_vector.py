@@ -43,6 +43,95 @@ def test_an_episode_that_ends_starts_anew_at_the_next_step():
             assert (infos["time"] == 0).all()
 
 
+def rows(envs, seed, count, max_steps=None):
+    """Everything that the first steps return, as one array (count, n, .)."""
+    rng, out = np.random.default_rng(seed), []
+    frames, infos = envs.reset(seed=seed)
+    for _ in range(count):
+        frames, rewards, lost, over, infos = envs.step(rng.uniform(-1, 1, (envs.num_envs, 1)).astype(np.float32))
+        numbers = [infos[name] for name in NUMBERS]
+        out.append(np.column_stack([frames, rewards, lost, over, *numbers, infos["force"], infos["torque"]]))
+    return np.array(out)
+
+
+NUMBERS = ("reward_tracking", "reward_change", "fan_y", "fan_velocity", "y", "offset", "time", "lost")
+
+
+@pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_give_the_same_bits(estimator, threads):
+    given = {"scenario": "varied", "estimator": estimator, "max_episode_steps": 7}
+    alone, spread = make(5, **given), make(5, threads=threads, **given)
+    np.testing.assert_array_equal(rows(alone, 3, 20), rows(spread, 3, 20))
+    spread.close()
+
+
+def test_an_episode_after_another_is_that_of_the_single_environment():
+    envs, single = make(2, max_episode_steps=5), gym.make(NAME, max_episode_steps=5)
+    envs.reset(seed=1)
+    single.reset(seed=2)
+    ended = False
+    for k in range(18):
+        action = np.array([0.1 * (k % 7) - 0.3], np.float32)
+        frames, rewards, lost, over, infos = envs.step(np.stack([action, action]))
+        if ended:
+            frame, info = single.reset()
+            reward, terminated, truncated = 0.0, False, False
+        else:
+            frame, reward, terminated, truncated, info = single.step(action)
+        np.testing.assert_array_equal(frames[1], frame)
+        assert (rewards[1], lost[1], over[1]) == (reward, terminated, truncated)
+        assert {key for key in infos if not key.startswith("_")} == set(info)
+        for key, value in info.items():
+            np.testing.assert_array_equal(infos[key][1], value)
+            assert infos[f"_{key}"].all()
+        ended = terminated or truncated
+
+
+def test_a_lost_vehicle_starts_anew_and_the_others_fly_on():
+    envs = make(2, scenario="static", max_episode_steps=1000)
+    _, infos = envs.reset(seed=0)
+    away = np.array([[np.sign(infos["offset"][0])], [0.0]], np.float32)
+    lost = np.zeros(2, bool)
+    while not lost.any():
+        _, _, lost, _, infos = envs.step(away)
+        assert infos["time"][0] < 6.0
+    assert lost.tolist() == [True, False]
+    then = infos["time"][1]
+    _, rewards, lost, _, infos = envs.step(away)
+    assert not lost.any()
+    assert rewards[0] == 0.0
+    assert infos["time"].tolist() == [0.0, pytest.approx(then + 0.08)]
+
+
+def test_seeds_may_be_listed_and_a_part_reset():
+    envs = make(3)
+    frames, _ = envs.reset(seed=[7, 5, 7])
+    np.testing.assert_array_equal(frames[0], frames[2])
+    assert not np.array_equal(frames[0], frames[1])
+    for _ in range(2):
+        envs.step(np.zeros((3, 1), np.float32))
+    again, infos = envs.reset(seed=[7, None, None], options={"reset_mask": np.array([True, False, False])})
+    np.testing.assert_array_equal(again[0], frames[0])
+    assert infos["time"].tolist() == [0.0, pytest.approx(0.16), pytest.approx(0.16)]
+    with pytest.raises(InputError, match="3 seeds"):
+        envs.reset(seed=[1, 2])
+
+
+@pytest.mark.parametrize("actions", [np.zeros(3), np.zeros((2, 1)), np.full((3, 1), np.nan)])
+def test_bad_actions_are_named_and_nothing_flies(actions):
+    envs = make(3)
+    envs.reset(seed=0)
+    with pytest.raises(InputError, match=r"shape \(3, 1\)"):
+        envs.step(actions)
+    assert (envs.step(np.zeros((3, 1)))[4]["time"] == 0.08).all()
+
+
+def test_threads_must_be_positive():
+    with pytest.raises(InputError, match="threads"):
+        make(2, threads=0)
+
+
 @pytest.mark.parametrize("count", [0, -1])
 def test_too_few_are_refused(count):
     with pytest.raises(InputError, match="num_envs"):

@@ -1,0 +1,168 @@
+"""The wrench filter with the gain that it converges to: less than a tenth of the work, for training and for many vehicles.
+
+A Kalman filter in steady flight soon always does the same with a measurement. Here that is worked out once, from
+``WrenchUKF`` at hover: the mean is carried by the same functions (2)-(5), (11)-(14), the covariance not at all. The gain
+knows world axes and body axes; a vehicle that is yawed sees the same problem turned about the vertical, so the innovation
+is turned into the vehicle's heading and the correction back out of it.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..dynamics.compiled import Record, compiled
+from ..dynamics.errors import InputError
+from ..dynamics.rotation import attitude_error
+from ..dynamics.vehicle import Vehicle
+from .direct import released
+from .error_state import fold
+from .estimate import NIS, Array, WrenchEstimate
+from .filter_record import FILTER, N, drive, propagate
+from .sample import check_sample, undo_sensing
+from .tuning import UKFTuning
+from .ukf import WrenchUKF
+from .ukf import step as ukf_step
+
+_MEASURED = [0, 1, 2, 6, 7, 8]  # rows of (rho, x) in the error state
+_LONGEST = 60  # s of hover in which the gain must have converged
+_CONVERGED = 1e-9  # relative change of the covariance in a second
+_HEIGHT = 1.2  # m, of that hover
+
+
+@compiled
+def _turn(values: Array, cosine: float, sine: float) -> None:
+    """Turn the horizontal part of each three of ``values`` about the vertical, in place."""
+    for i in range(0, len(values), 3):
+        a, b = values[i], values[i + 1]
+        values[i], values[i + 1] = cosine * a - sine * b, sine * a + cosine * b
+
+
+@compiled
+def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
+    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of the covariance's."""
+    usable: int = check_sample(f, z, parts)
+    if usable < 0:
+        return usable
+    sample = undo_sensing(f, z, usable, dt)
+    x, centre, y = f.x, f.centre, f.innovation
+    for i in range(NIS):
+        centre[i] = x[i]
+    if dt > 0.0:
+        drive(f, sample[0:4], dt, voltage)
+        propagate(f, x, dt, centre)
+        f.time += dt
+    for i in range(6):
+        y[i] = 0.0
+    if usable & 2 != 0:
+        attitude_error(sample[7:11], centre[3:7], y[0:3])
+    if usable & 1 != 0:
+        for i in range(3):
+            y[3 + i] = sample[4 + i] - centre[i]
+    # the heading as cosine and sine; straight up or down there is none, and none is needed
+    across, along = centre[3] * centre[6] + centre[4] * centre[5], 0.5 - centre[5] * centre[5] - centre[6] * centre[6]
+    length = math.sqrt(across * across + along * along)
+    cosine, sine = (along / length, across / length) if length > 1e-6 else (1.0, 0.0)
+    _turn(y, cosine, -sine)
+    mean = f.mean
+    for i in range(N):
+        total = 0.0
+        for j in range(6):
+            total += f.gain[i, j] * y[j]
+        mean[i] = total
+    x[NIS] = math.nan
+    if usable == 3:
+        x[NIS] = 0.0
+        for i in range(6):
+            for j in range(6):
+                x[NIS] += y[i] * f.information[i, j] * y[j]
+    _turn(mean[0:3], cosine, sine)  # the rate, next, is in body axes
+    _turn(mean[6:N], cosine, sine)
+    fold(f, centre, mean)
+    return usable
+
+
+@compiled
+def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
+    f = record[0]
+    return step(f, f.z, parts, dt, voltage)
+
+
+class ConstantGainFilter(WrenchUKF):
+    """The wrench filter with a constant gain; ``reset`` and ``step`` are those of ``WrenchUKF``.
+
+    It starts with the gain of a filter that has long converged: a first guess of pose or wrench that is far off takes the
+    rise time to correct. A measurement, or a part of it, that was not made is coasted over: the state moves on by the
+    model, and what is measured again is believed no more than before. The covariance is that of the converged ``WrenchUKF``
+    at hover, facing along x. Where noise differs between x and y, the gain is exact at that heading only.
+
+    Args:
+        vehicle: the declared vehicle, with its declared effects.
+        tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
+        period: time between steps, s.
+
+    Raises:
+        InputError: the period is out of range, or the filter does not converge at hover.
+    """
+
+    _compiled_step = staticmethod(_step_record)
+
+    def __init__(self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005) -> None:
+        super().__init__(vehicle, tuning, period)
+        super().reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
+        self._converged = _converged_covariance(self.record.tobytes(), vehicle.voltage_ref)
+        f = self.record[0]
+        inverse = 1.0 / f["noise"]
+        # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R - H P H') within / R
+        f["gain"] = self._converged[:, _MEASURED] * inverse
+        left = np.diag(f["noise"]) - self._converged[np.ix_(_MEASURED, _MEASURED)]
+        f["information"] = inverse[:, None] * left * inverse
+        f["P"] = self._converged
+
+    def reset(
+        self,
+        position: ArrayLike,
+        quaternion: ArrayLike,
+        covariance: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Start at a pose, without an external wrench; a ``covariance`` is checked and makes no difference."""
+        super().reset(position, quaternion, covariance, velocity, angular_velocity)
+        self.record[0]["P"] = self._converged
+
+    def correct_imu(self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None) -> WrenchEstimate:
+        """Refuse: there is a gain for pose alone.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError("ConstantGainFilter: correct_imu needs a covariance; use WrenchUKF")
+
+
+@released
+def _hover(record: np.ndarray, z: Array, steps: int, voltage: float) -> None:
+    f = record[0]
+    for _ in range(steps):
+        ukf_step(f, z, 3, f.period, voltage)
+
+
+@lru_cache(maxsize=32)
+def _converged_covariance(start: bytes, voltage: float) -> Array:
+    """Return the covariance (18, 18) after a correction that ``WrenchUKF``, its record given at hover, comes to.
+
+    Raises:
+        InputError: it comes to none.
+    """
+    record = np.frombuffer(start, dtype=FILTER).copy()
+    f = record[0]
+    z = np.concatenate([f["last_speeds"], f["x"][:7]])
+    second = max(1, round(1.0 / float(f["period"])))
+    for _ in range(_LONGEST):
+        before = f["P"].copy()
+        _hover(record, z, second, voltage)
+        scale = np.sqrt(np.diag(f["P"]))
+        if np.all(np.abs(f["P"] - before) <= _CONVERGED * np.outer(scale, scale)):
+            return np.array(f["P"])
+    raise InputError(f"ConstantGainFilter: the gain does not converge within {_LONGEST} s of hover; use WrenchUKF")

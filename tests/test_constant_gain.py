@@ -1,0 +1,134 @@
+"""The filter with a constant gain against the full one."""
+
+import numpy as np
+import pytest
+from flights import PERIOD, yawing_flight
+
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.envs import Fan
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.plant import NOISE
+from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
+
+VEHICLE = load_vehicle("ardrone2")
+ALL = ("position", "velocity", "angular_velocity", "force", "torque")
+# standard deviations of the converged filter: m, m/s, rad/s, N, Nm
+DEVIATION = {"position": 4.2e-4, "velocity": 0.011, "angular_velocity": 0.13, "force": 0.033, "torque": 3.2e-3}
+
+
+def largest_differences(a, b):
+    return {name: max(np.abs(getattr(x, name) - getattr(y, name)).max() for x, y in zip(a, b, strict=True)) for name in ALL}
+
+
+def assert_close(a, b, share):
+    """No difference exceeds a share of its standard deviation, or ten times that of the rate's: tilt turns the inertia."""
+    for name, difference in largest_differences(a, b).items():
+        assert difference < share * DEVIATION[name] * (10 if name == "angular_velocity" else 1), name
+
+
+def both(vehicle, flight, settled, missing=(), **start):
+    """The estimates of the full filter and of this one along a flight, once both have settled."""
+    filters = WrenchUKF(vehicle), ConstantGainFilter(vehicle)
+    estimates = [], []
+    for f, out in zip(filters, estimates, strict=True):
+        f.reset(flight["position"][0], flight["quaternion"][0], **start)
+        for k in range(1, len(flight["rotors"])):
+            pose = (None, None) if k in missing else (flight["position"][k], flight["quaternion"][k])
+            out.append(f.step(flight["rotors"][k], *pose))
+    return [out[settled:] for out in estimates]
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """A flight that starts yawed by 120 degrees, turns at 1.5 to 4.5 rad/s and translates."""
+    return yawing_flight(VEHICLE, 2400, seed=6, torque=(0.01, -0.015, 0.02))
+
+
+def twist(flight):
+    return {"velocity": flight["velocity"][0], "angular_velocity": flight["omega"][0]}
+
+
+def test_it_follows_the_full_filter_through_a_yawing_flight(turning):
+    full, constant = both(VEHICLE, turning, 1500, **twist(turning))
+    assert_close(full, constant, 0.1)
+    assert np.mean([e.nis for e in constant]) == pytest.approx(6.0, abs=1.0)
+
+
+@pytest.mark.parametrize("yaw", [0.0, np.radians(120.0), np.pi])
+def test_it_follows_the_full_filter_in_the_gusts_of_a_jet(yaw):
+    loop = ClosedLoop(VEHICLE, fan=Fan())
+    rng = np.random.default_rng(3)
+    loop.reset(rng, np.array([2.3, 0.3, 1.2]), yaw)
+    filters, estimates = (WrenchUKF(VEHICLE), ConstantGainFilter(VEHICLE)), ([], [])
+    for f in filters:
+        f.reset(loop.sample[4:7].copy(), loop.sample[7:11].copy())
+    for _ in range(1600):
+        speeds = loop.sample[:4].copy()
+        loop.run(rng.standard_normal((1, NOISE)))
+        for f, out in zip(filters, estimates, strict=True):
+            out.append(f.step(speeds, loop.sample[4:7], loop.sample[7:11]))
+    assert np.abs(estimates[0][-1].force[0]) > 0.2
+    assert_close(*(out[1200:] for out in estimates), 0.5)
+
+
+def test_what_was_not_measured_is_coasted_over(turning):
+    missing = set(range(600, 700))  # half a second
+    full, constant = both(VEHICLE, turning, 1800, missing, **twist(turning))
+    assert_close(full, constant, 0.1)
+    during = both(VEHICLE, {name: values[:700] for name, values in turning.items()}, 640, missing, **twist(turning))[1]
+    assert all(np.isnan(e.nis) for e in during)
+    np.testing.assert_array_equal(during[0].force, during[-1].force)
+    assert np.linalg.norm(during[-1].position - during[0].position) > 0.01
+
+
+def test_a_part_of_a_pose_is_taken_in(turning):
+    f, base = ConstantGainFilter(VEHICLE), None
+    for parts in ((True, True), (True, False), (False, True), (False, False)):
+        f.reset(turning["position"][0], turning["quaternion"][0])
+        pose = [turning[name][5] if given else None for name, given in zip(("position", "quaternion"), parts, strict=True)]
+        e = f.step(turning["rotors"][1], *pose)
+        assert np.isfinite(e.state[:19]).all()
+        assert np.isfinite(e.nis) == all(parts)
+        base = e if base is None else base
+        assert (e is base) or not np.array_equal(e.state, base.state)
+
+
+def test_it_knows_the_declared_effects():
+    vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
+    flight = yawing_flight(VEHICLE, 2000, seed=2)
+    full, constant = both(vehicle, flight, 1500, **twist(flight))
+    plain = both(VEHICLE, flight, 1500, **twist(flight))[1]
+    difference = largest_differences(full, constant)
+    assert difference["force"] < 0.01
+    assert difference["torque"] < 0.001
+    assert largest_differences(full, plain)["force"] > 0.1
+
+
+def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
+    tuning = UKFTuning(
+        motor_torque_noise=(0.02, 0.03, 0.04), torque_walk=(2e-4, 3e-4, 4e-4), thrust_noise=(0.2, 0.3, 0.4),
+        force_walk=(2e-3, 3e-3, 4e-3), position_noise=(0.001, 0.002, 0.003), attitude_noise=(0.003, 0.005, 0.008))
+    full, constant = WrenchUKF(VEHICLE, tuning, PERIOD), ConstantGainFilter(VEHICLE, tuning, PERIOD)
+    rng, out = np.random.default_rng(0), ([], [])
+    for f in (full, constant):
+        f.reset([0, 0, 1], [1, 0, 0, 0])
+    W = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, [0.0, 0.0, 0.0])
+    for _ in range(3000):
+        x, q = [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal(3), np.append(1.0, 0.0025 * rng.standard_normal(3))
+        for f, kept in ((full, out[0]), (constant, out[1])):
+            kept.append(f.step(W, x, q / np.linalg.norm(q)))
+    assert_close(out[0][2500:], out[1][2500:], 0.1)
+    np.testing.assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
+
+
+def test_bad_input_is_named_and_changes_nothing():
+    f = ConstantGainFilter(VEHICLE)
+    f.reset([0, 0, 1], [1, 0, 0, 0])
+    before = f.estimate.state
+    with pytest.raises(InputError, match="length 1"):
+        f.step([400.0] * 4, [0, 0, 1], [2, 0, 0, 0])
+    np.testing.assert_array_equal(f.estimate.state, before)
+    with pytest.raises(InputError, match="period"):
+        ConstantGainFilter(VEHICLE, period=0.0)
+    with pytest.raises(InputError, match="correct_imu"):
+        f.correct_imu(gyro=[0, 0, 0])

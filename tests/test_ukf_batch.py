@@ -1,0 +1,109 @@
+"""A batch of filters is as many single ones."""
+
+import numpy as np
+import pytest
+from flights import PERIOD, yawing_flight
+
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
+
+VEHICLE = load_vehicle("ardrone2")
+COUNT, STEPS = 5, 150
+NAMES = ("rotors", "position", "quaternion")
+
+
+def with_effects(strength):
+    """A vehicle whose effects remember: the motors' lag, and drag, which keeps its own turn rates."""
+    return VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": strength, "kdy": strength}),
+                                EffectSetting("motor_lag", {"tau": 0.04}))
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """Turn rates, positions and quaternions of five flights (STEPS, COUNT, .), with poses and turn rates missing."""
+    flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
+    rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
+    rng = np.random.default_rng(0)
+    rotors[1:][rng.random((STEPS - 1, COUNT)) < 0.02] = np.nan
+    position[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
+    quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
+    position[40:60, 2] = quaternion[40:60, 2] = np.nan
+    position[70, 1] += 0.5  # an outlier
+    return rotors, position, quaternion
+
+
+@pytest.mark.parametrize(("vehicles", "gate"), [
+    (VEHICLE, None), (VEHICLE, 0.999), (with_effects(1e-4), None),
+    ([VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)], None),
+], ids=["one vehicle", "gated", "effects", "one each"])
+def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
+    batch = WrenchUKFBatch(vehicles, COUNT, gate=gate)
+    each = vehicles if isinstance(vehicles, list) else [vehicles] * COUNT
+    singles = [WrenchUKF(vehicle, gate=gate) for vehicle in each]
+    rotors, position, quaternion = samples
+    batch.reset(position[0], quaternion[0])
+    for n, ukf in enumerate(singles):
+        ukf.reset(position[0, n], quaternion[0, n])
+    for k in range(1, STEPS):
+        together = batch.step(rotors[k], position[k], quaternion[k])
+        for n, ukf in enumerate(singles):
+            np.testing.assert_array_equal(together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state)
+    np.testing.assert_array_equal(batch.covariance, [ukf.covariance for ukf in singles])
+    last = singles[-1].estimate
+    for name in ("position", "quaternion", "velocity", "angular_velocity", "torque", "force", "nis"):
+        np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
+
+
+def test_it_starts_from_what_is_given_for_each_or_for_all():
+    batch = WrenchUKFBatch(VEHICLE, 2, UKFTuning(), PERIOD)
+    P = np.stack([1e-4 * np.eye(18), 4e-4 * np.eye(18)])
+    batch.reset([[0, 0, 1], [0, 0, 2]], [1, 0, 0, 0], P, velocity=[1, 0, 0], angular_velocity=[[0, 0, 1], [0, 0, 2]])
+    for n in range(2):
+        ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
+        ukf.reset([0, 0, n + 1], [1, 0, 0, 0], P[n], [1, 0, 0], [0, 0, n + 1])
+        np.testing.assert_array_equal(batch.estimate.state[n], ukf.estimate.state)
+        np.testing.assert_array_equal(batch.covariance[n], ukf.covariance)
+
+
+def test_without_a_pose_it_predicts_and_an_estimate_stays_what_it_was():
+    batch, ukf = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
+    batch.reset([0, 0, 1], [1, 0, 0, 0])
+    ukf.reset([0, 0, 1], [1, 0, 0, 0])
+    speeds = np.full(4, 1.05 * VEHICLE.hover_rate)
+    first = batch.step(np.tile(speeds, (3, 1)))
+    kept = first.state.copy()
+    batch.step(np.tile(speeds, (3, 1)))
+    np.testing.assert_array_equal(first.state, kept)
+    np.testing.assert_array_equal(kept[1], ukf.step(speeds).state)
+    assert len(batch) == 3
+    assert np.isnan(first.nis).all()
+
+
+SPEEDS, POSITION, QUATERNION = np.full((2, 4), 400.0), np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1))
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds must be \(2, 4\)"),
+    ((SPEEDS, POSITION[:, :2], QUATERNION), r"position must be \(2, 3\)"),
+    ((SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
+    ((SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
+])
+def test_bad_measurements_are_named_and_change_nothing(arguments, words):
+    batch = WrenchUKFBatch(VEHICLE, 2)
+    batch.reset([0, 0, 1], [1, 0, 0, 0])
+    before, P = batch.estimate.state, batch.covariance
+    with pytest.raises(InputError, match=words):
+        batch.step(*arguments)
+    np.testing.assert_array_equal(batch.estimate.state, before)
+    np.testing.assert_array_equal(batch.covariance, P)
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
+    (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
+    (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
+    (lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]), r"length 1, got 3 \(filter 1\)"),
+])
+def test_bad_settings_are_named(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
