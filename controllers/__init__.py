@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..dynamics.errors import unknown_name
 from .admittance import Admittance, Ratio
 from .bounds import Hover, Oracle
+from .tuned import tuned_controllers
 
 __all__ = ["CONTROLLERS", "Admittance", "Controller", "Hover", "Oracle", "Ratio", "make_controller"]
 
@@ -29,6 +30,7 @@ class Controller(Protocol):
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "hover": Hover, "admittance": Admittance, "ratio": Ratio, "oracle": Oracle,
+    **tuned_controllers({"admittance": Admittance, "ratio": Ratio}),
 }
 
 

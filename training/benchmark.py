@@ -4,19 +4,20 @@ import json
 import math
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from ..controllers import make_controller
+from ..controllers import Controller, make_controller
 from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
+from ..dynamics.workers import workers
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.scenarios import get_scenario
 from .evaluate import Episode, benchmark_seeds, fly_episode
+from .policy import TrainedPolicy, is_policy_path, load_policy
+from .worlds import make_world
 
 _CHUNK = 5  # episodes that a worker flies at a time
 _REFERENCES = ("hover", "admittance", "oracle")  # what scores and wins are relative to
@@ -41,6 +42,22 @@ class Row:
     wins_over_admittance: float  # share of the paired episodes with a smaller RMSE
 
 
+def make_pilot(name: str) -> Controller:
+    """Return a new controller by its name, or the trained policy in the file that ``name`` is the path of.
+
+    Raises:
+        InputError: no controller has this name, or the file is no trained policy.
+    """
+    return load_policy(name) if is_policy_path(name) else make_controller(name)
+
+
+def world_for(scenario: str, sources: frozenset[str]) -> FanTrackingEnv:
+    """Return a scenario's environment, with what a policy must find in its ``info``."""
+    world = make_world(scenario, sources=sources)
+    assert isinstance(world, FanTrackingEnv)
+    return world
+
+
 def check_request(controllers: Sequence[str], scenarios: Sequence[str], episodes: int, seed: int) -> None:
     """Check what ``fly_all`` is asked for, before anything is flown.
 
@@ -52,7 +69,7 @@ def check_request(controllers: Sequence[str], scenarios: Sequence[str], episodes
     if not 0 <= seed < 100_000:
         raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
     for name in controllers:
-        make_controller(name)
+        make_pilot(name)
     for name in scenarios:
         get_scenario(name)
 
@@ -64,16 +81,18 @@ def fly_all(
     seed: int,
     jobs: int | None = None,
     advance: Callable[[int], None] = lambda count: None,
+    cluster: str | None = None,
 ) -> Results:
     """Fly every controller, and the references, through every scenario on the same seeds.
 
     Args:
-        controllers: names.
+        controllers: names, or paths of trained policies.
         scenarios: names.
         episodes: a scenario.
         seed: of the benchmark.
         jobs: processes; default: one a core. The results do not depend on it.
         advance: called with the number of episodes flown since the last call.
+        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this machine; default: none.
 
     Raises:
         InputError: as ``check_request``.
@@ -90,11 +109,16 @@ def fly_all(
         results[task[0], task[1]].extend(flown)
         advance(len(flown))
 
-    if jobs == 1:
+    if cluster is not None:
+        from .cluster import spread
+
+        for task, flown in zip(tasks, spread(_fly_chunk, tasks, cluster), strict=True):
+            take(task, flown)
+    elif jobs == 1:
         for task in tasks:
             take(task, _fly_chunk(task))
     else:
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        with workers(jobs) as pool:
             for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
                 take(task, flown)
     return results
@@ -107,7 +131,8 @@ def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes
 
 def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
     name, scenario, seeds = task
-    env, controller = FanTrackingEnv(scenario), make_controller(name)
+    controller = make_pilot(name)
+    env = world_for(scenario, controller.features.sources if isinstance(controller, TrainedPolicy) else frozenset())
     return [fly_episode(env, controller, seed) for seed in seeds]
 
 

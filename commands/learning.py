@@ -1,0 +1,253 @@
+"""Learning: policies trained, tuned, and compared with the laws that were designed."""
+
+import os
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich import box
+from rich.table import Table
+
+from .running import expensive
+from .terminal import Out, console, names_in, offering, progress_bar, results_folder, say, share_bars
+
+
+def algorithm_names() -> list[str]:
+    """Return the algorithms that ``train`` knows."""
+    return ["sac", "ppo", "recurrent-ppo", "td3"]
+
+
+def world_names() -> list[str]:
+    """Return what can be trained in."""
+    from ..envs.scenarios import SCENARIOS
+    from ..training.worlds import TIERS
+
+    return [*SCENARIOS, *TIERS]
+
+
+Scenario = Annotated[str, typer.Option("--scenario", help="A scenario, or the tier wide, which mixes them all.",
+                                       autocompletion=offering(world_names))]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the training run.")]
+Steps = Annotated[int | None, typer.Option("--steps", min=1, help="Decisions to fly; default: the configuration's.")]
+Settings = Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE of the configuration, such as "
+                                                                  "learner.gamma=0.98; may be repeated.")]
+ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML file of keys in place of the configuration's own.")]
+
+
+@expensive
+def train(
+    algorithm: Annotated[str, typer.Argument(help="sac, ppo, recurrent-ppo or td3.",
+                                             autocompletion=offering(algorithm_names))],
+    scenario: Scenario = "base",
+    seed: Seed = 0,
+    steps: Steps = None,
+    setting: Settings = None,
+    config: ConfigFile = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs, with this many seeds from --seed on, each in a folder of its own.")
+                     ] = 1,
+    search: Annotated[list[str] | None, typer.Option(help="KEY=VALUE|VALUE|...: a run for each; may be repeated.")] = None,
+    cluster: Annotated[str | None, typer.Option(help="Spread the runs over a Ray cluster: its address, or local.")] = None,
+    out: Out = Path("results/train"),
+) -> dict[str, Any]:
+    """Train a policy; a run that was killed goes on where its last checkpoint is.
+
+    Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
+    """
+    from ..dynamics.errors import unknown_name
+    from ..training.extras import need
+
+    if algorithm not in algorithm_names():
+        raise unknown_name("algorithm", algorithm, algorithm_names())
+    need("stable_baselines3", "rl")
+    if algorithm == "recurrent-ppo":
+        need("sb3_contrib", "rl")
+    if seeds > 1 or search or cluster:
+        return _sweep(algorithm, scenario, range(seed, seed + seeds), steps, setting, search or [], config, cluster, out)
+    from ..training.train import train as work
+
+    return _learn(work, algorithm, scenario, seed, steps, setting, config, out)
+
+
+def _sweep(algorithm: str, scenario: str, seeds: range, steps: int | None, setting: list[str] | None, search: list[str],
+           config: Path | None, cluster: str | None, out: Path) -> dict[str, Any]:
+    from ..training.cluster import jobs_of, run_job, run_jobs
+    from ..training.extras import need
+    from ..training.worlds import check_world
+
+    check_world(scenario)
+    if cluster:
+        need("ray", "cluster")
+    overrides = [*(setting or []), *([f"steps={steps}"] if steps else [])]
+    jobs = jobs_of(algorithm, scenario, seeds, overrides, search, config)
+    folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
+    with progress_bar() as progress:
+        task = progress.add_task(f"{algorithm}, {scenario}", total=None if cluster else len(jobs))
+        if cluster:
+            found = run_jobs(jobs, folder, cluster)
+        else:
+            found = []
+            for job in jobs:
+                found.append(run_job(job, folder))
+                progress.advance(task)
+    table = Table("run", "validation RMSE (m)", "minutes", box=box.SIMPLE_HEAD)
+    for one in sorted(found, key=lambda r: float(r["validation_rmse_m"])):
+        table.add_row(one["run"], f"{one['validation_rmse_m']:.3f}", f"{one['seconds'] / 60:.1f}")
+    console.print(table)
+    say(*(Path(one["policy"]) for one in found))
+    return {"runs": found}
+
+
+@expensive
+def imitate(
+    scenario: Scenario = "base",
+    seed: Seed = 0,
+    steps: Steps = None,
+    setting: Settings = None,
+    config: ConfigFile = None,
+    out: Out = Path("results/imitate"),
+) -> dict[str, Any]:
+    """Learn what the oracle commands from what a policy may see (DAgger): the bound on this observation.
+
+    Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
+    """
+    from ..training.extras import need
+
+    need("torch", "rl")
+    from ..training.imitate import imitate as work
+
+    return _learn(work, "imitation", scenario, seed, steps, setting, config, out)
+
+
+def _learn(work: Callable[..., Path], algorithm: str, scenario: str, seed: int, steps: int | None,
+           setting: list[str] | None, config: Path | None, out: Path) -> dict[str, Any]:
+    from ..training.configuration import load_config
+    from ..training.train import Progress, read_progress
+    from ..training.worlds import check_world
+
+    check_world(scenario)
+    given = load_config(algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config)
+    folder = results_folder(out, algorithm=algorithm, scenario=scenario, seed=seed, config=given)
+    with progress_bar() as progress:
+        task = progress.add_task(f"{algorithm}, {scenario}", total=given["steps"])
+
+        def report(now: Progress) -> None:
+            progress.update(task, description=f"{algorithm}, {scenario}: validation RMSE {now.rmse_m[-1]:.3f} m")
+            console.print(f"{now.steps[-1]:8d} decisions: validation RMSE {now.rmse_m[-1]:.3f} m, {now.lost[-1]} lost",
+                          highlight=False)
+
+        path = work(given, scenario, seed, folder, lambda done: progress.update(task, completed=done), report)
+    done = read_progress(folder)
+    assert done is not None
+    console.print(f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s", highlight=False)
+    say(path, path.with_suffix(".json"), folder / "last.npz", folder / "progress.json")
+    return {"policy": str(path), "validation_rmse_m": done.best_rmse, "seconds": done.seconds, "progress": done}
+
+
+def law_names() -> list[str]:
+    """Return the laws that have gains to tune."""
+    return ["admittance", "ratio"]
+
+
+@expensive
+def tune(
+    law: Annotated[str, typer.Argument(help="admittance or ratio.", autocompletion=offering(law_names))],
+    scenario: Scenario = "base",
+    trials: Annotated[int, typer.Option(min=1, help="Gains to try.")] = 30,
+    episodes: Annotated[int, typer.Option(min=1, help="Validation episodes of each.")] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
+    out: Out = Path("results/tune"),
+) -> dict[str, Any]:
+    """Search the gains of a hand-designed law on validation episodes; add them to tuned.yaml in the folder.
+
+    Example: windwrench tune admittance --scenario fast --trials 30 --episodes 60
+    """
+    from ..training.extras import need
+    from ..training.seeds import validation_seeds
+    from ..training.worlds import check_world
+
+    need("optuna", "rl")
+    from ..training.tune import check_law, keep_gains
+    from ..training.tune import tune as search
+
+    check_law(law)
+    check_world(scenario)
+    validation_seeds(episodes)
+    folder = results_folder(out, law=law, scenario=scenario, trials=trials, episodes=episodes)
+    with progress_bar() as progress:
+        task = progress.add_task(f"{law}, {scenario}", total=trials)
+        found = search(law, scenario, trials, episodes, seed, lambda done: progress.update(task, completed=done))
+    keep_gains(found, folder / "tuned.yaml", shlex.join(["windwrench", *sys.argv[1:]]))
+    gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
+    console.print(f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation episodes "
+                  f"(as it comes: {found['default_rmse_m']:.3f} m)", highlight=False)
+    say(folder / "tuned.yaml")
+    return found
+
+
+@expensive
+def leaderboard(
+    train: Annotated[bool, typer.Option("--train", help="Train and score what is missing, not only write the page.")] = False,
+    only: Annotated[str, typer.Option(help="Parts of the study, with commas: designed, learned, ablation, or names of lines.")
+                    ] = "",
+    plan: Annotated[Path | None, typer.Option(help="A plan like training/configs/study.yaml, in its place.")] = None,
+    results: Annotated[Path, typer.Option(help="Folder of the result files, one for each line and seed.")] = Path(
+        "docs/results/learning"),
+    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path("training/policies"),
+    markdown: Annotated[Path | None, typer.Option(help="The page; its pictures go to a folder of its name beside it.")] = Path(
+        "docs/leaderboard.md"),
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")] = Path(
+        "results/leaderboard"),
+) -> dict[str, Any]:
+    """Write the page of the leaderboard from its result files; with --train, first do what is missing of the study.
+
+    What a run has finished, the next does not repeat; a training run that was stopped goes on where it was.
+
+    Example: windwrench leaderboard --train --only sac,sac-wide
+    """
+    from ..training.study import Places, entries_of, is_done, load_plan, read_results, run_study
+
+    study = load_plan(plan)
+    wanted = entries_of(study, names_in(only, "--only") if only else ())
+    places = Places(out, results, policies)
+    missing = [e.file for e in wanted if not is_done(e, study, places)]
+    folder = results_folder(out, lines=len(wanted), missing=missing if train else "left alone (no --train)")
+    for one in (places.results, places.policies):
+        results_folder(one)
+    results_folder(folder)
+    if train:
+        from ..training.extras import need
+
+        need("stable_baselines3", "rl")
+        need("sb3_contrib", "rl")
+        with share_bars() as bars:
+            total = bars.add_task("all", total=max(len(missing), 1))
+            tasks: dict[str, Any] = {}
+
+            def report(shares: dict[str, tuple[str, float]], done: int) -> None:
+                bars.update(total, completed=done)
+                for name in [n for n in tasks if n not in shares]:
+                    bars.remove_task(tasks.pop(name))
+                for name, (text, share) in shares.items():
+                    if name not in tasks:
+                        tasks[name] = bars.add_task(text, total=1.0)
+                    bars.update(tasks[name], completed=share, description=text)
+
+            run_study(wanted, study, places, jobs or os.cpu_count() or 1, report)
+    found = read_results(places)
+    if markdown is None:
+        return {"lines": len(found), "missing": missing}
+    from ..training.leaderboard_page import rows_of, write_page
+
+    written = write_page(found, study, places, markdown)
+    table = Table("world", "controller", "RMSE (m)", "95 %", "lost", "against the best admittance", box=box.SIMPLE_HEAD)
+    for row in rows_of(found, study):
+        if row.world in ("base", "fast"):
+            table.add_row(row.world, row.name, f"{row.rmse_m:.3f}", f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
+                          f"{row.lost_fraction:.1%}", f"{row.change:+.0%}")
+    console.print(table)
+    say(*written)
+    return {"lines": len(found), "missing": [e.file for e in wanted if not is_done(e, study, places)]}

@@ -1,0 +1,118 @@
+"""Trained policies as files: what they hold, how they fly, and what is refused."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import InputError
+from windwrench.envs.fan_tracking import FanTrackingEnv
+from windwrench.training.benchmark import fly_all, leaderboard
+from windwrench.training.evaluate import fly_episode
+from windwrench.training.policy import TrainedPolicy, load_policy, lstm, save_policy
+
+CARD = {"algorithm": "test", "features": {"frame": ["torque_z"], "history": 1, "scale": [0.03]}, "repeat": 1,
+        "activation": "relu", "squash": False}
+
+
+def follower(gain=18.0):
+    """The admittance law as a policy: one linear layer on the scaled torque."""
+    return {"weight0": np.array([[-gain * 0.03]], dtype=np.float32), "bias0": np.zeros(1, dtype=np.float32)}
+
+
+def test_a_linear_policy_is_the_admittance_law(tmp_path):
+    path = save_policy(CARD, follower(), tmp_path / "law.npz")
+    results = fly_all([str(path), "admittance"], ["base"], 3, seed=0, jobs=1)
+    rows = {row.controller: row for row in leaderboard(results, [str(path), "admittance"], 0)}
+    assert rows[str(path)].rmse_m == pytest.approx(rows["admittance"].rmse_m, rel=1e-4)
+    assert rows["admittance"].rmse_m < 0.3
+
+
+def test_what_is_written_is_what_is_read(tmp_path):
+    path = save_policy(CARD, follower(), tmp_path / "a.npz")
+    again = save_policy(CARD, follower(), tmp_path / "b.npz")
+    assert path.read_bytes() == again.read_bytes()
+    for name in ("a.npz", "a.json"):
+        policy = load_policy(tmp_path / name)
+        np.testing.assert_array_equal(policy.weights["weight0"], follower()["weight0"])
+        assert policy.card["algorithm"] == "test"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "a.npz", "b.json", "b.npz"]
+
+
+def test_a_held_command_changes_every_other_decision():
+    policy = TrainedPolicy({**CARD, "repeat": 2}, follower())
+    episode = fly_episode(FanTrackingEnv("static"), policy, 1)
+    commands = episode.command[:40].reshape(20, 2)
+    np.testing.assert_array_equal(commands[:, 0], commands[:, 1])
+    assert len(np.unique(commands[:, 0])) > 15
+
+
+def test_a_recurrent_policy_forgets_at_the_start_of_an_episode():
+    rng = np.random.default_rng(0)
+    weights = {name: 0.3 * rng.normal(size=shape).astype(np.float32) for name, shape in (
+        ("lstm_input", (16, 1)), ("lstm_hidden", (16, 4)), ("lstm_input_bias", (16,)), ("lstm_hidden_bias", (16,)),
+        ("weight0", (1, 4)), ("bias0", (1,)))}
+    policy = TrainedPolicy(CARD, weights)
+    observation = np.full(8, 0.02)
+    first = [policy(observation)[0] for _ in range(3)]
+    assert len(set(first)) == 3  # it remembers
+    policy.reset()
+    assert [policy(observation)[0] for _ in range(3)] == first
+
+
+def test_the_lstm_is_torch_s():
+    torch = pytest.importorskip("torch")
+    torch.manual_seed(0)
+    cell = torch.nn.LSTM(5, 7)
+    weights = {"lstm_input": cell.weight_ih_l0, "lstm_hidden": cell.weight_hh_l0,
+               "lstm_input_bias": cell.bias_ih_l0, "lstm_hidden_bias": cell.bias_hh_l0}
+    weights = {name: tensor.detach().numpy() for name, tensor in weights.items()}
+    inputs = torch.randn(6, 1, 5)
+    with torch.no_grad():
+        expected = cell(inputs)[0][:, 0].numpy()
+    hidden, state = np.zeros(7, dtype=np.float32), np.zeros(7, dtype=np.float32)
+    for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
+        hidden, state = lstm(weights, x, hidden, state)
+        np.testing.assert_allclose(hidden, h, atol=1e-6)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda folder: (folder / "p.json").unlink(), "no such file"),
+    (lambda folder: (folder / "p.npz").unlink(), "no such file"),
+    (lambda folder: (folder / "p.json").write_text("{"), "cannot be read as a policy's card"),
+    (lambda folder: (folder / "p.json").write_text("[]"), "format must be 1"),
+    (lambda folder: (folder / "p.npz").write_bytes(b"else"), "not the weights that its card"),
+])
+def test_files_that_do_not_go_together_are_refused(tmp_path, change, words):
+    path = save_policy(CARD, follower(), tmp_path / "p.npz")
+    change(tmp_path)
+    with pytest.raises(InputError, match=words):
+        load_policy(path)
+
+
+def test_a_file_that_would_run_code_is_refused(tmp_path):
+    path = save_policy(CARD, follower(), tmp_path / "p.npz")
+    buffer = io.BytesIO()
+    np.savez(buffer, weight0=np.array([print], dtype=object))
+    path.write_bytes(buffer.getvalue())
+    import hashlib
+
+    card = json.loads((tmp_path / "p.json").read_text())
+    card["sha256"] = hashlib.sha256(buffer.getvalue()).hexdigest()
+    (tmp_path / "p.json").write_text(json.dumps(card))
+    with pytest.raises(InputError, match="cannot be read as weights"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(("card", "weights", "words"), [
+    ({"activation": "gelu"}, {}, "activation"),
+    ({"repeat": 0}, {}, "repeat"),
+    ({"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}}, {}, "must take 2 numbers"),
+    ({"features": {}}, {}, "lacks or spoils"),
+    ({}, {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)}, "layer 1 does not fit"),
+    ({}, {"bias0": np.zeros(2, np.float32)}, "layer 0 does not fit"),
+])
+def test_cards_and_weights_that_do_not_fit_are_named(card, weights, words):
+    with pytest.raises(InputError, match=words):
+        TrainedPolicy({**CARD, **card}, {**follower(), **weights})

@@ -1,0 +1,149 @@
+"""The study behind the leaderboard: it goes on where it was, and its page says what its files say."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from windwrench.dynamics import InputError
+from windwrench.training.benchmark import fly_all
+from windwrench.training.leaderboard_page import write_page
+from windwrench.training.leaderboard_rows import aggregate, lines_of, rows_of
+from windwrench.training.study import Places, do_entry, entries_of, is_done, load_plan, read_results, run_study
+
+pytest.importorskip("stable_baselines3")
+
+PLAN = {
+    "worlds": {"base": {"scenario": "base"}, "fast": {"scenario": "fast"},
+               "other filter": {"scenario": "base", "estimator": "constant-gain"},
+               "weak-rotor": {"scenario": "base", "effects": ["rotor_efficiency:e1=-0.08"]}},
+    "episodes": 3,
+    "designed": ["hover", "admittance", "admittance-tuned-fast", "ratio", "oracle"],
+    "learned": {"sac": {"algorithm": "sac", "scenario": "base", "seeds": 2, "ship": True, "set": [
+        "steps=200", "net=[8]", "validation.every=100", "validation.episodes=1", "learner.batch_size=16",
+        "learner.learning_starts=50", "checkpoint=100"]}},
+    "ablation": {"worlds": ["base"], "seeds": 1, "algorithm": "sac", "scenario": "base", "reference": "as it is",
+                 "set": ["steps=100", "net=[8]", "validation.every=100", "validation.episodes=1",
+                         "learner.learning_starts=90", "learner.batch_size=16"],
+                 "changes": {"truth instead": ["features.frame=[true_torque_z, true_force_x]"],
+                             "with deviations": ["features.frame=[torque_z, std_torque_z]"],
+                             "an observer": ["features.frame=[observer_torque_z]"],
+                             "slower": ["repeat=2"]}},
+}
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory):
+    root = tmp_path_factory.mktemp("study")
+    places = Places(root / "runs", root / "results", root / "policies")
+    entries = entries_of(PLAN)
+    assert run_study([e for e in entries if e.group != "ablation"], PLAN, places, 2) == 7
+    for entry in entries:
+        do_entry(entry, PLAN, places)
+    return places
+
+
+def test_everything_is_done_once(places):
+    entries = entries_of(PLAN)
+    assert [e.file for e in entries if e.seed is not None][:3] == ["sac-0", "sac-1", "as-it-is-0"]
+    assert all(is_done(e, PLAN, places) for e in entries)
+    before = {p: p.stat().st_mtime_ns for p in places.results.iterdir()}
+    assert run_study(entries, PLAN, places, 1) == 0
+    assert {p: p.stat().st_mtime_ns for p in places.results.iterdir()} == before
+    assert sorted(p.name for p in places.policies.iterdir()) == ["sac-0.json", "sac-0.npz", "sac-1.json", "sac-1.npz"]
+
+
+def test_what_is_missing_is_scored_from_the_shipped_policy(places, tmp_path):
+    kept = json.loads((places.results / "sac-1.json").read_text())
+    del kept["scores"]["fast"]
+    other = Places(tmp_path / "no-runs", tmp_path / "results", places.policies)
+    other.results.mkdir()
+    (other.results / "sac-1.json").write_text(json.dumps(kept))
+    entry = next(e for e in entries_of(PLAN) if e.file == "sac-1")
+    assert not is_done(entry, PLAN, other)
+    do_entry(entry, PLAN, other)
+    assert is_done(entry, PLAN, other)
+    assert json.loads((other.results / "sac-1.json").read_text()) == json.loads((places.results / "sac-1.json").read_text())
+    assert not other.runs.exists()
+
+
+def test_a_shipped_policy_reproduces_its_line(places):
+    path = str(places.policies / "sac-0.npz")
+    flown = fly_all([path], ["base"], 3, seed=0, jobs=1)[path, "base"]
+    kept = json.loads((places.results / "sac-0.json").read_text())["scores"]["base"]
+    assert kept["rmse_m"] == [round(e.rmse, 6) for e in flown]
+    assert kept["lost"] == [int(e.lost) for e in flown]
+
+
+def test_rows_are_those_of_the_files(places):
+    results = read_results(places)
+    rows = {(r.world, r.name): r for r in rows_of(results, PLAN)}
+    rmse = {name: np.array([r["scores"]["fast"]["rmse_m"] for r in results if r["name"] == name])
+            for name in ("hover", "oracle", "sac", "admittance", "admittance-tuned-fast")}
+    row = rows["fast", "sac"]
+    assert row.rmse_m == pytest.approx(rmse["sac"].mean())
+    assert row.by_seed == pytest.approx(rmse["sac"].mean(axis=1))
+    rival = min("admittance", "admittance-tuned-fast", key=lambda name: rmse[name].mean())
+    assert row.rival == rival
+    assert row.change == pytest.approx(rmse["sac"].mean() / rmse[rival].mean() - 1)
+    hover, oracle = rmse["hover"].mean(), rmse["oracle"].mean()
+    assert row.score == pytest.approx((hover - rmse["sac"].mean()) / (hover - oracle))
+    assert rows["base", "oracle"].score == 1.0
+    assert rows["base", "hover"].score == 0.0
+    assert {name for _, name in rows} == {*PLAN["designed"], "sac"}
+    names = [name for name, _, _ in aggregate(lines_of(results, PLAN), ["base", "fast"])]
+    assert names[0] == "oracle"
+    assert set(names) == {*PLAN["designed"], "sac"}
+
+
+def test_the_page_names_what_is_missing_and_where_learning_loses(places, tmp_path):
+    written = write_page(read_results(places), PLAN, places, tmp_path / "board.md")
+    text = (tmp_path / "board.md").read_text(encoding="utf-8")
+    assert all(p.read_bytes().startswith(b"\x89PNG") for p in written if p.suffix == ".png")
+    assert len([p for p in written if p.suffix == ".png"]) == 4
+    assert "Not finished" not in text
+    assert "worse than" in text  # nobody learns to track in 200 decisions
+    assert "| truth instead | 1 |" in text
+    fewer = Places(places.runs, tmp_path / "results", places.policies)
+    fewer.results.mkdir()
+    for p in places.results.glob("*.json"):
+        if p.name != "sac-1.json":
+            (fewer.results / p.name).write_bytes(p.read_bytes())
+    write_page(read_results(fewer), PLAN, fewer, tmp_path / "board.md")
+    assert "Not finished: sac (1 seeds)." in (tmp_path / "board.md").read_text(encoding="utf-8")
+
+
+def test_the_plan_that_comes_with_the_kit_can_be_done():
+    from windwrench.controllers import CONTROLLERS
+    from windwrench.dynamics.effects import parse_setting
+    from windwrench.envs.scenarios import SCENARIOS
+    from windwrench.training.configuration import load_config
+
+    plan = load_plan()
+    assert set(SCENARIOS) <= set(plan["worlds"])
+    for world in plan["worlds"].values():
+        assert world["scenario"] in SCENARIOS
+        for text in world.get("effects", ()):
+            parse_setting(text)
+    entries = entries_of(plan)
+    assert len({e.file for e in entries}) == len(entries)
+    for entry in entries:
+        if entry.seed is None:
+            assert entry.name in CONTROLLERS
+        else:
+            load_config(entry.algorithm, entry.overrides)
+    assert {e.algorithm for e in entries} >= {"sac", "td3", "ppo", "recurrent-ppo", "imitation"}
+    assert min(sum(e.name == n for e in entries) for n in plan["learned"]) >= 5
+
+
+def test_a_part_of_the_study_can_be_named(tmp_path):
+    assert [e.file for e in entries_of(PLAN, ["sac-1", "hover"])] == ["hover", "sac-1"]
+    with pytest.raises(InputError, match="Did you mean 'sac'"):
+        entries_of(PLAN, ["sack"])
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump({"worlds": {}}), encoding="utf-8")
+    with pytest.raises(InputError, match="needs ablation, designed, episodes, learned"):
+        load_plan(tmp_path / "plan.yaml")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_plan(Path(tmp_path / "none.yaml"))

@@ -1,0 +1,102 @@
+"""Configurations of training, as data: one YAML file an algorithm, every key of which a run may override."""
+
+import copy
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..dynamics.errors import InputError, unknown_name
+from ..dynamics.yaml_file import parse_yaml, read_yaml
+from .features import Features
+
+Config = dict[str, Any]
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation")
+
+
+def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:
+    """Return an algorithm's configuration.
+
+    Args:
+        algorithm: one of ``ALGORITHMS``.
+        overrides: ``KEY=VALUE`` in YAML, with dots for what lies deeper: ``learner.gamma=0.98``.
+        file: a YAML file of such keys, nested, that changes the algorithm's own before ``overrides`` do.
+
+    Raises:
+        InputError: an algorithm, key or value that does not exist or is of another kind.
+    """
+    if algorithm not in ALGORITHMS:
+        raise unknown_name("algorithm", algorithm, ALGORITHMS)
+    text = (resources.files(__package__) / "configs" / f"{algorithm}.yaml").read_text(encoding="utf-8")
+    config: Config = yaml.safe_load(text)
+    if file is not None:
+        changes = read_yaml(file, "a configuration of training")
+        if not isinstance(changes, dict):
+            raise InputError(f"{file}: expected keys and values, as in training/configs/{algorithm}.yaml")
+        _merge(config, changes, str(file), "")
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise InputError(f"--set {text}: expected KEY=VALUE, such as learner.gamma=0.98")
+        nested: Any = parse_yaml(value, f"--set {text}")
+        for part in reversed(key.split(".")):
+            nested = {part: nested}
+        _merge(config, nested, "--set", "")
+    if config["algorithm"] != algorithm:
+        raise InputError(f"{algorithm}: algorithm cannot be overridden, got {config['algorithm']!r}")
+    _check(config)
+    return config
+
+
+def _merge(config: Config, changes: Config, where: str, above: str) -> None:
+    for key, value in changes.items():
+        name = f"{above}{key}"
+        if key not in config:
+            raise unknown_name("key", name, [f"{above}{k}" for k in config], where)
+        old = config[key]
+        if isinstance(old, dict):
+            if not isinstance(value, dict):
+                raise InputError(f"{where}: {name} holds keys of its own ({', '.join(old)}), got {value!r}")
+            _merge(old, value, where, f"{name}.")
+        else:
+            config[key] = _like(old, value, f"{where}: {name}")
+
+
+def _like(old: Any, value: Any, where: str) -> Any:
+    """Return ``value`` in the kind of ``old``."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(old, str) and old.startswith("auto") and number:
+        return float(value)  # a coefficient that is found by itself may be fixed
+    if isinstance(old, int) and number and float(value).is_integer():
+        return int(value)
+    if isinstance(old, float) and number:
+        return float(value)
+    if isinstance(old, str | list) and isinstance(value, type(old)):
+        return copy.deepcopy(value)
+    kind = {int: "a whole number", float: "a number", str: "a word", list: "a list"}[type(old)]
+    raise InputError(f"{where} must be {kind} such as {old!r}, got {value!r}")
+
+
+def _check(config: Config) -> None:
+    for key in ("steps", "environments", "repeat"):
+        if config.get(key, 1) < 1:
+            raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
+    for key in ("every", "episodes"):
+        if config["validation"][key] < 1:
+            raise InputError(f"{config['algorithm']}: validation.{key} must be at least 1, got {config['validation'][key]}")
+    if config.get("checkpoint", 1) < 1:
+        raise InputError(f"{config['algorithm']}: checkpoint must be at least 1, got {config['checkpoint']}")
+    if config["activation"] not in ("relu", "tanh"):
+        raise unknown_name("activation", config["activation"], ("relu", "tanh"), config["algorithm"])
+    if not all(isinstance(n, int) and n > 0 for n in config["net"]):
+        raise InputError(f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}")
+    if config["estimator"] not in ("ukf", "constant-gain"):
+        raise unknown_name("estimator", config["estimator"], ("ukf", "constant-gain"), config["algorithm"])
+    features_of(config)
+
+
+def features_of(config: Config) -> Features:
+    """Return what the configured policy sees."""
+    return Features(tuple(config["features"]["frame"]), config["features"]["history"])

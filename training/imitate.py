@@ -1,0 +1,148 @@
+"""Imitation of the oracle (DAgger): how far what a policy may see can take it.
+
+In every round the newest policy flies, the oracle says what it would have commanded in each place, and a network is fitted
+to all that was said so far. What remains of the error then is what the observation does not hold, or the network cannot.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ..controllers.bounds import Oracle
+from .configuration import Config, features_of
+from .evaluate import DECISIONS
+from .features import History
+from .learners import dense_weights
+from .policy import TrainedPolicy, Weights, save_policy
+from .seeds import training_seed, validation_seeds
+from .train import Progress, card_of, claim, read_progress, validate, write_json
+from .worlds import check_world, make_world
+
+Array = NDArray[np.float32]
+
+
+def imitate(
+    config: Config,
+    scenario: str,
+    seed: int,
+    folder: Path,
+    advance: Callable[[int], None] = lambda steps: None,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> Path:
+    """Learn the oracle's commands; return the path of the best policy on the validation episodes.
+
+    The files are those of ``train``, without a checkpoint: a run that was killed starts anew.
+
+    Raises:
+        InputError: as ``train``.
+    """
+    check_world(scenario)
+    features = features_of(config)
+    claim(folder, config, scenario, seed)
+    done = read_progress(folder)
+    if done is not None and done.steps and done.steps[-1] >= config["steps"]:
+        return folder / "best.npz"
+    torch.set_num_threads(1)
+    torch.manual_seed(seed)
+    world = make_world(scenario, config["estimator"], features.sources)
+    judge, seeds = make_world(scenario, sources=features.sources), validation_seeds(config["validation"]["episodes"])
+    network = _network(features.size, config)
+    inputs: list[Array] = []
+    labels: list[Array] = []
+    flown, episode, validated, began = 0, 0, 0, time.perf_counter()
+    progress = Progress()
+    per_round = -(-config["steps"] // config["rounds"])
+    oracle = Oracle(config["gain"])
+    while flown < config["steps"]:
+        pilot = None if flown == 0 else TrainedPolicy(card_of(config, scenario, seed, flown, True), _weights(network))
+        until = min(flown + per_round, config["steps"])
+        while flown < until:
+            seen, said = _fly(world, pilot, oracle, config, training_seed(seed, 0, episode))
+            inputs.append(seen)
+            labels.append(said)
+            flown += len(said)
+            episode += 1
+            advance(flown)
+        _fit(network, np.concatenate(inputs), np.concatenate(labels), config, seed + flown)
+        if flown // config["validation"]["every"] == validated and flown < config["steps"]:
+            continue
+        validated = flown // config["validation"]["every"]
+        card = card_of(config, scenario, seed, flown, True)
+        policy = TrainedPolicy(card, _weights(network))
+        rmse, lost = validate(policy, judge, seeds)
+        progress.steps.append(flown)
+        progress.rmse_m.append(rmse)
+        progress.lost.append(lost)
+        card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": len(seeds)}
+        save_policy(card, policy.weights, folder / "last.npz")
+        if progress.best < 0 or rmse < progress.best_rmse:
+            progress.best = len(progress.rmse_m) - 1
+            save_policy(card, policy.weights, folder / "best.npz")
+        progress.seconds = time.perf_counter() - began
+        write_json(asdict(progress), folder / "progress.json")
+        report(progress)
+    return folder / "best.npz"
+
+
+def _network(size: int, config: Config) -> torch.nn.Sequential:
+    act = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}[config["activation"]]
+    layers: list[torch.nn.Module] = []
+    for width in config["net"]:
+        layers += [torch.nn.Linear(size, width), act()]
+        size = width
+    return torch.nn.Sequential(*layers, torch.nn.Linear(size, 1))
+
+
+def _weights(network: torch.nn.Sequential) -> Weights:
+    return dense_weights(network)
+
+
+def _fly(world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config, seed: int) -> tuple[Array, Array]:
+    """Fly one episode (the oracle where there is no pilot); return what a policy saw (n, size) and was told (n,)."""
+    features = features_of(config)
+    history = History(features, 1)
+    observation, info = world.reset(seed=seed)
+    if pilot is not None:
+        pilot.reset()
+    seen, said = [], []
+    command = np.zeros(1, dtype=np.float32)
+    for k in range(DECISIONS):
+        best = np.asarray(oracle(observation, info), dtype=np.float32)
+        if k % config["repeat"] == 0:
+            frames = features.frames(observation[None], {s: np.asarray(info[s])[None] for s in features.sources})
+            if k == 0:
+                history.restart(frames, [0])
+            else:
+                history.push(frames)
+            seen.append(history.flat()[0])
+            said.append(float(best[0]))
+            command = best
+        if pilot is not None:
+            command = pilot(observation, info)
+        observation, _, lost, _, info = world.step(command)
+        if lost:
+            break
+    return np.array(seen, dtype=np.float32), np.array(said, dtype=np.float32)
+
+
+def _fit(network: torch.nn.Sequential, inputs: Array, labels: Array, config: Config, seed: int) -> None:
+    """Fit the network to commands, by least squares with a learning rate that falls to zero."""
+    generator = torch.Generator().manual_seed(seed)
+    x, y = torch.from_numpy(inputs), torch.from_numpy(labels)[:, None]
+    size = config["batch_size"]
+    updates = config["epochs"] * -(-len(x) // size)
+    optimiser = torch.optim.Adam(network.parameters(), lr=config["learning_rate"], fused=True)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates)
+    for _ in range(config["epochs"]):
+        for batch in torch.randperm(len(x), generator=generator).split(size):  # type: ignore[no-untyped-call]
+            loss = torch.mean((torch.tanh(network(x[batch])) - y[batch]) ** 2)
+            optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimiser.step()
+            schedule.step()

@@ -1,0 +1,27 @@
+"""Seeds of episodes: those of training, validation and test lie in ranges that do not meet."""
+
+import numpy as np
+
+from ..dynamics.errors import InputError
+from .evaluate import FIRST_TEST_SEED
+
+FIRST_VALIDATION_SEED = 900_000  # below it: training
+
+
+def training_seed(seed: int, environment: int, episode: int) -> int:
+    """Return the seed of a training run's episode, the same whenever it is flown: 0 to ``FIRST_VALIDATION_SEED`` - 1."""
+    words = np.random.SeedSequence((seed, environment, episode)).generate_state(1, np.uint64)
+    return int(words[0] % FIRST_VALIDATION_SEED)
+
+
+def validation_seeds(episodes: int, first: int = 0) -> list[int]:
+    """Return the seeds of validation episodes ``first`` to ``first + episodes``.
+
+    Raises:
+        InputError: more than there are.
+    """
+    seeds = list(range(FIRST_VALIDATION_SEED + first, FIRST_VALIDATION_SEED + first + episodes))
+    if not seeds or first < 0 or seeds[-1] >= FIRST_TEST_SEED:
+        count = FIRST_TEST_SEED - FIRST_VALIDATION_SEED
+        raise InputError(f"validation: there are {count} episodes, got {episodes} from {first}")
+    return seeds

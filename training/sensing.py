@@ -1,0 +1,71 @@
+"""The fan-tracking environment with more in ``info``: what else an agent could be given to see."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.vehicle import Vehicle
+from ..envs.closed_loop import ClosedLoop
+from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.jet import Fan
+from ..envs.plant import TICK
+from ..estimator.observer import NonlinearObserver, ObserverTuning
+
+Array = NDArray[np.float64]
+
+
+class _Watched(ClosedLoop):
+    """A closed loop beside which a nonlinear observer watches the same samples; the flight loop keeps to the filter."""
+
+    observer: NonlinearObserver | None = None
+    _speeds: Array = np.zeros(4)  # turn rates of the tick before
+
+    def run(self, noise: Array, fan_y: Array | None = None, first: int = 0) -> None:
+        """Run as ``ClosedLoop`` does, and show the observer every sample."""
+        if self.observer is None:
+            super().run(noise, fan_y, first)
+            return
+        for k in range(len(noise)):
+            super().run(noise[k : k + 1], fan_y, 0 if fan_y is None else min(first + k, len(fan_y) - 1))
+            seen = (self.sample[4:7], self.sample[7:11]) if self.seen else (None, None)
+            self.observer.step(self._speeds, *seen)
+            self._speeds = self.sample[:4].copy()
+
+    def reset(self, rng: np.random.Generator, position: Array, yaw: float = 0.0) -> None:
+        """Hover as ``ClosedLoop`` does, and start the observer from the same measured pose."""
+        super().reset(rng, position, yaw)
+        self._speeds = self.sample[:4].copy()
+        if self.observer is not None:
+            self.observer.reset(self.sample[4:7].copy(), self.sample[7:11].copy())
+
+
+class SensingFanTracking(FanTrackingEnv):
+    """``FanTrackingEnv`` with more in ``info``.
+
+    ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm. With ``observer``, also
+    ``observer_force``, ``observer_torque``: what a nonlinear observer of the same rise time makes of the same samples.
+    """
+
+    def __init__(self, *args: Any, observer: bool = False, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._observed = observer
+
+    def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
+        loop = super()._make_loop(vehicle, fan)
+        if self._observed:
+            loop.__class__ = _Watched  # the same loop, watched
+            assert isinstance(loop, _Watched)
+            gain = 2.2 / self.scenario.rise_time
+            loop.observer = NonlinearObserver(loop.ukf.vehicle, ObserverTuning(gain, gain), TICK)
+        return loop
+
+    def _info(self) -> dict[str, Any]:
+        info, loop = super()._info(), self.loop
+        assert loop is not None
+        std = np.sqrt(np.diagonal(loop.covariance)[12:18])
+        info["std_torque"], info["std_force"] = std[:3].copy(), std[3:].copy()
+        if isinstance(loop, _Watched) and loop.observer is not None:
+            estimate = loop.observer.estimate
+            info["observer_force"], info["observer_torque"] = estimate.force.copy(), estimate.torque.copy()
+        return info

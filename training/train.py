@@ -1,0 +1,201 @@
+"""Training a policy with stable-baselines3."""
+
+import json
+import platform
+import re
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..dynamics.errors import InputError
+from ..dynamics.files import replaced
+from .configuration import Config, features_of
+from .evaluate import fly_episode
+from .policy import TrainedPolicy, save_policy
+from .seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
+from .worlds import check_world, make_world, make_worlds
+
+_PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
+
+
+@dataclass
+class Progress:
+    """How a run has gone so far; ``progress.json`` in its folder."""
+
+    steps: list[int] = field(default_factory=list)  # of each validation
+    rmse_m: list[float] = field(default_factory=list)  # mean over the validation episodes
+    lost: list[int] = field(default_factory=list)  # episodes of each validation
+    best: int = -1  # index of the best
+    seconds: float = 0.0  # of all parts of the run, validation included
+
+    @property
+    def best_rmse(self) -> float:
+        """The smallest validation RMSE, m."""
+        return self.rmse_m[self.best]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a policy was trained with."""
+    found = {"windwrench": __version__, "python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def card_of(config: Config, scenario: str, seed: int, steps: int, squash: bool) -> dict[str, Any]:
+    """Return the card of a policy: all that is needed to fly it, and to train it again."""
+    features = features_of(config)
+    return {
+        "algorithm": config["algorithm"], "scenario": scenario, "seed": seed, "steps": steps,
+        "features": asdict(features), "repeat": config["repeat"], "activation": config["activation"], "squash": squash,
+        "seeds": {"training": [0, FIRST_VALIDATION_SEED - 1],
+                  "validation": [FIRST_VALIDATION_SEED, FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1]},
+        "config": config, "versions": versions(),
+    }
+
+
+def validate(policy: TrainedPolicy, world: Any, seeds: Sequence[int]) -> tuple[float, int]:
+    """Fly validation episodes with the full filter; return the mean RMSE (m) and how many were lost."""
+    flown = [fly_episode(world, policy, seed) for seed in seeds]
+    return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
+
+
+def write_json(data: Any, path: Path) -> None:
+    """Write JSON at once or not at all, each list of numbers on a line of its own."""
+    text = json.dumps(data, indent=1, allow_nan=False)
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text)
+    with replaced(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
+
+
+def read_progress(folder: Path) -> Progress | None:
+    """Return how a run in ``folder`` has gone; None where there is none."""
+    path = folder / "progress.json"
+    return Progress(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+
+
+def claim(folder: Path, config: Config, scenario: str, seed: int) -> None:
+    """Write what a run is into its folder.
+
+    Raises:
+        InputError: the folder holds another run.
+    """
+    path = folder / "training.json"
+    run = {"config": config, "scenario": scenario, "seed": seed}
+    if path.exists():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if {k: kept.get(k) for k in run} != run:
+            raise InputError(f"{folder}: holds a run with another configuration, scenario or seed; "
+                             "give another --out, or delete it")
+    write_json({**run, "versions": versions()}, path)
+
+
+def train(
+    config: Config,
+    scenario: str,
+    seed: int,
+    folder: Path,
+    advance: Callable[[int], None] = lambda steps: None,
+    report: Callable[[Progress], None] = lambda progress: None,
+    stop_after: int | None = None,
+) -> Path:
+    """Train a policy; return the path of the best one on the validation episodes.
+
+    ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``, ``training.json``, TensorBoard's
+    events, and ``checkpoint.pt``. Called again after a run was killed, it goes on from the last checkpoint and ends with
+    the same policies, bit for bit, as a run that was not.
+
+    Args:
+        config: as of ``load_config``.
+        scenario: scenario or tier to train in.
+        seed: of the run.
+        folder: for its files.
+        advance: called with the number of decisions (over all environments) that the run stands at.
+        report: called after each validation.
+        stop_after: decisions after which to return early, at the next checkpoint; for tests.
+
+    Raises:
+        InputError: a scenario that does not exist, or a folder with another run.
+    """
+    from .checkpoint import load_checkpoint, save_checkpoint
+    from .learners import make_learner, squashes, weights_of
+    from .vec_env import FeatureVecEnv
+
+    check_world(scenario)
+    claim(folder, config, scenario, seed)
+    features, algorithm = features_of(config), config["algorithm"]
+    worlds = make_worlds(scenario, config["environments"], config["estimator"], config["repeat"], features.sources)
+    env = FeatureVecEnv(worlds, features, lambda i, episode: training_seed(seed, i, episode), config["reward"])
+    learner = make_learner(config, env, seed)
+    learner.set_logger(_logger(folder))
+    judge, seeds = make_world(scenario, sources=features.sources), validation_seeds(config["validation"]["episodes"])
+    progress, checkpoint = Progress(), folder / "checkpoint.pt"
+    if checkpoint.exists():
+        progress = Progress(**load_checkpoint(learner, env, checkpoint))
+    every, between = config["validation"]["every"], config["checkpoint"]
+    began, before = time.perf_counter(), progress.seconds
+    follow = _follower(advance)
+    while learner.num_timesteps < config["steps"]:
+        done = learner.num_timesteps
+        target = min((done // every + 1) * every, (done // between + 1) * between, config["steps"])
+        learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
+        done = learner.num_timesteps
+        if done // every > (progress.steps[-1] // every if progress.steps else 0) or done >= config["steps"]:
+            card = card_of(config, scenario, seed, done, squashes(algorithm))
+            policy = TrainedPolicy(card, weights_of(learner, algorithm))
+            rmse, lost = validate(policy, judge, seeds)
+            progress.steps.append(done)
+            progress.rmse_m.append(rmse)
+            progress.lost.append(lost)
+            card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": len(seeds)}
+            save_policy(card, policy.weights, folder / "last.npz")
+            if progress.best < 0 or rmse < progress.best_rmse:
+                progress.best = len(progress.rmse_m) - 1
+                save_policy(card, policy.weights, folder / "best.npz")
+            learner.logger.record("validation/rmse_m", rmse)
+            learner.logger.record("validation/lost", lost)
+            learner.logger.dump(done)
+            report(progress)
+        progress.seconds = before + time.perf_counter() - began
+        write_json(asdict(progress), folder / "progress.json")
+        if done // between > (done - 1) // between or done >= config["steps"]:
+            save_checkpoint(learner, env, asdict(progress), checkpoint)
+            if stop_after is not None and done >= stop_after:
+                break
+    env.close()
+    return folder / "best.npz"
+
+
+def _logger(folder: Path) -> Any:
+    from stable_baselines3.common.logger import configure
+
+    try:
+        import torch.utils.tensorboard  # noqa: F401
+    except ImportError:
+        return configure(str(folder), ["csv"])
+    return configure(str(folder / "tensorboard"), ["tensorboard"])
+
+
+def _follower(advance: Callable[[int], None]) -> Any:
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    class Follow(BaseCallback):  # type: ignore[misc]
+        """Tell how far the run is, and what the episodes of training that ended were worth."""
+
+        def _on_step(self) -> bool:
+            advance(self.num_timesteps)
+            for info in self.locals["infos"]:
+                if "rmse" in info:
+                    self.logger.record_mean("rollout/rmse_m", info["rmse"])
+            return True
+
+    return Follow()
