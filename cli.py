@@ -1,36 +1,76 @@
 """The ``windwrench`` command."""
 
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+from . import __version__
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
+from .commands.learning import imitate, leaderboard, train, tune
 from .commands.library import effects
-from .commands.logs import diagnose, estimate
+from .commands.logs import diagnose, estimate, replay
+from .commands.running import as_command, command_name
 from .commands.studies import close_loop, real_flights, reproduce, trials
 from .commands.terminal import errors
-from .dynamics.errors import InputError
+from .dynamics.errors import InputError, unknown_name
+
+
+class _Commands(TyperGroup):
+    """Names the nearest command where one is mistyped."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that the first argument names."""
+        name = args[0] if args else ""
+        if name and not name.startswith("-") and name not in self.commands:
+            raise unknown_name("command", name, self.commands)
+        return super().resolve_command(ctx, args)
+
 
 app = typer.Typer(
-    name="windwrench", no_args_is_help=True, add_completion=True, rich_markup_mode=None, pretty_exceptions_enable=False,
-    help="A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the wrench on a flight log.",
+    name="windwrench", cls=_Commands, no_args_is_help=True, add_completion=True, rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    epilog="Exit codes: 0 done; 1 a fault of windwrench itself, with its traceback; 2 a mistake in what was asked or in a "
+           "file, with one line that names it; 130 interrupted. NO_COLOR=1 switches colours off.",
 )
+_INTERRUPTED = 130
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
 
-for command in (fly, benchmark, estimate, diagnose, record, reproduce, trials, speed, real_flights, effects, close_loop):
-    app.command(command.__name__.replace("_", "-"))(command)
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"windwrench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def windwrench(
+    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Print the version.")] = False,
+) -> None:
+    """A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the wrench on a flight log.
+
+    Example: windwrench fly --scenario base --seed 4
+    """
+
+
+for command in (fly, benchmark, estimate, diagnose, record, replay, reproduce, trials, speed, real_flights, effects, close_loop,
+                train, imitate, tune, leaderboard):
+    app.command(command_name(command))(as_command(command))
 
 
 def main() -> None:
     """Run the command; a user's mistake ends in one clear line and exit code 2."""
     try:
-        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
+        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except (InputError, _UsageError) as error:
         text = str(error) if isinstance(error, InputError) else error.format_message()
-        errors.print(f"error: {text}", style="red", highlight=False, soft_wrap=True, markup=False)
+        # what a parser says may take several lines
+        errors.print(f"error: {' '.join(text.split())}", style="red", highlight=False, soft_wrap=True, markup=False)
         sys.exit(2)
     except (KeyboardInterrupt, typer.Abort):
+        code = _INTERRUPTED
+    if code == _INTERRUPTED:
         errors.print("interrupted")
-        sys.exit(130)
+    sys.exit(code)

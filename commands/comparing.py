@@ -1,23 +1,39 @@
 """Comparing: controllers on the same episodes, and the speed of it all."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich import box
 from rich.table import Table
 
-from .terminal import Out, console, names_in, progress_bar, results_folder, say
+from .running import expensive
+from .terminal import (
+    Out,
+    console,
+    controller_names,
+    names_in,
+    offering,
+    progress_bar,
+    results_folder,
+    say,
+    scenario_names,
+)
 
 
+@expensive
 def benchmark(
-    controllers: Annotated[str, typer.Option(help="Names, with commas.")] = "hover,admittance,ratio,oracle",
-    scenarios: Annotated[str, typer.Option(help="Names, with commas.")] = "static,base",
+    controllers: Annotated[str, typer.Option(
+        help="Names, or paths of trained policies, with commas.",
+        autocompletion=offering(controller_names))] = "hover,admittance,ratio,oracle",
+    scenarios: Annotated[str, typer.Option(
+        help="Names, with commas.", autocompletion=offering(scenario_names))] = "static,base",
     episodes: Annotated[int, typer.Option(min=1, help="Paired episodes a scenario.")] = 40,
     seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    cluster: Annotated[str | None, typer.Option(help="Fly on a Ray cluster: its address, or local.")] = None,
     out: Out = Path("results/benchmark"),
-) -> None:
+) -> dict[str, Any]:
     """Fly controllers through the same episodes; write the leaderboard.
 
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
@@ -27,10 +43,10 @@ def benchmark(
 
     names, worlds = names_in(controllers, "--controllers"), names_in(scenarios, "--scenarios")
     check_request(names, worlds, episodes, seed)
-    folder = results_folder(out)
+    folder = results_folder(out, controllers=names, scenarios=worlds, flights=count_flights(names, worlds, episodes), jobs=jobs)
     with progress_bar() as progress:
         task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
-        results = fly_all(names, worlds, episodes, seed, jobs, lambda count: progress.advance(task, count))
+        results = fly_all(names, worlds, episodes, seed, jobs, lambda count: progress.advance(task, count), cluster)
     rows = leaderboard(results, names, seed)
     path = write_leaderboard(rows, folder)
     draw_leaderboard(rows, results, folder / "leaderboard.png")
@@ -45,27 +61,42 @@ def benchmark(
     console.print(f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over admittance",
                   highlight=False)
     say(path, folder / "leaderboard.png")
+    return {"leaderboard": rows}
 
 
 def speed(
     rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
     markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
-) -> None:
-    """Measure a filter step, flights against real time, and start-up, beside peers that are installed.
+) -> dict[str, Any]:
+    """Measure a filter step, flights against real time, growth and start-up, beside peers that are installed.
 
     Example: windwrench speed --rounds 7
     """
-    from ..benchmarks.speed import HEADER, filters, flights, measure, rows_of, starts, write_markdown
+    from ..benchmarks.environment_profile import profiles
+    from ..benchmarks.flight_speed import flights
+    from ..benchmarks.growth import over_steps, over_vehicles
+    from ..benchmarks.speed import HEADER, filters, measure, rows_of, starts, write_markdown
 
     with progress_bar() as progress:
         task = progress.add_task("measuring", total=None)
         contenders = [*filters(), *flights(), *starts()]
         progress.update(task, total=rounds * len(contenders))
         figures = measure(contenders, rounds, lambda: progress.advance(task))
+        progress.update(task, description="growth and profile", total=None)
+        sections = [*profiles(rounds), over_vehicles(rounds), over_steps()]
     table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
     for row in rows_of(figures):
         table.add_row(*row[:-1])
     console.print(table)
+    for section in sections:
+        table = Table(*section.header, box=box.SIMPLE_HEAD, title=section.title)
+        for row in section.rows:
+            table.add_row(*row)
+        console.print(table)
+        console.print(section.words, highlight=False)
     if markdown is not None:
-        write_markdown(figures, rounds, markdown)
+        write_markdown(figures, rounds, markdown, sections)
         say(markdown)
+    return {"figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
+            "sections": {section.title: [dict(zip(section.header, row, strict=True)) for row in section.rows]
+                         for section in sections}}

@@ -2,24 +2,30 @@
 
 import shlex
 import sys
+import time
 import warnings
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich import box
 from rich.table import Table
 
-from .terminal import Out, VehicleOption, console, errors, results_folder, say
+from ..dynamics.errors import InputError
+from .terminal import Out, ReaderOption, VehicleOption, console, effect_names, note, offering, results_folder, say, working
+
+# of a diagnosis' time, where its stages begin
+_STAGES = {"looking at the logs": 0.0, "asking whether every effect is needed": 0.45, "asking what else it could be": 0.75,
+           "looking for what is left": 0.9, "predicting the flights": 0.96}
 
 
 def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
-    reader: Annotated[str | None, typer.Option(help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag "
-                                                    "or rosbag:TOPICS.yaml.")] = None,
+    reader: ReaderOption = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/estimate"),
-) -> None:
+) -> dict[str, Any]:
     """Estimate the external wrench on a logged flight; write wrench.csv and a picture.
 
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
@@ -33,34 +39,38 @@ def estimate(
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
         flight = read_log(log, reader, model)
     folder = results_folder(out)
-    with console.status("estimating"):
-        series = estimate_log(flight, model)
+    with working("estimating") as progress:
+        series = estimate_log(flight, model, report=progress)
     path = write_wrench(series, folder)
     picture = plot_wrench(series, flight, folder / "wrench.png")
-    for note in dict.fromkeys((*flight.notes, *series.notes)):
-        errors.print(note, style="yellow" if note.startswith("warning") else "dim", highlight=False, markup=False)
+    for text in dict.fromkeys((*flight.notes, *series.notes)):
+        note(text)
     console.print(f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s", highlight=False)
     table = Table("", "x", "y", "z", box=box.SIMPLE_HEAD)
+    result: dict[str, Any] = {"log": flight.name, "samples": len(flight.t), "seconds": flight.t[-1] - flight.t[0]}
     for name, values, unit in (("force", series.force, "N"), ("torque", series.torque, "Nm")):
+        result |= {f"{name}_mean_{unit}": values.mean(axis=0), f"{name}_std_{unit}": values.std(axis=0)}
         table.add_row(f"{name}, mean ({unit})", *(f"{v:+.4g}" for v in values.mean(axis=0)))
         table.add_row(f"{name}, std ({unit})", *(f"{v:.4g}" for v in values.std(axis=0)))
     truth = truth_rmse(series, flight)
     if truth is not None:
         for name, error, unit in (("force", truth[0], "N"), ("torque", truth[1], "Nm")):
+            result[f"{name}_rmse_to_truth_{unit}"] = error
             table.add_row(f"{name}, RMSE to truth ({unit})", *(f"{v:.4g}" for v in error))
     console.print(table)
     say(path, picture)
+    return result
 
 
 def diagnose(
     logs: Annotated[list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")],
     test: Annotated[list[Path] | None, typer.Option(help="Log on which alone the error is reported; may be repeated.")] = None,
-    reader: Annotated[str | None, typer.Option(help="For logs of another form: nanobench, crazyswarm2, px4_ulog, rosbag or "
-                                                    "rosbag:TOPICS.yaml.")] = None,
-    without: Annotated[list[str] | None, typer.Option(help="Effect to take out of the library; may be repeated.")] = None,
+    reader: ReaderOption = None,
+    without: Annotated[list[str] | None, typer.Option(help="Effect to take out of the library; may be repeated.",
+                                                        autocompletion=offering(effect_names))] = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/diagnose"),
-) -> None:
+) -> dict[str, Any]:
     """Find the physical effects that a vehicle's model lacks; write report.json, report.html and vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
@@ -68,7 +78,7 @@ def diagnose(
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.diagnosis import diagnose as run
     from ..identification.flight_log import read_log
-    from ..identification.report import write_report
+    from ..identification.report import report_data, write_report
     from ..identification.report_words import error_sentences, headline, remainder_sentence
 
     model = load_vehicle(vehicle)
@@ -77,10 +87,10 @@ def diagnose(
         flights = [read_log(path, reader, model) for path in logs]
         unseen = [read_log(path, reader, model) for path in test or []]
     folder = results_folder(out)
-    with console.status("looking at the logs") as status:
-        found = run(flights, model, unseen, without or (), lambda text: status.update(text))
-    for note in found.notes:
-        errors.print(note, style="dim", highlight=False, markup=False)
+    with working("looking at the logs") as progress:
+        found = run(flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text))
+    for text in found.notes:
+        note(text)
     for sentence in (headline(found), *error_sentences(found), remainder_sentence(found)):
         console.print(sentence, highlight=False, markup=False)
     if found.effects:
@@ -99,3 +109,78 @@ def diagnose(
     for line in found.advice:
         console.print(line, highlight=False, markup=False)
     say(*write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]])))
+    return report_data(found)
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    reader: ReaderOption = None,
+    vehicle: VehicleOption = "ardrone2",
+    video: Annotated[bool, typer.Option("--video", help="Write replay.mp4 (video extra).")] = False,
+    gif: Annotated[bool, typer.Option("--gif", help="Write replay.gif.")] = False,
+    rrd: Annotated[bool, typer.Option("--rrd", help="Write replay.rrd for the Rerun viewer (rerun extra).")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show it in a window.")] = False,
+    begin: Annotated[float, typer.Option("--from", min=0.0, help="Time in the log at which the film begins, in s.")] = 0.0,
+    film_seconds: Annotated[float, typer.Option(min=0.1, help="Longest film.")] = 30.0,
+    out: Out = Path("results/replay"),
+) -> dict[str, Any]:
+    """Draw a logged flight again, with its residual wrench as arrows; write its last picture, and films if asked for.
+
+    Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
+    """
+    import numpy as np
+
+    from ..dynamics.vehicle_file import load_vehicle
+    from ..envs.drawing import Viewer
+    from ..envs.replay import Flight, pictures
+    from ..envs.video import FPS, Film, save_picture
+    from ..identification.estimate import estimate_log
+    from ..identification.flight_log import read_log
+
+    model = load_vehicle(vehicle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        flight = read_log(log, reader, model)
+    length = float(flight.t[-1] - flight.t[0])
+    if begin >= length:
+        raise InputError(f"--from {begin:g}: {log} ends after {length:.6g} s; expected a time before that")
+    folder = results_folder(out)
+    with working("estimating") as progress:
+        series = estimate_log(flight, model, report=progress)
+    shown = np.flatnonzero((flight.t - flight.t[0] >= begin) & (flight.t - flight.t[0] <= begin + film_seconds))
+    if len(shown) < 2:
+        raise InputError(f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected more time")
+    # where motion capture lost the vehicle, the filter's own pose goes on
+    whole = Flight(series.t, series.position, series.quaternion, series.force, series.torque, flight.force, flight.torque)
+    part = whole.part(shown)
+    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
+    written, last = [], None
+    viewer = Viewer("human" if view else "rgb_array", 960, 640)
+    total = max(1, int((part.t[-1] - part.t[0]) * FPS))
+    try:
+        with working("drawing") as progress, ExitStack() as films:
+            open_films = [films.enter_context(Film(folder / f"replay.{kind}", 960, 640)) for kind in kinds]
+            for count, picture in enumerate(pictures(part, model, viewer, FPS)):
+                if view:
+                    time.sleep(1.0 / FPS)
+                for film in open_films:
+                    film.add(picture)
+                last = picture
+                progress(min(1.0, (count + 1) / total))
+        written += [folder / f"replay.{kind}" for kind in kinds]
+    finally:
+        viewer.close()
+    if last is not None:
+        save_picture(last, folder / "replay.png")
+        written.append(folder / "replay.png")
+    if rrd:
+        from ..envs.rerun_export import write_rrd
+
+        write_rrd(whole, model, folder / "replay.rrd")
+        written.append(folder / "replay.rrd")
+    for text in dict.fromkeys((*flight.notes, *series.notes)):
+        note(text)
+    say(*written)
+    return {"log": flight.name, "samples": len(flight.t), "seconds": length,
+            "largest_force_N": np.linalg.norm(part.force, axis=1).max(),
+            "largest_torque_Nm": np.linalg.norm(part.torque, axis=1).max()}

@@ -2,23 +2,35 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich import box
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Column, Table
 
-from .terminal import Out, VehicleOption, console, errors, progress_bar, results_folder, say
+from .running import expensive
+from .terminal import (
+    Out,
+    VehicleOption,
+    console,
+    effect_names,
+    offering,
+    progress_bar,
+    results_folder,
+    say,
+    share_bars,
+    working,
+)
 
 
+@expensive
 def reproduce(
     figure: Annotated[str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")] = "all",
     out: Out = Path("results/reproduction"),
     seeds: Annotated[int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
     page: Annotated[Path | None, typer.Option(help="Where to write the page; default: reproduction.md in the folder.")] = None,
-) -> None:
+) -> dict[str, Any]:
     """Reproduce the paper's figures; what a run has finished, the next does not repeat.
 
     Example: windwrench reproduce fig6 --out results/reproduction
@@ -26,13 +38,14 @@ def reproduce(
     import json
 
     from ..experiments import NAMES
-    from ..experiments.reproduce import chosen, write_page
+    from ..experiments.reproduce import chosen, is_done, numbers_of_seeds, write_page
     from ..experiments.reproduce import reproduce as run
 
     names = chosen(figure)
-    folder = results_folder(out)
-    columns = (TextColumn("{task.description:10}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
-    with Progress(*columns, console=errors, transient=True) as progress:
+    numbers = numbers_of_seeds(names, seeds)
+    folder = results_folder(out, seeds={name: n for name, n in numbers.items() if not is_done(out, name, n)},
+                            kept=[name for name, n in numbers.items() if is_done(out, name, n)], jobs=jobs)
+    with share_bars() as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
 
         def report(shares: Mapping[str, float]) -> None:
@@ -42,22 +55,27 @@ def reproduce(
         fresh = run(names, folder, seeds, jobs, report)
     target = folder / "reproduction.md" if page is None else page
     write_page(NAMES, folder, target)
+    result: dict[str, Any] = {}
     for name in names:
         kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        result[name] = {"title": kept["title"], "figures": kept["figures"], "comparison": kept["comparison"],
+                        "kept": not fresh[name]}
         console.print(f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"), style="bold", highlight=False)
         for row in kept["comparison"]:
             paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
             console.print(f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False)
     say(*(folder / f"{name}.png" for name in names), target)
+    return result
 
 
+@expensive
 def trials(
     seeds: Annotated[int, typer.Option(min=1, help="How often everything is flown, each time anew.")] = 1,
     quick: Annotated[bool, typer.Option("--quick", help="A part of it only, some minutes long.")] = False,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")] = None,
     out: Out = Path("results/trials"),
-) -> None:
+) -> dict[str, Any]:
     """Diagnose flights whose cause is known, and score it; what a run has finished, the next does not repeat.
 
     Example: windwrench trials --quick --out results/trials
@@ -67,48 +85,55 @@ def trials(
     from ..experiments.diagnosis_trials_page import write_results
 
     wanted = plan(seeds, quick)
-    folder = results_folder(out)
+    folder = results_folder(out, flights=len(wanted), diagnoses=sum(len(trial.libraries) for trial in wanted), jobs=jobs)
     with progress_bar() as progress:
         task = progress.add_task("diagnosing flights", total=len(wanted))
         outcomes = run_trials(wanted, folder, jobs, lambda done: progress.update(task, completed=done))
     paths = write_results(outcomes, folder, folder / "trials.md" if markdown is None else markdown, seeds, quick)
-    for rule in rules(j for outcome in outcomes for j in judge(outcome)):
+    measured = rules(j for outcome in outcomes for j in judge(outcome))
+    for rule in measured:
         met = {True: "met", False: "not met", None: "-"}[rule.met]
         console.print(f"{met:8}{rule.subject}: {rule.measured}; target: {rule.target}", highlight=False, markup=False,
                       soft_wrap=True)
     say(*paths)
+    return {"rules": measured}
 
 
+@expensive
 def real_flights(
     data: Annotated[Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")],
     markdown: Annotated[Path, typer.Option(help="The page; pictures and numbers go to a folder of its name beside it.")] = Path(
         "results/real-flights.md"),
-) -> None:
+) -> dict[str, Any]:
     """Diagnose measured flights, each judged on flights that the fit never saw, and write the page.
 
     Example: windwrench real-flights --data ../shared/data --markdown docs/real-flights.md
     """
     from ..dynamics.files import replaced
-    from ..experiments.real_flights import page, run
+    from ..experiments.real_flights import page, plan, run
 
-    folder = results_folder(markdown.with_suffix(""))
-    with console.status("diagnosing") as status:
-        result = run(folder, data / "nanobench", data / "crazyswarm2_payload" / "csv", status.update)
+    sources = data / "nanobench", data / "crazyswarm2_payload" / "csv"
+    folder = results_folder(markdown.with_suffix(""), **plan(*sources))
+    with working("diagnosing") as progress:
+        result: dict[str, Any] = run(folder, *sources, progress)
     with replaced(markdown) as partial:
         partial.write_text(page(result, folder.name), encoding="utf-8")
     say(folder / "real_flights.json", folder / "nanobench.png", markdown)
+    return result
 
 
+@expensive
 def close_loop(
-    effect: Annotated[list[str] | None, typer.Option(help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten "
-                                                          "of typical size.")] = None,
+    effect: Annotated[list[str] | None, typer.Option(
+        help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten of typical size.",
+        autocompletion=offering(effect_names))] = None,
     vehicle: VehicleOption = "ardrone2",
     episodes: Annotated[int, typer.Option(min=1, help="Paired episodes an effect and model.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of flights and episodes.")] = 0,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Also write the results as a page.")] = None,
     out: Out = Path("results/close-loop"),
-) -> None:
+) -> dict[str, Any]:
     """Fly an undeclared effect, name it from the log, declare it, and follow the fan before and after.
 
     What a run has finished, the next does not repeat.
@@ -124,9 +149,8 @@ def close_loop(
     model = load_vehicle(vehicle)
     requests = [Request(parse_setting(e, model), model, episodes, seed) for e in effect or DEFAULT_EFFECTS]
     check_requests(requests)
-    folder = results_folder(out)
-    columns = (TextColumn("{task.description:18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeRemainingColumn())
-    with Progress(*columns, console=errors, transient=True) as progress:
+    folder = results_folder(out, effects=[r.name for r in requests], episodes=2 * episodes * len(requests), jobs=jobs)
+    with share_bars() as progress:
         tasks = {r.name: progress.add_task(r.name, total=1.0) for r in requests}
 
         def report(shares: Mapping[str, float]) -> None:
@@ -148,3 +172,4 @@ def close_loop(
     if markdown is not None:
         write_page(results, folder, markdown)
     say(picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else []))
+    return {r["name"]: {"summary": r["summary"], "diagnosis": r["diagnosis"]} for r in results}

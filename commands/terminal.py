@@ -1,37 +1,157 @@
 """What the commands share: the terminal, the results' folder, options that mean the same everywhere."""
 
 import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from ..dynamics.errors import InputError
 
 console = Console()
 errors = Console(stderr=True)
 
+
+@dataclass
+class Run:
+    """What the command that runs now has done so far."""
+
+    dry: bool = False
+    written: list[Path] = field(default_factory=list)
+    record: Path | None = None  # where it is noted how the results came about
+    made: list[Path] = field(default_factory=list)  # folders, innermost first
+
+    def begin(self, dry: bool = False) -> None:
+        """Forget the command before."""
+        self.dry, self.written, self.record, self.made = dry, [], None, []
+
+    def undo(self) -> None:
+        """Take the folders away again that were made for results and are empty."""
+        with suppress(OSError):
+            for folder in self.made:
+                folder.rmdir()
+
+
+run = Run()
+
+
+class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error
+    """Ends a dry run where the work would begin."""
+
+    def __init__(self, plan: Mapping[str, Any], out: Path) -> None:
+        super().__init__("dry run")
+        self.plan, self.out = plan, out
+
+
+def offering(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return what completes a name, or the last of several with commas, in a shell; ``names`` is only called there."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in names() if name.startswith(last)]
+
+    return complete
+
+
+def vehicle_names() -> list[str]:
+    """Return the vehicles that come with the kit."""
+    from ..dynamics.vehicle_file import preset_names
+
+    return preset_names()
+
+
+def effect_names() -> Iterable[str]:
+    """Return the effects of the library."""
+    from ..dynamics.effects import names
+
+    return names()
+
+
+def scenario_names() -> Iterable[str]:
+    """Return the scenarios of the task."""
+    from ..envs.scenarios import SCENARIOS
+
+    return SCENARIOS
+
+
+def controller_names() -> Iterable[str]:
+    """Return the controllers that come with the kit."""
+    from ..controllers import CONTROLLERS
+
+    return CONTROLLERS
+
+
+def reader_names() -> Iterable[str]:
+    """Return the readers of logs of other forms."""
+    from ..identification.readers import READERS
+
+    return READERS
+
+
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; it is made if need be.")]
-VehicleOption = Annotated[str, typer.Option("--vehicle", help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.")]
+VehicleOption = Annotated[str, typer.Option("--vehicle", help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
+                                            autocompletion=offering(vehicle_names))]
+ReaderOption = Annotated[str | None, typer.Option(
+    "--reader", help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag or rosbag:TOPICS.yaml.",
+    autocompletion=offering(reader_names))]
 
 
-def results_folder(out: Path) -> Path:
-    """Make the results' folder before the work starts, so that no result is lost for want of it."""
+def results_folder(out: Path, **plan: object) -> Path:
+    """Make the results' folder, before the work starts, so that no result is lost for want of it.
+
+    Every command calls this once its request is checked and before its work begins: here a dry run ends.
+
+    Args:
+        out: the folder.
+        plan: what is about to be done, for a dry run.
+
+    Raises:
+        InputError: there can be no such folder.
+        DryRun: the command is not to do its work.
+    """
+    if run.dry:
+        raise DryRun(plan, out)
     try:
+        run.made = [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"--out {out}: cannot be made a folder: {error.strerror or error}") from error
     if not os.access(out, os.W_OK):
         raise InputError(f"--out {out}: is not writable")
+    run.record = out / "run.json"
     return out
 
 
 def progress_bar() -> Progress:
     """Return a bar that counts what is done and says how long the rest will take; it goes when the work is over."""
     return Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-                    console=errors, transient=True)
+                    console=errors, transient=True, disable=errors.quiet)
+
+
+def share_bars() -> Progress:
+    """Return bars for shares of work between 0 and 1, with the time that is left; they go when the work is over."""
+    return Progress(TextColumn("{task.description:18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
+                    TimeRemainingColumn(), console=errors, transient=True, disable=errors.quiet)
+
+
+@contextmanager
+def working(text: str) -> Iterator[Callable[..., None]]:
+    """Show what is being done; give a function that takes the share done so far, another text, or both."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
+    with Progress(*columns, console=errors, transient=True, disable=errors.quiet) as progress:
+        task = progress.add_task(text, total=None)
+
+        def report(share: float | None = None, text: str | None = None) -> None:
+            if share is not None:
+                progress.update(task, total=1.0, completed=share)
+            progress.update(task, description=text)
+
+        yield report
 
 
 def names_in(text: str, option: str) -> list[str]:
@@ -46,7 +166,13 @@ def names_in(text: str, option: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+def note(text: str) -> None:
+    """Say on standard error what is worth knowing about the input; a warning stands out."""
+    errors.print(text, style="yellow" if text.startswith("warning") else "dim", highlight=False, markup=False)
+
+
 def say(*paths: Path) -> None:
     """Say which files were written."""
+    run.written.extend(paths)
     for path in paths:
         console.print(f"wrote {path}", highlight=False, soft_wrap=True, markup=False)

@@ -13,8 +13,10 @@ from .effects import check_setting
 from .errors import InputError, unknown_name
 from .files import replaced
 from .vehicle import Array, EffectSetting, Mocap, Vehicle
+from .yaml_file import parse_yaml, read_yaml
 
 _ROTOR_STEPS = 255  # an 8-bit turn rate
+_LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow
 
 
 def preset_names() -> list[str]:
@@ -31,11 +33,7 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read as a vehicle file: {error}") from error
-        return parse_vehicle(text, str(path))
+        return _vehicle(read_yaml(path, "a vehicle file"), str(path))
     presets = preset_names()
     if str(name_or_path) not in presets:
         raise unknown_name("vehicle", str(name_or_path), presets, "vehicle (a preset's name or a .yaml file)")
@@ -45,10 +43,10 @@ def load_vehicle(name_or_path: str | Path) -> Vehicle:
 
 def parse_vehicle(text: str, where: str = "vehicle") -> Vehicle:
     """Return the vehicle that a YAML text describes; ``where`` names it in errors."""
-    try:
-        data = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not valid YAML: {error}") from error
+    return _vehicle(parse_yaml(text, where), where)
+
+
+def _vehicle(data: object, where: str) -> Vehicle:
     if not isinstance(data, dict):
         raise InputError(f"{where}: expected a mapping of fields such as mass and inertia, got {type(data).__name__}")
     known = {f.name for f in fields(Vehicle)}
@@ -93,7 +91,8 @@ def parse_vehicle(text: str, where: str = "vehicle") -> Vehicle:
         given["mocap"] = _mocap(data["mocap"], where)
     given["effects"] = _effects(data.get("effects") or [], where)
     vehicle = Vehicle(**given)
-    if np.linalg.cond(vehicle.mixing / np.linalg.norm(vehicle.mixing, axis=1, keepdims=True)) > 1e6:
+    length = np.linalg.norm(vehicle.mixing, axis=1, keepdims=True)  # zero where all rotors stand in one line
+    if np.any(length == 0.0) or np.linalg.cond(vehicle.mixing / length) > 1e6:
         raise InputError(f"{where}: rotor_positions and spin: the four rotors cannot make thrust and three torques "
                          "independently of one another")
     return vehicle
@@ -134,7 +133,7 @@ def _number(value: object, where: str, key: str, positive: bool = False) -> floa
         number = math.nan if isinstance(text, bool) else float(text)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         number = math.nan
-    if not math.isfinite(number) or (positive and number <= 0):
+    if not abs(number) <= _LARGEST or (positive and number <= 0):
         expected = "a positive number" if positive else "a finite number"
         raise InputError(f"{where}: {key} must be {expected}, got {value!r}")
     return number
@@ -145,7 +144,7 @@ def _numbers(value: object, where: str, key: str, shape: tuple[int, ...]) -> Arr
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
-    if array.shape != shape or not np.all(np.isfinite(array)):
+    if array.shape != shape or not np.all(np.abs(array) <= _LARGEST):
         expected = " x ".join(map(str, shape))
         raise InputError(f"{where}: {key} must be {expected} finite numbers, got {value!r}")
     return array

@@ -1,8 +1,9 @@
-"""Writing an episode as a film."""
+"""Films: pictures one after the other as an mp4 or a GIF, whole or not at all."""
 
+import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from matplotlib.image import imsave
@@ -10,43 +11,104 @@ from numpy.typing import NDArray
 
 from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
-from .fan_tracking import FanTrackingEnv
+from .marks import MARKS
+
+Picture = NDArray[np.uint8]
+
+FPS = 12.5  # of an episode: a picture a decision
+_GIF_WIDTH = 480  # pixels
+_GIF_COLOURS = 192
+_GIF_SAMPLES = 6  # pictures from which colours are chosen
+_SWATCH, _SHADES = 8, 3  # pixels, and shades, of a mark's colour on the sheet that colours are chosen from
 
 
-class VideoWriter:
-    """Appends pictures of an environment to an mp4; it and the last picture beside it appear only when it is whole.
+class Film:
+    """Appends pictures to a ``.mp4`` or ``.gif`` file that appears only when it is whole.
+
+    Args:
+        path: of the film; its ending says which kind.
+        width: of the pictures, in pixels; a GIF is made narrower.
+        height: likewise.
+        fps: pictures a second.
+        longest: s of film, after which pictures are left out; default: none are.
 
     Raises:
-        InputError: the video extra is not installed.
+        InputError: an mp4 without the video extra.
     """
 
-    def __init__(self, path: Path, env: FanTrackingEnv) -> None:
-        try:
-            import imageio_ffmpeg
-        except ImportError as error:
-            raise InputError("--video needs the video extra: pip install 'windwrench[video]'") from error
-        self.path, self.env = path, env
-        self._partial = path.with_suffix(".partial.mp4")
-        self._stream: Any = imageio_ffmpeg.write_frames(
-            str(self._partial), (env.width, env.height), fps=12.5, quality=7, macro_block_size=16)
-        self._stream.send(None)
-        self._last: NDArray[np.uint8] | None = None
+    def __init__(self, path: Path, width: int, height: int, fps: float = FPS, longest: float | None = None) -> None:
+        self.path, self.width, self.height, self.fps = path, width, height, fps
+        self._left = None if longest is None else max(1, round(longest * fps))
+        self._partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        self._stream: Any = None
+        self._pictures: list[Any] = []
+        if path.suffix == ".mp4":
+            try:
+                import imageio_ffmpeg
+            except ImportError as error:
+                raise InputError(f"{path}: an mp4 needs the video extra: pip install 'windwrench[video]'") from error
+            self._stream = imageio_ffmpeg.write_frames(str(self._partial), (width, height), fps=fps, quality=7,
+                                                       macro_block_size=16, output_params=["-f", "mp4"])
+            self._stream.send(None)
 
-    def add(self) -> None:
-        """Append a picture of the environment as it is now."""
-        self._last = self.env.render()
-        if self._last is not None:
-            self._stream.send(self._last.tobytes())
+    def add(self, picture: Picture | None) -> None:
+        """Append a picture (height, width, 3); None, which a window returns, is none."""
+        if picture is None or self.is_full:
+            return
+        if self._left is not None:
+            self._left -= 1
+        if self._stream is not None:
+            self._stream.send(picture.tobytes())
+            return
+        from PIL import Image
 
-    def __enter__(self) -> "VideoWriter":
+        width = min(_GIF_WIDTH, self.width)
+        size = width, round(self.height * width / self.width)
+        self._pictures.append(Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS))
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more pictures are wanted."""
+        return self._left == 0
+
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._stream.close()
-        if kind is None:
-            self._partial.replace(self.path)
-            if self._last is not None:
-                with replaced(self.path.with_suffix(".scene.png")) as partial:
-                    imsave(partial, self._last, format="png")
-        else:
-            self._partial.unlink(missing_ok=True)
+        if self._stream is not None:
+            self._stream.close()
+            if kind is None:
+                self._partial.replace(self.path)
+            else:
+                self._partial.unlink(missing_ok=True)
+        elif kind is None and self._pictures:
+            first, *others = _reduced(self._pictures)
+            with replaced(self.path) as partial:
+                first.save(partial, format="GIF", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0,
+                           optimize=False)
+
+
+def _reduced(images: list[Any]) -> list[Any]:
+    """Return images in the same few colours, which neither flicker nor cost space in every picture."""
+    from PIL import Image
+
+    width, height = images[0].size
+    some = images[:: max(1, len(images) // _GIF_SAMPLES)]
+    sheet = Image.new("RGB", (width, height * len(some) + _SWATCH * len(MARKS)))
+    for i, image in enumerate(some):
+        sheet.paste(image, (0, i * height))
+    # arrows are small, and colours are chosen by the area that they cover
+    for i, colour in enumerate(MARKS):
+        for j in range(_SHADES):
+            shade = tuple(int(255 * c * (0.45 + 0.55 * (j + 1) / _SHADES)) for c in colour[:3])
+            left = j * width // _SHADES
+            sheet.paste(shade, (left, len(some) * height + i * _SWATCH, left + width // _SHADES, len(some) * height
+                                + (i + 1) * _SWATCH))
+    palette = sheet.quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+
+
+def save_picture(picture: Picture, path: Path) -> None:
+    """Write a picture (height, width, 3) as a PNG."""
+    with replaced(path) as partial:
+        imsave(partial, picture, format="png")

@@ -11,9 +11,8 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from multiprocessing import Manager, get_context
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..dynamics.vehicle_file import dump_vehicle
+from ..dynamics.workers import shared_dict, workers
 from ..envs.fan_tracking import FanTrackingEnv
 from ..identification.diagnosis import diagnose
 from ..training.evaluate import benchmark_seeds, fly_episode
@@ -286,19 +286,13 @@ def close_loops(
 
 def _side_by_side(pending: Sequence[Request], folder: Path, jobs: int, shares: dict[str, float],
                   report: Callable[[Mapping[str, float]], None]) -> None:
-    with Manager() as manager, ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        shared = manager.dict(shares)
+    with shared_dict(shares) as shared, workers(jobs) as pool:
         waiting: set[Future[None]] = {pool.submit(_close_and_share, request, folder, shared) for request in pending}
-        try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
-                report(dict(shared))
-                for future in done:
-                    future.result()
-        except BaseException:
-            for future in waiting:
-                future.cancel()
-            raise
+        while waiting:
+            done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
+            report(dict(shared))
+            for future in done:
+                future.result()
 
 
 def _close_and_share(request: Request, folder: Path, shared: Any) -> None:

@@ -11,11 +11,10 @@ import os
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from ..dynamics.effects import names
 from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
 from ..dynamics.vehicle import Vehicle
+from ..dynamics.workers import workers
 from ..envs.recording import TRAJECTORIES
 from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
@@ -229,20 +229,14 @@ def run_trials(
     report(len(done))
     pending = [trial for key, trial in wanted.items() if key not in done]
     if pending:
-        workers = min(jobs or os.cpu_count() or 1, len(pending))
-        with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool, \
-                path.open("a", encoding="utf-8") as kept_file:
-            waiting = [pool.submit(fly_and_diagnose, trial) for trial in pending]
-            try:
-                for future in as_completed(waiting):
-                    outcome = future.result()
-                    kept_file.write(_line(outcome))
-                    kept_file.flush()
-                    done[outcome["key"]] = outcome
-                    report(len(done))
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        count = min(jobs or os.cpu_count() or 1, len(pending))
+        with _one_thread_each(), path.open("a", encoding="utf-8") as kept_file, workers(count) as pool:
+            for future in as_completed([pool.submit(fly_and_diagnose, trial) for trial in pending]):
+                outcome = future.result()
+                kept_file.write(_line(outcome))
+                kept_file.flush()
+                done[outcome["key"]] = outcome
+                report(len(done))
     return [done[key] for key in wanted]
 
 

@@ -5,10 +5,9 @@ import io
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import asdict
 from importlib import import_module
-from multiprocessing import Manager, get_context
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.files import replaced
+from ..dynamics.workers import shared_dict, workers
 from . import NAMES
 from .result import Result
 
@@ -58,31 +58,17 @@ def reproduce(
     Raises:
         InputError: ``seeds`` is not positive, or an experiment needs a package that is not there.
     """
-    if seeds is not None and seeds < 1:
-        raise InputError(f"reproduce: --seeds must be at least 1, got {seeds}")
-    wanted = {name: seeds or int(_module(name).SEEDS) for name in names}
-    done = {name: _is_done(folder, name, count) for name, count in wanted.items()}
+    wanted = numbers_of_seeds(names, seeds)
+    done = {name: is_done(folder, name, count) for name, count in wanted.items()}
     pending = [name for name in names if not done[name]]
-    with Manager() as manager:
-        shares = manager.dict({name: float(done[name]) for name in names})
-        workers = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending}
-            while waiting:
-                finished = {future for future in waiting if future.done()}
-                waiting -= finished
-                report(dict(shares))
-                try:
-                    for future in finished:
-                        future.result()
-                    if waiting:
-                        next(iter(waiting)).exception(timeout=0.3)
-                except TimeoutError:
-                    pass
-                except BaseException:
-                    for future in waiting:
-                        future.cancel()
-                    raise
+    count = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
+    with shared_dict({name: float(done[name]) for name in names}) as shares, workers(count) as pool:
+        waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending}
+        while waiting:
+            finished, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
+            report(dict(shares))
+            for future in finished:
+                future.result()
         report(dict(shares))
     return {name: name in pending for name in names}
 
@@ -91,7 +77,19 @@ def _module(name: str) -> Any:
     return import_module(f".{name}", __package__)
 
 
-def _is_done(folder: Path, name: str, seeds: int) -> bool:
+def numbers_of_seeds(names: Sequence[str], seeds: int | None = None) -> dict[str, int]:
+    """Return with how many seeds each experiment runs: ``seeds``, or its own number.
+
+    Raises:
+        InputError: ``seeds`` is not positive.
+    """
+    if seeds is not None and seeds < 1:
+        raise InputError(f"reproduce: --seeds must be at least 1, got {seeds}")
+    return {name: seeds or int(_module(name).SEEDS) for name in names}
+
+
+def is_done(folder: Path, name: str, seeds: int) -> bool:
+    """Return whether an experiment's files of this version and number of seeds lie in a folder."""
     try:
         kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,6 +1,7 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from .wrench_plot import plot_wrench
 Array = NDArray[np.float64]
 
 _LOST = 2.0  # s without a pose, after which the filter starts anew at the next one
+_REPORTED = 10_000  # rows between two reports of progress
 _SLACK = 0.1  # of a period: a step so little too long is still one step
 
 
@@ -38,7 +40,8 @@ class WrenchSeries:
     notes: tuple[str, ...] = ()
 
 
-def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> WrenchSeries:
+def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None,
+                 report: Callable[[float], None] = lambda share: None) -> WrenchSeries:
     """Estimate the external force and torque at every row of a log.
 
     The filter starts at the first pose. Each row's prediction uses the mean of its turn rates and those of the row
@@ -50,6 +53,7 @@ def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = No
         log: the flight.
         vehicle: the declared vehicle; the wrench is what it and its declared effects do not explain.
         tuning: default ``UKFTuning.for_vehicle(vehicle, log.period)``.
+        report: called now and then with the share that is done.
 
     Raises:
         InputError: the log has no pose at all, or its turn rates make the filter's numbers overflow.
@@ -67,21 +71,24 @@ def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = No
     first = int(seen[0])
     ukf.reset(log.position[first], log.quaternion[first])
     last_pose = float(log.t[first])
-    for k in range(first, count):
-        t = float(log.t[k])
-        if k > first:
-            if t - last_pose <= _LOST:
-                _predict(ukf, log, k, period)
-                if log.valid[k]:
-                    nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
-            elif log.valid[k]:
-                ukf.reset(log.position[k], log.quaternion[k])
-                notes.append(f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter starts anew there")
-        if log.valid[k]:
-            last_pose = t
-        estimate = ukf.estimate
-        state[k] = estimate.state[:19]
-        deviation[k] = np.sqrt(np.diagonal(estimate.covariance)[12:18])
+    with np.errstate(over="ignore", invalid="ignore"):  # an estimate that overflows is refused below
+        for k in range(first, count):
+            t = float(log.t[k])
+            if k % _REPORTED == 0:
+                report(k / count)
+            if k > first:
+                if t - last_pose <= _LOST:
+                    _predict(ukf, log, k, period)
+                    if log.valid[k]:
+                        nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
+                elif log.valid[k]:
+                    ukf.reset(log.position[k], log.quaternion[k])
+                    notes.append(f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter starts anew there")
+            if log.valid[k]:
+                last_pose = t
+            estimate = ukf.estimate
+            state[k] = estimate.state[:19]
+            deviation[k] = np.sqrt(np.diagonal(estimate.covariance)[12:18])
     state[:first], deviation[:first] = state[first], deviation[first]
     if not (np.isfinite(state).all() and np.isfinite(deviation).all()):
         bad = int(np.flatnonzero(~np.isfinite(np.column_stack([state, deviation])).all(axis=1))[0])

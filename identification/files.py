@@ -16,6 +16,8 @@ from ..dynamics.files import replaced
 Array = NDArray[np.float64]
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
+LARGEST = 2**31  # bytes of text
+MOST_ROWS = 20_000_000  # a day at 200 Hz
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,8 @@ def open_table(path: Path) -> Table:
     repeated = {name for name in table.header if table.header.count(name) > 1}
     if repeated:
         raise InputError(f"{path}: column {', '.join(sorted(repeated))} stands there more than once; expected it once")
+    if table.rows > MOST_ROWS:
+        raise InputError(f"{path}: claims {table.rows} rows; expected one flight, at most {MOST_ROWS}")
     if table.rows == 0:
         raise InputError(f"{path}: no rows; expected a header and at least one row of numbers")
     return table
@@ -61,9 +65,11 @@ def open_table(path: Path) -> Table:
 
 def _read_text(path: Path) -> str:
     try:
-        data = path.read_bytes()
-        if file_kind(path) == ".csv.gz":
-            data = gzip.decompress(data)
+        # what is packed may unpack to any size
+        with gzip.open(path) if file_kind(path) == ".csv.gz" else path.open("rb") as file:
+            data = file.read(LARGEST + 1)
+        if len(data) > LARGEST:
+            raise InputError(f"{path}: more than {LARGEST} bytes of text; expected one flight")
         text = data.decode("utf-8-sig")
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
@@ -137,6 +143,8 @@ def _open_parquet(path: Path) -> Table:
                 column = file.read(columns=[name]).column(0).cast(pyarrow.float64())
             except (OSError, pyarrow.ArrowException) as error:
                 raise InputError(f"{path}: column {name} cannot be read: {error}; expected numbers") from error
+            if len(column) != rows:
+                raise InputError(f"{path}: column {name} has {len(column)} rows; expected the {rows} that the file claims")
             columns[name] = np.array(column.to_numpy(), dtype=np.float64)
         return columns
 

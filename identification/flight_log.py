@@ -86,7 +86,8 @@ def read_log(path: str | Path, reader: str | None = None, vehicle: Vehicle | Non
 
     path = Path(path)
     if reader is not None:
-        log = find_reader(reader).read(path, vehicle)
+        with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for what they are
+            log = find_reader(reader).read(path, vehicle)
     else:
         for other in READERS.values():
             if path.name.lower().endswith(other.suffixes):
@@ -102,7 +103,8 @@ def read_log(path: str | Path, reader: str | None = None, vehicle: Vehicle | Non
                                      f"(reader={other.name!r}) with it")
             raise InputError(f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "
                              f"found {', '.join(table.header[:20])}")
-        log = _canonical(table)
+        with np.errstate(over="ignore", invalid="ignore"):
+            log = _canonical(table)
     return _with_doubts(log, vehicle)
 
 

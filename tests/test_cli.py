@@ -75,7 +75,7 @@ def test_fly_draws_the_episode(tmp_path):
     out = tmp_path / "a" / "folder"
     text = succeed(tmp_path, "fly", "--scenario", "static", "--controller", "admittance", "--seed", 3, "--out", out)
     assert (out / "fly.png").read_bytes().startswith(PNG)
-    assert [p.name for p in out.iterdir()] == ["fly.png"]
+    assert {p.name for p in out.iterdir()} == {"fly.png", "run.json"}
     assert f"wrote {out / 'fly.png'}" in text
 
 
@@ -86,7 +86,7 @@ def test_benchmark_writes_the_leaderboard(tmp_path):
     assert [(row["controller"], row["scenario"], row["episodes"], row["seed"]) for row in rows] == [
         ("oracle", "base", 2, 5), ("hover", "base", 2, 5)]
     assert (tmp_path / "out" / "leaderboard.png").read_bytes().startswith(PNG)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"leaderboard.json", "leaderboard.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"leaderboard.json", "leaderboard.png", "run.json"}
 
 
 def test_a_recorded_flight_can_be_estimated(log, tmp_path):
@@ -98,7 +98,7 @@ def test_a_recorded_flight_can_be_estimated(log, tmp_path):
                              "std_tz", "nis"]
     late = [float(row["fx"]) for row in rows if float(row["t"]) > 5.0]
     assert np.mean(late) == pytest.approx(0.2, abs=0.03)
-    assert {p.suffix for p in (tmp_path / "out").iterdir()} == {".csv", ".png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"wrench.csv", "wrench.png", "run.json"}
 
 
 def test_a_recording_repeats_with_its_seed(log, tmp_path):
@@ -128,7 +128,8 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
     (("fly", "--effect", "rotor_drag:kdx=-1"), "between"),
     (("fly", "--seed", "-1"), "--seed"),
     (("fly", "--nothing"), "No such option"),
-    (("flie",), "No such command"),
+    (("flie",), "Did you mean 'fly'"),
+    (("fly", "--sceanrio", "base"), "--scenario"),
     (("benchmark", "--controllers", "hovre"), "Did you mean 'hover'"),
     (("benchmark", "--scenarios", "bsae"), "Did you mean 'base'"),
     (("benchmark", "--scenarios", ","), "--scenarios"),

@@ -3,8 +3,8 @@ import sys
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from ulog_writer import ulog_bytes
 
+from windwrench.benchmarks.ulog_writer import ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.flight_log import read_log
 

@@ -66,8 +66,8 @@ def test_nanobench_names(nanobench):
     named = by_name(diagnosis)
     assert not set(named) & {"wind", "com_offset", "inflow_thrust", "ground_effect", "slung_payload", "fan_jet"}
     assert 0.8 < named["battery_sag"].coefficients["n"] < 2.0
-    assert set(named) <= {"thrust_scale", "battery_sag", "thrust_curvature", "thrust_fade", "latency", "rotor_drag", "body_drag",
-                          "world_tilt", "thrust_axis_tilt", "constant_force", "marker_offset"}
+    assert set(named) <= {"thrust_scale", "battery_sag", "thrust_curvature", "thrust_fade", "latency", "rotor_drag",
+                          "body_drag", "world_tilt", "thrust_axis_tilt", "constant_force", "marker_offset"}
     assert named["battery_sag"].indistinguishable_from == ()
     drag = named.get("rotor_drag") or named["body_drag"]
     assert {drag.name, *drag.indistinguishable_from} >= {"rotor_drag", "body_drag"}

@@ -1,11 +1,6 @@
 """The runner of the paper's figures: whole files or none, the same bytes again, and a run that goes on where it stopped."""
 
 import json
-import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +10,6 @@ from windwrench.dynamics import InputError
 from windwrench.experiments import NAMES
 from windwrench.experiments.reproduce import _module, chosen, reproduce, write_page, write_result
 from windwrench.experiments.result import Comparison, Result
-
-COMMAND = str(Path(sys.executable).with_name("windwrench"))
 
 
 def small_result(value=1.0):
@@ -68,20 +61,6 @@ def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == first
     assert shares[-1] == 1.0
     assert shares == sorted(shares)
-
-
-def test_a_run_that_is_killed_leaves_no_half_file(tmp_path):
-    run = subprocess.Popen([COMMAND, "reproduce", "fig6", "--seeds", "1", "--out", str(tmp_path)], stdout=subprocess.DEVNULL,
-                           stderr=subprocess.DEVNULL, start_new_session=True)
-    time.sleep(2.5)
-    run.send_signal(signal.SIGKILL)
-    run.wait()
-    for path in tmp_path.glob("*.json"):
-        json.loads(path.read_text())
-    again = subprocess.run([COMMAND, "reproduce", "fig6", "--seeds", "1", "--out", str(tmp_path)], capture_output=True,
-                           text=True)
-    assert again.returncode == 0, again.stderr
-    assert {p.name for p in tmp_path.iterdir()} >= {"fig6.csv", "fig6.json", "fig6.png", "fig6.svg", "reproduction.md"}
 
 
 def test_wrong_requests_are_named(tmp_path):

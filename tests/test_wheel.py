@@ -1,18 +1,23 @@
 """The built wheel, installed where there is no checkout, is whole."""
 
+import json
+import os
 import subprocess
 import sys
-import zipfile
+import sysconfig
+import venv
 from pathlib import Path
 
 import pytest
+
+from windwrench.cli import app
 
 ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """The folder of a wheel's contents; dependencies come from the environment that runs the tests."""
+def wheel(tmp_path_factory):
+    """The wheel, built from a copy of the checkout."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     # built from a copy: a build folder in the checkout must not leak into the wheel, nor be left behind
@@ -26,16 +31,40 @@ def installed(tmp_path_factory):
     built = subprocess.run([sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(source)],
                            capture_output=True, text=True)
     assert built.returncode == 0, built.stdout + built.stderr
-    (wheel,) = folder.glob("*.whl")
-    site = folder / "site"
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(site)
-    return site
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def empty(wheel, tmp_path_factory):
+    """The programs' folder of an environment that holds the wheel alone; dependencies are those of the running one."""
+    folder = tmp_path_factory.mktemp("environment")
+    venv.create(folder, with_pip=False, symlinks=os.name != "nt")
+    programs = folder / ("Scripts" if os.name == "nt" else "bin")
+    done = subprocess.run([sys.executable, "-m", "pip", "--python", str(programs / "python"), "install", "--no-deps", "--quiet",
+                           "--disable-pip-version-check", "--no-index", str(wheel)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    site = subprocess.run([programs / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+                          capture_output=True, text=True, check=True).stdout.strip()
+    # a line of a .pth file is a folder whose own .pth files, an editable install's among them, do not count
+    (Path(site) / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    return programs
+
+
+@pytest.fixture(scope="module")
+def installed(empty):
+    """The folder that the wheel was installed to."""
+    return next(empty.parent.rglob("windwrench/__init__.py")).parent.parent
 
 
 def run(installed, code, folder):
     return subprocess.run([sys.executable, "-c", f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"],
                           cwd=folder, capture_output=True, text=True)
+
+
+def call(empty, folder, *arguments):
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    return subprocess.run([empty / "windwrench", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
 
 
 def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
@@ -48,7 +77,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
                                                        "training", "experiments", "benchmarks", "commands")
                for p in (ROOT / folder).rglob("*.py")}
     assert sources <= {str(p.relative_to(package)) for p in package.rglob("*.py")}
-    entry = next(installed.glob("*.dist-info")) / "entry_points.txt"
+    entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
     assert "windwrench = windwrench.cli:main" in entry.read_text()
 
 
@@ -61,10 +90,23 @@ def test_it_runs_from_any_folder(installed, tmp_path):
     assert float(out.stdout) > 0
 
 
-def test_the_command_runs_from_any_folder(installed, tmp_path):
-    out = run(installed, "sys.argv = ['windwrench', 'record', '--seconds', '1', '--out', 'flight.csv']\n"
-              "from windwrench.cli import main; main()", tmp_path)
-    assert out.returncode == 0, out.stderr
+def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
+    for name in sorted(command.name for command in app.registered_commands):
+        done = call(empty, tmp_path, name, "--help")
+        assert done.returncode == 0, done.stderr
+        assert f"Usage: windwrench {name}" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_demo_runs_where_there_is_no_checkout(empty, tmp_path):
+    done = call(empty, tmp_path, "benchmark", "--episodes", "1", "--scenarios", "static", "--jobs", "1", "--out", "demo")
+    assert done.returncode == 0, done.stderr
+    assert len(json.loads((tmp_path / "demo" / "leaderboard.json").read_text())) == 4
+    done = call(empty, tmp_path, "fly", "--scenario", "static", "--out", "demo", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["result"]["lost"] is False
+    done = call(empty, tmp_path, "record", "--seconds", "1", "--out", "flight.csv")
+    assert done.returncode == 0, done.stderr
     assert (tmp_path / "flight.csv").read_text().startswith("t,px,py,pz,qw,qx,qy,qz,omega1")
 
 

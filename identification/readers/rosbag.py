@@ -31,11 +31,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from ...dynamics.errors import InputError, unknown_name
 from ...dynamics.vehicle import Vehicle
+from ...dynamics.yaml_file import read_yaml
 from ..flight_log import FlightLog
 from .streams import Stream, flight_log, from_ned
 
@@ -108,12 +108,7 @@ def _topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]
     file = Path(option) if option else path.with_name(f"{stem}.topics.yaml")
     if not option and not file.exists():
         return {}, str(file)
-    try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read as a topic map: {error}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{file}: not valid YAML: {error}") from error
+    data = read_yaml(file, "a topic map")
     if not isinstance(data, dict):
         raise InputError(f"{file}: expected a mapping of {', '.join(_TYPES)} to topics, got {type(data).__name__}")
     settings = {}

@@ -1,15 +1,13 @@
 """A small writer of ULog files, after the format's description in PX4's user guide."""
 
 import struct
+from collections.abc import Mapping
+from typing import Any
 
 _TYPES = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "int32_t": "i", "bool": "?"}
 
 
-def _message(kind, payload):
-    return struct.pack("<HB", len(payload), ord(kind)) + payload
-
-
-def ulog_bytes(topics, parameters=None):
+def ulog_bytes(topics: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, int | float] | None = None) -> bytes:
     """Return a ULog.
 
     Args:
@@ -32,12 +30,17 @@ def ulog_bytes(topics, parameters=None):
     for number, fields in enumerate(topics.values()):
         codes = [_TYPES[key.split()[0]] for key in fields]
         for row in zip(*fields.values(), strict=True):
-            data = b"".join(struct.pack(f"<{size(value)}{code}", *flat(value)) for code, value in zip(codes, row, strict=True))
+            data = b"".join(struct.pack(f"<{len(_flat(value))}{code}", *_flat(value))
+                            for code, value in zip(codes, row, strict=True))
             out.append(_message("D", struct.pack("<H", number) + data))
     return b"".join(out)
 
 
-def _formats(topic, fields):
+def _message(kind: str, payload: bytes) -> bytes:
+    return struct.pack("<HB", len(payload), ord(kind)) + payload
+
+
+def _formats(topic: str, fields: Mapping[str, Any]) -> list[bytes]:
     """Return the format messages of a topic, its nested type's among them."""
     plain = "".join(_declare(key, column) for key, column in fields.items() if "." not in key)
     nested = [key.split() for key in fields if "." in key]
@@ -50,15 +53,11 @@ def _formats(topic, fields):
             _message("F", f"{item}_report:{first}".encode())]
 
 
-def _declare(key, column):
+def _declare(key: str, column: Any) -> str:
     kind, name = key.split()
     width = getattr(column[0], "shape", ())
     return f"{kind}[{width[0]}] {name};" if width else f"{kind} {name};"
 
 
-def size(value):
-    return len(flat(value))
-
-
-def flat(value):
+def _flat(value: Any) -> list[Any]:
     return value.tolist() if getattr(value, "shape", ()) else [value.item() if hasattr(value, "item") else value]

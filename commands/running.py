@@ -1,0 +1,133 @@
+"""How every command runs: ``--json``, ``--quiet`` and ``--dry-run`` mean the same everywhere; ``run.json`` says what ran."""
+
+import functools
+import inspect
+import json
+import math
+import platform
+import shlex
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, is_dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from .. import __version__
+from ..dynamics.files import replaced
+from .terminal import DryRun, console, errors, run
+
+Work = TypeVar("Work", bound=Callable[..., Any])
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on standard output.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check the request and say what would be done; do nothing.")]
+
+# what a result depends on
+_PACKAGES = ("numpy", "scipy", "numba", "mujoco", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
+
+
+def expensive(work: Work) -> Work:
+    """Mark a command as one that runs for minutes: it gets ``--dry-run``, which stops it at ``results_folder``."""
+    work.expensive = True  # type: ignore[attr-defined]
+    return work
+
+
+def as_command(work: Callable[..., Any]) -> Callable[..., None]:
+    """Return a function for typer: ``work`` with the options that every command has.
+
+    ``work`` returns what ``--json`` prints as the result, tells ``say`` what it wrote, and ``results_folder`` where.
+    """
+    name = command_name(work)
+    can_stop = getattr(work, "expensive", False)
+
+    @functools.wraps(work)
+    def command(*, as_json: bool, quiet: bool, dry_run: bool = False, **options: Any) -> None:
+        run.begin(dry_run)
+        console.quiet, errors.quiet = as_json or quiet, quiet
+        try:
+            outcome: dict[str, Any] = {"result": work(**options)}
+            if run.record is not None:
+                write_run(run.record, name, options)
+        except DryRun as stopped:
+            outcome = {"dry_run": True, "would": stopped.plan, "out": stopped.out}
+            lines = [f"  {key}: {_words(value)}" for key, value in stopped.plan.items() if value is not None]
+            console.print("\n".join([f"{name} would do", *lines, f"  and write to {stopped.out}"]), highlight=False,
+                          markup=False, soft_wrap=True)
+        except BaseException:
+            run.undo()
+            raise
+        finally:
+            console.quiet = errors.quiet = False
+        if as_json:
+            written = [*run.written, *([run.record] if run.record is not None else [])]
+            print(json.dumps(plain({"command": name, **outcome, "written": written}), allow_nan=False))
+
+    shared = {"as_json": JsonOption, "quiet": QuietOption, **({"dry_run": DryRunOption} if can_stop else {})}
+    signature = inspect.signature(work, eval_str=True)
+    extra = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+             for key, kind in shared.items()]
+    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[*signature.parameters.values(), *extra], return_annotation=None)
+    command.__annotations__ = {**work.__annotations__, **shared}
+    return command
+
+
+def _words(value: object) -> str:
+    """Return a part of a plan as a person reads it."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {_words(item)}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return ", ".join(map(str, value))
+    return str(value)
+
+
+def command_name(work: Callable[..., Any]) -> str:
+    """Return what a user types for the command that a function is."""
+    return work.__name__.replace("_", "-")
+
+
+def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
+    """Write how the results beside a file came about, under the command's name: other commands' runs in it stay.
+
+    It holds no date and no duration: the same command gives the same bytes.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        kept = {}
+    packages = {}
+    for package in _PACKAGES:
+        try:
+            packages[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    entry = {"command": shlex.join(["windwrench", *sys.argv[1:]]), "seed": options.get("seed"), "options": options,
+             "windwrench": __version__, "python": platform.python_version(), "platform": platform.platform(),
+             "packages": packages}
+    runs = {**(kept if isinstance(kept, dict) else {}), name: plain(entry)}
+    with replaced(path) as partial:
+        partial.write_text(json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def plain(value: Any) -> Any:
+    """Return a value as strict JSON holds it: arrays as lists, paths as texts, what is not finite as None."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # NumPy's arrays and numbers
+        value = value.tolist()
+    if isinstance(value, (list, tuple, set)):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int)):
+        return value
+    # a name of a file may hold bytes that are no text
+    return str(value).encode("utf-8", "replace").decode()

@@ -1,0 +1,184 @@
+"""What every command shares: help with an example, --json, --quiet, --dry-run, run.json, completion, exit codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+
+from windwrench.cli import app, main
+from windwrench.commands.running import plain, write_run
+from windwrench.commands.terminal import names_in, offering
+
+COMMANDS = sorted(command.name for command in app.registered_commands)
+EXPENSIVE = ("benchmark", "close-loop", "imitate", "leaderboard", "reproduce", "trials")
+COMMAND = Path(sys.executable).with_name("windwrench")
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capfd):
+    """Run a command in ``tmp_path``, in this process to save its start; return exit code, standard output and error."""
+
+    def run_here(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["windwrench", *map(str, arguments)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capfd.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run_here
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_an_example_and_the_options_that_all_share(call, name):
+    code, text, _ = call(name, "--help")
+    assert code == 0
+    words = " ".join(text.split())
+    assert f"Example: windwrench {name} " in words
+    assert "--json" in words
+    assert "--quiet" in words
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_says_what_it_is_for(name):
+    command = typer.main.get_command(app).commands[name]
+    assert [p.name for p in command.params if not getattr(p, "help", None)] == []
+
+
+def test_help_says_what_exit_codes_mean(call):
+    code, text, _ = call("--help")
+    assert code == 0
+    for words in ("Exit codes: 0 done", "2 a mistake", "130 interrupted", "NO_COLOR"):
+        assert words in " ".join(text.split())
+    assert call("--version")[1].startswith("windwrench ")
+
+
+def test_json_is_one_object_and_nothing_else(call, tmp_path):
+    code, text, _ = call("record", "--seconds", 2, "--trajectory", "hover", "--effect", "mass:dm=0.01", "--out", "log.csv",
+                         "--json")
+    assert code == 0
+    said = json.loads(text)
+    assert said == {"command": "record", "written": ["log.csv", "log.run.json"], "result": {
+        "samples": 401, "vehicle": "ardrone2", "trajectory": "hover", "effects": {"mass": {"dm": 0.01}}}}
+    said = json.loads(call("estimate", "log.csv", "--out", "out", "--json")[1])
+    assert said["result"]["samples"] == 401
+    assert len(said["result"]["force_rmse_to_truth_N"]) == 3
+    assert all((tmp_path / path).is_file() for path in said["written"])
+
+
+def test_json_of_a_mistake_leaves_standard_output_empty(call):
+    code, out, err = call("estimate", "nowhere.csv", "--json")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: nowhere.csv")
+
+
+def test_quiet_says_nothing_but_errors(call, tmp_path):
+    assert call("record", "--seconds", 2, "--out", "log.csv", "--quiet") == (0, "", "")
+    assert (tmp_path / "log.csv").is_file()
+    code, out, err = call("record", "--seconds", 2, "--effect", "mas", "-q")
+    assert (code, out) == (2, "")
+    assert "Did you mean 'mass'" in err
+    assert "wrote" in call("record", "--seconds", 2, "--out", "log.csv")[1]  # the next one speaks again
+
+
+@pytest.mark.parametrize("name", EXPENSIVE)
+def test_a_dry_run_says_what_would_be_done_and_does_nothing(call, tmp_path, name):
+    code, text, _ = call(name, "--dry-run", "--out", "there")
+    assert code == 0
+    assert text.startswith(f"{name} would do\n")
+    assert "there" in text
+    said = json.loads(call(name, "--dry-run", "--json")[1])
+    assert said["dry_run"] is True
+    assert said["would"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_dry_run_checks_the_request(call):
+    code, _, err = call("benchmark", "--controllers", "hovre", "--dry-run")
+    assert code == 2
+    assert "Did you mean 'hover'" in err
+
+
+def test_a_run_is_noted_beside_its_results(call, tmp_path):
+    arguments = ("benchmark", "--controllers", "hover", "--scenarios", "static", "--episodes", 1, "--jobs", 1, "--seed", 7,
+                 "--out", "out")
+    assert call(*arguments)[0] == 0
+    path = tmp_path / "out" / "run.json"
+    first = path.read_bytes()
+    noted = json.loads(first)["benchmark"]
+    assert noted["command"] == "windwrench " + " ".join(map(str, arguments))
+    assert noted["seed"] == 7
+    assert noted["options"]["jobs"] == 1
+    assert {"numpy", "mujoco", "numba"} <= set(noted["packages"])
+    assert call("fly", "--scenario", "static", "--out", "out")[0] == 0
+    both = json.loads(path.read_text())
+    assert set(both) == {"benchmark", "fly"}  # results of two commands may share a folder
+    assert both["benchmark"] == noted
+    path.unlink()
+    assert call(*arguments)[0] == 0
+    assert path.read_bytes() == first
+
+
+def test_a_broken_note_is_written_anew(tmp_path):
+    path = tmp_path / "run.json"
+    path.write_text("[1, ")
+    write_run(path, "fly", {"seed": 3, "out": Path("x"), "far": float("inf")})
+    noted = json.loads(path.read_text())["fly"]
+    assert noted["options"] == {"seed": 3, "out": "x", "far": None}
+
+
+def test_plain_values_are_strict_json():
+    import numpy as np
+
+    value = {"a": np.array([1.0, np.nan]), "b": np.float64(2.0), "c": (Path("x"), None, True), 3: "\udcff"}
+    assert plain(value) == {"a": [1.0, None], "b": 2.0, "c": ["x", None, True], "3": "?"}
+
+
+def test_completion_offers_names():
+    complete = offering(lambda: ["hover", "admittance", "ratio"])
+    assert complete("h") == ["hover"]
+    assert complete("hover,a") == ["hover,admittance"]
+    assert complete("x") == []
+    assert names_in("a, b,,a", "--x") == ["a", "b"]
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+def test_a_shell_completes_commands_and_names(tmp_path):
+    def completed(words):
+        environment = {**os.environ, "_WINDWRENCH_COMPLETE": "complete_bash", "COMP_WORDS": words,
+                       "COMP_CWORD": str(len(words.split(" ")) - 1)}
+        return subprocess.run([COMMAND], env=environment, cwd=tmp_path, capture_output=True, text=True).stdout.split()
+
+    assert completed("windwrench diag") == ["diagnose"]
+    assert completed("windwrench fly --vehicle ar") == ["ardrone2"]
+    assert completed("windwrench fly --scenario sl") == ["slow-filter"]
+    assert completed("windwrench fly --effect rotor_d") == ["rotor_drag"]
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+def test_no_color_is_honoured(tmp_path):
+    def error(**more):
+        environment = {**{k: v for k, v in os.environ.items() if k != "NO_COLOR"}, **more}
+        return subprocess.run([COMMAND, "flie"], env=environment, cwd=tmp_path, capture_output=True, text=True).stderr
+
+    assert "\x1b[" in error(FORCE_COLOR="1", TERM="xterm-256color")
+    assert "\x1b[3" not in error(FORCE_COLOR="1", TERM="xterm-256color", NO_COLOR="1")
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+def test_an_interrupted_command_ends_with_130_and_no_traceback(tmp_path):
+    run = subprocess.Popen([COMMAND, "benchmark", "--episodes", "40", "--jobs", "2"], cwd=tmp_path, start_new_session=True,
+                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(4)
+    os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to every process of the command
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
+    assert "Traceback" not in err
+    assert err.strip().endswith("interrupted")

@@ -1,0 +1,128 @@
+"""Commands that are killed (no chance to clean up) leave no half file and no process; run again they give the same result."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from windwrench.dynamics.files import replaced
+
+START = "from windwrench.cli import main; main()"
+TRIALS = """
+from pathlib import Path
+from windwrench.experiments.diagnosis_trials import Trial, run_trials
+if __name__ == "__main__":
+    trials = [Trial("nothing", (), seed=s, trajectory="gentle", seconds=12.0) for s in range(2)]
+    Path("out").mkdir(exist_ok=True)
+    run_trials(trials, Path("out"), jobs=2)
+"""
+BENCHMARK = ("benchmark", "--controllers", "hover", "--scenarios", "static", "--episodes", "6", "--jobs", "2", "--out", "out")
+DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
+REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
+CLOSE_LOOP = ("close-loop", "--effect", "constant_force", "--episodes", "1", "--out", "out")
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc")
+
+
+def start(folder, *arguments):
+    if arguments == ("trials",):
+        (folder / "trials.py").write_text(TRIALS)
+        words = [sys.executable, "trials.py"]
+    else:
+        words = [sys.executable, "-c", START, *arguments]
+    return subprocess.Popen(words, cwd=folder, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def processes_of(session):
+    """Return those processes of a session that still run."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(path.parent.name))
+    return found
+
+
+def assert_ends(session, seconds=20.0):
+    deadline = time.monotonic() + seconds
+    while processes_of(session) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert processes_of(session) == []
+
+
+def assert_whole(folder):
+    """Every result that is there is whole; a temporary file has a name that no one takes for a result."""
+    for path in folder.rglob("*"):
+        if path.name.startswith("."):
+            continue
+        if path.suffix == ".json":
+            json.loads(path.read_text(encoding="utf-8"))
+        elif path.suffix == ".png":
+            assert path.read_bytes().endswith(b"IEND\xaeB`\x82"), path
+        elif path.suffix in (".svg", ".html"):
+            assert path.read_text(encoding="utf-8").rstrip().endswith(("</svg>", "</html>")), path
+
+
+def results(folder):
+    """Return what a run has written; times of the flights' diagnoses are no result."""
+    kept = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_dir():
+            continue
+        if path.suffix == ".jsonl":
+            lines = [json.loads(line) for line in path.read_text().splitlines()]
+            for line in lines:
+                for part in (line, *line["diagnoses"]):
+                    part.pop("seconds", None)
+            kept[path.name] = sorted(map(json.dumps, lines))
+        elif path.name != "run.json":
+            kept[path.name] = path.read_bytes()
+    return kept
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    """The bytes of a short flight log."""
+    folder = tmp_path_factory.mktemp("flight")
+    assert start(folder, "record", "--seconds", "12", "--trajectory", "gentle", "--out", "flight.csv").wait() == 0
+    return (folder / "flight.csv").read_bytes()
+
+
+@pytest.mark.parametrize("arguments", [BENCHMARK, DIAGNOSE, REPRODUCE, CLOSE_LOOP, ("trials",)], ids=lambda a: a[0])
+def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, arguments):
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    for folder in (whole, cut):
+        folder.mkdir()
+        (folder / "flight.csv").write_bytes(flight)
+    begun = time.monotonic()
+    assert start(whole, *arguments).wait() == 0
+    lasted = time.monotonic() - begun
+    run = start(cut, *arguments)
+    time.sleep(random.uniform(0.3, 0.95) * lasted)
+    os.kill(run.pid, signal.SIGKILL)  # the command alone: what becomes of its workers is the question
+    run.wait()
+    assert_whole(cut)
+    assert_ends(run.pid)
+    assert start(cut, *arguments).wait() == 0
+    assert results(cut) == results(whole)
+
+
+def test_what_a_killed_writer_left_is_swept_away(tmp_path):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / f".a.json.{gone.pid}.tmp").write_text("half")
+    (tmp_path / f".a.json.{os.getppid()}.tmp").write_text("someone's who still writes")
+    (tmp_path / ".a.json.tmp").write_text("not one of ours")
+    with replaced(tmp_path / "a.json") as partial:
+        partial.write_text("whole")
+    assert {p.name for p in tmp_path.iterdir()} == {"a.json", f".a.json.{os.getppid()}.tmp", ".a.json.tmp"}
+    assert (tmp_path / "a.json").read_text() == "whole"
