@@ -37,8 +37,9 @@ class Flight:
 
     def part(self, rows: NDArray[np.integer[Any]]) -> "Flight":
         """Return some rows of it."""
-        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        return Flight(**{name: None if column is None else column[rows] for name, column in columns.items()})
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        columns: dict[str, Any] = {name: None if column is None else column[rows] for name, column in every.items()}
+        return Flight(**columns)
 
 
 def arrow_scales(flight: Flight, arm: float) -> tuple[float, float]:
