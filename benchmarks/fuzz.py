@@ -145,7 +145,6 @@ def fuzz_chunk(name: str, first: int, count: int, seed: int) -> Tally:
     """Return what becomes of the inputs ``first`` to ``first + count`` of a form."""
     import time
 
-    _limit_memory()
     form, tally = forms()[name], Tally(name)
     with tempfile.TemporaryDirectory() as folder:
         # the first use of code is its slowest, and no fault of an input's
@@ -171,13 +170,15 @@ def fuzz_chunk(name: str, first: int, count: int, seed: int) -> Tally:
     return tally
 
 
-def _limit_memory() -> None:
+def _limited_chunk(name: str, first: int, count: int, seed: int) -> Tally:
+    """Do the same in a process of the fuzzer's own, which may have so much memory and no more."""
     try:
         import resource
 
         resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
     except (ImportError, OSError, ValueError):
         pass  # not on this system
+    return fuzz_chunk(name, first, count, seed)
 
 
 def fuzz(inputs: int, seed: int, jobs: int | None = None, only: Sequence[str] = (),
@@ -199,7 +200,7 @@ def fuzz(inputs: int, seed: int, jobs: int | None = None, only: Sequence[str] = 
         left: list[tuple[str, int, int]] = []
         with workers(min(jobs or os.cpu_count() or 1, len(tasks))) as pool:
             waiting: list[tuple[tuple[str, int, int], Future[Tally]]] = [
-                (task, pool.submit(fuzz_chunk, *task, seed)) for task in tasks]
+                (task, pool.submit(_limited_chunk, *task, seed)) for task in tasks]
             for (name, first, count), future in waiting:
                 try:
                     tallies[name].add(future.result())

@@ -258,7 +258,7 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
     assert asked == [(3, True)]
     assert "1. one effect of typical size" in capfd.readouterr().out
     assert "`windwrench trials --seeds 3 --quick`" in page.read_text(encoding="utf-8")
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"trials.json", "trials.jsonl", "trials.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"run.json", "trials.json", "trials.jsonl", "trials.png"}
 
 
 def test_a_diagnosis_that_falls_over_is_an_outcome():
