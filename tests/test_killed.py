@@ -18,7 +18,7 @@ TRIALS = """
 from pathlib import Path
 from windwrench.experiments.diagnosis_trials import Trial, run_trials
 if __name__ == "__main__":
-    trials = [Trial("nothing", (), seed=s, trajectory="gentle", seconds=12.0) for s in range(2)]
+    trials = [Trial("nothing", (), seed=s, trajectory="gentle", seconds=12.0) for s in range(1)]
     Path("out").mkdir(exist_ok=True)
     run_trials(trials, Path("out"), jobs=2)
 """
