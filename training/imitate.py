@@ -19,9 +19,9 @@ from .configuration import Config, features_of
 from .evaluate import DECISIONS
 from .features import History
 from .learners import dense_weights
-from .policy import TrainedPolicy, Weights, save_policy
+from .policy import TrainedPolicy, Weights
 from .seeds import training_seed, validation_seeds
-from .train import Progress, card_of, claim, read_progress, validate, write_json
+from .train import Progress, card_of, claim, read_progress, take_stock, write_json
 from .worlds import check_world, make_world
 
 Array = NDArray[np.float32]
@@ -75,15 +75,7 @@ def imitate(
         validated = flown // config["validation"]["every"]
         card = card_of(config, scenario, seed, flown, True)
         policy = TrainedPolicy(card, _weights(network))
-        rmse, lost = validate(policy, judge, seeds)
-        progress.steps.append(flown)
-        progress.rmse_m.append(rmse)
-        progress.lost.append(lost)
-        card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": len(seeds)}
-        save_policy(card, policy.weights, folder / "last.npz")
-        if progress.best < 0 or rmse < progress.best_rmse:
-            progress.best = len(progress.rmse_m) - 1
-            save_policy(card, policy.weights, folder / "best.npz")
+        take_stock(policy, card, progress, judge, seeds, folder)
         progress.seconds = time.perf_counter() - began
         write_json(asdict(progress), folder / "progress.json")
         report(progress)

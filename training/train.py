@@ -69,6 +69,25 @@ def validate(policy: TrainedPolicy, world: Any, seeds: Sequence[int]) -> tuple[f
     return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
 
 
+def take_stock(policy: TrainedPolicy, card: dict[str, Any], progress: Progress, world: Any, seeds: Sequence[int],
+               folder: Path) -> tuple[float, int]:
+    """Validate a policy, save it as the last one, and as the best if it is, and note it in ``progress``.
+
+    Returns:
+        Its mean RMSE (m) and how many episodes were lost, as of ``validate``.
+    """
+    rmse, lost = validate(policy, world, seeds)
+    progress.steps.append(card["steps"])
+    progress.rmse_m.append(rmse)
+    progress.lost.append(lost)
+    card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": len(seeds)}
+    save_policy(card, policy.weights, folder / "last.npz")
+    if progress.best < 0 or rmse < progress.best_rmse:
+        progress.best = len(progress.rmse_m) - 1
+        save_policy(card, policy.weights, folder / "best.npz")
+    return rmse, lost
+
+
 def write_json(data: Any, path: Path) -> None:
     """Write JSON at once or not at all, each list of numbers on a line of its own."""
     text = json.dumps(data, indent=1, allow_nan=False)
@@ -152,15 +171,7 @@ def train(
         if done // every > (progress.steps[-1] // every if progress.steps else 0) or done >= config["steps"]:
             card = card_of(config, scenario, seed, done, squashes(algorithm))
             policy = TrainedPolicy(card, weights_of(learner, algorithm))
-            rmse, lost = validate(policy, judge, seeds)
-            progress.steps.append(done)
-            progress.rmse_m.append(rmse)
-            progress.lost.append(lost)
-            card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": len(seeds)}
-            save_policy(card, policy.weights, folder / "last.npz")
-            if progress.best < 0 or rmse < progress.best_rmse:
-                progress.best = len(progress.rmse_m) - 1
-                save_policy(card, policy.weights, folder / "best.npz")
+            rmse, lost = take_stock(policy, card, progress, judge, seeds, folder)
             learner.logger.record("validation/rmse_m", rmse)
             learner.logger.record("validation/lost", lost)
             learner.logger.dump(done)
