@@ -12,9 +12,8 @@ from ..envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ..envs.jet import gust, jet_wrench
 from ..envs.plant import NOISE, SUBSTEPS, TICK, actuate, sense
 from ..envs.stepping import mj_step, mj_step_address
-from ..estimator.constant_gain import step as constant_gain_step
+from ..estimator.by_address import call_step
 from ..estimator.direct import released
-from ..estimator.ukf import step as filter_step
 from .speed import Section
 
 _REPEATS = 2000  # ticks
@@ -24,10 +23,7 @@ _REPEATS = 2000  # ticks
 def _filter(loops: np.ndarray, count: int) -> None:
     loop = loops[0]
     for _ in range(count):
-        if loop.constant_gain:
-            constant_gain_step(loop.filter, loop.plant.z, 3, TICK, loop.plant.battery)
-        else:
-            filter_step(loop.filter, loop.plant.z, 3, TICK, loop.plant.battery)
+        call_step(loop.step, loop.filter, 3, TICK, loop.plant.battery)
 
 
 @released

@@ -1,9 +1,12 @@
 """How this kit's inner loops are compiled."""
 
+import os
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -38,3 +41,30 @@ def announced(patience: float = 2.0) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+@contextmanager
+def compiled_meanwhile(function: Callable[..., Any], compile_it: Callable[[], None]) -> Iterator[None]:
+    """Have another process compile ``function`` while the block compiles something else, and wait for it.
+
+    Only where there is no machine code of it on disk and a second core: this one then finds it there. Numba compiles one
+    function at a time in a process, in threads or not.
+
+    Args:
+        function: a compiled one.
+        compile_it: compiles it; a function without arguments, found by its module and name.
+    """
+    code = cast(Any, function)
+    known = is_compiled(function) or any(Path(code.stats.cache_path).glob(f"*.{code.__name__}-*.nbi"))
+    if known or len(os.sched_getaffinity(0)) < 2:
+        yield
+        return
+    module, name = compile_it.__module__, compile_it.__name__
+    with subprocess.Popen([sys.executable, "-c", f"from {module} import {name}; {name}()"], stdin=subprocess.DEVNULL,
+                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                          env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}) as other:
+        try:
+            yield
+        except BaseException:
+            other.kill()
+            raise

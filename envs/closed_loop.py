@@ -8,19 +8,18 @@ import mujoco
 import numpy as np
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
-from ..dynamics.compiled import Record, announced, compiled, is_compiled
+from ..dynamics.compiled import Record, announced, compiled, compiled_meanwhile, is_compiled
 from ..dynamics.effects import compile_effects
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
+from ..estimator.by_address import call_step
 from ..estimator.constant_gain import ConstantGainFilter
-from ..estimator.constant_gain import step as constant_gain_step
 from ..estimator.direct import direct, released
 from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
-from ..estimator.ukf import WrenchUKF
-from ..estimator.ukf import step as filter_step
+from ..estimator.ukf import WrenchUKF, correct_parts
 from .jet import FAN, Fan, fan_record, jet_table
 from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
 from .stepping import mj_step, mj_step_address
@@ -28,7 +27,7 @@ from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
 _AT_REST = np.zeros(1)
-LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("constant_gain", "i8"), ("flight", FLIGHT), ("fan", FAN)])
+LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("step", "i8"), ("flight", FLIGHT), ("fan", FAN)])
 
 # what estimates the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
@@ -42,10 +41,9 @@ def tick(loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xf
     """
     plant, ukf, flight = loop.plant, loop.filter, loop.flight
     plant.seen = sense(plant, qpos, noise)
-    if loop.constant_gain:
-        constant_gain_step(ukf, plant.z, plant.seen, TICK, plant.battery)
-    else:
-        filter_step(ukf, plant.z, plant.seen, TICK, plant.battery)
+    for i in range(len(ukf.z)):
+        ukf.z[i] = plant.z[i]
+    call_step(loop.step, ukf, plant.seen, TICK, plant.battery)
     move_setpoint(flight, ukf.x, TICK)
     fly(flight, ukf.x, TICK)
     actuate(plant, flight.command, loop.fan, axial, radial, qpos, qvel, noise, xfrc)
@@ -61,6 +59,13 @@ def _run(loops: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Arra
         tick(loop, axial, radial, qpos, qvel, xfrc, noise[k])
         for _ in range(SUBSTEPS):
             mj_step(step, model, data)
+
+
+def compile_run() -> None:
+    """Compile the correction, which the filter's step compiles last, and the loop: half of what a first flight needs."""
+    vector, table = np.zeros(1), np.zeros((2, 2))
+    direct(correct_parts, np.zeros(1, dtype=FILTER)[0], vector, 3)
+    direct(_run, np.zeros(1, dtype=LOOP), table, table, vector, vector, vector, table, vector, 0, 0, 0, 0)
 
 
 class ClosedLoop:
@@ -110,8 +115,9 @@ class ClosedLoop:
         self._steps = 0
         self._call: Callable[..., None] | None = None
         with nullcontext() if is_compiled(_run) else announced():
-            self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-            loop["constant_gain"] = isinstance(self.ukf, ConstantGainFilter)
+            with compiled_meanwhile(_run, compile_run):
+                self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
+                loop["step"] = self.ukf.step_address
             loop["filter"] = self.ukf.record[0]
             self._views()
             self.run(np.empty((0, NOISE)))  # compiles it

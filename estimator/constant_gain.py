@@ -8,8 +8,10 @@ is turned into the vehicle's heading and the correction back out of it.
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
@@ -89,6 +91,11 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
+def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer, 1, FILTER)[0]
+    return step(f, f.z, parts, dt, voltage)
+
+
 class ConstantGainFilter(WrenchUKF):
     """The wrench filter with a constant gain; ``reset`` and ``step`` are those of ``WrenchUKF``.
 
@@ -107,6 +114,7 @@ class ConstantGainFilter(WrenchUKF):
     """
 
     _compiled_step = staticmethod(_step_record)
+    _step_by_address = staticmethod(_step_at)
 
     def __init__(self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005) -> None:
         super().__init__(vehicle, tuning, period)

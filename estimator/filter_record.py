@@ -30,7 +30,7 @@ FILTER = np.dtype([
     ("patience", "i8"),  # measurements that may be refused in a row
     ("refused", "i8"),
     # the step in progress
-    ("z", "f8", (11,)),  # turn rates, position and quaternion, where they come from Python
+    ("z", "f8", (11,)),  # turn rates, position and quaternion, for a step that is called from elsewhere
     ("acceleration", "f8", (6,)),
     ("rotation", "f8", (3, 3)),  # of the sigma point in hand
     ("centre_rotation", "f8", (3, 3)),

@@ -13,8 +13,10 @@ The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
@@ -22,6 +24,7 @@ from ..dynamics.errors import InputError
 from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from .by_address import address_of
 from .covariance import (
     add_more_pairs,
     add_noise,
@@ -35,7 +38,7 @@ from .covariance import (
 from .direct import direct
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
-from .filter_record import ESTIMATE, N, drive, filter_record, propagate
+from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, propagate
 from .imu import take_in_imu
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
@@ -154,10 +157,9 @@ def correct_parts(f: Record, z: Array, parts: int) -> None:
     """Correct with the checked ``parts`` of ``z`` (11,): 1 position, 2 attitude, 3 both."""
     if parts == 3:
         correct(f, z[4:7], z[7:11], 0, 6)
-    elif parts == 2:
-        correct(f, z[4:7], z[7:11], 0, 3)
-    elif parts == 1:
-        correct(f, z[4:7], f.x[3:7], 3, 6)
+    elif parts != 0:
+        first = 0 if parts == 2 else 3
+        correct(f, z[4:7], z[7:11] if parts == 2 else f.x[3:7], first, first + 3)
 
 
 @compiled
@@ -181,6 +183,11 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
+def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
+    f = carray(pointer, 1, FILTER)[0]
+    return step(f, f.z, parts, dt, voltage)
+
+
 class WrenchUKF:
     """Unscented Kalman filter for the external force and torque on a quadrotor.
 
@@ -201,6 +208,7 @@ class WrenchUKF:
     """
 
     _compiled_step = staticmethod(_step_record)
+    _step_by_address = staticmethod(_step_at)
 
     def __init__(
         self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005, gate: float | None = None
@@ -279,6 +287,11 @@ class WrenchUKF:
         f["refused"] = 0
         reset_model(f)
         undo_first_pose(self.record)
+
+    @property
+    def step_address(self) -> int:
+        """Address of the step for ``call_step``, in compiled loops."""
+        return address_of(self._step_by_address)
 
     @property
     def covariance(self) -> Array:
