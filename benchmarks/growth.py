@@ -1,8 +1,12 @@
-"""How cost grows with the work: over a million steps of a filter, and with the number of vehicles."""
+"""How cost grows with the work: over a million steps of a filter, with the number of vehicles, with the length of a log."""
 
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Sequence
+from pathlib import Path
 
 from ..dynamics import load_vehicle
 from ..estimator import UKFTuning, WrenchUKF
@@ -61,3 +65,32 @@ def over_vehicles(rounds: int = 5, counts: tuple[int, ...] = COUNTS, worlds: tup
     return Section("With the number of vehicles", ["vehicles", "us a filter's step", "us an environment's tick"], rows,
                    "Time for each vehicle: flat where cost is linear in their number. From 64 filters on, the dearest batch "
                    f"costs {max(middle) / min(middle):.2f} times the cheapest, a vehicle.")
+
+
+# its children are one diagnosis alone
+_DIAGNOSE = """
+import resource, subprocess, sys, time
+begin = time.perf_counter()
+subprocess.run([sys.executable, "-m", "windwrench", "diagnose", *sys.argv[1:]], check=True)
+print(time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
+"""
+
+
+def over_logs(seconds: Sequence[float] = (60.0, 600.0)) -> Section:
+    """Return the time and the greatest memory of a diagnosis of logs of growing length, each in a process of its own."""
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for length in (seconds[0], *seconds):  # the first one compiles
+            log = folder / f"{length:g}.csv"
+            subprocess.run([sys.executable, "-m", "windwrench", "record", "--effect", "rotor_drag", "--seconds", f"{length:g}",
+                            "--out", str(log), "--quiet"], check=True)
+            done = subprocess.run([sys.executable, "-c", _DIAGNOSE, str(log), "--vehicle", "ardrone2", "--out",
+                                   str(folder / "diagnosis"), "--quiet"], check=True, capture_output=True, text=True)
+            taken, memory = (float(word) for word in done.stdout.split())
+            rows.append([f"{length:,.0f}", f"{taken:.1f}", f"{taken / length:.3f}", f"{memory:.0f}"])
+    header = ["flight, s", "diagnosis, s", "s for a second of flight", "memory, MB"]
+    return Section("With the length of a log", header, rows[1:],
+                   "A process of its own, from the start of Python to the written report, with one effect that is not declared, "
+                   "at 200 Hz. Of flights of more than eight minutes, windows of a minute spread over them are looked at; reading "
+                   "and checking the log is what still grows.")

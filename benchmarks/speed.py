@@ -10,7 +10,8 @@ import platform
 import statistics
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -66,17 +67,29 @@ def filters() -> list[Contender]:
     return out
 
 
+_FIRST_STEP = ("import gymnasium, windwrench\nenv = gymnasium.make('windwrench/FanTracking-v0')\nenv.reset(seed=0)\n"
+               "env.step(env.action_space.sample())")
+
+
 def starts() -> list[Contender]:
     """Return the times from a fresh process to the package, and to the first step of an environment."""
-    def fresh(code: str) -> float:
-        done = subprocess.run([sys.executable, "-c", f"import time; t = time.perf_counter()\n{code}\n"
-                               "print(time.perf_counter() - t)"], capture_output=True, text=True, check=True)
-        return float(done.stdout.split()[-1])
+    return [Contender("import windwrench", "s", "a fresh process", lambda: _fresh("import windwrench"), reference=True),
+            Contender("first make, reset and step", "s", "a fresh process, compiled code on disk", lambda: _fresh(_FIRST_STEP))]
 
-    step = ("import gymnasium, windwrench\nenv = gymnasium.make('windwrench/FanTracking-v0')\nenv.reset(seed=0)\n"
-            "env.step(env.action_space.sample())")
-    return [Contender("import windwrench", "s", "a fresh process", lambda: fresh("import windwrench"), reference=True),
-            Contender("first make, reset and step", "s", "a fresh process, compiled code on disk", lambda: fresh(step))]
+
+def _fresh(code: str, environment: Mapping[str, str] | None = None) -> float:
+    timed = f"import time; t = time.perf_counter()\n{code}\nprint(time.perf_counter() - t)"
+    done = subprocess.run([sys.executable, "-c", timed], capture_output=True, text=True, check=True,
+                          env=environment)
+    return float(done.stdout.split()[-1])
+
+
+def cold_start() -> "Section":
+    """Return the time of a first flight where nothing is compiled yet, in a fresh process, once."""
+    with tempfile.TemporaryDirectory() as cache:
+        taken = _fresh(_FIRST_STEP, {**os.environ, "NUMBA_CACHE_DIR": cache})
+    return Section("Once for an installation", ["what", "s"], [["first make, reset and step", f"{taken:.1f}"]],
+                   "Nothing compiled on disk; filter and loop are compiled in a process each.")
 
 
 def measure(contenders: list[Contender], rounds: int, advance: Callable[[], None] = lambda: None) -> list[Figure]:
@@ -119,9 +132,9 @@ class Section:
 HEADER = ["what", "median", "least - largest", "ratio to the first of its kind", "includes"]
 
 
-def write_markdown(figures: list[Figure], rounds: int, path: Path, sections: Sequence[Section] = ()) -> None:
-    """Write a run as a page."""
-    lines = ["# Speed", "", f"One run of `windwrench speed --rounds {rounds} --markdown docs/speed.md`: one process, all "
+def write_markdown(figures: list[Figure], rounds: int, path: Path, sections: Sequence[Section] = (), hour: str = "") -> None:
+    """Write a run as a page; ``hour`` is the further option it was run with."""
+    lines = ["# Speed", "", f"One run of `windwrench speed --rounds {rounds}{hour} --markdown docs/speed.md`: one process, all "
              "contenders in turn in every round; medians, with ratios taken round by round. One thread, where no other number "
              "is given. Peers are measured where they are installed (`pip install 'windwrench[peers]'`).", "",
              f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in ("numpy", "numba", "mujoco"))

@@ -66,6 +66,7 @@ def benchmark(
 
 def speed(
     rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
+    hour: Annotated[bool, typer.Option("--hour", help="Also diagnose a log of an hour (some minutes).")] = False,
     markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
 ) -> dict[str, Any]:
     """Measure a filter step, flights against real time, growth and start-up, beside peers that are installed.
@@ -74,8 +75,8 @@ def speed(
     """
     from ..benchmarks.environment_profile import profiles
     from ..benchmarks.flight_speed import flights
-    from ..benchmarks.growth import over_steps, over_vehicles
-    from ..benchmarks.speed import HEADER, filters, measure, rows_of, starts, write_markdown
+    from ..benchmarks.growth import over_logs, over_steps, over_vehicles
+    from ..benchmarks.speed import HEADER, cold_start, filters, measure, rows_of, starts, write_markdown
 
     with progress_bar() as progress:
         task = progress.add_task("measuring", total=None)
@@ -83,7 +84,8 @@ def speed(
         progress.update(task, total=rounds * len(contenders))
         figures = measure(contenders, rounds, lambda: progress.advance(task))
         progress.update(task, description="growth and profile", total=None)
-        sections = [*profiles(rounds), over_vehicles(rounds), over_steps()]
+        sections = [*profiles(rounds), over_vehicles(rounds), over_steps(),
+                    over_logs((60.0, 600.0, 3600.0) if hour else (60.0, 600.0)), cold_start()]
     table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
     for row in rows_of(figures):
         table.add_row(*row[:-1])
@@ -95,7 +97,7 @@ def speed(
         console.print(table)
         console.print(section.words, highlight=False)
     if markdown is not None:
-        write_markdown(figures, rounds, markdown, sections)
+        write_markdown(figures, rounds, markdown, sections, " --hour" if hour else "")
         say(markdown)
     return {"figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
             "sections": {section.title: [dict(zip(section.header, row, strict=True)) for row in section.rows]

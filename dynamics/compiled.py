@@ -4,14 +4,18 @@ import os
 import subprocess
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import NumbaExperimentalFeatureWarning, njit
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+# a record that begins like another may stand for it: the plant's for the model's
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning, message="Record")
 
 # One record of a structured array: compiled code reads its fields as attributes.
 Record = Any

@@ -7,13 +7,12 @@ deviations: their mean over the flights is zero, so that what the flights have i
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
-from .flight_log import FlightLog
+from .flight_log import FlightLog, with_rows
 from .phases import FLIGHT, flight_phases
 from .signals import WIDE_HZ, Signals, low_pass
 
@@ -46,16 +45,7 @@ def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     flight = [p for p in flight_phases(log.t, height, log.rotor_speeds, vehicle) if p.name == FLIGHT]
     if not flight:
         return log
-    keep = (log.t >= flight[0].start) & (log.t <= flight[0].end)
-    if keep.all():
-        return log
-
-    def cut(x: Array | None) -> Array | None:
-        return None if x is None else x[keep]
-
-    return replace(log, t=log.t[keep], position=log.position[keep], quaternion=log.quaternion[keep],
-                   rotor_speeds=log.rotor_speeds[keep], voltage=cut(log.voltage), force=cut(log.force), torque=cut(log.torque),
-                   valid=log.valid[keep], extra={name: x[keep] for name, x in log.extra.items()})
+    return with_rows(log, (log.t >= flight[0].start) & (log.t <= flight[0].end))
 
 
 def thinned(signals: Signals) -> Signals:

@@ -59,8 +59,9 @@ def diagnose(
     report("looking at the logs")
     every = (*logs, *test)
     least = LEAST_SECONDS if len(every) == 1 and not every[0].commanded else LEAST_SECONDS_EACH
-    notes = [f"{log.name}: {note}" for log in every for note in (*log.notes, *screen_log(log, vehicle, least))]
+    doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
     flights = Flights(logs, vehicle, test)
+    notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = search.forward()
     report("asking whether every effect is needed")

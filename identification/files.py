@@ -2,10 +2,12 @@
 
 import csv
 import gzip
+import io
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,8 @@ from ..dynamics.files import replaced
 Array = NDArray[np.float64]
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
-LARGEST = 2**31  # bytes of text
+LARGEST = 2**31  # characters of text
+_LONGEST_LINE = 1_000_000  # characters
 MOST_ROWS = 20_000_000  # a day at 200 Hz
 
 
@@ -31,7 +34,11 @@ class Table:
 
     def row(self, index: int) -> str:
         """Return how to find a row (counted from 0) in the file: rows count from 1, lines include the header."""
-        return f"row {index + 1}" if file_kind(self.path) == ".parquet" else f"row {index + 1} (line {index + 2})"
+        return f"row {index + 1}" if file_kind(self.path) == ".parquet" else _text_row(index)
+
+
+def _text_row(index: int) -> str:
+    return f"row {index + 1} (line {index + 2})"
 
 
 def file_kind(path: Path) -> str:
@@ -52,7 +59,7 @@ def open_table(path: Path) -> Table:
     Raises:
         InputError: unreadable, not of its kind, without rows, or with two columns of one name.
     """
-    table = _open_parquet(path) if file_kind(path) == ".parquet" else _open_text(path, _read_text(path))
+    table = _open_parquet(path) if file_kind(path) == ".parquet" else _open_text(path, _read_lines(path))
     repeated = {name for name in table.header if table.header.count(name) > 1}
     if repeated:
         raise InputError(f"{path}: column {', '.join(sorted(repeated))} stands there more than once; expected it once")
@@ -63,26 +70,33 @@ def open_table(path: Path) -> Table:
     return table
 
 
-def _read_text(path: Path) -> str:
+def _read_lines(path: Path) -> list[str]:
+    """Return the lines of a text file, read one by one: as one text, and cut, they would take three times the memory."""
+    lines: list[str] = []
+    size = 0
     try:
         # what is packed may unpack to any size
         with gzip.open(path) if file_kind(path) == ".csv.gz" else path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise InputError(f"{path}: more than {LARGEST} bytes of text; expected one flight")
-        text = data.decode("utf-8-sig")
+            text = io.TextIOWrapper(cast(IO[bytes], file), encoding="utf-8-sig")
+            while line := text.readline(_LONGEST_LINE + 1):
+                size += len(line)
+                if size > LARGEST or len(line) > _LONGEST_LINE:
+                    limit = f"{LARGEST} characters of text" if size > LARGEST else f"{_LONGEST_LINE} in line {len(lines) + 1}"
+                    raise InputError(f"{path}: more than {limit}; expected one flight")
+                if "\0" in line:
+                    raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
+                lines.append(line.rstrip("\n"))
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path}: cannot be read: {error}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8); expected CSV") from error
-    if "\0" in text:
-        raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
-    return text
+        raise InputError(f"{path}: not a text file (behind line {len(lines)} it is not UTF-8); expected CSV") from error
+    while lines and not lines[-1].strip():
+        lines.pop()
+    return lines
 
 
-def _open_text(path: Path, text: str) -> Table:
-    lines = text.rstrip().splitlines()
-    if '"' in text:
+def _open_text(path: Path, lines: list[str]) -> Table:
+    if any('"' in line for line in lines):
         try:
             lines = [",".join(field.replace(",", " ") for field in row) for row in csv.reader(lines, strict=True)]
         except csv.Error as error:
@@ -96,7 +110,7 @@ def _open_text(path: Path, text: str) -> Table:
         commas = len(header) - 1
         for i, line in enumerate(body):
             if line.count(",") != commas:
-                raise InputError(f"{path}: {table.row(i)} has {line.count(',') + 1} field(s); expected {commas + 1}, "
+                raise InputError(f"{path}: {_text_row(i)} has {line.count(',') + 1} field(s); expected {commas + 1}, "
                                  "as many as the header")
         # the fast parser knows no empty field; two passes, because neighbours share a comma
         filled = body
@@ -106,14 +120,13 @@ def _open_text(path: Path, text: str) -> Table:
         try:
             values = np.loadtxt(filled, delimiter=",", comments=None, usecols=where, ndmin=2)
         except ValueError as error:
-            raise _bad_number(table, filled, names, where) from error
+            raise _bad_number(path, filled, names, where) from error
         return {name: np.ascontiguousarray(values[:, i]) for i, name in enumerate(names)}
 
-    table = Table(path, header, len(body), read)
-    return table
+    return Table(path, header, len(body), read)
 
 
-def _bad_number(table: Table, lines: Sequence[str], names: Sequence[str], where: Sequence[int]) -> InputError:
+def _bad_number(path: Path, lines: Sequence[str], names: Sequence[str], where: Sequence[int]) -> InputError:
     """Return the error for the first field that is not a number."""
     for i, line in enumerate(lines):
         fields = line.split(",")
@@ -121,9 +134,9 @@ def _bad_number(table: Table, lines: Sequence[str], names: Sequence[str], where:
             try:
                 float(fields[j].replace("_", "?"))  # Python's numbers may hold underscores, the fast parser's not
             except ValueError:
-                return InputError(f"{table.path}: column {name}, {table.row(i)}: {fields[j]!r} is not a number; "
+                return InputError(f"{path}: column {name}, {_text_row(i)}: {fields[j]!r} is not a number; "
                                   "expected a decimal number")
-    return InputError(f"{table.path}: not a table of numbers; expected CSV")
+    return InputError(f"{path}: not a table of numbers; expected CSV")
 
 
 def _open_parquet(path: Path) -> Table:

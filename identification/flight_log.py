@@ -232,6 +232,19 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))
 
 
+def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
+    """Return a log with the rows (N,) that are to be kept alone; the log itself where that is all of them."""
+    if keep.all():
+        return log
+
+    def cut(x: Array | None) -> Array | None:
+        return None if x is None else x[keep]
+
+    return replace(log, t=log.t[keep], position=log.position[keep], quaternion=log.quaternion[keep],
+                   rotor_speeds=log.rotor_speeds[keep], voltage=cut(log.voltage), force=cut(log.force), torque=cut(log.torque),
+                   valid=log.valid[keep], extra={name: x[keep] for name, x in log.extra.items()})
+
+
 def write_log(log: FlightLog, path: str | Path) -> None:
     """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or not at all.
 

@@ -17,6 +17,7 @@ from ..dynamics.effects import get, names
 from ..dynamics.effects.base import Coefficient
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from .commanded import LEAN_X, LEAN_Y, NOT_FROM_COMMANDS, SCALE, commanded, deviation, deviations, in_flight, size_of, thinned
+from .excerpt import excerpt
 from .flight_log import FlightLog
 from .floor import noisy_logs
 from .residual import centre_acceleration, model_wrench
@@ -39,6 +40,8 @@ _QUICK = frozenset({"inertia", "rotor_inertia", "motor_lag", "latency", "clock_o
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
+_ROOM = 2**28  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
+_SAMPLE = 400  # bytes of a piece, a sample
 BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
 _HELD_OUT = 4  # every fourth block
 
@@ -107,6 +110,7 @@ class Flights:
         self.commanded = commanded(self.logs)  # torque is left out, and only the time in the air counts
         if self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
+        self.logs = tuple(excerpt(self.logs))
         self.own = len(logs) if self.commanded else 0  # flights that have a thrust scale and a lean of their own
         self.deviations: tuple[Column, ...] = tuple(deviations(self.own))
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
@@ -180,8 +184,10 @@ class Flights:
         vehicle = self.amended(setting)
         sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in vehicle.effects if get(e.name).kind == "sensing")
         if sensing not in self._pieces:
-            if len(self._pieces) > 40:
+            if len(self._pieces) * max(_SAMPLE * sum(len(p.signals.t) for p in self._first), _ROOM // 40) > _ROOM:
                 self._pieces.clear()
+                self._needs.clear()
+                self._moved.clear()
             self._pieces[sensing] = self._cut(vehicle)
         return self._pieces[sensing]
 
@@ -258,7 +264,7 @@ class Flights:
                     for name, values in sorted(setting.items()) if name == "wind" or (name and get(name).kind != "wrench")
                     for c, value in sorted(values.items()))
         if key not in self._columns:
-            if len(self._columns) > 12:
+            if len(self._columns) > 12 or sum(map(len, self._columns.values())) * 48 * len(self.t) > _ROOM:
                 self._columns.clear()
             self._columns[key] = {}
         return self._columns[key]

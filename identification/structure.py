@@ -28,7 +28,7 @@ LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one
 
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
-_BATCH = 64  # columns at a time
+_BATCH = 24  # columns at a time
 
 Drive = tuple[str, Array]  # in words, (rows,)
 

@@ -104,6 +104,7 @@ def test_a_missing_column_is_named(path, rows, name):
     ((",".join(REQUIRED) + "\n0,0,0,1,1,0,0,0,9,9,9,9\n").encode(), "only one row; expected at least two"),
     ((",".join(REQUIRED) + ",t\n").encode(), "column t stands there more than once"),
     (b't,"px\n1,2\n', "not valid CSV"),
+    (b"t," * 600_000, "more than 1000000 in line 1"),
 ])
 def test_a_file_that_is_no_log_is_refused(path, content, expected):
     path.write_bytes(content)

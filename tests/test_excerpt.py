@@ -1,0 +1,38 @@
+"""Long flights are looked at by windows, and what is found in them is what is found in a short one."""
+
+import numpy as np
+import pytest
+
+from windwrench.identification.excerpt import LONGEST, excerpt
+from windwrench.identification.flight_log import FlightLog
+from windwrench.identification.signals import log_signals
+
+
+def long_log(seconds, period=0.02):
+    t = 5.0 + period * np.arange(round(seconds / period))
+    ones = np.ones((len(t), 4))
+    return FlightLog(t, np.zeros((len(t), 3)), ones * [1.0, 0, 0, 0], 300.0 * ones, voltage=t, name="long")
+
+
+def test_what_is_short_stays_whole():
+    logs = [long_log(0.4 * LONGEST), long_log(0.5 * LONGEST)]
+    assert all(a is b for a, b in zip(excerpt(logs), logs, strict=True))
+
+
+@pytest.mark.parametrize("lengths", [[3600.0], [900.0, 2700.0, 30.0], [700.0, 100.0]])
+def test_windows_are_spread_over_long_flights(lengths):
+    logs = [long_log(seconds) for seconds in lengths]
+    out = excerpt(logs)
+    pieces = [log_signals(log) for log in out]
+    kept = [sum(p.t[-1] - p.t[0] for p in each) for each in pieces]
+    assert 0.8 * LONGEST < sum(kept) < 1.2 * LONGEST + 30.0
+    for log, short, each in zip(logs, out, pieces, strict=True):
+        if log.t[-1] - log.t[0] <= 60.0:
+            assert short is log
+            continue
+        assert [round(p.t[-1] - p.t[0]) for p in each] == [60] * len(each)
+        assert np.all(np.diff([p.t[0] for p in each]) > 60.0)
+        before, behind = each[0].t[0] - log.t[0], log.t[-1] - each[-1].t[-1]
+        assert abs(before - behind) < 0.1
+        assert np.array_equal(short.voltage, short.t)  # rows stay together
+        assert f"{len(each)} windows" in short.notes[-1]
