@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test coverage lint types check clean
+.PHONY: demo test coverage lint types docs check clean
 
 demo: $(VENV)/.installed
 	$(BIN)/windwrench benchmark --episodes 10 --out results/demo
@@ -19,13 +19,19 @@ coverage: $(VENV)/.tested
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
 
-# as a user's type checker sees it: the built package, from outside the checkout
-types: $(VENV)/.tested
-	rm -rf $(VENV)/built
-	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --target $(VENV)/built .
+# the package as a user has it, outside the checkout
+.PHONY: $(VENV)/built
+$(VENV)/built: $(VENV)/.tested
+	rm -rf $@
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --target $@ .
+
+types: $(VENV)/built
 	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
-check: lint types test
+docs: $(VENV)/built
+	WINDWRENCH_BUILT=$(VENV)/built NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
+check: lint types docs test
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -39,5 +45,5 @@ $(VENV)/.tested: $(VENV)/.installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist results *.egg-info
+	rm -rf $(VENV) build dist results site *.egg-info
 	find . -name '*.nb[ic]' -delete

@@ -91,6 +91,6 @@ def over_logs(seconds: Sequence[float] = (60.0, 600.0)) -> Section:
             rows.append([f"{length:,.0f}", f"{taken:.1f}", f"{taken / length:.3f}", f"{memory:.0f}"])
     header = ["flight, s", "diagnosis, s", "s for a second of flight", "memory, MB"]
     return Section("With the length of a log", header, rows[1:],
-                   "A process of its own, from the start of Python to the written report, with one effect that is not declared, "
-                   "at 200 Hz. Of flights of more than eight minutes, windows of a minute spread over them are looked at; reading "
-                   "and checking the log is what still grows.")
+                   "A process of its own, from the start of Python to the written report, with one effect that is not "
+                   "declared, at 200 Hz. Of flights of more than eight minutes, windows of a minute spread over them are "
+                   "looked at; reading and checking the log is what still grows.")

@@ -24,7 +24,7 @@ from .terminal import (
 @expensive
 def benchmark(
     controllers: Annotated[str, typer.Option(
-        help="Names, or paths of trained policies, with commas.",
+        help="Names, paths of trained policies, or FILE.py:CLASS, with commas.",
         autocompletion=offering(controller_names))] = "hover,admittance,ratio,oracle",
     scenarios: Annotated[str, typer.Option(
         help="Names, with commas.", autocompletion=offering(scenario_names))] = "static,base",

@@ -28,7 +28,7 @@ from .terminal import (
 def fly(
     scenario: Annotated[str, typer.Option(help="static, base, fast, slow-filter, noisy, gusty, far or varied.",
                                          autocompletion=offering(scenario_names))] = "base",
-    controller: Annotated[str, typer.Option(help="hover, admittance, ratio, oracle ..., or the path of a policy.",
+    controller: Annotated[str, typer.Option(help="hover, admittance, ratio, oracle ..., a policy's path, or FILE.py:CLASS.",
                                            autocompletion=offering(controller_names))] = "admittance",
     seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
     vehicle: VehicleOption = "ardrone2",

@@ -1,8 +1,6 @@
 """The effect library as a page of documentation, made from the library itself."""
 
-import sys
-
-from .effects import get, names
+from .effects import get, law_in_words, names
 
 _HEAD = """# The effects
 
@@ -29,7 +27,7 @@ def effects_page() -> str:
                      f"{', '.join(effect.confused_with)} |\n")
     for name in names():
         effect = get(name)
-        law = (sys.modules[f"{__package__}.effects.{name}"].__doc__ or "").strip().replace("``", "`")
+        law = law_in_words(name).replace("``", "`")
         parts.append(f"\n## {name}\n\n{law}\n\nKind: {effect.kind}.\n\n"
                      "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
                      "| --- | --- | --- | --- | --- | --- |\n")

@@ -1,7 +1,6 @@
 """A diagnosis in words and rounded numbers, as its report gives them to a reader."""
 
 import math
-import sys
 from collections.abc import Iterable, Sequence
 
 from ..dynamics import effects as library
@@ -74,9 +73,7 @@ def effect_summary(name: str) -> str:
     """Return the library's sentence on an effect, empty for one that is not in it."""
     if name not in library.names():
         return ""
-    library.get(name)
-    text = sys.modules[f"{library.__name__}.{name}"].__doc__ or ""
-    return " ".join(text.split("\n\n")[0].split()).replace("``", "")
+    return " ".join(library.law_in_words(name).split("\n\n")[0].split()).replace("``", "")
 
 
 def coefficient_meaning(effect: str, coefficient: str) -> str:

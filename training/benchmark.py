@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..controllers import Controller, make_controller
+from ..controllers.own_file import is_file_name, load_controller
 from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
 from ..dynamics.workers import workers
@@ -43,11 +44,13 @@ class Row:
 
 
 def make_pilot(name: str) -> Controller:
-    """Return a new controller by its name, or the trained policy in the file that ``name`` is the path of.
+    """Return a new controller by its name, by the path of a trained policy, or by FILE.py:CLASS of a file that is then run.
 
     Raises:
-        InputError: no controller has this name, or the file is no trained policy.
+        InputError: no controller has this name, or the file holds none.
     """
+    if is_file_name(name):
+        return load_controller(name)
     return load_policy(name) if is_policy_path(name) else make_controller(name)
 
 

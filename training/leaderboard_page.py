@@ -59,7 +59,7 @@ def _head(plan: Mapping[str, Any]) -> str:
     return f"""# Leaderboard: learned policies against designed laws
 
 Who holds a quadrotor best in the jet of a moving fan that it can only feel? Every number below is from the result
-files in [docs/results/learning](results/learning); `windwrench leaderboard` writes this page from them, and
+files in `docs/results/learning`; `windwrench leaderboard` writes this page from them, and
 `windwrench leaderboard --train` does whatever is missing. {plan["episodes"]} paired test episodes a world, on seeds that
 neither training nor tuning sees; a lost vehicle's remaining time counts at 2.5 m; every policy flies with the full filter."""
 
@@ -261,10 +261,10 @@ def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> 
 * Seeds of episodes: training below 900 000, validation from there, test from 1 000 000 on. The best of a run's validations,
   not the last, is the policy that is scored.
 * The laws' gains are tuned on 60 validation episodes of base, fast and wide (`windwrench tune`); what was found, and the
-  command, is in [controllers/tuned.yaml](../controllers/tuned.yaml).
-* A policy is a file of weights with a card beside it ([training/policies](../training/policies)) and is flown without a
+  command, is in `controllers/tuned.yaml`.
+* A policy is a file of weights with a card beside it (`training/policies`) and is flown without a
   deep-learning library: `windwrench benchmark --controllers training/policies/sac-0.npz,admittance --scenarios base,fast`.
-* `windwrench train sac --scenario base --seed 0` trains one again. Configurations: [training/configs](../training/configs)."""
+* `windwrench train sac --scenario base --seed 0` trains one again. Configurations: `training/configs`."""
     if missing:
         names = dict.fromkeys(e.name for e in missing if e.group != "ablation")
         some = [f"{name} ({sum(e.name == name for e in missing)} seeds)" for name in names]

@@ -1,29 +1,77 @@
 """The library of physical effects: one file an effect, found by its file's name.
 
 ``get("rotor_drag")`` is the ``EFFECT`` of ``rotor_drag.py``. ``compile_effects`` prepares a vehicle's effects for
-compiled code.
+compiled code. Folders of a user's own join the library: those in the environment variable ``WINDWRENCH_EFFECTS``, which every
+command and its workers know, and those given to ``add_folder``.
 """
 
+import os
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from ..errors import InputError, unknown_name
+from ..python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 
-__all__ = ["Bundle", "Coefficient", "Effect", "check_setting", "compile_effects", "get", "names", "parse_setting"]
+__all__ = [
+    "Bundle", "Coefficient", "Effect", "add_folder", "check_setting", "compile_effects", "get", "law_in_words",
+    "names", "parse_setting",
+]
 
+_FOLDERS = "WINDWRENCH_EFFECTS"
 _NOT_EFFECTS = {"__init__", "base", "call", "parts"}
+
+
+def add_folder(folder: str | Path) -> tuple[str, ...]:
+    """Let the files of a folder be effects, here and in processes that this one starts; return their names.
+
+    Raises:
+        InputError: there is no such folder, or a file has the name of an effect that is there.
+    """
+    folders = [*filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)), str(Path(folder).resolve())]
+    before = os.environ.get(_FOLDERS)
+    os.environ[_FOLDERS] = os.pathsep.join(dict.fromkeys(folders))
+    _files.cache_clear()
+    names.cache_clear()
+    try:
+        _files()
+    except InputError:
+        os.environ.pop(_FOLDERS)
+        if before is not None:
+            os.environ[_FOLDERS] = before
+        raise
+    return tuple(sorted(path.stem for path in _effects_in(Path(folder))))
+
+
+def _effects_in(folder: Path) -> list[Path]:
+    return [path for path in sorted(folder.glob("*.py")) if path.stem not in _NOT_EFFECTS and not path.stem.startswith("_")]
+
+
+@cache
+def _files() -> dict[str, Path]:
+    """Return the file of each effect; those of the kit's own first."""
+    own = Path(__file__).parent
+    found = {path.stem: path for path in _effects_in(own)}
+    for text in filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)):
+        folder = Path(text).resolve()
+        if not folder.is_dir():
+            raise InputError(f"{_FOLDERS}: {text} is no folder; expected folders of effects, with {os.pathsep} between them")
+        for path in _effects_in(folder):
+            if found.setdefault(path.stem, path) != path:
+                raise InputError(f"{path}: an effect {path.stem} is there already ({found[path.stem]}); expected another name")
+    return found
 
 
 @cache
 def names() -> tuple[str, ...]:
     """Return the names of all effects, sorted."""
-    return tuple(sorted(p.stem for p in Path(__file__).parent.glob("*.py") if p.stem not in _NOT_EFFECTS))
+    return tuple(sorted(_files()))
 
 
 @cache
@@ -31,12 +79,26 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no effect has this name.
+        InputError: no effect has this name, or a user's own file holds none.
     """
     if name not in names():
         raise unknown_name("effect", name, names())
-    effect: Effect = import_module(f".{name}", __name__).EFFECT
+    effect = getattr(_module(name), "EFFECT", None)
+    if not isinstance(effect, Effect) or effect.name != name:
+        raise InputError(f"{_files()[name]}: expected EFFECT = Effect(name={name!r}, ...), got "
+                         f"{getattr(effect, 'name', effect)!r}")
     return effect
+
+
+def law_in_words(name: str) -> str:
+    """Return what an effect's file says of its law, its docstring."""
+    return (_module(name).__doc__ or "").strip()
+
+
+def _module(name: str) -> ModuleType:
+    path = _files()[name]
+    own = path.parent == Path(__file__).parent
+    return import_module(f".{name}", __name__) if own else import_file(path, "an effect")
 
 
 def check_setting(setting: EffectSetting, where: str = "effect") -> EffectSetting:

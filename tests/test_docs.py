@@ -1,0 +1,135 @@
+"""Every code block of README and documentation is run, page by page, from top to bottom, in an empty folder.
+
+``sh`` blocks run in a shell, ``python`` blocks in one namespace a page; a block with a ``title`` is written to a file of that
+name. Under the comment ``<!-- dry run -->`` commands are run with ``--dry-run``: they would take minutes. ``pip`` and ``make``
+are not run; what they name must exist. Blocks of other languages are not code to run, except that YAML must be YAML.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+from data_paths import DATA
+from markdown_it import MarkdownIt
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DRY_RUN = "<!-- dry run -->"
+NOT_CODE = {"", "text", "yaml"}
+
+
+def blocks(page):
+    """Yield (line, language, title, dry run, content) of a page's code blocks."""
+    dry = False
+    for token in MarkdownIt().parse(page.read_text(encoding="utf-8")):
+        if token.type == "fence":
+            language, _, rest = token.info.strip().partition(" ")
+            title = re.search(r'title="(.*?)"', rest)
+            yield token.map[0] + 2, language, title and title.group(1), dry, token.content
+        if token.type == "html_block":
+            dry = token.content.strip() == DRY_RUN
+        elif token.level == 0:
+            dry = False
+
+
+def pages_with_code():
+    return [page for page in PAGES if any(language not in NOT_CODE for _, language, *_ in blocks(page))]
+
+
+def commands(content):
+    """Yield the words of each command of a shell block, without its comments."""
+    for line in content.replace("\\\n", " ").splitlines():
+        words = shlex.split(line, comments=True)
+        if words:
+            yield words
+
+
+def check_pip(words):
+    extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    for word in words[2:]:
+        for extra in re.findall(r"\[(.*?)\]", word):
+            assert all(re.search(rf"^{name} = \[", extras, re.M) for name in extra.split(",")), f"no extra {extra}"
+
+
+def run_shell(content, environment, dry, where):
+    for words in commands(content):
+        if words[:2] == ["pip", "install"]:
+            check_pip(words)
+        elif words[0] == "make":
+            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M), f"no target {words[1]}"
+        elif "--cluster" in words and find_spec("ray") is None:
+            continue
+        elif words[0] == "export":
+            name, _, value = words[1].partition("=")
+            environment[name] = value
+        else:
+            done = subprocess.run([*words, *(["--dry-run"] if dry else [])], env=environment, capture_output=True, text=True)
+            assert done.returncode == 0, f"{where}: {shlex.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+
+
+def prepare(page, folder):
+    """Put there what a page takes for given: logs of others."""
+    if page.name == "diagnose.md":
+        pytest.importorskip("pyulog")
+        pytest.importorskip("rosbags")
+        from converted_flights import write_bag, write_ulog
+
+        from windwrench.cli import app
+        from windwrench.identification.flight_log import read_log
+
+        app(["record", "--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1", "--quiet",
+             "--out", str(folder / "given.csv")], standalone_mode=False)
+        log = read_log(folder / "given.csv")
+        write_ulog(log, folder / "flight.ulg")
+        write_bag(log, folder / "flight_bag")
+    for name in re.findall(r"results/[\w-]+/best", page.read_text(encoding="utf-8")) if page.name != "train.md" else ():
+        for ending in (".npz", ".json"):  # what a dry run does not train
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / "training" / "policies" / f"sac-0{ending}", folder / f"{name}{ending}")
+    for name in re.findall(r"\bB\d\w+\.csv\b", page.read_text(encoding="utf-8")):
+        found = next(iter(DATA.rglob(name)), None)
+        if found is None:
+            pytest.skip(f"{page.name} reads the measured flight {name}, which is not here")
+        (folder / name).symlink_to(found)
+
+
+@pytest.mark.parametrize("page", pages_with_code(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_code_block_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    bin_folder = str(Path(sys.executable).parent)
+    environment = {**os.environ, "PATH": f"{bin_folder}{os.pathsep}{os.environ['PATH']}", "NO_COLOR": "1"}
+    prepare(page, tmp_path)
+    names = {"__name__": "__main__"}
+    for line, language, title, dry, content in blocks(page):
+        where = f"{page.relative_to(ROOT)}:{line}"
+        if language == "yaml":
+            assert yaml.safe_load(content), where
+        if title:
+            Path(title).parent.mkdir(parents=True, exist_ok=True)
+            Path(title).write_text(content, encoding="utf-8")
+        elif language == "python":
+            exec(compile(content, where, "exec"), names)
+        elif language == "sh":
+            run_shell(content, environment, dry, where)
+        else:
+            assert language in NOT_CODE, f"{where}: a block of {language!r} is not run"
+
+
+def test_the_reader_of_pages_reads_blocks(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f'```python title="a b.py"\nx\n```\n\n{DRY_RUN}\n```sh\nwindwrench fly \\\n  --seed 1 # why\n```\n\n'
+                    "```sh\nmake test\n```\n")
+    found = list(blocks(page))
+    assert [(language, title, dry) for _, language, title, dry, _ in found] == [
+        ("python", "a b.py", False), ("sh", None, True), ("sh", None, False)]
+    assert list(commands(found[1][-1])) == [["windwrench", "fly", "--seed", "1"]]
+    with pytest.raises(AssertionError, match="no extra"):
+        check_pip(["pip", "install", "windwrench[nothing]"])
