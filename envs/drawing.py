@@ -1,6 +1,7 @@
 """Drawing the world: the jet as drifting tracers, the wrench as arrows, the path flown, in a window or as a picture."""
 
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -35,7 +36,8 @@ class Viewer:
         self._window: Any = None
         self._model: Any = None
         self._path: list[NDArray[np.float64]] = []
-        self._last = -math.inf  # s, of the loop's clock
+        self._last = math.inf  # s, of the loop's clock
+        self._begun = 0.0  # s, of the wall's clock, at its start
         # tracers drift with the jet; they only decorate, so their generator is their own
         self._rng = np.random.default_rng(0)
         self._tracers = self._new_tracers(_TRACERS)
@@ -75,7 +77,10 @@ class Viewer:
         self.open_world(loop.model, loop.data)
         if loop.time < self._last:  # another episode
             self._path.clear()
+            self._begun = time.perf_counter() - loop.time
         self._last = loop.time
+        if self.mode == "human":  # not faster than life
+            time.sleep(max(self._begun + loop.time - time.perf_counter(), 0.0))
         self._path.append(loop.position.copy())
         fan = loop.record[0]["fan"]
         loop.data.mocap_pos[0] = (0.0, fan_y, float(fan["height"]) or 1.2)

@@ -1,0 +1,135 @@
+"""Controllers and effects in files of a user's own: found, used by commands and their workers, and refused in clear words."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from windwrench.cli import app
+from windwrench.controllers.own_file import is_file_name, load_controller
+from windwrench.dynamics import InputError, effects, load_vehicle
+from windwrench.dynamics.effects import compile_effects, parse_setting
+from windwrench.identification.report_words import effect_summary
+from windwrench.training.benchmark import make_pilot
+
+LAWS = """
+import numpy as np
+LIMIT = 1.0
+
+class Left:
+    def __init__(self, speed=0.25):
+        self.speed = speed
+    def reset(self):
+        pass
+    def __call__(self, observation, info=None):
+        return np.array([min(self.speed, LIMIT)], dtype=np.float32)
+"""
+EFFECT = '''"""A pull along x, in proportion to x."""
+
+from numba import cfunc
+from windwrench.dynamics.effects.base import LAW, POSITION, Coefficient, Effect
+
+
+@cfunc(LAW, cache=True)
+def law(c, vehicle, state, wrench):
+    wrench[0] -= c[0] * state[POSITION]
+
+
+EFFECT = Effect(name="NAME", kind="wrench", coefficients=(Coefficient("k", "N/m", (0.1, 0.01), "stiffness"),), source="test",
+                confused_with=("constant_force",), excitation="flight along x", law=law)
+'''
+
+
+@pytest.fixture
+def laws(tmp_path):
+    path = tmp_path / "laws.py"
+    path.write_text(LAWS)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder for effects that has left the library again once the test is over."""
+    monkeypatch.setenv("WINDWRENCH_EFFECTS", "")
+    yield tmp_path
+    monkeypatch.undo()
+    for known in (effects._files, effects.names, effects.get):
+        known.cache_clear()
+
+
+def test_a_class_of_a_file_is_a_controller(laws):
+    for name in (f"{laws}:Left", str(laws)):
+        assert is_file_name(name)
+        assert make_pilot(name)(np.zeros(8)) == pytest.approx([0.25])
+    assert not is_file_name("admittance")
+    assert not is_file_name("results/sac/best.npz")
+
+
+def test_a_subclass_is_one_too(laws):
+    laws.write_text("from windwrench.controllers import Admittance\n\nclass Stiff(Admittance):\n    def __init__(self):\n"
+                    "        super().__init__(40.0)\n")
+    assert make_pilot(str(laws)).gain == 40.0
+
+
+def test_workers_fly_it(laws, tmp_path):
+    app(["benchmark", "--controllers", f"{laws}:Left", "--scenarios", "static", "--episodes", "6", "--jobs", "2", "--quiet",
+         "--out", str(tmp_path / "out")], standalone_mode=False)
+    rows = json.loads((tmp_path / "out" / "leaderboard.json").read_text())
+    (row,) = rows
+    assert row["controller"] == f"{laws}:Left"
+    assert row["lost_fraction"] == 1.0  # it flies off to the left
+
+
+@pytest.mark.parametrize(("text", "name", "words"), [
+    (None, "laws.py", "there is no such file; expected a Python file"),
+    ("x = (", "laws.py", "line 1: SyntaxError"),
+    ("import math\nmath.nothing", "laws.py", "line 2: AttributeError: .*nothing"),
+    ("x = 1", "laws.py", "holds no controller"),
+    (LAWS, "laws.py:Lef", "unknown controller 'Lef'.*Did you mean 'Left'"),
+    (LAWS + LAWS.replace("Left", "Right"), "laws.py", r"holds Left, Right; expected one of them"),
+    (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
+])
+def test_what_is_no_controller_is_named(text, name, words, tmp_path):
+    if text is not None:
+        (tmp_path / "laws.py").write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_controller(str(tmp_path / name))
+
+
+def test_a_folder_s_files_join_the_library(folder):
+    (folder / "own_spring.py").write_text(EFFECT.replace("NAME", "own_spring"))
+    (folder / "_helper.py").write_text("x = 1")
+    assert effects.add_folder(folder) == ("own_spring",)
+    assert "own_spring" in effects.names()
+    assert "rotor_drag" in effects.names()
+    assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
+    setting = parse_setting("own_spring")
+    assert setting.coefficients == {"k": 0.1}
+    assert compile_effects(load_vehicle("ardrone2").with_effects(setting)).wrench_laws[0] != 0
+    assert effect_summary("own_spring") == "A pull along x, in proportion to x."
+    effects.add_folder(folder)  # once more changes nothing
+    assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("x = 1", "expected EFFECT = Effect.name='own_spring'"),
+    (EFFECT.replace("NAME", "another"), "expected EFFECT = Effect.name='own_spring', ....*got 'another'"),
+    ("raise RuntimeError('no')", "line 1: RuntimeError: no"),
+])
+def test_what_is_no_effect_is_named(text, words, folder):
+    (folder / "own_spring.py").write_text(text)
+    effects.add_folder(folder)
+    with pytest.raises(InputError, match=words):
+        effects.get("own_spring")
+
+
+def test_a_name_that_is_taken_or_a_folder_that_is_not_there_leaves_the_library_as_it_was(folder):
+    (folder / "rotor_drag.py").write_text(EFFECT)
+    with pytest.raises(InputError, match="an effect rotor_drag is there already"):
+        effects.add_folder(folder)
+    with pytest.raises(InputError, match="is no folder"):
+        effects.add_folder(folder / "absent")
+    assert os.environ["WINDWRENCH_EFFECTS"] == ""
+    assert Path(effects._files()["rotor_drag"]).parent == Path(effects.__file__).parent
