@@ -80,7 +80,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
     """State what was asked of the comparison, and whether it holds."""
     asked: list[tuple[str, bool, str]] = []
     for line in lines:
-        if line.name not in ("sac", "sac-wide"):
+        if line.name not in ("sac", "sac-wide", "sac-fast"):
             continue
         for world, target in (("base", 0.10), ("fast", 0.15)):
             row = _get(rows, line.name, world)
@@ -94,7 +94,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
             if world == "fast":
                 asked.append((f"{who}: better than the best ratio law, interval clear of zero", row.ratio_interval[1] < 0,
                               f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})"))
-            if world == "base" or line.name == "sac-wide":
+            if world == "base" or line.name != "sac":
                 asked.append((f"{who}: nothing lost", row.lost_fraction == 0, f"{row.lost_fraction:.1%} lost"))
     if not asked:
         return ""
