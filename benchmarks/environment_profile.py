@@ -11,8 +11,8 @@ from ..envs.closed_loop import ESTIMATORS, ClosedLoop
 from ..envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ..envs.jet import gust, jet_wrench
 from ..envs.plant import NOISE, SUBSTEPS, TICK, actuate, sense
-from ..envs.stepping import mj_step, mj_step_address
-from ..estimator.by_address import call_step
+from ..envs.stepping import bits_address, normals_address
+from ..estimator.by_address import call_at, call_step
 from ..estimator.direct import released
 from .speed import Section
 
@@ -49,9 +49,16 @@ def _plant(loops: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Ar
 
 
 @released
-def _mujoco(step: int, model: int, data: int, count: int) -> None:
+def _mujoco(loops: np.ndarray, count: int) -> None:
+    loop = loops[0]
     for _ in range(count * SUBSTEPS):
-        mj_step(step, model, data)
+        call_at(loop.mj_step, loop.model, loop.data)
+
+
+@released
+def _normals(function: int, bits: int, out: Array, count: int) -> None:
+    for _ in range(count):
+        call_at(function, bits, out.size, out.ctypes.data)
 
 
 def _per_tick(work: Callable[[], object], ticks: int) -> float:
@@ -72,7 +79,12 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     copy["plant"]["seen"] = 3
     twin = ClosedLoop(env.vehicle, drawn=False)  # for MuJoCo alone
     twin.reset(rng, q[:3])
-    address = mj_step_address(), twin.model._address, twin.data._address
+
+    def look_on() -> None:
+        for _ in range(100):
+            env._decide(0)
+            env._observation()
+            env._info()
 
     def fly_on() -> None:
         for _ in range(12):
@@ -81,9 +93,9 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     parts: dict[str, Callable[[], float]] = {
         f"filter ({estimator})": lambda: _per_tick(lambda: _filter(copy, _REPEATS), _REPEATS),
         "jet and gusts": lambda: _per_tick(lambda: _jet(copy, *loop.jet_table, q, v, noise, _REPEATS), _REPEATS),
-        "MuJoCo": lambda: _per_tick(lambda: _mujoco(*address, _REPEATS), _REPEATS),
-        "random numbers": lambda: _per_tick(lambda: [rng.standard_normal((DECISION_TICKS, NOISE)) for _ in range(50)],
-                                            50 * DECISION_TICKS),
+        "MuJoCo": lambda: _per_tick(lambda: _mujoco(twin.record, _REPEATS), _REPEATS),
+        "random numbers": lambda: _per_tick(lambda: _normals(normals_address(), bits_address(rng), noise, _REPEATS), _REPEATS),
+        "reward, info, Python": lambda: _per_tick(look_on, 100 * DECISION_TICKS),
         "motors, sensors, flight loop": lambda: _per_tick(
             lambda: _plant(copy, *loop.jet_table, q, v, noise, np.zeros(6), _REPEATS), _REPEATS),
         "whole": lambda: _per_tick(fly_on, 12 * DECISION_TICKS),
@@ -98,7 +110,7 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     rest = "motors, sensors, flight loop"
     least[rest] = max(least[rest] - least["jet and gusts"], 0.0)  # it contains them
     whole = least.pop("whole")
-    least["Python, and what the parts disturb in each other"] = max(whole - sum(least.values()), 0.0)
+    least["what the parts disturb in each other"] = max(whole - sum(least.values()), 0.0)
     largest = max(least, key=lambda name: least[name])
     rows = [[name, f"{value:.2f}", f"{value / whole:.0%}"] for name, value in sorted(least.items(), key=lambda p: -p[1])]
     rows.append(["whole step", f"{whole:.2f}", "100%"])

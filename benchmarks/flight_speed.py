@@ -29,9 +29,8 @@ def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
     out = [Contender("FanTracking, 1 environment", _UNIT, _EVERYTHING, _single("ukf"), reference=True)]
     for count in counts:
         out.append(Contender(f"FanTracking, {count} in one process", _UNIT, "the same, all of them together", _many(count)))
-    if cores > 1:
-        out.append(Contender(f"FanTracking, {counts[-1]} on {cores} threads", _UNIT, "the same",
-                              _many(counts[-1], threads=cores)))
+        if cores > 1:
+            out.append(Contender(f"FanTracking, {count} on {cores} threads", _UNIT, "the same", _many(count, threads=cores)))
     out += [Contender("constant gain, 1 environment", _UNIT, "the same, with a filter of constant gain",
                       _single("constant-gain")),
             Contender(f"constant gain, {counts[0]} in one process", _UNIT, "the same, all of them together",

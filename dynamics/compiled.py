@@ -15,7 +15,7 @@ from numba import NumbaExperimentalFeatureWarning, njit
 F = TypeVar("F", bound=Callable[..., Any])
 
 # a record that begins like another may stand for it: the plant's for the model's
-warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning, message="Record")
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning, message=r"(\x1b\[\d+m)*Record")
 
 # One record of a structured array: compiled code reads its fields as attributes.
 Record = Any

@@ -1,20 +1,23 @@
 """Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the wind."""
 
 import math
-from collections.abc import Callable
 from contextlib import nullcontext
+from functools import cache
+from typing import NoReturn
 
 import mujoco
 import numpy as np
+from numba import carray, types
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
-from ..dynamics.compiled import Record, announced, compiled, compiled_meanwhile, is_compiled
+from ..dynamics.compiled import Record, announced, compiled, compiled_meanwhile
 from ..dynamics.effects import compile_effects
 from ..dynamics.errors import InputError, unknown_name
+from ..dynamics.jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
-from ..estimator.by_address import call_step
+from ..estimator.by_address import address_of, call_at, call_step, numbers_at, pointer_to
 from ..estimator.constant_gain import ConstantGainFilter
 from ..estimator.direct import direct, released
 from ..estimator.filter_record import FILTER
@@ -22,12 +25,18 @@ from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF, correct_parts
 from .jet import FAN, Fan, fan_record, jet_table
 from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
-from .stepping import mj_step, mj_step_address
+from .stepping import clock_address, mj_step_address
 from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
 _AT_REST = np.zeros(1)
-LOOP = np.dtype([("plant", PLANT), ("filter", FILTER), ("step", "i8"), ("flight", FLIGHT), ("fan", FAN)])
+_STILL_AIR = (np.zeros((COUNT_X, COUNT_R)),) * 2
+LOOP = np.dtype([
+    ("plant", PLANT), ("filter", FILTER), ("step", "i8"), ("flight", FLIGHT), ("fan", FAN),
+    ("ticks", "i8"),  # since the reset
+    # addresses: of the jet's tables, of MuJoCo's step and its arguments, and of arrays in its data
+    *[(name, "i8") for name in ("axial", "radial", "mj_step", "model", "data", "qpos", "qvel", "xfrc", "clock")],
+])
 
 # what estimates the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
@@ -49,23 +58,51 @@ def tick(loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xf
     actuate(plant, flight.command, loop.fan, axial, radial, qpos, qvel, noise, xfrc)
 
 
-@released
-def _run(loops: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array, noise: Array,
-         fan_y: Array, first: int, step: int, model: int, data: int) -> None:
-    """Run one tick for each row of ``noise``; the last three are the addresses of ``mj_step`` and of its arguments."""
-    loop = loops[0]
-    for k in range(len(noise)):
-        loop.fan.y = fan_y[min(first + k, len(fan_y) - 1)]
-        tick(loop, axial, radial, qpos, qvel, xfrc, noise[k])
+def _run(address: int, noise: int, count: int, fan_y: int, fan_count: int, first: int) -> None:
+    """Run ``count`` ticks of the loop whose record lies at ``address``.
+
+    ``noise`` and ``fan_y`` are the addresses of normals (count, NOISE) and of the fan's path (fan_count,) in m, of which
+    ``first`` is this first tick's place; after its end the fan stands still.
+    """
+    loop = carray(pointer_to(address), 1, LOOP)[0]
+    # first of all: a run that does not come to its end lags behind it, as one that MuJoCo reset does
+    loop.ticks += count
+    axial, radial = numbers_at(loop.axial, (COUNT_X, COUNT_R)), numbers_at(loop.radial, (COUNT_X, COUNT_R))
+    qpos, qvel, xfrc = numbers_at(loop.qpos, (7,)), numbers_at(loop.qvel, (6,)), numbers_at(loop.xfrc, (6,))
+    normals, path = numbers_at(noise, (count, NOISE)), numbers_at(fan_y, (fan_count,))
+    for k in range(count):
+        loop.fan.y = path[min(first + k, fan_count - 1)]
+        tick(loop, axial, radial, qpos, qvel, xfrc, normals[k])
         for _ in range(SUBSTEPS):
-            mj_step(step, model, data)
+            call_at(loop.mj_step, loop.model, loop.data)
+
+
+_RUN = types.void(*[types.int64] * 6)
+
+
+@cache
+def run_address() -> int:
+    """Return the address of ``_run``, compiled now if it was not: one machine code for all that run loops."""
+    return address_of(_run, _RUN)
+
+
+@released
+def _run_rows(run: int, loop: int, noise: Array, fan_y: Array, first: int) -> None:
+    """Run one tick for each row of ``noise``."""
+    call_at(run, loop, noise.ctypes.data, len(noise), fan_y.ctypes.data, len(fan_y), first)
 
 
 def compile_run() -> None:
     """Compile the correction, which the filter's step compiles last, and the loop: half of what a first flight needs."""
-    vector, table = np.zeros(1), np.zeros((2, 2))
-    direct(correct_parts, np.zeros(1, dtype=FILTER)[0], vector, 3)
-    direct(_run, np.zeros(1, dtype=LOOP), table, table, vector, vector, vector, table, vector, 0, 0, 0, 0)
+    direct(correct_parts, np.zeros(1, dtype=FILTER)[0], np.zeros(1), 3)
+    run_address()
+
+
+@compiled
+def has_been_reset(loop: Record) -> bool:
+    """Return whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state is not finite."""
+    late: bool = numbers_at(loop.clock, (1,))[0] < (loop.ticks - 0.5) * TICK
+    return late
 
 
 class ClosedLoop:
@@ -102,8 +139,9 @@ class ClosedLoop:
             raise unknown_name("estimator", estimator, ESTIMATORS)
         plant, self._body = plant_record(declared if true is None else true, settings or PlantSettings())
         self.model, self.data = load_world(self._body, load, drawn)
-        self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else (np.zeros((2, 2)), np.zeros((2, 2)))
+        self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else _STILL_AIR
         self.record = np.zeros(1, dtype=LOOP)
+        self.address = int(self.record.ctypes.data)  # of the record, for compiled code; good for as long as this loop lives
         loop = self.record[0]
         loop["plant"] = plant[0]
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
@@ -112,15 +150,15 @@ class ClosedLoop:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
         self._load = load
         self._body_id = self.model.body("vehicle").id
-        self._steps = 0
-        self._call: Callable[..., None] | None = None
-        with nullcontext() if is_compiled(_run) else announced():
-            with compiled_meanwhile(_run, compile_run):
+        first = run_address.cache_info().currsize == 0
+        with announced() if first else nullcontext():
+            with compiled_meanwhile(tick, compile_run) if first else nullcontext():
                 self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
                 loop["step"] = self.ukf.step_address
-            loop["filter"] = self.ukf.record[0]
-            self._views()
-            self.run(np.empty((0, NOISE)))  # compiles it
+            self._run = run_address()
+            self._call = direct(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
+        loop["filter"] = self.ukf.record[0]
+        self._views()
 
     def _views(self) -> None:
         self._qpos: Array = self.data.qpos
@@ -135,8 +173,11 @@ class ClosedLoop:
         self.disturbance: Array = loop["plant"]["disturbance"]  # (6,) of the actuators' unmodelled disturbance,
         self.applied: Array = loop["plant"]["applied"]  # (6,) and that a user applies; zero after a reset
         self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
-        self._world = (self.record, *self.jet_table, self._qpos, self._qvel, self._xfrc)
-        self._addresses = (mj_step_address(), self.model._address, self.data._address)
+        loop["mj_step"], loop["model"], loop["data"] = mj_step_address(), self.model._address, self.data._address
+        loop["clock"] = clock_address(self.data)
+        for name, array in (("qpos", self._qpos), ("qvel", self._qvel), ("xfrc", self._xfrc),
+                            ("axial", self.jet_table[0]), ("radial", self.jet_table[1])):
+            loop[name] = array.ctypes.data
 
     @property
     def motion(self) -> tuple[Array, Array]:
@@ -171,14 +212,14 @@ class ClosedLoop:
     @property
     def time(self) -> float:
         """Time since the reset, s."""
-        return self._steps * TICK
+        return int(self.record["ticks"][0]) * TICK
 
     def reset(self, rng: np.random.Generator, position: Array, yaw: float = 0.0) -> None:
         """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured pose."""
         mujoco.mj_resetData(self.model, self.data)
         self._views()
-        self._steps = 0
         loop = self.record[0]
+        loop["ticks"] = 0
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
         self.setpoint[:] = 0.0
@@ -223,15 +264,21 @@ class ClosedLoop:
         if noise.ndim != 2 or noise.shape[1] != NOISE or fan_y.ndim != 1 or len(fan_y) == 0 or first < 0:
             raise InputError(f"ClosedLoop: expected noise (n, {NOISE}), fan_y (m,) and first from 0 on; got shapes "
                              f"{noise.shape}, {fan_y.shape} and first = {first}")
-        if self._call is None:
-            self._call = direct(_run, *self._world, noise, fan_y, first, *self._addresses)
-        self._call(*self._world, noise, fan_y, first, *self._addresses)
-        self._steps += len(noise)
+        self._call(self._run, self.address, noise, fan_y, first)
 
     @property
     def was_reset(self) -> bool:
         """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state is not finite."""
-        return bool(self.data.time < self.time - 0.5 * TICK)
+        return bool(has_been_reset(self.record[0]))
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be copied or pickled: compiled code knows its arrays by address, and the copy would fly this one's.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError("a flight cannot be copied or pickled; make another environment, reset it with the same seed and fly "
+                         "the same actions: it arrives at the same state")
 
     def healthy(self) -> bool:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than a vehicle can be."""

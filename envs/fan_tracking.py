@@ -16,18 +16,17 @@ from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.direct import direct
 from ..estimator.tuning import UKFTuning
-from .closed_loop import ESTIMATORS, ClosedLoop
+from .closed_loop import ESTIMATORS, ClosedLoop, run_address
 from .jet import Fan
-from .outcome import INFO, LIMITS, LOST_OFFSET, OUTCOME, look
+from .outcome import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
 from .plant import NOISE, TICK, PlantSettings
 from .scenarios import Scenario, draw_fan_path, get_scenario
+from .stepping import bits_address, normals_address
 
-DECISION_TICKS = 16  # 12.5 Hz
 EPISODE_SECONDS = 20.0
 SETTLE_TICKS = 300  # the filter settles in the jet before an episode starts
 DISTANCE = 2.3  # m, from the fan
-TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
-CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
+_FLYING = np.zeros(1, dtype=np.bool_)
 
 
 class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -140,7 +139,9 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._viewer: Any = None
         self.loop: ClosedLoop | None = None
         self.fan_motion = ""
-        self.outcome = np.zeros(1, dtype=OUTCOME)  # of the last decision
+        self.episode = np.zeros(1, dtype=EPISODE)
+        self._command = np.zeros(1)
+        self._addressed: tuple[object, ...] = ()  # what the episode has the addresses of, beside its generator
         self._call: Callable[..., None] | None = None
 
     def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
@@ -181,10 +182,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         loop.reset(rng, np.array([distance, self._fan_y[0] + offset, self.fan.height]), math.pi)
         loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y[:1])
-        self._distance, self._tick, self._command = distance, 0, 0.0
-        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
-        self._look()
-        self.outcome["lost"] = False
+        self._begin(distance)
         if self.render_mode == "human":
             self.render()
         return self._observation(), self._info()
@@ -203,38 +201,55 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._observation(), info["reward_tracking"] + info["reward_change"], info["lost"], False, info
 
     def fly(self, command: float) -> None:
-        """Do what ``step`` does at a finite ``command``, and leave what came of it in ``outcome``."""
-        loop = self.loop
-        if loop is None:
+        """Do what ``step`` does at a finite ``command``, and leave what came of it in ``episode``."""
+        if not self._addressed:
             raise InputError("FanTracking: call reset before step")
-        value = min(max(command, -MAX_COMMAND), MAX_COMMAND)
-        change, self._command = value - self._command, value
-        loop.setpoint[4] = value
-        loop.run(self.np_random.standard_normal((DECISION_TICKS, NOISE)), self._fan_y, self._tick)
-        self._tick += DECISION_TICKS
-        self._look()
-        out = self.outcome
-        out["reward_tracking"] = 1.0 / (1.0 + (out["offset"].item() / TRACKING_WIDTH) ** 2)
-        out["reward_change"] = -CHANGE_COST * change * change
-        if loop.was_reset:
-            out["lost"] = True
+        self._command[0] = command
+        self._decide(DECISION_TICKS)
 
-    def _look(self) -> None:
+    def _begin(self, distance: float) -> None:
+        """Tell the compiled decision where everything of this episode lies, and look at its start."""
         loop = self.loop
         assert loop is not None
-        seen = (loop.record, *loop.motion, self._fan_y, self._tick, self._distance, self.fan.height, self._command,
-                self.outcome)
+        e = self.episode[0]
+        e["loop"], e["run"], e["path"], e["path_count"] = loop.address, run_address(), self._fan_y.ctypes.data, len(self._fan_y)
+        self._addressed = loop, self._fan_y
+        self._draw_from(self.np_random)
+        e["ticks"], e["distance"], e["height"], e["command"] = 0, distance, self.fan.height, 0.0
+        e["power"] = 2.0
+        self._command[0] = 0.0
+        self._decide(0)
+        out = e["outcome"]
+        out["reward_tracking"] = out["reward_change"] = 0.0
+        out["lost"] = False
+
+    def _draw_from(self, generator: np.random.Generator) -> None:
+        e = self.episode[0]
+        e["normals"], e["bits"], self._generator = normals_address(), bits_address(generator), generator
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """What all noise is drawn from."""
+        return super().np_random
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator) -> None:
+        self._np_random, self._np_random_seed = value, -1
+        self._draw_from(value)
+
+    def _decide(self, ticks: int) -> None:
+        """Fly some ticks at ``_command`` and write the outcome."""
         if self._call is None:
-            self._call = direct(look, *seen)
-        self._call(*seen)
+            self._call = direct(decide, self.episode, self._command, _FLYING, ticks)
+        self._call(self.episode, self._command, _FLYING, ticks)
 
     def _observation(self) -> NDArray[np.float32]:
-        observation: NDArray[np.float32] = self.outcome["observation"][0].copy()
+        observation: NDArray[np.float32] = self.episode["outcome"]["observation"][0].copy()
         return observation
 
     def _info(self) -> dict[str, Any]:
         """Return the reward's terms and the truth that the agent does not see."""
-        info = dict(zip(INFO, self.outcome[0].item()[1:], strict=True))
+        info = dict(zip(INFO, self.episode["outcome"][0].item()[1:], strict=True))
         info["force"], info["torque"], info["fan_motion"] = info["force"].copy(), info["torque"].copy(), self.fan_motion
         return info
 
@@ -250,7 +265,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             from .drawing import Viewer
 
             self._viewer = Viewer(self.render_mode, self.width, self.height)
-        picture: NDArray[np.uint8] | None = self._viewer.draw(self.loop, float(self._fan_y[max(self._tick - 1, 0)]))
+        picture: NDArray[np.uint8] | None = self._viewer.draw(self.loop, float(self.episode["outcome"]["fan_y"][0]))
         return picture
 
     def close(self) -> None:

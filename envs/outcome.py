@@ -1,15 +1,21 @@
-"""What the fan-tracking task makes of a closed loop after a decision: the observation, and the truth behind it."""
+"""A decision of the fan-tracking task, all of it compiled: its flight, the observation, the reward and the truth behind it."""
 
 import math
 
 import numpy as np
+from numba import carray
 
 from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
+from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import Array
+from ..estimator.by_address import call_at, numbers_at, pointer_to
 from ..estimator.direct import released
-from .closed_loop import FASTEST
-from .plant import TICK
+from .closed_loop import FASTEST, LOOP, has_been_reset
+from .plant import NOISE, TICK
 
+DECISION_TICKS = 16  # 12.5 Hz
+TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
+CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
 LOST_OFFSET = 2.5  # m
 _AWAY = 1.0  # m, off its height or its distance
 _UPRIGHT = 0.34  # cosine of 70 degrees
@@ -34,29 +40,67 @@ OUTCOME = np.dtype([
 INFO = OUTCOME.names[1:]  # type: ignore[index]
 
 
-@released
-def look(loops: np.ndarray, qpos: Array, qvel: Array, fan_y: Array, ticks: int, distance: float, height: float,
-         command: float, outcomes: np.ndarray) -> None:
-    """Write what there is to see ``ticks`` after the start into ``outcomes[0]``, all but the reward.
+# an episode in progress
+EPISODE = np.dtype([
+    # addresses: of the closed loop's record and of what runs it, of NumPy's normals and their bits, of the fan's path
+    *[(name, "i8") for name in ("loop", "run", "normals", "bits", "path")],
+    ("path_count", "i8"),  # of that path's places (m), one a tick
+    ("ticks", "i8"),  # since its start
+    ("distance", "f8"),  # m, where the vehicle started
+    ("height", "f8"),
+    ("command", "f8"),  # m/s, the last
+    # 2, of the offset in the reward; the compiler would make a product of a constant one, which rounds otherwise than C's
+    # ``pow`` once in a thousand times, and rewards keep their bits
+    ("power", "f8"),
+    ("outcome", OUTCOME),
+])
 
-    ``fan_y`` (n,) m is the fan's path, ``distance`` and ``height`` (m) where the vehicle started, ``command`` (m/s) the last.
-    """
-    out, x, external = outcomes[0], loops[0].filter.x, loops[0].plant.external
+
+@compiled
+def look(loop: Record, episode: Record) -> None:
+    """Write what there is to see now into ``episode.outcome``, all but the reward."""
+    e, out, x, external = episode, episode.outcome, loop.filter.x, loop.plant.external
+    qpos, qvel, path = numbers_at(loop.qpos, (7,)), numbers_at(loop.qvel, (6,)), numbers_at(e.path, (e.path_count,))
     for i in range(OBSERVATION_SIZE):
-        value = x[16 + i] if i < 3 else x[10 + i] if i < 6 else x[8] if i == 6 else command
+        value = x[16 + i] if i < 3 else x[10 + i] if i < 6 else x[8] if i == 6 else e.command
         out.observation[i] = min(max(value, -LIMITS[i]), LIMITS[i]) if math.isfinite(value) else 0.0
-    k = min(ticks, len(fan_y) - 1)
-    out.fan_y = fan_y[max(k - 1, 0)]
-    out.fan_velocity = (fan_y[k] - fan_y[k - 1]) / TICK if k > 0 else 0.0
+    k = min(e.ticks, e.path_count - 1)
+    out.fan_y = path[max(k - 1, 0)]
+    out.fan_velocity = (path[k] - path[k - 1]) / TICK if k > 0 else 0.0
     out.y = qpos[1]
     out.offset = qpos[1] - out.fan_y
     for i in range(3):
         out.force[i] = external[i]
         out.torque[i] = external[3 + i]
-    out.time = ticks * TICK
+    out.time = e.ticks * TICK
     flying = math.isfinite(x[:19].sum()) and 1.0 - 2.0 * (qpos[4] * qpos[4] + qpos[5] * qpos[5]) >= _UPRIGHT
     for i in range(6):
         flying = flying and abs(qvel[i]) < FASTEST
     # all of them such that a number that is none counts as lost
-    out.lost = not (flying and abs(out.offset) <= LOST_OFFSET and abs(qpos[0] - distance) <= _AWAY
-                    and abs(qpos[2] - height) <= _AWAY)
+    out.lost = has_been_reset(loop) or not (flying and abs(out.offset) <= LOST_OFFSET
+                                            and abs(qpos[0] - e.distance) <= _AWAY and abs(qpos[2] - e.height) <= _AWAY)
+
+
+@released
+def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int) -> None:
+    """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its outcome.
+
+    Other threads run meanwhile. All that an episode's record has the addresses of must live.
+    """
+    noise = np.empty((ticks, NOISE))
+    for n in range(len(episodes)):
+        if resting[n]:
+            continue
+        e = episodes[n]
+        loop = carray(pointer_to(e.loop), 1, LOOP)[0]
+        value = min(max(commands[n], -MAX_COMMAND), MAX_COMMAND)
+        change = value - e.command
+        e.command = loop.flight.setpoint[4] = value
+        if ticks > 0:
+            call_at(e.normals, e.bits, noise.size, noise.ctypes.data)
+            call_at(e.run, e.loop, noise.ctypes.data, ticks, e.path, e.path_count, e.ticks)
+            e.ticks += ticks
+        look(loop, e)
+        out = e.outcome
+        out.reward_tracking = 1.0 / (1.0 + (out.offset / TRACKING_WIDTH) ** e.power)
+        out.reward_change = -CHANGE_COST * change * change

@@ -138,9 +138,13 @@ def load_world(
     if load is not None:
         add_load(spec, load)
     spec.compiler.discardvisual = not drawn
+    if not drawn:
+        for part in (*spec.cameras, *spec.lights, spec.body("fan")):
+            spec.delete(part)
     model = spec.compile()
-    if load is None:  # whose thread is the world's one constraint
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    if load is None:  # whose thread is the world's one constraint, and the one that could have a spring or a damper
+        flags = mujoco.mjtDisableBit
+        model.opt.disableflags |= int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS
     # the drawing follows the vehicle's size

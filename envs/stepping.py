@@ -1,14 +1,11 @@
-"""MuJoCo's ``mj_step``, called from compiled code: a call through its Python binding would end the compiled loop."""
+"""C functions of MuJoCo and NumPy by their addresses: through its Python binding each call would end the compiled loop."""
 
 import ctypes
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import mujoco
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+import numpy as np
 
 from ..dynamics.errors import InputError
 
@@ -23,22 +20,49 @@ def mj_step_address() -> int:
     folder = Path(mujoco.__file__).parent
     for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):
         for path in sorted(folder.glob(pattern)):
-            address = ctypes.cast(ctypes.CDLL(str(path)).mj_step, ctypes.c_void_p).value
-            assert address is not None
-            return address
+            return _address(path, "mj_step")
     raise InputError(f"mujoco {mujoco.__version__}: expected its library (libmujoco) in {folder}; install mujoco's own wheel")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def mj_step(_typing_context: Any, function: Any, model: Any, data: Any) -> Any:
-    """Call ``mj_step`` at the address ``function``; ``model`` and ``data`` are the addresses of its arguments."""
-    signature = types.void(types.int64, types.int64, types.int64)
+def clock_address(data: "mujoco.MjData") -> int:
+    """Return the address of MuJoCo's time in s, a float of 64 bits; it follows a state that MuJoCo reset on its own.
 
-    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        pointer = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer])
-        target = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(target, [builder.inttoptr(argument, pointer) for argument in arguments[1:]])
-        return context.get_dummy_value()
+    Raises:
+        InputError: it is not where MuJoCo's header has it, before the energies.
+    """
+    address = int(data.energy.ctypes.data) - ctypes.sizeof(ctypes.c_double)
+    time, data.time = data.time, -1.25
+    found = ctypes.c_double.from_address(address).value == -1.25
+    data.time = time
+    if not found:
+        raise InputError(f"mujoco {mujoco.__version__}: expected the time before the energies in mjData, as in 3.3 and 4.0")
+    return address
 
-    return signature, generate
+
+@cache
+def normals_address() -> int:
+    """Return the address of ``void random_standard_normal_fill(bitgen_t *, npy_intp, double *)``, NumPy's unit normals.
+
+    They are those of ``Generator.standard_normal``, which calls it, bit for bit.
+
+    Raises:
+        InputError: this build of NumPy does not export it.
+    """
+    import numpy.random._generator as library
+
+    try:
+        return _address(Path(library.__file__), "random_standard_normal_fill")
+    except AttributeError:
+        raise InputError(f"numpy {np.__version__}: expected random_standard_normal_fill in {library.__file__}; install "
+                         "numpy's own wheel") from None
+
+
+def bits_address(generator: np.random.Generator) -> int:
+    """Return the address of a generator's ``bitgen_t``, good for as long as the generator lives."""
+    return int(generator.bit_generator.ctypes.bit_generator.value)
+
+
+def _address(library: Path, name: str) -> int:
+    address = ctypes.cast(getattr(ctypes.CDLL(str(library)), name), ctypes.c_void_p).value
+    assert address is not None
+    return address

@@ -1,7 +1,7 @@
 """Many fan-tracking environments in one process."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import gymnasium as gym
@@ -10,12 +10,15 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..dynamics.errors import InputError
+from ..estimator.direct import direct
 from .fan_tracking import FanTrackingEnv
-from .outcome import INFO, OUTCOME
+from .outcome import DECISION_TICKS, EPISODE, INFO, decide
 
 Frames = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
+
+_TURNS = 8  # of each thread in a decision: a call more costs 1 us, an environment's decision 130 us
 
 
 class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
@@ -49,10 +52,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._outcomes = np.zeros(num_envs, dtype=OUTCOME)
+        self._episodes = np.zeros(num_envs, dtype=EPISODE)
+        self._outcomes = self._episodes["outcome"]
+        self._motions = np.full(num_envs, "", dtype=object)
         for i, env in enumerate(self.envs):
-            env.outcome = self._outcomes[i : i + 1]
+            env.episode = self._episodes[i : i + 1]
         self._all = np.ones(num_envs, dtype=np.bool_)
+        self._call: Callable[..., None] | None = None
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
@@ -70,11 +76,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             raise InputError(f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
                              f"got {len(seeds)} and {mask!r}")
 
-        def start(i: int) -> None:
-            if mask[i]:
-                self.envs[i].reset(seed=seeds[i])
-
-        self._each(start)
+        self._spread(lambda first, last: self._start(first, last, mask, seeds))
         self._decisions[mask], self._over[mask] = 0, False
         return self._frames(), self._infos()
 
@@ -87,35 +89,52 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         actions = np.asarray(actions, dtype=np.float64)
         if actions.shape != (self.num_envs, 1) or not np.all(np.isfinite(actions)):
             raise InputError(f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), got {actions!r}")
-        commands, over = actions[:, 0].tolist(), self._over.tolist()
+        if not self._episodes["loop"].all():
+            raise InputError("FanTracking: call reset before step")
+        commands, over = np.ascontiguousarray(actions[:, 0]), self._over
+        if self._call is None:
+            self._call = direct(decide, self._episodes, commands, over, DECISION_TICKS)
+        decided = self._call
 
-        def fly(i: int) -> None:
-            if over[i]:
-                self.envs[i].reset()
-            else:
-                self.envs[i].fly(commands[i])
+        def fly(first: int, last: int) -> None:
+            decided(self._episodes[first:last], commands[first:last], over[first:last], DECISION_TICKS)
+            self._start(first, last, over)
 
-        self._each(fly)
+        self._spread(fly)
         self._decisions = np.where(self._over, 0, self._decisions + 1)
         out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
         lost = out["lost"].copy()
         self._over = lost | truncated
         return self._frames(), out["reward_tracking"] + out["reward_change"], lost, truncated, self._infos()
 
-    def _each(self, do: Callable[[int], None]) -> None:
-        """Call ``do`` for every environment, on the threads if there are several: they overlap in compiled code."""
-        if self.threads == 1:
-            for i in range(self.num_envs):
-                do(i)
-            return
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads)
+    def _start(self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
+        """Start an episode in those environments from ``first`` to before ``last`` that ``which`` (num_envs,) names."""
+        for i in (first + np.flatnonzero(which[first:last])).tolist():
+            self.envs[i].reset(seed=None if seeds is None else seeds[i])
+            self._motions[i] = self.envs[i].fan_motion
 
-        def part(first: int) -> None:
-            for i in range(first, self.num_envs, self.threads):
-                do(i)
+    def _spread(self, work: Callable[[int, int], None]) -> None:
+        """Call ``work`` with the bounds of some environments, until all had their turn; this thread works, too.
 
-        list(self._pool.map(part, range(self.threads)))
+        Whoever is done takes the next few, so that nobody waits for a thread that the machine held up.
+        """
+        size = self.num_envs if self.threads == 1 else -(-self.num_envs // (_TURNS * self.threads))
+        turns = iter([(first, min(first + size, self.num_envs)) for first in range(0, self.num_envs, size)])
+
+        def take_turns() -> None:
+            for first, last in turns:
+                work(first, last)
+
+        if self._pool is None and self.threads > 1:
+            self._pool = ThreadPoolExecutor(self.threads - 1)
+        others = [self._pool.submit(take_turns) for _ in range(self.threads - 1)] if self._pool else []
+        try:
+            take_turns()
+        finally:
+            others = [other for other in others if not other.cancel()]  # the rest came too late to find any
+            wait(others)
+        for other in others:
+            other.result()
 
     def _frames(self) -> Frames:
         frames: Frames = self._outcomes["observation"].copy()
@@ -124,7 +143,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
     def _infos(self) -> Infos:
         """Return what the environments say as Gymnasium's vector environments do: an array and a mask for each entry."""
         infos: Infos = {name: self._outcomes[name].copy() for name in INFO}
-        infos["fan_motion"] = np.array([env.fan_motion for env in self.envs], dtype=object)
+        infos["fan_motion"] = self._motions.copy()
         return infos | {f"_{name}": self._all.copy() for name in infos}
 
     def render(self) -> tuple[Any, ...]:

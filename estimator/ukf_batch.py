@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.errors import InputError
 from ..dynamics.vehicle import Vehicle
+from .by_address import numbers_at
 from .direct import released
 from .estimate import FORCE, NIS, POSITION, QUATERNION, RATE, STATE_SIZE, TORQUE, VELOCITY, Array
 from .filter_record import N
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 
-# what a filter must not forget from one step to the next
+# what a filter must not forget from one step to the next; x and P lie one after the other, as in ``FILTER``
 _KEPT = np.dtype([("x", "f8", (STATE_SIZE,)), ("P", "f8", (N, N)), ("last_speeds", "f8", (4,)), ("refused", "i8")])
+_ESTIMATE_SIZE = STATE_SIZE + N * N
 
 
 @released
@@ -38,20 +40,18 @@ def _step_all(records: np.ndarray, kept: np.ndarray, z: Array, parts: int, dt: f
     """Step every filter and write its state into ``out`` (n, 20); there is one record, or one for each."""
     for n in range(len(kept)):
         f, k = records[n if len(records) > 1 else 0], kept[n]
-        for i in range(STATE_SIZE):
-            f.x[i] = k.x[i]
-        for i in range(N):
-            for j in range(N):
-                f.P[i, j] = k.P[i, j]
+        # estimate and covariance in one piece: copied row by row they cost twice as much, a twentieth of the step
+        now, then = numbers_at(f.x.ctypes.data, (_ESTIMATE_SIZE,)), numbers_at(k.x.ctypes.data, (_ESTIMATE_SIZE,))
+        for i in range(_ESTIMATE_SIZE):
+            now[i] = then[i]
         for i in range(4):
             f.last_speeds[i] = k.last_speeds[i]
         f.refused = k.refused
         step(f, z[n], parts, dt, voltage[n])
+        for i in range(_ESTIMATE_SIZE):
+            then[i] = now[i]
         for i in range(STATE_SIZE):
-            k.x[i] = out[n, i] = f.x[i]
-        for i in range(N):
-            for j in range(N):
-                k.P[i, j] = f.P[i, j]
+            out[n, i] = now[i]
         for i in range(4):
             k.last_speeds[i] = f.last_speeds[i]
         k.refused = f.refused

@@ -176,7 +176,10 @@ def test_no_color_is_honoured(tmp_path):
 def test_an_interrupted_command_ends_with_130_and_no_traceback(tmp_path):
     run = subprocess.Popen([COMMAND, "benchmark", "--episodes", "40", "--jobs", "2"], cwd=tmp_path, start_new_session=True,
                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(4)
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob("results/*")) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(1)
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to every process of the command
     _, err = run.communicate(timeout=60)
     assert run.returncode == 130, err

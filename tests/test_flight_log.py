@@ -1,6 +1,5 @@
 import gzip
 import sys
-import time
 import warnings
 
 import numpy as np
@@ -243,22 +242,6 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, rows, path):
     with pytest.raises(InputError, match=r"flight.xlsx: unknown kind"):
         write_log(log, tmp_path / "flight.xlsx")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["flight.csv", "taken.csv"]
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_minute_at_200_hz_reads_fast(tmp_path, suffix):
-    rng = np.random.default_rng(0)
-    count = 12000
-    log = FlightLog(t=0.005 * np.arange(count), position=rng.normal(size=(count, 3)),
-                    quaternion=Rotation.random(count, rng=rng).as_quat()[:, [3, 0, 1, 2]],
-                    rotor_speeds=rng.uniform(300, 400, (count, 4)), voltage=rng.uniform(11, 12, count))
-    write_log(log, tmp_path / f"long{suffix}")
-    times = []
-    for _ in range(3):
-        start = time.perf_counter()
-        read_log(tmp_path / f"long{suffix}")
-        times.append(time.perf_counter() - start)
-    assert min(times) < 0.3
 
 
 def test_an_unknown_reader_is_named(path):

@@ -180,7 +180,7 @@ def test_a_text_that_unpacks_to_more_than_a_flight_is_refused(tmp_path, monkeypa
     monkeypatch.setattr(files, "LARGEST", 1_000_000)
     path = tmp_path / "bomb.csv.gz"
     path.write_bytes(gzip.compress(b"0" * 50_000_000))
-    with pytest.raises(InputError, match=r"bomb\.csv\.gz: more than 1000000 bytes"):
+    with pytest.raises(InputError, match=r"bomb\.csv\.gz: more than 1000000 characters"):
         read_log(path)
 
 

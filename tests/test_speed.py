@@ -38,7 +38,7 @@ def test_a_page_holds_the_sections(tmp_path):
 def test_the_profile_s_parts_sum_to_the_whole_or_less_than_rounding_above(estimator):
     section = profile(1, estimator)
     *parts, whole = [float(row[1]) for row in section.rows]
-    assert len(parts) == 6
+    assert len(parts) == 7
     assert all(part >= 0 for part in parts)
     assert sum(parts) > 0.9 * whole
     assert f"filter ({estimator})" in [row[0] for row in section.rows]

@@ -50,7 +50,8 @@ def make_pilot(name: str) -> Controller:
         InputError: no controller has this name, or the file holds none.
     """
     if is_file_name(name):
-        return load_controller(name)
+        controller: Controller = load_controller(name)
+        return controller
     return load_policy(name) if is_policy_path(name) else make_controller(name)
 
 

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..controllers.observation import MAX_COMMAND
 from ..dynamics.vehicle import Vehicle
 from ..envs.closed_loop import ClosedLoop
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.jet import Fan
-from ..envs.plant import TICK
+from ..envs.plant import NOISE, TICK
 from ..estimator.observer import NonlinearObserver, ObserverTuning
 
 Array = NDArray[np.float64]
@@ -59,6 +60,17 @@ class SensingFanTracking(FanTrackingEnv):
             gain = 2.2 / self.scenario.rise_time
             loop.observer = NonlinearObserver(loop.ukf.vehicle, ObserverTuning(gain, gain), TICK)
         return loop
+
+    def _decide(self, ticks: int) -> None:
+        loop = self.loop
+        if isinstance(loop, _Watched) and ticks > 0:
+            # the observer must see every tick's sample: they are flown one by one, before the look at what came of them
+            e = self.episode[0]
+            loop.setpoint[4] = min(max(self._command[0], -MAX_COMMAND), MAX_COMMAND)
+            loop.run(self.np_random.standard_normal((ticks, NOISE)), self._fan_y, int(e["ticks"]))
+            e["ticks"] += ticks
+            ticks = 0
+        super()._decide(ticks)
 
     def _info(self) -> dict[str, Any]:
         info, loop = super()._info(), self.loop

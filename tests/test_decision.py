@@ -1,0 +1,139 @@
+"""A decision is one compiled call: the numbers are those of the same steps taken from Python."""
+
+import copy
+import ctypes
+import pickle
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+
+from windwrench.dynamics import InputError
+from windwrench.envs import FanTrackingEnv
+from windwrench.envs.plant import NOISE
+from windwrench.envs.stepping import bits_address, clock_address, normals_address
+from windwrench.envs.vector import FanTrackingVectorEnv
+from windwrench.estimator.by_address import call_at
+from windwrench.estimator.direct import released
+from windwrench.training.sensing import SensingFanTracking
+
+
+@released
+def fill(function, bits, out):
+    call_at(function, bits, out.size, out.ctypes.data)
+
+
+@pytest.mark.parametrize("kind", [np.random.PCG64, np.random.MT19937, np.random.SFC64])
+def test_the_normals_are_numpy_s(kind):
+    compiled, plain = np.random.Generator(kind(3)), np.random.Generator(kind(3))
+    for count in (1, 49, 784):
+        out = np.zeros(count)
+        fill(normals_address(), bits_address(compiled), out)
+        np.testing.assert_array_equal(out, plain.standard_normal(count))
+    assert compiled.uniform() == plain.uniform()
+
+
+@pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
+def test_a_decision_is_sixteen_ticks_with_numpy_s_normals(estimator):
+    env, twin = FanTrackingEnv("fast", estimator=estimator), FanTrackingEnv("fast", estimator=estimator)
+    env.reset(seed=6)
+    twin.reset(seed=6)
+    for k in range(5):
+        env.step(np.array([0.3], np.float32))
+        twin.loop.setpoint[4] = np.float32(0.3)
+        twin.loop.run(twin.np_random.standard_normal((16, NOISE)), twin._fan_y, 16 * k)
+        for one, other in zip((env.loop.state, env.loop.covariance, env.loop.external, *env.loop.motion),
+                              (twin.loop.state, twin.loop.covariance, twin.loop.external, *twin.loop.motion), strict=True):
+            np.testing.assert_array_equal(one, other)
+        assert env.loop.time == twin.loop.time
+    assert env.np_random.uniform() == twin.np_random.uniform()
+
+
+def test_watching_every_tick_from_python_changes_nothing():
+    env, watched = FanTrackingEnv("gusty"), SensingFanTracking("gusty", observer=True)
+    np.testing.assert_array_equal(env.reset(seed=2)[0], watched.reset(seed=2)[0])
+    for command in (0.3, -2.0, 0.1):
+        one, other = env.step(np.array([command], np.float32)), watched.step(np.array([command], np.float32))
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:4] == other[1:4]
+        assert one[4]["time"] == other[4]["time"]
+    assert other[4]["observer_force"][0] == pytest.approx(other[4]["force"][0], abs=0.3)
+
+
+def test_the_reward_is_that_of_c_s_pow_to_the_last_bit():
+    env = FanTrackingEnv("static")
+    env.reset(seed=0)
+    for y in np.random.default_rng(0).uniform(-2.0, 2.0, 8000):  # a product would round a few of them otherwise
+        env.loop.position[1] = y
+        env._decide(0)
+        info = env._info()
+        assert info["reward_tracking"] == 1.0 / (1.0 + (info["offset"] / 0.3) ** 2)
+
+
+def test_a_generator_that_is_put_in_is_drawn_from():
+    env, twin = FanTrackingEnv(), FanTrackingEnv()
+    env.reset(seed=1)
+    twin.reset(seed=1)
+    env.np_random, other = np.random.Generator(np.random.SFC64(4)), np.random.Generator(np.random.SFC64(4))
+    env.step(np.zeros(1, np.float32))
+    twin.step(np.zeros(1, np.float32))
+    assert not np.array_equal(env.loop.state, twin.loop.state)
+    other.standard_normal((16, NOISE))
+    assert env.np_random.uniform() == other.uniform()
+
+
+def test_after_a_reset_that_failed_there_is_no_step():
+    env = FanTrackingEnv(fan_path=lambda t: t[:-1])
+    with pytest.raises(InputError, match="fan_path"):
+        env.reset(seed=0)
+    with pytest.raises(InputError, match="reset before step"):
+        env.step(np.zeros(1, np.float32))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_one_state_that_is_no_number_is_lost_and_the_others_fly_on(threads, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs
+    envs, healthy = FanTrackingVectorEnv(3, threads=threads), FanTrackingVectorEnv(3)
+    actions = np.zeros((3, 1), np.float32)
+    envs.reset(seed=0)
+    healthy.reset(seed=0)
+    envs.envs[1].loop.data.qvel[0] = np.nan
+    frames, _, lost, _, infos = envs.step(actions)
+    assert lost.tolist() == infos["lost"].tolist() == [False, True, False]
+    assert frames in envs.observation_space
+    np.testing.assert_array_equal(frames[[0, 2]], healthy.step(actions)[0][[0, 2]])
+    _, rewards, lost, _, infos = envs.step(actions)
+    assert not lost.any()
+    assert (rewards[1], infos["time"][1]) == (0.0, 0.0)
+    envs.close()
+
+
+def test_many_environments_want_a_reset_of_all_first():
+    envs = FanTrackingVectorEnv(2)
+    with pytest.raises(InputError, match="reset before step"):
+        envs.step(np.zeros((2, 1), np.float32))
+    envs.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    with pytest.raises(InputError, match="reset before step"):
+        envs.step(np.zeros((2, 1), np.float32))
+
+
+def test_another_build_of_numpy_or_mujoco_is_named(monkeypatch):
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    data = mujoco.MjData(model)
+    data.time = 2.5
+    assert ctypes.c_double.from_address(clock_address(data)).value == 2.5
+    with pytest.raises(InputError, match="the time before the energies"):
+        clock_address(SimpleNamespace(energy=np.zeros(3)[1:], time=0.0))
+    monkeypatch.setattr("numpy.random._generator.__file__", np.random.bit_generator.__file__)
+    with pytest.raises(InputError, match="random_standard_normal_fill"):
+        normals_address.__wrapped__()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
+def test_a_flight_in_progress_is_not_copied(copied):
+    env = FanTrackingEnv("static")
+    copy.deepcopy(env).reset(seed=0)  # before its first flight there is nothing that could be shared
+    env.reset(seed=0)
+    with pytest.raises(InputError, match="cannot be copied or pickled"):
+        copied(env)
