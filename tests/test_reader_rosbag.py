@@ -6,10 +6,12 @@ from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.flight_log import read_log
+from windwrench.identification.readers import unpacking
 
 pytest.importorskip("rosbags")
 
 from rosbags import rosbag1, rosbag2
+from rosbags.rosbag1 import reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ACTUATORS = "mav_msgs/msg/Actuators"
@@ -94,7 +96,7 @@ class Messages:
 
 @pytest.fixture
 def write(tmp_path, stores):
-    def to_bag(kind, topics, topic_map=None, delay=0.0):
+    def to_bag(kind, topics, topic_map=None, delay=0.0, packed=()):
         """Write ``{topic: (type, times, make(messages, t), definition)}`` into a bag and return its path."""
         ros1 = kind == "bag"
         store, path = stores[ros1], tmp_path / ("flight.bag" if ros1 else "flight")
@@ -104,6 +106,8 @@ def write(tmp_path, stores):
         else:
             plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
             writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+        if packed:
+            writer.set_compression(*packed)
         with writer:
             for topic, (name, times, make, *definition) in topics.items():
                 how = {"msgdef": definition[0], "md5sum": 32 * "0"} if definition else {"typestore": store}
@@ -306,6 +310,32 @@ def test_a_voltage_that_nobody_asked_for_may_be_unreadable(write, vehicle):
     assert any("no voltage: " in note and "another definition" in note for note in log.notes)
     path.with_name("flight.topics.yaml").write_text("voltage: /battery")
     with pytest.raises(InputError, match="another definition"):
+        read_log(path, "rosbag", vehicle)
+
+
+PACKED = {
+    "bz2": ("bag", (rosbag1.Writer.CompressionFormat.BZ2,)),
+    "lz4": ("bag", (rosbag1.Writer.CompressionFormat.LZ4,)),
+    "zstd": ("mcap", (rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)),
+}
+
+
+@pytest.mark.parametrize("way", PACKED)
+def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypatch):
+    kind, packed = PACKED[way]
+    path = write(kind, {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=packed)
+    assert_motion(read_log(path, "rosbag", vehicle))
+    before = dict(reader.decompressors)
+    monkeypatch.setattr(unpacking, "LARGEST", 1000)
+    with pytest.raises(InputError, match=r"flight.*a chunk unpacks to more than 1000 bytes"):
+        read_log(path, "rosbag", vehicle)
+    assert reader.decompressors == before  # rosbags is left as it was
+
+
+@pytest.mark.parametrize("mode", [rosbag2.CompressionMode.FILE, rosbag2.CompressionMode.MESSAGE])
+def test_files_and_messages_packed_one_by_one_are_refused(mode, write, vehicle):
+    path = write("db3", {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=(mode, rosbag2.CompressionFormat.ZSTD))
+    with pytest.raises(InputError, match=rf"metadata.yaml: compression_mode {mode.name.lower()}: expected a bag that is not"):
         read_log(path, "rosbag", vehicle)
 
 

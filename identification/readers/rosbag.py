@@ -25,7 +25,7 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ from ...dynamics.vehicle import Vehicle
 from ...dynamics.yaml_file import read_yaml
 from ..flight_log import FlightLog
 from .streams import Stream, flight_log, from_ned
+from .unpacking import limited_unpacking, refuse_packed_files
 
 Array = NDArray[np.float64]
 
@@ -158,12 +159,17 @@ def _opened(path: Path) -> Iterator[_Bag]:
                          "install rosbags") from error
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     store.register(get_types_from_msg(_ACTUATORS_TEXT, _ACTUATORS))
+    if not ros1:
+        refuse_packed_files(path)
+    limits = ExitStack()
     reader: Any = None
     try:
+        limits.enter_context(limited_unpacking())
         reader = rosbag1.Reader(path) if ros1 else rosbag2.Reader(path)
         reader.open()
         types = {connection.topic: connection.msgtype for connection in reader.connections}
     except Exception as error:  # whatever a parser makes of bytes that are no bag
+        limits.close()
         raise InputError(f"{path}: cannot be read as a ROS {1 if ros1 else 2} bag: {error or type(error).__name__}; "
                          "expected a whole bag") from error
 
@@ -187,6 +193,7 @@ def _opened(path: Path) -> Iterator[_Bag]:
         yield _Bag(path, types, messages)
     finally:
         reader.close()
+        limits.close()
 
 
 def _check_definition(path: Path, connection: Any, store: Any, ros1: bool) -> None:
