@@ -94,7 +94,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
             if world == "fast":
                 asked.append((f"{who}: better than the best ratio law, interval clear of zero", row.ratio_interval[1] < 0,
                               f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})"))
-            if world == "base" or line.name != "sac":
+            if world == "base" or line.name == "sac-wide":
                 asked.append((f"{who}: nothing lost", row.lost_fraction == 0, f"{row.lost_fraction:.1%} lost"))
     if not asked:
         return ""
