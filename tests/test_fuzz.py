@@ -97,6 +97,7 @@ def test_the_outcome_does_not_depend_on_processes():
     assert "| all | 30 |" in table(one)
 
 
+@settings(deadline=None)
 @given(st.text(max_size=60) | st.builds(lambda n, t: f"{n}:{t}", st.sampled_from(names()), st.text(max_size=30)))
 def test_any_effect_setting_is_taken_or_refused(text):
     setting = taken_or_refused("", parse_setting, text)
