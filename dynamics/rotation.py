@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled
+from .lanes import any_of, choose
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ def attitude_error(q: Array, reference: Array, out: Array) -> None:
     x = -q[0] * reference[1] + q[1] * reference[0] - q[2] * reference[3] + q[3] * reference[2]
     y = -q[0] * reference[2] + q[1] * reference[3] + q[2] * reference[0] - q[3] * reference[1]
     z = -q[0] * reference[3] - q[1] * reference[2] + q[2] * reference[1] + q[3] * reference[0]
-    sign = 1.0 if w >= 0.0 else -1.0
+    sign = choose(w >= 0.0, 1.0, -1.0)
     scale = sign / (1.0 + sign * w)
     out[0] = x * scale
     out[1] = y * scale
@@ -93,13 +94,14 @@ def turn_body(q: Array, wx: float, wy: float, wz: float, dt: float, out: Array) 
     """Write ``q`` turned at the body rate (wx, wy, wz) rad/s for ``dt`` s into ``out``: (13), (14), ``-[psi]x``."""
     half = 0.5 * dt
     square = half * half * (wx * wx + wy * wy + wz * wz)
-    if square < 0.01:
-        # the series to the last digit of a double: three times as fast as the functions, and safe at zero
-        cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
-        scale = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))))
-    else:
+    # the series to the last digit of a double: three times as fast as the functions, and safe at zero
+    cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
+    scale = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))))
+    large = square >= 0.01
+    if any_of(large):
         angle = math.sqrt(square)
-        cosine, scale = math.cos(angle), half * math.sin(angle) / angle
+        cosine = choose(large, math.cos(angle), cosine)
+        scale = choose(large, half * math.sin(angle) / angle, scale)
     x, y, z = wx * scale, wy * scale, wz * scale
     out[0] = q[0] * cosine - q[1] * x - q[2] * y - q[3] * z
     out[1] = q[1] * cosine + q[0] * x + q[2] * z - q[3] * y

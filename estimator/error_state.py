@@ -3,6 +3,7 @@
 import math
 
 from ..dynamics.compiled import Record, compiled
+from ..dynamics.lanes import any_of, choose
 from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
 from .estimate import Array
 
@@ -62,8 +63,9 @@ def symmetrise(P: Array) -> None:
             P[i, j] = a
             P[j, i] = a
     for i in range(3):
-        if P[i, i] > _SPREAD:
-            scale = math.sqrt(_SPREAD / P[i, i])
+        wide = P[i, i] > _SPREAD
+        if any_of(wide):
+            scale = choose(wide, math.sqrt(_SPREAD / P[i, i]), 1.0)
             for j in range(n):
                 P[i, j] *= scale
                 P[j, i] *= scale

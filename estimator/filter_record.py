@@ -90,6 +90,12 @@ def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
     """Write the state that follows ``x`` after ``dt`` s into ``out``: (2)-(5), (11)-(14)."""
     quaternion_to_matrix(x[3:7], f.rotation)
     apply_effects(f, x[0:3], f.rotation, x[7:10], x[10:13])
+    move(f, x, dt, out)
+
+
+@compiled
+def move(f: Record, x: Array, dt: float, out: Array) -> None:
+    """Do what ``propagate`` does once ``f.rotation`` and the effects' wrench at ``x`` are known."""
     accelerations(f.body, f.rotation, x[10:13], f.rotor_wrench, x[13:16], x[16:19], f.effect_wrench, f.acceleration)
     for i in range(3):
         out[i] = x[i] + dt * (x[7 + i] + 0.5 * dt * f.acceleration[i])
@@ -100,4 +106,4 @@ def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
     turn_body(x[3:7], x[10], x[11], x[12], dt, out[3:7])
 
 
-__all__ = ["ESTIMATE", "FILTER", "N", "drive", "filter_record", "propagate"]
+__all__ = ["ESTIMATE", "FILTER", "N", "drive", "filter_record", "move", "propagate"]

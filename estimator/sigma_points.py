@@ -8,6 +8,7 @@ so are the results, bit for bit. Arrays here have a row for each number and a co
 import math
 
 from ..dynamics.compiled import Record
+from ..dynamics.lanes import any_of, choose
 from .side_by_side import side_by_side
 
 PAIRS = 6  # columns of the root that turn or spin the vehicle
@@ -93,9 +94,11 @@ def propagate_points(f: Record, dt: float) -> None:
         C[1, k] = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
         C[2, k] = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))))
     for k in range(POINTS):
-        if not C[0, k] < 0.01:
+        large = C[0, k] >= 0.01
+        if any_of(large):
             angle = math.sqrt(C[0, k])
-            C[1, k], C[2, k] = math.cos(angle), half * math.sin(angle) / angle
+            C[1, k] = choose(large, math.cos(angle), C[1, k])
+            C[2, k] = choose(large, half * math.sin(angle) / angle, C[2, k])
     for k in range(POINTS):
         q0, q1, q2, q3, cosine, scale = X[3, k], X[4, k], X[5, k], X[6, k], C[1, k], C[2, k]
         x, y, z = X[10, k] * scale, X[11, k] * scale, X[12, k] * scale
@@ -118,7 +121,7 @@ def errors_of_points(f: Record) -> None:
     for k in range(POINTS):
         a0, a1, a2, a3 = X[3, k], X[4, k], X[5, k], X[6, k]
         w = a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3
-        sign = 1.0 if w >= 0.0 else -1.0
+        sign = choose(w >= 0.0, 1.0, -1.0)
         scale = sign / (1.0 + sign * w)
         D[0, k] = (-a0 * q1 + a1 * q0 - a2 * q3 + a3 * q2) * scale
         D[1, k] = (-a0 * q2 + a1 * q3 + a2 * q0 - a3 * q1) * scale

@@ -21,8 +21,9 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.compiled import Record, compiled
 from ..dynamics.errors import InputError
+from ..dynamics.lanes import all_of, any_of, choose
 from ..dynamics.model import reset_model
-from ..dynamics.rotation import attitude_error
+from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from .by_address import address_of
 from .covariance import (
@@ -38,7 +39,7 @@ from .covariance import (
 from .direct import direct
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
-from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, propagate
+from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
@@ -70,96 +71,118 @@ def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weigh
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
-    x, P, mean = f.x, f.P, f.mean
     drive(f, rotor_speeds, dt, voltage)
-    plain = f.wrench_count == 0
-    if plain:
-        root_of_six(f)
+    if f.wrench_count == 0:
+        quaternion_to_matrix(f.x[3:7], f.rotation)
+        carry(f, dt)
     else:
+        spread, weight, scale = _spread_of(f)
         root_of_twelve(f)
-    propagate(f, x, dt, f.centre)
+        propagate(f, f.x, dt, f.centre)
+        _carry_linear(f, dt)
+        _pairs_with_effects(f, dt, spread, scale, weight)
+        add_pairs(f)
+        add_more_pairs(f)
+        _gather(f)
+    f.time += dt
+
+
+@compiled
+def carry(f: Record, dt: float) -> None:
+    """Carry a filter without wrench effects ahead, its rotors' wrench and the matrix of its attitude being known."""
+    spread, weight, scale = _spread_of(f)
+    root_of_six(f)
+    move(f, f.x, dt, f.centre)
+    _carry_linear(f, dt)
+    spread_points(f, spread)
+    propagate_points(f, dt)
+    errors_of_points(f)
+    halve_pairs(f, scale, weight)
+    add_pairs(f)
+    _gather(f)
+
+
+@compiled
+def _spread_of(f: Record) -> tuple[float, float, float]:
+    """Return how far out sigma points lie, and the factors of a pair's mean and of its differences."""
+    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
+    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
+    # there where the model is nonlinear, in the first 12 rows
+    return math.sqrt(N + NOISE + f.kappa), weight, math.sqrt(0.5 * weight)
+
+
+@compiled
+def _carry_linear(f: Record, dt: float) -> None:
     for i in range(3):
         for j in range(3):
             f.centre_rotation[i, j] = f.rotation[i, j]
     carry_linear_part(f, dt)
     add_noise(f, f.centre_rotation, dt)
-    spread = math.sqrt(N + NOISE + f.kappa)
-    weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
-    # there where the model is nonlinear, in the first 12 rows
-    scale = math.sqrt(0.5 * weight)
-    if plain:
-        spread_points(f, spread)
-        propagate_points(f, dt)
-        errors_of_points(f)
-        halve_pairs(f, scale, weight)
-        add_pairs(f)
-    else:
-        _pairs_with_effects(f, dt, spread, scale, weight)
-        add_pairs(f)
-        add_more_pairs(f)
+
+
+@compiled
+def _gather(f: Record) -> None:
+    """Take the mean's part off the covariance, and fold it into the estimate."""
+    P, mean = f.P, f.mean
     for i in range(12):
         a = mean[i]
         for j in range(12):
             P[i, j] -= a * mean[j]
     fold(f, f.centre, mean)
     symmetrise(P)
-    f.time += dt
-    x[NIS] = math.nan
+    f.x[NIS] = math.nan
 
 
 @compiled
-def correct(f: Record, position: Array, quaternion: Array, first: int, last: int) -> bool:
-    """Take in rows ``first`` to ``last`` of the measurement (rho, x), (27)-(37), unless the gate refuses it."""
+def correct(f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool) -> None:
+    """Take in what was measured of a pose, (rho, x), (27)-(37), unless the gate refuses it."""
     x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
     attitude_error(quaternion, x[3:7], y[0:3])
     for i in range(3):
         y[3 + i] = position[i] - x[i]
-    # y becomes the whitened innovation
+    # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes zero
     nis = 0.0
     for i in range(6):
-        measured = first <= i < last
+        measured = with_attitude if i < 3 else with_position
         a = i if i < 3 else i + 3  # rows of (rho, x) in the error state are 0-2 and 6-8
         for j in range(i):
-            if measured and j >= first:
-                total = P[a, j if j < 3 else j + 3]
-                for k in range(first, j):
-                    total -= L[i, k] * L[j, k]
-                L[i, j] = total / L[j, j]
-                y[i] -= L[i, j] * y[j]
-            else:
-                L[i, j] = 0.0
-        if measured:
-            total = P[a, a] + f.noise[i]
-            for k in range(first, i):
-                total -= L[i, k] * L[i, k]
-            L[i, i] = math.sqrt(total)
-            scales[i] = 1.0 / L[i, i]
-            y[i] /= L[i, i]
-            nis += y[i] * y[i]
-        else:
-            scales[i] = y[i] = 0.0
-    x[NIS] = nis
-    if f.gate > 0.0 and nis > f.gate and f.refused < f.patience:
-        f.refused += 1
-        return False
-    f.refused = 0
+            total = P[a, j if j < 3 else j + 3]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            L[i, j] = choose(measured & (with_attitude if j < 3 else with_position), total / L[j, j], 0.0)
+            y[i] -= L[i, j] * y[j]
+        total = P[a, a] + f.noise[i]
+        for k in range(i):
+            total -= L[i, k] * L[i, k]
+        L[i, i] = math.sqrt(total)
+        scales[i] = choose(measured, 1.0 / L[i, i], 0.0)
+        y[i] = choose(measured, y[i] / L[i, i], 0.0)
+        nis += y[i] * y[i]
+    taken = with_position | with_attitude
+    x[NIS] = choose(taken, nis, math.nan)
+    if f.gate > 0.0:
+        likely = (nis <= f.gate) | (f.refused >= f.patience)
+        f.refused = choose(taken, choose(likely, 0, f.refused + 1), f.refused)
+        taken = taken & likely
+        if not any_of(taken):
+            return
+        for i in range(6):
+            scales[i], y[i] = choose(taken, scales[i], 0.0), choose(taken, y[i], 0.0)
     whiten(f)
     subtract_squares(f)
     for i in range(NIS):
         f.centre[i] = x[i]
     fold(f, f.centre, f.mean)
-    return True
+    if not all_of(taken):  # a quaternion brought to length 1 once more may change in its last digit
+        for i in range(3, 7):
+            x[i] = choose(taken, x[i], f.centre[i])
 
 
 @compiled
 def correct_parts(f: Record, z: Array, parts: int) -> None:
     """Correct with the checked ``parts`` of ``z`` (11,): 1 position, 2 attitude, 3 both."""
-    if parts == 3:
-        correct(f, z[4:7], z[7:11], 0, 6)
-    elif parts != 0:
-        first = 0 if parts == 2 else 3
-        correct(f, z[4:7], z[7:11] if parts == 2 else f.x[3:7], first, first + 3)
+    if parts != 0:
+        correct(f, z[4:7], z[7:11], parts & 1 != 0, parts & 2 != 0)
 
 
 @compiled

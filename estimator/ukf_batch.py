@@ -1,28 +1,25 @@
-"""Wrench filters of many vehicles, stepped together in one compiled loop over the single filter's own step.
+"""Wrench filters of many vehicles, stepped together.
 
-Between steps a filter is its state and covariance, 3 kB; what it works on in a step lies in one record that all of them
-share, so that a few hundred filters stay in a core's cache. Filters of different vehicles, or with declared effects,
-which remember, have a record each.
+Filters of one vehicle without effects stand side by side in the lanes of a vector unit (``ukf_lanes``). Filters of different
+vehicles, or with declared effects, which remember, are stepped one after the other in a compiled loop.
 """
 
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..dynamics.compiled import announced
 from ..dynamics.errors import InputError
 from ..dynamics.vehicle import Vehicle
-from .by_address import numbers_at
 from .direct import released
 from .estimate import FORCE, NIS, POSITION, QUATERNION, RATE, STATE_SIZE, TORQUE, VELOCITY, Array
 from .filter_record import N
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
-
-# what a filter must not forget from one step to the next; x and P lie one after the other, as in ``FILTER``
-_KEPT = np.dtype([("x", "f8", (STATE_SIZE,)), ("P", "f8", (N, N)), ("last_speeds", "f8", (4,)), ("refused", "i8")])
-_ESTIMATE_SIZE = STATE_SIZE + N * N
+from .ukf_lanes import Blocks
 
 
 @released
@@ -36,25 +33,33 @@ def _first_bad_quaternion(z: Array) -> int:
 
 
 @released
-def _step_all(records: np.ndarray, kept: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array) -> None:
-    """Step every filter and write its state into ``out`` (n, 20); there is one record, or one for each."""
-    for n in range(len(kept)):
-        f, k = records[n if len(records) > 1 else 0], kept[n]
-        # estimate and covariance in one piece: copied row by row they cost twice as much, a twentieth of the step
-        now, then = numbers_at(f.x.ctypes.data, (_ESTIMATE_SIZE,)), numbers_at(k.x.ctypes.data, (_ESTIMATE_SIZE,))
-        for i in range(_ESTIMATE_SIZE):
-            now[i] = then[i]
-        for i in range(4):
-            f.last_speeds[i] = k.last_speeds[i]
-        f.refused = k.refused
+def _step_records(records: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array) -> None:
+    for n in range(len(records)):
+        f = records[n]
         step(f, z[n], parts, dt, voltage[n])
-        for i in range(_ESTIMATE_SIZE):
-            then[i] = now[i]
         for i in range(STATE_SIZE):
-            out[n, i] = now[i]
-        for i in range(4):
-            k.last_speeds[i] = f.last_speeds[i]
-        k.refused = f.refused
+            out[n, i] = f.x[i]
+
+
+class _Records:
+    """Memory of filters (n,), each with a record of its own, and their step; as ``Blocks``."""
+
+    def __init__(self, records: np.ndarray) -> None:
+        self._records = records
+
+    def put(self, n: int, record: np.ndarray) -> None:
+        self._records[n] = record[0]
+
+    def step(self, z: Array, parts: int, dt: float, voltage: Array, out: Array) -> None:
+        _step_records(self._records, z, parts, dt, voltage, out)
+
+    @property
+    def state(self) -> Array:
+        return np.array(self._records["x"])
+
+    @property
+    def covariance(self) -> Array:
+        return np.array(self._records["P"])
 
 
 class WrenchEstimates:
@@ -104,9 +109,8 @@ class WrenchEstimates:
 class WrenchUKFBatch:
     """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one call.
 
-    A step of one of them costs what it costs in a compiled loop over one single filter (``windwrench speed`` prints both).
-    Given up: filters side by side in the lanes of a vector unit. The heaviest loop, tried that way with eight filters, took
-    0.55 of the time a filter, and 3.6 times as long for a single one, so it would need a second form of the arithmetic.
+    Filters of one vehicle without declared effects cost less than half of what a single one does in a compiled loop, others
+    as much (``windwrench speed`` prints it).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
@@ -133,17 +137,24 @@ class WrenchUKFBatch:
             raise InputError(f"WrenchUKFBatch: expected one vehicle or one for each of {self.count}, got {len(given)}")
         self._filters = [WrenchUKF(vehicle, tuning, period, gate) for vehicle in given]
         self.period = self._filters[0].period
-        records = np.concatenate([ukf.record for ukf in self._filters])
-        if any(records[f"{kind}_count"].any() for kind in ("wrench", "rotor", "sense")) and len(records) < self.count:
-            records = np.repeat(records, self.count)
-        self._records = records
-        self._kept = np.zeros(self.count, dtype=_KEPT)
+        self._memory = self._new_memory()
+        self._compiled = False  # as far as this one knows
         self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(np.float64)
         self._z = np.zeros((self.count, 11))
 
     def __len__(self) -> int:
         """Return how many filters there are."""
         return self.count
+
+    def _new_memory(self) -> Blocks | _Records:
+        first = self._filters[0].record
+        if len(self._filters) == 1 and not any(first[f"{kind}_count"][0] for kind in ("wrench", "rotor", "sense")):
+            return Blocks(first, self.count)
+        return _Records(np.concatenate([self._of(n).record for n in range(self.count)]))
+
+    def _of(self, n: int) -> WrenchUKF:
+        """Return a single filter like number ``n``."""
+        return self._filters[n if len(self._filters) > 1 else 0]
 
     def reset(
         self,
@@ -169,27 +180,25 @@ class WrenchUKFBatch:
         rows = [_rows(name, value, shape, self.count) for name, value, shape in zip(
             names, (position, quaternion, velocity, angular_velocity), ((3,), (4,), (3,), (3,)), strict=True)]
         P = None if covariance is None else _rows("covariance", covariance, (N, N), self.count)
-        kept, records = self._kept.copy(), self._records.copy()
+        memory = self._new_memory()
         for n in range(self.count):
-            ukf = self._filters[n if len(self._filters) > 1 else 0]
+            ukf = self._of(n)
             try:
                 ukf.reset(rows[0][n], rows[1][n], None if P is None else P[n], rows[2][n], rows[3][n])
             except InputError as error:
                 raise InputError(f"{error} (filter {n})") from None
-            for name in _KEPT.names or ():
-                kept[n][name] = ukf.record[0][name]
-            records[n if len(records) > 1 else 0] = ukf.record[0]
-        self._kept, self._records = kept, records
+            memory.put(n, ukf.record)
+        self._memory = memory
 
     @property
     def covariance(self) -> Array:
         """Covariances (n, 18, 18) of the error states, as of ``WrenchUKF``."""
-        return np.array(self._kept["P"])
+        return self._memory.covariance
 
     @property
     def estimate(self) -> WrenchEstimates:
         """What the filters believe now."""
-        return WrenchEstimates(np.array(self._kept["x"]))
+        return WrenchEstimates(self._memory.state)
 
     def step(
         self,
@@ -225,7 +234,9 @@ class WrenchUKFBatch:
             raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[bad, 7:11]):g} (filter {bad})")
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
         out = np.empty((self.count, STATE_SIZE))
-        _step_all(self._records, self._kept, z, parts, self.period, volts, out)
+        with nullcontext() if self._compiled else announced():
+            self._memory.step(z, parts, self.period, volts, out)
+        self._compiled = True
         return WrenchEstimates(out)
 
 

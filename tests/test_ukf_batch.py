@@ -1,5 +1,8 @@
 """A batch of filters is as many single ones."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from flights import PERIOD, yawing_flight
@@ -8,7 +11,7 @@ from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
 
 VEHICLE = load_vehicle("ardrone2")
-COUNT, STEPS = 5, 150
+COUNT, STEPS = 11, 150  # more than are side by side at once
 NAMES = ("rotors", "position", "quaternion")
 
 
@@ -20,7 +23,7 @@ def with_effects(strength):
 
 @pytest.fixture(scope="module")
 def samples():
-    """Turn rates, positions and quaternions of five flights (STEPS, COUNT, .), with poses and turn rates missing."""
+    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and turn rates missing."""
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
     rng = np.random.default_rng(0)
@@ -34,7 +37,7 @@ def samples():
 
 @pytest.mark.parametrize(("vehicles", "gate"), [
     (VEHICLE, None), (VEHICLE, 0.999), (with_effects(1e-4), None),
-    ([VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)], None),
+    ([VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)] + 6 * [VEHICLE], None),
 ], ids=["one vehicle", "gated", "effects", "one each"])
 def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     batch = WrenchUKFBatch(vehicles, COUNT, gate=gate)
@@ -63,6 +66,50 @@ def test_it_starts_from_what_is_given_for_each_or_for_all():
         ukf.reset([0, 0, n + 1], [1, 0, 0, 0], P[n], [1, 0, 0], [0, 0, n + 1])
         np.testing.assert_array_equal(batch.estimate.state[n], ukf.estimate.state)
         np.testing.assert_array_equal(batch.covariance[n], ukf.covariance)
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))])
+def test_a_copy_flies_on_alone(samples, duplicate):
+    rotors, position, quaternion = samples
+    batch = WrenchUKFBatch(VEHICLE, COUNT)
+    batch.reset(position[0], quaternion[0])
+    batch.step(rotors[1], position[1], quaternion[1])
+    other, before = duplicate(batch), batch.covariance
+    for k in range(2, 20):
+        last = other.step(rotors[k], position[k], quaternion[k])
+    np.testing.assert_array_equal(batch.covariance, before)
+    for k in range(2, 20):
+        expected = batch.step(rotors[k], position[k], quaternion[k])
+    np.testing.assert_array_equal(last.state, expected.state)
+
+
+def test_one_may_spin_too_fast_for_the_series_of_sine_and_cosine():
+    batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
+    rates, speeds = np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]]), np.full((3, 4), VEHICLE.hover_rate)
+    batch.reset([0, 0, 1], [1, 0, 0, 0], angular_velocity=rates)
+    for _ in range(3):
+        together = batch.step(speeds)
+    for n in range(3):
+        single.reset([0, 0, 1], [1, 0, 0, 0], angular_velocity=rates[n])
+        for _ in range(3):
+            alone = single.step(speeds[n])
+        np.testing.assert_array_equal(together.state[n], alone.state)
+
+
+def test_an_attitude_that_nobody_measures_stays_an_attitude():
+    """Where its variance is held, which only some of those side by side need."""
+    P = np.stack([np.diag(np.r_[np.full(3, scale), np.full(15, 1e-4)]) for scale in (1e-4, 0.4, 1e-3)])
+    batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
+    batch.reset([0, 0, 1], [1, 0, 0, 0], P)
+    speeds = np.full((3, 4), VEHICLE.hover_rate)
+    for n in range(3):
+        single.reset([0, 0, 1], [1, 0, 0, 0], P[n])
+        for _ in range(5):
+            single.step(speeds[n])
+        if n == 0:
+            for _ in range(5):
+                batch.step(speeds)
+        np.testing.assert_array_equal(batch.covariance[n], single.covariance)
 
 
 def test_without_a_pose_it_predicts_and_an_estimate_stays_what_it_was():

@@ -1,0 +1,251 @@
+"""Numbers of several vehicles side by side: one value of compiled code, one register of a processor's vector unit.
+
+A function written for single numbers is compiled a second time for values of this kind, as a C++ template is: arrays of
+them are indexed and sliced, records have them as fields, and each operation rounds as that of single numbers does. What
+differs is a question: a comparison has an answer for each lane, so code for both uses ``choose``, ``all_of`` and
+``any_of`` where single numbers would do with ``if``.
+"""
+
+import math
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.datamodel.registry import register_default
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing import signature
+from numba.core.typing.templates import ConcreteTemplate, infer_global
+from numba.extending import intrinsic, overload
+
+WIDTH = 8  # lanes: 512 bits of doubles; a processor with less takes each operation in parts
+
+_ALIGNMENT = 8 * WIDTH
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+_TRUTHS = ir.VectorType(ir.IntType(1), WIDTH)
+
+
+class _Lanes(types.Type):
+    """``WIDTH`` doubles."""
+
+    bitwidth = 64 * WIDTH
+
+    def __init__(self) -> None:
+        super().__init__(name=f"lanes{WIDTH}")
+
+    def can_convert_from(self, _context: Any, other: Any) -> Any:
+        return Conversion.safe if isinstance(other, types.Number) else None
+
+    def unify(self, _context: Any, other: Any) -> Any:
+        return self if isinstance(other, types.Number) else None
+
+
+class _Answers(types.Type):
+    """``WIDTH`` truth values, of a comparison."""
+
+    def __init__(self) -> None:
+        super().__init__(name=f"answers{WIDTH}")
+
+    def can_convert_from(self, _context: Any, other: Any) -> Any:
+        return Conversion.safe if isinstance(other, types.Boolean) else None
+
+    def unify(self, _context: Any, other: Any) -> Any:
+        return self if isinstance(other, types.Boolean) else None
+
+
+LANES, ANSWERS = _Lanes(), _Answers()
+
+
+@register_default(_Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, kind: Any) -> None:
+        super().__init__(dmm, kind, _VECTOR)
+
+
+@register_default(_Answers)
+class _AnswersModel(models.PrimitiveModel):
+    def __init__(self, dmm: Any, kind: Any) -> None:
+        super().__init__(dmm, kind, _TRUTHS)
+
+
+def _splat(builder: Any, value: Any, kind: Any) -> Any:
+    first = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined),
+                                  ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+
+
+@lower_cast(types.Number, _Lanes)
+def _number_to_lanes(context: Any, builder: Any, given: Any, _wanted: Any, value: Any) -> Any:
+    return _splat(builder, context.cast(builder, value, given, types.float64), _VECTOR)
+
+
+@lower_cast(types.Boolean, _Answers)
+def _truth_to_answers(context: Any, builder: Any, given: Any, _wanted: Any, value: Any) -> Any:
+    return _splat(builder, context.cast(builder, value, given, types.boolean), _TRUTHS)
+
+
+def _define(function: Any, result: Any, operands: tuple[Any, ...], generate: Callable[..., Any]) -> None:
+    """Give a function of Python a meaning for lanes."""
+    template = type(f"_{getattr(function, '__name__', 'lanes')}", (ConcreteTemplate,),
+                    {"cases": [signature(result, *operands)]})
+    infer_global(function)(template)
+
+    @lower_builtin(function, *operands)
+    def lower(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return generate(builder, *arguments)
+
+
+for _names, _method in ((("add", "iadd"), "fadd"), (("sub", "isub"), "fsub"), (("mul", "imul"), "fmul"),
+                        (("truediv", "itruediv"), "fdiv")):
+    for _name in _names:
+        _define(getattr(operator, _name), LANES, (LANES, LANES),
+                lambda builder, a, b, method=_method: getattr(builder, method)(a, b))
+for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">=")):
+    _define(getattr(operator, _name), ANSWERS, (LANES, LANES),
+            lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+_define(operator.and_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.and_(a, b))
+_define(operator.or_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.or_(a, b))
+_define(operator.neg, LANES, (LANES,),
+        lambda builder, a: builder.fsub(ir.Constant(_VECTOR, [-0.0] * WIDTH), a))
+
+
+def _intrinsic_of(builder: Any, name: str, kind: Any) -> Any:
+    return cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
+
+
+_define(math.sqrt, LANES, (LANES,),
+        lambda builder, a: builder.call(_intrinsic_of(builder, f"llvm.sqrt.v{WIDTH}f64", _VECTOR), [a]))
+for _function in (math.cos, math.sin):
+    def _each(builder: Any, a: Any, name: str = _function.__name__) -> Any:
+        """Lane by lane with the function of single numbers: rare, and so with its digits."""
+        out, one = a, _intrinsic_of(builder, f"llvm.{name}.f64", ir.DoubleType())
+        for lane in range(WIDTH):
+            place = ir.Constant(ir.IntType(32), lane)
+            out = builder.insert_element(out, builder.call(one, [builder.extract_element(a, place)]), place)
+        return out
+
+    _define(_function, LANES, (LANES,), _each)
+# finite: less than infinity in size, which NaN is not
+_define(math.isfinite, ANSWERS, (LANES,), lambda builder, a: builder.and_(
+    builder.fcmp_ordered("<", a, ir.Constant(_VECTOR, [math.inf] * WIDTH)),
+    builder.fcmp_ordered(">", a, ir.Constant(_VECTOR, [-math.inf] * WIDTH))))
+# as numba orders single numbers
+_define(max, LANES, (LANES, LANES), lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+
+
+@intrinsic
+def _select(_context: Any, condition: Any, a: Any, b: Any) -> Any:
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        values = [context.cast(builder, value, kind, LANES) for value, kind in
+                  zip(arguments[1:], given.args[1:], strict=True)]
+        return builder.select(arguments[0], *values)
+
+    return LANES(condition, a, b), generate
+
+
+@intrinsic
+def _bits(_context: Any, answers: Any) -> Any:
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.zext(builder.bitcast(arguments[0], ir.IntType(WIDTH)), ir.IntType(64))
+
+    return types.int64(answers), generate
+
+
+def choose(condition: Any, a: Any, b: Any) -> Any:
+    """Return ``a`` where the condition holds, else ``b``."""
+    return a if condition else b
+
+
+def all_of(condition: Any) -> bool:
+    """Return whether a condition holds in all lanes."""
+    return bool(condition)
+
+
+def any_of(condition: Any) -> bool:
+    """Return whether a condition holds in any lane."""
+    return bool(condition)
+
+
+@overload(choose, strict=False)
+def _choose(condition: Any, a: Any, b: Any) -> Any:
+    if condition == ANSWERS:
+        return lambda condition, a, b: _select(condition, a, b)
+    return lambda condition, a, b: a if condition else b
+
+
+@overload(all_of, strict=False)
+def _all_of(condition: Any) -> Any:
+    if condition == ANSWERS:
+        return lambda condition: _bits(condition) == (1 << WIDTH) - 1
+    return lambda condition: bool(condition)
+
+
+@overload(any_of, strict=False)
+def _any_of(condition: Any) -> Any:
+    if condition == ANSWERS:
+        return lambda condition: _bits(condition) != 0
+    return lambda condition: bool(condition)
+
+
+class _LaneRecord(types.Record):
+    """A record some of whose fields are lanes."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Of the memory, as far as numba asks for it."""
+        return np.dtype((np.void, self.size))
+
+
+register_default(_LaneRecord)(models.RecordModel)
+
+
+class LaneRecord:
+    """Layout of a record like one of single numbers, with some of its fields in lanes.
+
+    Args:
+        single: the structured type of single numbers.
+        lanes: names of the fields that become lanes; their numbers stand in the last axis, ``WIDTH`` of them.
+        shared: names of the fields that stay single numbers, for all lanes.
+    """
+
+    def __init__(self, single: np.dtype, lanes: Sequence[str], shared: Sequence[str] = ()) -> None:
+        forms: dict[str, Any] = {}
+        fields, offset = [], 0
+        for name in (*lanes, *shared):  # lanes first: they are loaded from addresses that are multiples of their size
+            kind = single[name]
+            element = LANES if name in lanes else from_dtype(kind.base)
+            form = np.dtype((np.float64, (*kind.shape, WIDTH)) if name in lanes else kind)
+            fields.append((name, {"type": types.NestedArray(element, kind.shape) if kind.shape else element, "offset": offset}))
+            forms[name] = (form, offset)
+            offset += form.itemsize
+        size = -(-offset // _ALIGNMENT) * _ALIGNMENT
+        self.dtype = np.dtype({"names": list(forms), "formats": [form for form, _ in forms.values()],
+                               "offsets": [where for _, where in forms.values()], "itemsize": size})
+        record = _LaneRecord(fields, size, True)
+
+        @intrinsic
+        def at(_context: Any, address: Any) -> Any:
+            def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+                return builder.inttoptr(arguments[0], context.get_value_type(record))
+
+            return record(types.int64), generate
+
+        self.at = at  # for compiled code: the record at an address
+
+    def zeros(self, count: int) -> np.ndarray:
+        """Return ``count`` records (count,) of zeros, where lanes may be loaded."""
+        size = count * self.dtype.itemsize
+        room = np.zeros(size + _ALIGNMENT, np.uint8)
+        first = -room.ctypes.data % _ALIGNMENT
+        return room[first : first + size].view(self.dtype)
+
+    def like(self, records: np.ndarray) -> np.ndarray:
+        """Return a copy of records (n,) where lanes may be loaded; NumPy's own copies lie anywhere."""
+        copy = self.zeros(len(records))
+        copy[...] = records
+        return copy

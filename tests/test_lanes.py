@@ -1,0 +1,85 @@
+"""Lanes do what single numbers do, each for itself."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import njit
+
+from windwrench.dynamics.lanes import WIDTH, LaneRecord, all_of, any_of, choose
+
+SINGLE = np.dtype([("a", "f8"), ("b", "f8", (2,)), ("out", "f8", (12,)), ("gain", "f8"), ("count", "i8")])
+RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"))
+_at = RECORD.at
+
+
+@njit(error_model="numpy")
+def work(f):
+    """Everything that lanes can do."""
+    a, b, out = f.a, f.b[0], f.out
+    out[0], out[1], out[2], out[3] = a + b, a - b, a * b, a / b
+    out[4] = -a
+    out[5] = choose(a < b, a, 1.5)
+    out[6] = choose((a <= b) | (b > 0.0), 1, math.sqrt(b))
+    out[7] = choose((a >= b) & math.isfinite(a), f.gain * math.cos(a), math.sin(b))
+    out[8] = max(a, b)
+    total = 0.0
+    for i in range(f.count):
+        total += f.b[i]
+        out[9] -= total
+        out[10] += 2
+    f.b[1:][0] = 3.0
+    if any_of(a > 5.0):
+        out[11] = 1.0
+    if all_of(a > 5.0):
+        out[11] = 2.0
+
+
+@njit
+def work_at(address):
+    work(_at(address))
+
+
+@njit
+def work_singly(records):
+    for n in range(len(records)):
+        work(records[n])
+
+
+numbers = st.one_of(st.floats(-10, 10), st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf]))
+
+
+@settings(max_examples=60, deadline=None)
+@given(a=st.lists(numbers, min_size=WIDTH, max_size=WIDTH), b=st.lists(numbers, min_size=WIDTH, max_size=WIDTH))
+def test_each_lane_is_a_single_number(a, b):
+    lanes, singles = RECORD.zeros(1), np.zeros(WIDTH, SINGLE)
+    for records in (lanes, singles):
+        records["gain"], records["count"] = 0.7, 2
+    lanes["a"], singles["a"] = a, a
+    lanes["b"][0, 0], singles["b"][:, 0] = b, b
+    work_at(lanes.ctypes.data)
+    work_singly(singles)
+    np.testing.assert_array_equal(lanes["b"][0].T, singles["b"])
+    np.testing.assert_array_equal(lanes["out"][0, :11].T, singles["out"][:, :11])
+    large = [x > 5.0 for x in a]
+    assert set(lanes["out"][0, 11]) == {2.0 if all(large) else float(any(large))}
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_memory_lies_where_lanes_may_be_loaded(count):
+    for _ in range(20):
+        records = RECORD.zeros(count)
+        assert records.ctypes.data % (8 * WIDTH) == 0
+        assert RECORD.dtype.itemsize % (8 * WIDTH) == 0
+        records["gain"] = 2.0
+        again = RECORD.like(records[:1].copy())
+        assert again.ctypes.data % (8 * WIDTH) == 0
+        assert again["gain"][0] == 2.0
+
+
+def test_in_python_a_condition_is_one_truth():
+    assert choose(True, 1, 2) == 1
+    assert any_of(True)
+    assert not all_of(False)
