@@ -17,7 +17,8 @@ from .speed import Contender
 
 _UNIT = "x real time"
 _EVERYTHING = "jet at 12 stations, gusts, motors, sensors, 200 Hz UKF, flight loop, MuJoCo at 400 Hz"
-_DECISIONS = 128  # of a run, over all environments
+_DECISIONS = 128  # of a run of one environment
+_TOGETHER = 512  # of a run of many, over all of them
 
 
 def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
@@ -28,13 +29,13 @@ def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
     cores = os.cpu_count() or 1
     out = [Contender("FanTracking, 1 environment", _UNIT, _EVERYTHING, _single("ukf"), reference=True)]
     for count in counts:
-        out.append(Contender(f"FanTracking, {count} in one process", _UNIT, "the same, all of them together", _many(count)))
+        out.append(Contender(f"FanTracking, {count} in one process", _UNIT, "the same, all of them together", many(count)))
         if cores > 1:
-            out.append(Contender(f"FanTracking, {count} on {cores} threads", _UNIT, "the same", _many(count, threads=cores)))
+            out.append(Contender(f"FanTracking, {count} on {cores} threads", _UNIT, "the same", many(count, threads=cores)))
     out += [Contender("constant gain, 1 environment", _UNIT, "the same, with a filter of constant gain",
                       _single("constant-gain")),
             Contender(f"constant gain, {counts[0]} in one process", _UNIT, "the same, all of them together",
-                      _many(counts[0], estimator="constant-gain")),
+                      many(counts[0], estimator="constant-gain")),
             _ant()]
     for name, peer in (("rotorpy", _rotorpy), ("PyFlyt", _pyflyt), ("crazyflow", _crazyflow)):
         if importlib.util.find_spec(name):
@@ -59,14 +60,15 @@ def _single(estimator: str) -> Callable[[], float]:
     return run
 
 
-def _many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], float]:
+def many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], float]:
+    """Return what flies ``count`` environments together and returns how many times faster than real time."""
     from ..envs.fan_tracking import DECISION_TICKS
     from ..envs.plant import TICK
     from ..envs.vector import FanTrackingVectorEnv
 
     # a fan that stands still never leaves the vehicle behind: no reset falls into a run
     envs = FanTrackingVectorEnv(count, max_episode_steps=10**9, threads=threads, scenario="static", estimator=estimator)
-    actions, steps = np.zeros((count, 1), dtype=np.float32), max(2, _DECISIONS // count)
+    actions, steps = np.zeros((count, 1), dtype=np.float32), max(2, _TOGETHER // count)
     envs.reset(seed=0)
 
     def run() -> float:
@@ -82,7 +84,7 @@ def many_us(count: int) -> Callable[[], float]:
     """Return what flies ``count`` environments and returns the time of one environment's tick in us."""
     from ..envs.plant import TICK
 
-    run = _many(count)
+    run = many(count)
     return lambda: 1e6 * TICK / run()
 
 

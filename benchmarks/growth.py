@@ -1,5 +1,6 @@
 """How cost grows with the work: over a million steps of a filter, with the number of vehicles, with the length of a log."""
 
+import os
 import statistics
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 from ..dynamics import load_vehicle
 from ..estimator import UKFTuning, WrenchUKF
 from .filter_step import PERIOD, make_run, time_batch
-from .flight_speed import many_us
+from .flight_speed import many, many_us
 from .speed import Section
 
 COUNTS = (1, 4, 16, 64, 256, 1024, 4096)  # filters
@@ -65,6 +66,79 @@ def over_vehicles(rounds: int = 5, counts: tuple[int, ...] = COUNTS, worlds: tup
     return Section("With the number of vehicles", ["vehicles", "us a filter's step", "us an environment's tick"], rows,
                    "Time for each vehicle: flat where cost is linear in their number. From 64 filters on, the dearest batch "
                    f"costs {max(middle) / min(middle):.2f} times the cheapest, a vehicle.")
+
+
+# environments in a process of their own: one run a line
+_PROCESS = """
+import sys
+from windwrench.benchmarks.flight_speed import many
+run = many(int(sys.argv[1]))
+for line in sys.stdin:
+    print(run(), flush=True)
+"""
+
+
+def over_threads(rounds: int = 5, worlds: tuple[int, ...] = (16, 64, 256)) -> Section:
+    """Return how fast environments fly on one thread, on one for each core, and in as many processes as there are cores."""
+    cores = os.cpu_count() or 1
+    rows = []
+    for count in worlds:
+        alone, spread, processes = many(count), many(count, threads=cores), [_process(count) for _ in range(cores)]
+        taken = [(alone(), spread(), _run_all(processes)) for _ in range(rounds + 1)][1:]  # the first one compiles
+        for process in processes:
+            process.communicate()
+        speeds = [statistics.median(column) for column in zip(*taken, strict=True)]
+        gains = [statistics.median(row[k] / row[0] for row in taken) for k in (1, 2)]
+        rows.append([f"{count:,}", *(f"{speed:.0f}" for speed in speeds), *(f"{gain:.2f}" for gain in gains)])
+    return Section("With the number of threads",
+                   ["environments", "one thread", f"{cores} threads", f"{cores} processes", "threads / one", "processes / one"],
+                   rows, "Times real time, summed over the environments; the last columns are medians of the rounds' ratios. "
+                   "Processes, with as many environments each, have nothing in common but the machine: more than they gain, "
+                   "threads cannot.")
+
+
+def _process(count: int) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, "-c", _PROCESS, str(count)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                            text=True)
+
+
+def _run_all(processes: Sequence[subprocess.Popen[str]]) -> float:
+    """Have all processes run once, together; return the sum of what they measured."""
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    total = 0.0
+    for process in processes:
+        assert process.stdout is not None
+        total += float(process.stdout.readline())
+    return total
+
+
+def over_formats(rounds: int = 5, seconds: float = 60.0) -> Section:
+    """Return the time in which a log is read and checked, in each form that logs are written in."""
+    from ..identification.flight_log import read_log, write_log
+
+    taken: dict[str, list[float]] = {}
+    sizes: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as name:
+        first = Path(name) / "flight.csv"
+        subprocess.run([sys.executable, "-m", "windwrench", "record", "--seconds", f"{seconds:g}", "--out", str(first),
+                        "--quiet"], check=True)
+        log = read_log(first)
+        files = [first, *(first.with_suffix(suffix) for suffix in (".csv.gz", ".parquet"))]
+        for file in files[1:]:
+            write_log(log, file)
+        for _ in range(rounds):
+            for file in files:
+                begin = time.perf_counter()
+                read_log(file)
+                taken.setdefault(file.name, []).append(time.perf_counter() - begin)
+                sizes[file.name] = file.stat().st_size / 1e6
+    rows = [[name.partition(".")[2], f"{sizes[name]:.1f}", *(f"{f(values):.3f}" for f in (statistics.median, min, max))]
+            for name, values in taken.items()]
+    return Section("Reading a log", ["form", "MB", "s", "least", "most"], rows,
+                   f"{seconds:g} s of flight at 200 Hz, read and checked.")
 
 
 # its children are one diagnosis alone

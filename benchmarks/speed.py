@@ -139,10 +139,11 @@ def write_markdown(figures: list[Figure], rounds: int, path: Path, sections: Seq
              "is given. Peers are measured where they are installed (`pip install 'windwrench[peers]'`).", "",
              f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in ("numpy", "numba", "mujoco"))
              + f", {platform.machine()}, {os.cpu_count()} cores.", "", *_table(HEADER, rows_of(figures)), "",
-             "`x real time` is simulated seconds a second, summed over the environments. A batch takes filters "
-             "side by side, eight to a vector register, with the functions of the single filter. filterpy's filter has 37 sigma points and additive noise; its model is "
-             "measured as one writes it down, with vectors and `numpy.cross`, and with every product by component in plain "
-             "Python numbers. `python -m windwrench.benchmarks.filter_step` prints how far it agrees with `WrenchUKF`.", ""]
+             "`x real time` is simulated seconds a second, summed over the environments. A batch takes filters side by "
+             "side, eight to a vector register, with the functions of the single filter. filterpy's filter has 37 sigma "
+             "points and additive noise; its model is measured as one writes it down, with vectors and `numpy.cross`, and "
+             "with every product by component in plain Python numbers. `python -m windwrench.benchmarks.filter_step` prints "
+             "how far it agrees with `WrenchUKF`.", ""]
     for section in sections:
         lines += [f"## {section.title}", "", *_table(section.header, section.rows), ""]
         lines += [section.words, ""] if section.words else []

@@ -75,7 +75,7 @@ def speed(
     """
     from ..benchmarks.environment_profile import profiles
     from ..benchmarks.flight_speed import flights
-    from ..benchmarks.growth import over_logs, over_steps, over_vehicles
+    from ..benchmarks.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
     from ..benchmarks.speed import HEADER, cold_start, filters, measure, rows_of, starts, write_markdown
 
     with progress_bar() as progress:
@@ -84,7 +84,7 @@ def speed(
         progress.update(task, total=rounds * len(contenders))
         figures = measure(contenders, rounds, lambda: progress.advance(task))
         progress.update(task, description="growth and profile", total=None)
-        sections = [*profiles(rounds), over_vehicles(rounds), over_steps(),
+        sections = [*profiles(rounds), over_threads(rounds), over_vehicles(rounds), over_steps(), over_formats(rounds),
                     over_logs((60.0, 600.0, 3600.0) if hour else (60.0, 600.0)), cold_start()]
     table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
     for row in rows_of(figures):

@@ -12,6 +12,7 @@ from ..estimator.by_address import call_at, numbers_at, pointer_to
 from ..estimator.direct import released
 from .closed_loop import FASTEST, LOOP, has_been_reset
 from .plant import NOISE, TICK
+from .turns import take_turn, turn_done
 
 DECISION_TICKS = 16  # 12.5 Hz
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
@@ -81,26 +82,41 @@ def look(loop: Record, episode: Record) -> None:
                                             and abs(qpos[0] - e.distance) <= _AWAY and abs(qpos[2] - e.height) <= _AWAY)
 
 
+@compiled
+def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
+    loop = carray(pointer_to(e.loop), 1, LOOP)[0]
+    value = min(max(command, -MAX_COMMAND), MAX_COMMAND)
+    change = value - e.command
+    e.command = loop.flight.setpoint[4] = value
+    if ticks > 0:
+        call_at(e.normals, e.bits, noise.size, noise.ctypes.data)
+        call_at(e.run, e.loop, noise.ctypes.data, ticks, e.path, e.path_count, e.ticks)
+        e.ticks += ticks
+    look(loop, e)
+    out = e.outcome
+    out.reward_tracking = 1.0 / (1.0 + (out.offset / TRACKING_WIDTH) ** e.power)
+    out.reward_change = -CHANGE_COST * change * change
+
+
 @released
-def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int) -> None:
+def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int, turns: np.ndarray) -> None:
     """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its outcome.
 
-    Other threads run meanwhile. All that an episode's record has the addresses of must live.
+    Other threads run meanwhile; several may call this with the same arguments and share the episodes out. All that an
+    episode's record has the addresses of must live.
+
+    Args:
+        episodes: (n,) of ``EPISODE``.
+        commands: (n,) m/s.
+        resting: (n,) booleans.
+        ticks: of ``TICK`` s.
+        turns: of the episodes, open (``turns.open_turns``).
     """
     noise = np.empty((ticks, NOISE))
-    for n in range(len(episodes)):
-        if resting[n]:
-            continue
-        e = episodes[n]
-        loop = carray(pointer_to(e.loop), 1, LOOP)[0]
-        value = min(max(commands[n], -MAX_COMMAND), MAX_COMMAND)
-        change = value - e.command
-        e.command = loop.flight.setpoint[4] = value
-        if ticks > 0:
-            call_at(e.normals, e.bits, noise.size, noise.ctypes.data)
-            call_at(e.run, e.loop, noise.ctypes.data, ticks, e.path, e.path_count, e.ticks)
-            e.ticks += ticks
-        look(loop, e)
-        out = e.outcome
-        out.reward_tracking = 1.0 / (1.0 + (out.offset / TRACKING_WIDTH) ** e.power)
-        out.reward_change = -CHANGE_COST * change * change
+    while True:
+        n = take_turn(turns)
+        if n >= len(episodes):
+            break
+        if not resting[n]:
+            _decide(episodes[n], commands[n], ticks, noise)
+        turn_done(turns)

@@ -1,7 +1,8 @@
 """Many fan-tracking environments in one process."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -13,12 +14,11 @@ from ..dynamics.errors import InputError
 from ..estimator.direct import direct
 from .fan_tracking import FanTrackingEnv
 from .outcome import DECISION_TICKS, EPISODE, INFO, decide
+from .turns import open_turns, watch
 
 Frames = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
-
-_TURNS = 8  # of each thread in a decision: a call more costs 1 us, an environment's decision 130 us
 
 
 class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
@@ -58,7 +58,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         for i, env in enumerate(self.envs):
             env.episode = self._episodes[i : i + 1]
         self._all = np.ones(num_envs, dtype=np.bool_)
-        self._call: Callable[..., None] | None = None
+        # what threads read; one that comes late works for the step that it finds
+        self._commands, self._resting = np.zeros(num_envs), np.zeros(num_envs, dtype=np.bool_)
+        self._turns = np.zeros(2, dtype=np.int64)
+        self._call: Callable[[], None] | None = None
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
@@ -91,21 +94,38 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             raise InputError(f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), got {actions!r}")
         if not self._episodes["loop"].all():
             raise InputError("FanTracking: call reset before step")
-        commands, over = np.ascontiguousarray(actions[:, 0]), self._over
-        if self._call is None:
-            self._call = direct(decide, self._episodes, commands, over, DECISION_TICKS)
-        decided = self._call
-
-        def fly(first: int, last: int) -> None:
-            decided(self._episodes[first:last], commands[first:last], over[first:last], DECISION_TICKS)
-            self._start(first, last, over)
-
-        self._spread(fly)
+        self._commands[:], self._resting[:] = actions[:, 0], self._over
+        self._fly()
+        if self._over.any():
+            self._spread(lambda first, last: self._start(first, last, self._resting))
         self._decisions = np.where(self._over, 0, self._decisions + 1)
         out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
         lost = out["lost"].copy()
         self._over = lost | truncated
         return self._frames(), out["reward_tracking"] + out["reward_change"], lost, truncated, self._infos()
+
+    def _fly(self) -> None:
+        """Fly a decision of all environments that do not rest."""
+        if self._call is None:
+            given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._turns
+            self._call = partial(direct(decide, *given), *given)
+        open_turns(self._turns)
+        others = self._call_others(self._call)
+        try:
+            self._call()
+            while not watch(self._turns, self.num_envs):
+                for other in others:
+                    if other.done():
+                        other.result()
+        except BaseException:
+            wait(others)  # what they have in hand must not be flown by two
+            raise
+
+    def _call_others(self, work: Callable[[], None]) -> list[Future[None]]:
+        """Have all threads but this one call ``work``."""
+        if self.threads > 1 and self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads - 1)
+        return [self._pool.submit(work) for _ in range(self.threads - 1)] if self._pool else []
 
     def _start(self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
         """Start an episode in those environments from ``first`` to before ``last`` that ``which`` (num_envs,) names."""
@@ -118,16 +138,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
 
         Whoever is done takes the next few, so that nobody waits for a thread that the machine held up.
         """
-        size = self.num_envs if self.threads == 1 else -(-self.num_envs // (_TURNS * self.threads))
-        turns = iter([(first, min(first + size, self.num_envs)) for first in range(0, self.num_envs, size)])
+        turns = iter(range(self.num_envs))
 
         def take_turns() -> None:
-            for first, last in turns:
-                work(first, last)
+            for n in turns:
+                work(n, n + 1)
 
-        if self._pool is None and self.threads > 1:
-            self._pool = ThreadPoolExecutor(self.threads - 1)
-        others = [self._pool.submit(take_turns) for _ in range(self.threads - 1)] if self._pool else []
+        others = self._call_others(take_turns)
         try:
             take_turns()
         finally:

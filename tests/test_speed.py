@@ -4,7 +4,7 @@ import pytest
 
 from windwrench.benchmarks.environment_profile import profile
 from windwrench.benchmarks.flight_speed import flights
-from windwrench.benchmarks.growth import over_logs, over_steps, over_vehicles
+from windwrench.benchmarks.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
 from windwrench.benchmarks.speed import HEADER, Contender, Section, filters, measure, rows_of, write_markdown
 
 
@@ -50,6 +50,9 @@ def test_growth_is_measured_for_each_count_and_part():
     assert float(section.rows[0][1]) > 0
     assert section.rows[2][2] == ""
     assert [row[0] for row in over_steps(2000, 2).rows] == ["1,000", "2,000"]
+    (row,) = over_threads(1, (3,)).rows
+    assert all(float(cell) > 0 for cell in row)
+    assert [row[0] for row in over_formats(1, 2.0).rows] == ["csv", "csv.gz", "parquet"]
     (row,) = over_logs((20.0,)).rows
     assert row[0] == "20"
     assert 100 < float(row[3]) < 1000  # MB

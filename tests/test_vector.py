@@ -1,11 +1,17 @@
 """Many environments in one process are as many single ones."""
 
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError
+from windwrench.envs.turns import open_turns, take_turn, turn_done, watch
+from windwrench.estimator.direct import released
 
 NAME = "windwrench/FanTracking-v0"
 
@@ -136,3 +142,50 @@ def test_threads_must_be_positive():
 def test_too_few_are_refused(count):
     with pytest.raises(InputError, match="num_envs"):
         make(count)
+
+
+def test_turns_are_taken_once_each_by_however_many_threads():
+    turns, taken = np.zeros(2, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
+    for _ in range(3):
+        taken[:] = 0
+        open_turns(turns)
+        assert not watch(turns, len(taken))
+        with ThreadPoolExecutor(4) as pool:
+            for done in [pool.submit(take_all, turns, taken) for _ in range(4)]:
+                done.result()
+        assert (taken == 1).all()
+        assert watch(turns, len(taken))
+
+
+@released
+def take_all(turns, taken):
+    while True:
+        n = take_turn(turns)
+        if n >= len(taken):
+            break
+        taken[n] += 1
+        turn_done(turns)
+
+
+def test_a_thread_that_fails_with_a_turn_in_hand_is_not_waited_for():
+    envs = make(3, threads=2)
+    envs.reset(seed=0)
+    envs.step(np.zeros((3, 1)))
+    envs._pool.submit(int).result()  # by then no thread is late
+    decide, main = envs._call, threading.current_thread()
+
+    def fail():
+        if threading.current_thread() is main:
+            while envs._turns[0] == 0:
+                time.sleep(0.001)
+            decide()
+        else:
+            take_turn(envs._turns)
+            raise RuntimeError("a thread's own fault")
+
+    envs._call = fail
+    with pytest.raises(RuntimeError, match="own fault"):
+        envs.step(np.zeros((3, 1)))
+    envs._call = decide
+    assert len(envs.step(np.zeros((3, 1)))[0]) == 3
+    envs.close()
