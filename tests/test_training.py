@@ -196,3 +196,20 @@ def test_a_configuration_file_comes_before_single_settings(tmp_path):
     assert (config["learner"]["gamma"], config["learner"]["tau"], config["steps"]) == (0.8, 0.02, 99)
     with pytest.raises(InputError, match=r"mine2.yaml: cannot be read"):
         load_config("sac", [], tmp_path / "mine2.yaml")
+
+
+@pytest.mark.parametrize("starts", [[0, 1, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0, 1, 0, 0, 0], [1, 0, 0, 0, 0, 0, 1, 0]])
+def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
+    """One sequence or two, with an episode's start at the first step, at none, or in the middle."""
+    from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+
+    from windwrench.training.fast_lstm import FastLstmPolicy
+
+    torch.manual_seed(0)
+    lstm, count = torch.nn.LSTM(3, 5), len(starts) // 4
+    states = torch.randn(1, count, 5), torch.randn(1, count, 5)
+    given = torch.randn(len(starts), 3), states, torch.tensor(starts, dtype=torch.float32), lstm
+    ours, then = FastLstmPolicy._process_sequence(*given)
+    theirs, expected = RecurrentActorCriticPolicy._process_sequence(*given)
+    torch.testing.assert_close(ours, theirs)
+    torch.testing.assert_close(then, expected)

@@ -58,8 +58,10 @@ def _ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, A
 def _recurrent_ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]) -> Any:
     from sb3_contrib import RecurrentPPO
 
+    from .fast_lstm import FastLstmPolicy
+
     policy = {**_actor_critic(config, policy), "lstm_hidden_size": config["lstm"]}
-    return RecurrentPPO("MlpLstmPolicy", env, policy_kwargs=policy, **given)
+    return RecurrentPPO(FastLstmPolicy, env, policy_kwargs=policy, **given)
 
 
 def _actor_critic(config: Config, policy: dict[str, Any]) -> dict[str, Any]:
