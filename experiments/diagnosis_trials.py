@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics import load_vehicle
+from ..dynamics import EffectSetting, load_vehicle
 from ..dynamics.effects import names
 from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
@@ -30,6 +30,7 @@ from ..envs.recording import TRAJECTORIES
 from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
 from ..identification.flight_log import FlightLog
+from ..identification.prediction import rollout_error
 from .held_back_outsiders import HELD_BACK, practise_held_back
 from .outsiders import OUTSIDERS
 from .practice_flights import practise, shown_in
@@ -156,6 +157,7 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     else:
         return out
     out.pop("error", None)
+    flown["rollout_of_truth"] = None if flown["outsider"] else _rollout_of_truth(log, vehicle, flown["truth"])
     out |= {"flown": _plain(flown), "seconds": _since(begun)}
     for without in trial.libraries:
         begun = time.perf_counter()
@@ -165,6 +167,19 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
             found = {"error": f"{type(error).__name__}: {error}"}
         out["diagnoses"].append({"without": list(without), **found, "seconds": _since(begun)})
     return out
+
+
+def _rollout_of_truth(log: FlightLog, vehicle: Vehicle, truth: Mapping[str, Mapping[str, float]]) -> float | None:
+    """Return the one-second prediction error of the true model over that of the declared one, on the whole flight.
+
+    What turbulence and the noise of the pose leave; no diagnosis can be far below it.
+    """
+    if not truth:
+        return None
+    effects = [EffectSetting(name, dict(coefficients)) for name, coefficients in truth.items()]
+    whole = [(float(log.t[0]), float(log.t[-1]))]
+    before, after = rollout_error(log, vehicle, whole), rollout_error(log, vehicle.with_effects(*effects), whole)
+    return after / before if before > 0.0 else None
 
 
 def _since(begun: float) -> float:

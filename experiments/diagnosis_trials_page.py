@@ -130,9 +130,9 @@ def _effect_table(some: Sequence[Judgement]) -> list[str]:
     for j in sorted(some, key=lambda j: (j.cause, j.group != "typical", j.vehicle, j.key)):
         size = "a third" if j.size == "small" else "typical"
         rows.append((j.cause, size + ("" if j.vehicle == "ardrone2" else f", {j.vehicle}"), _flight(j), j.outcome, _names(j),
-                     _worst(j), f"{j.floor_ratio:.2f}", f"{j.rollout_ratio:.2f}"))
+                     _worst(j), f"{j.floor_ratio:.2f}", f"{j.rollout_ratio:.2f} ({j.rollout_of_truth:.2f})"))
     return _table(("added", "size", "flight", "outcome", "named", "worst coefficient", "residual / floor",
-                   "1 s prediction, after / before"), rows)
+                   "1 s prediction, after / before (the true model's)"), rows)
 
 
 def _flight(j: Judgement) -> str:

@@ -49,7 +49,8 @@ def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more
 
 def outcome(group, truth, *diagnoses, outsider=None, size="typical", vehicle="ardrone2"):
     trial = {"group": group, "added": [outsider] if outsider else list(truth), "size": size, "vehicle": vehicle}
-    flown = {"trajectory": "excite", "turbulence": 1.0, "sensor": 1.0, "truth": truth, "outsider": outsider}
+    flown = {"trajectory": "excite", "turbulence": 1.0, "sensor": 1.0, "truth": truth, "outsider": outsider,
+             "rollout_of_truth": 0.28}
     key = f"{group}/{outsider or '+'.join(truth)}/{size}/{vehicle}"
     return {"key": key, "code": "x", "trial": trial, "flown": flown, "seconds": 1.0, "diagnoses": list(diagnoses)}
 
@@ -146,8 +147,9 @@ def test_the_rules_count_what_they_say():
     assert one.measured.startswith("66.7%")
     coefficients = rule(judged, "1. every coefficient")
     assert coefficients.count == 2
-    assert coefficients.measured.startswith("50.0%")
+    assert coefficients.measured.startswith("50.0% of flights, 1 of 2 coefficients")
     assert "20.0% at most" in coefficients.measured
+    assert "off by 16.7 of their own standard deviations" in coefficients.measured
     # by kind: mass wrong, wind and latency not, the held-back disturbance wrong
     assert {j.cause for j in left_out(judged, "typical")} == {"mass", "wind", "latency", "soft_arm"}
     assert rule(judged, "5. left out of the library, typical").measured == "50.0% (2 of 4 kinds)"
@@ -157,7 +159,8 @@ def test_the_rules_count_what_they_say():
     assert rule(judged, "3. outside the library, typical").met is False
     assert rule(judged, "3. outside the library, a third").met is None
     assert rule(judged, "4. hover: no name").met
-    assert rule(judged, "6. one-second prediction error after over before, mass").measured == "0.30 at worst"
+    assert rule(judged, "6. one-second prediction error after over before, mass").measured == (
+        "0.30 at worst, 0 of 1 within; on that flight the true model comes to 0.28")
     assert rule(judged, "6. one-second prediction error after over before, rotor_drag").met is None
     assert rule(judged, "2. two effects").measured == "not flown"
     assert rule(judged, "6. residual").measured == "1.10 at worst"
@@ -221,6 +224,7 @@ def test_a_flight_is_diagnosed_and_not_again(tmp_path):
     (judged,) = judge(whole)
     assert judged.right
     assert judged.cause == "mass"
+    assert 0.0 < judged.rollout_of_truth < 0.3
     json.dumps(whole)
     path = tmp_path / "trials.jsonl"
     other = json.dumps({**whole, "key": "of/other/code", "code": "other"})

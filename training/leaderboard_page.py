@@ -81,13 +81,18 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
     """State what was asked of the comparison, and whether it holds."""
     asked: list[tuple[str, bool, str]] = []
     for line in lines:
-        if line.name not in ("sac", "sac-wide", "sac-fast"):
+        learner = line.name in ("sac", "sac-wide", "sac-fast")
+        if not learner and line.trained_on != "wide":
             continue
         for world, target in (("base", 0.10), ("fast", 0.15)):
             row = _get(rows, line.name, world)
             if row is None:
                 continue
             who = f"{line.name} ({line.trained_on}) on {world}"
+            lost = f"{who}: nothing lost", row.lost_fraction == 0, f"{row.lost_fraction:.1%} lost"
+            if not learner:
+                asked.append(lost)
+                continue
             asked.append((f"{who}: {target:.0%} or more below the best admittance, interval clear of zero",
                           row.change <= -target and row.change_interval[1] < 0,
                           f"{_percent(row.change)} ({_between(row.change_interval)}), {row.seeds} seeds"))
@@ -96,7 +101,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
                 asked.append((f"{who}: better than the best ratio law, interval clear of zero", row.ratio_interval[1] < 0,
                               f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})"))
             if world == "base" or line.name != "sac":
-                asked.append((f"{who}: nothing lost", row.lost_fraction == 0, f"{row.lost_fraction:.1%} lost"))
+                asked.append(lost)
     if not asked:
         return ""
     table = ["| asked | holds | measured |", "| ----- | ----- | -------- |"]
