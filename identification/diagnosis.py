@@ -63,9 +63,7 @@ def diagnose(
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
-    fit, first = search.forward()
-    report("asking whether every effect is needed")
-    fit = search.prune(fit)
+    fit, first = search.find()
     report("asking what else it could be")
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")

@@ -246,11 +246,26 @@ class Search:
         noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in own], axis=2), shape, axes=(2, 0))
         return bool(self.whitened_energy(noise) > _DROWNED * energy)
 
-    def forward(self) -> tuple[Fit, "list[Gain]"]:
-        """Return the effects that are worth adding one after the other, and what each explained at first, alone."""
-        fit = Fit(self.delay.setting if self.delay else {})
+    def find(self) -> tuple[Fit, "list[Gain]"]:
+        """Return the effects that are needed, and what each of the library explained at first, alone."""
+        fit, first = self.forward()
+        asked: list[set[str]] = []
+        while True:
+            self._report("asking whether every effect is needed")
+            needed = self.prune(fit)
+            if self.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
+                return needed, first
+            # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
+            asked.append(set(needed.effects))
+            fit, _ = self.forward(needed)
+            if fit.effects == needed.effects:
+                return needed, first
+
+    def forward(self, fit: Fit | None = None) -> tuple[Fit, "list[Gain]"]:
+        """Return ``fit`` with the effects that are worth adding one after the other, and what each explained at first."""
+        fit = Fit(self.delay.setting if self.delay else {}) if fit is None else fit
         first: list[Gain] = []
-        for count in range(self._most + 1):
+        for count in range(len([e for e in fit.effects if not self.held(e)]), self._most + 1):
             regression = self.linearise(fit)
             if count == 0:
                 self.set_noise(fit, regression)

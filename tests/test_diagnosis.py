@@ -62,6 +62,20 @@ def test_a_neighbour_of_the_missing_effect_is_tentative_or_not_alone():
     assert found.verdict in ("unexplained", "partly explained")
 
 
+def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
+    """Four effects at once fill the model with two that stand for a third; what takes their place leaves room for the last."""
+    truth = {"rotor_drag": {"kdx": 1.19e-4, "kdy": 1.19e-4}, "translational_lift": {"kh": 3.39e-3},
+             "inflow_thrust": {"kz": 2.32e-4}, "body_drag": {"cx": 5e-3, "cy": 5e-3, "cz": 1e-2}}
+    vehicle = load_vehicle("hummingbird")
+    effects = tuple(EffectSetting(name, coefficients) for name, coefficients in truth.items())
+    found = diagnose([fly_practice(vehicle, effects, "fast", 16.0, turbulence=0.0)], vehicle)
+    assert set(named(found)) == set(truth)
+    for effect in found.effects:
+        if effect.name != "body_drag":  # which short a flight tells but roughly
+            for coefficient, value in truth[effect.name].items():
+                assert effect.coefficients[coefficient] == pytest.approx(value, rel=0.05)
+
+
 def test_the_error_is_that_of_test_logs_where_they_are_given():
     found = diagnose([fly()], load_vehicle("ardrone2"), [fly("mass", "excite", dm=0.04)])
     assert named(found) == []
