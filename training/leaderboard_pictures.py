@@ -128,6 +128,7 @@ def draw_tracking(policies: Mapping[str, Path], path: Path) -> None:
         axes.set_ylabel("y (m)")
     for axes in panels[: len(pilots)][-columns:]:
         axes.set_xlabel("time (s)")
+        axes.tick_params(labelbottom=True)
     figure.suptitle(f"the same test episode of {_WORLD} (seed {_SEED}), RMSE of the offset", fontsize=10)
     _save(figure, path)
 
