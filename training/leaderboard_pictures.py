@@ -18,7 +18,7 @@ from .worlds import make_world
 
 _LEARNED = {
     "sac": "#1b7f5c", "sac-wide": "#7fc8a9", "sac-fast": "#0d3b2a", "td3": "#8d5a97", "ppo": "#bc6c25",
-    "recurrent-ppo": "#e0a458", "imitation": "#3a6ea5", "imitation-wide": "#8fb8de",
+    "recurrent-ppo": "#5b3a1e", "imitation": "#3a6ea5", "imitation-wide": "#8fb8de",
 }
 _TRACKED = ("hover", "admittance", "admittance-tuned-fast", "ratio-tuned-fast", "oracle")
 _THOUSANDS = (5, 10, 20, 50, 100, 200, 400)
