@@ -17,6 +17,7 @@ from .speed import Section
 
 COUNTS = (1, 4, 16, 64, 256, 1024, 4096)  # filters
 WORLDS = (1, 4, 16, 64, 256)  # environments
+_MORE_ROUNDS = 4  # of flights on threads: the ratio of two runs of 0.1 s varies most of all
 
 
 def resident() -> float:
@@ -81,18 +82,23 @@ for line in sys.stdin:
 def over_threads(rounds: int = 5, worlds: tuple[int, ...] = (16, 64, 256)) -> Section:
     """Return how fast environments fly on one thread, on one for each core, and in as many processes as there are cores."""
     cores = os.cpu_count() or 1
+    fly = {count: (many(count), many(count, threads=cores), [_process(count) for _ in range(cores)]) for count in worlds}
+    taken: dict[int, list[tuple[float, float, float]]] = {count: [] for count in worlds}
+    for _ in range(_MORE_ROUNDS * rounds + 1):
+        for count, (alone, spread, processes) in fly.items():
+            taken[count].append((alone(), spread(), _run_all(processes)))
     rows = []
-    for count in worlds:
-        alone, spread, processes = many(count), many(count, threads=cores), [_process(count) for _ in range(cores)]
-        taken = [(alone(), spread(), _run_all(processes)) for _ in range(rounds + 1)][1:]  # the first one compiles
+    for count, (_, _, processes) in fly.items():
         for process in processes:
             process.communicate()
-        speeds = [statistics.median(column) for column in zip(*taken, strict=True)]
-        gains = [statistics.median(row[k] / row[0] for row in taken) for k in (1, 2)]
+        found = taken[count][1:]  # the first one compiles
+        speeds = [statistics.median(column) for column in zip(*found, strict=True)]
+        gains = [statistics.median(row[k] / row[0] for row in found) for k in (1, 2)]
         rows.append([f"{count:,}", *(f"{speed:.0f}" for speed in speeds), *(f"{gain:.2f}" for gain in gains)])
     return Section("With the number of threads",
                    ["environments", "one thread", f"{cores} threads", f"{cores} processes", "threads / one", "processes / one"],
-                   rows, "Times real time, summed over the environments; the last columns are medians of the rounds' ratios. "
+                   rows, f"Times real time, summed over the environments; the last columns are medians of the ratios of "
+                   f"{_MORE_ROUNDS * rounds} rounds, as a machine's second core comes and goes. "
                    "Processes, with as many environments each, have nothing in common but the machine: more than they gain, "
                    "threads cannot.")
 

@@ -142,7 +142,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.episode = np.zeros(1, dtype=EPISODE)
         self._command = np.zeros(1)
         self._addressed: tuple[object, ...] = ()  # what the episode has the addresses of, beside its generator
-        self._turns = np.zeros(2, dtype=np.int64)
+        self._turns = np.zeros(3, dtype=np.int64)
         self._call: Callable[..., None] | None = None
 
     def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
@@ -242,9 +242,9 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Fly some ticks at ``_command`` and write the outcome."""
         turns = self._turns
         if self._call is None:
-            self._call = direct(decide, self.episode, self._command, _FLYING, ticks, turns)
+            self._call = direct(decide, self.episode, self._command, _FLYING, ticks, turns, 0)
         turns[0] = 0
-        self._call(self.episode, self._command, _FLYING, ticks, turns)
+        self._call(self.episode, self._command, _FLYING, ticks, turns, 0)
 
     def _observation(self) -> NDArray[np.float32]:
         observation: NDArray[np.float32] = self.episode["outcome"]["observation"][0].copy()

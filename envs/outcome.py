@@ -12,7 +12,7 @@ from ..estimator.by_address import call_at, numbers_at, pointer_to
 from ..estimator.direct import released
 from .closed_loop import FASTEST, LOOP, has_been_reset
 from .plant import NOISE, TICK
-from .turns import take_turn, turn_done
+from .turns import leave, more_turns, take_turn, turn_done
 
 DECISION_TICKS = 16  # 12.5 Hz
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
@@ -99,7 +99,7 @@ def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
 
 
 @released
-def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int, turns: np.ndarray) -> None:
+def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int, turns: np.ndarray, patience: int) -> None:
     """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its outcome.
 
     Other threads run meanwhile; several may call this with the same arguments and share the episodes out. All that an
@@ -111,12 +111,15 @@ def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: in
         resting: (n,) booleans.
         ticks: of ``TICK`` s.
         turns: of the episodes, open (``turns.open_turns``).
+        patience: looks at the turns after the last, should they open again meanwhile.
     """
     noise = np.empty((ticks, NOISE))
     while True:
         n = take_turn(turns)
-        if n >= len(episodes):
+        if n < len(episodes):
+            if not resting[n]:
+                _decide(episodes[n], commands[n], ticks, noise)
+            turn_done(turns)
+        elif not more_turns(turns, len(episodes), patience):
+            leave(turns)
             break
-        if not resting[n]:
-            _decide(episodes[n], commands[n], ticks, noise)
-        turn_done(turns)

@@ -14,7 +14,7 @@ from ..dynamics.errors import InputError
 from ..estimator.direct import direct
 from .fan_tracking import FanTrackingEnv
 from .outcome import DECISION_TICKS, EPISODE, INFO, decide
-from .turns import open_turns, watch
+from .turns import PATIENCE, open_turns, watch
 
 Frames = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -60,8 +60,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self._all = np.ones(num_envs, dtype=np.bool_)
         # what threads read; one that comes late works for the step that it finds
         self._commands, self._resting = np.zeros(num_envs), np.zeros(num_envs, dtype=np.bool_)
-        self._turns = np.zeros(2, dtype=np.int64)
+        self._turns = np.array([0, 0, self.threads])  # all of them have left
         self._call: Callable[[], None] | None = None
+        self._help: Callable[[], None] | None = None  # the same, and to look for more
+        self._helpers: list[Future[None]] = []
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
@@ -106,26 +108,29 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
 
     def _fly(self) -> None:
         """Fly a decision of all environments that do not rest."""
-        if self._call is None:
+        if self._call is None or self._help is None:
             given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._turns
-            self._call = partial(direct(decide, *given), *given)
-        open_turns(self._turns)
-        others = self._call_others(self._call)
+            entry = direct(decide, *given, PATIENCE)
+            self._call, self._help = partial(entry, *given, 0), partial(entry, *given, PATIENCE)
+        left = open_turns(self._turns) - 1  # without this thread
+        if left:
+            self._helpers = [*(h for h in self._helpers if not h.done()), *self._call_others(self._help, left)]
         try:
             self._call()
             while not watch(self._turns, self.num_envs):
-                for other in others:
-                    if other.done():
-                        other.result()
+                for helper in self._helpers:
+                    if helper.done():
+                        helper.result()
         except BaseException:
-            wait(others)  # what they have in hand must not be flown by two
+            wait(self._helpers)  # what they have in hand must not be flown by two
+            self._turns[2] = self.threads
             raise
 
-    def _call_others(self, work: Callable[[], None]) -> list[Future[None]]:
-        """Have all threads but this one call ``work``."""
-        if self.threads > 1 and self._pool is None:
+    def _call_others(self, work: Callable[[], None], count: int) -> list[Future[None]]:
+        """Have ``count`` threads beside this one call ``work``."""
+        if count and self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads - 1)
-        return [self._pool.submit(work) for _ in range(self.threads - 1)] if self._pool else []
+        return [self._pool.submit(work) for _ in range(count)] if self._pool else []
 
     def _start(self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
         """Start an episode in those environments from ``first`` to before ``last`` that ``which`` (num_envs,) names."""
@@ -144,7 +149,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             for n in turns:
                 work(n, n + 1)
 
-        others = self._call_others(take_turns)
+        others = self._call_others(take_turns, self.threads - 1)
         try:
             take_turns()
         finally:

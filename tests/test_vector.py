@@ -1,6 +1,5 @@
 """Many environments in one process are as many single ones."""
 
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,7 +9,7 @@ import pytest
 
 import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError
-from windwrench.envs.turns import open_turns, take_turn, turn_done, watch
+from windwrench.envs.turns import leave, more_turns, open_turns, take_turn, turn_done, watch
 from windwrench.estimator.direct import released
 
 NAME = "windwrench/FanTracking-v0"
@@ -145,7 +144,7 @@ def test_too_few_are_refused(count):
 
 
 def test_turns_are_taken_once_each_by_however_many_threads():
-    turns, taken = np.zeros(2, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
+    turns, taken = np.zeros(3, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
     for _ in range(3):
         taken[:] = 0
         open_turns(turns)
@@ -167,25 +166,68 @@ def take_all(turns, taken):
         turn_done(turns)
 
 
+def test_turns_open_for_a_thread_that_looks_and_say_who_has_left():
+    turns = np.zeros(3, dtype=np.int64)
+    assert open_turns(turns) == 0
+    assert look(turns, 1, 1)
+    turns[0] = 1
+    assert not look(turns, 1, 1000)
+    go(turns)
+    go(turns)
+    assert open_turns(turns) == 2
+    assert turns.tolist() == [0, 0, 0]
+
+
+@released
+def look(turns, count, patience):
+    return more_turns(turns, count, patience)
+
+
+@released
+def go(turns):
+    leave(turns)
+
+
+def test_helpers_sleep_and_are_called_back_and_the_bits_stay(monkeypatch):
+    """Steps come about as long after each other as a helper's patience lasts, so that they meet it in every state."""
+    monkeypatch.setattr("windwrench.envs.vector.PATIENCE", 2000)
+    alone, spread = make(4, scenario="base"), make(4, threads=3, scenario="base")
+    alone.reset(seed=0)
+    spread.reset(seed=0)
+    called = []
+    call_others = spread._call_others
+    spread._call_others = lambda work, count: called.append(count) or call_others(work, count)
+    pauses = np.random.default_rng(0).uniform(0.0, 3e-5, 200)
+    for pause in pauses:
+        if pause > 1e-5:
+            time.sleep(pause)
+        frames = spread.step(np.zeros((4, 1)))[0]
+        np.testing.assert_array_equal(frames, alone.step(np.zeros((4, 1)))[0])
+    assert called[0] == 2
+    assert max(called) <= 2
+    spread.close()
+    alone.close()
+
+
 def test_a_thread_that_fails_with_a_turn_in_hand_is_not_waited_for():
     envs = make(3, threads=2)
     envs.reset(seed=0)
     envs.step(np.zeros((3, 1)))
-    envs._pool.submit(int).result()  # by then no thread is late
-    decide, main = envs._call, threading.current_thread()
+    envs._pool.submit(int).result()  # by then the helper has left
+    decide, help_on = envs._call, envs._help
+
+    def wait_and_decide():
+        while envs._turns[0] == 0:
+            time.sleep(0.001)
+        decide()
 
     def fail():
-        if threading.current_thread() is main:
-            while envs._turns[0] == 0:
-                time.sleep(0.001)
-            decide()
-        else:
-            take_turn(envs._turns)
-            raise RuntimeError("a thread's own fault")
+        take_turn(envs._turns)
+        raise RuntimeError("a thread's own fault")
 
-    envs._call = fail
+    envs._call, envs._help = wait_and_decide, fail
     with pytest.raises(RuntimeError, match="own fault"):
         envs.step(np.zeros((3, 1)))
-    envs._call = decide
+    envs._call, envs._help = decide, help_on
     assert len(envs.step(np.zeros((3, 1)))[0]) == 3
     envs.close()
