@@ -173,6 +173,7 @@ class ClosedLoop:
         self.disturbance: Array = loop["plant"]["disturbance"]  # (6,) of the actuators' unmodelled disturbance,
         self.applied: Array = loop["plant"]["applied"]  # (6,) and that a user applies; zero after a reset
         self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
+        self.unrounded: Array = loop["plant"]["sample"][:4]  # (4,) these turn rates before they are rounded
         loop["mj_step"], loop["model"], loop["data"] = mj_step_address(), self.model._address, self.data._address
         loop["clock"] = clock_address(self.data)
         for name, array in (("qpos", self._qpos), ("qvel", self._qvel), ("xfrc", self._xfrc),

@@ -189,13 +189,10 @@ def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array,
         p.speeds[i] = command[i] + p.motor_keep * (p.speeds[i] - command[i])
         p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
         load += p.body.k[i] * p.speeds[i] * p.speeds[i]
-        p.z[i] = p.speeds[i] if p.omega_lsb == 0.0 else p.omega_lsb * math.floor(p.speeds[i] / p.omega_lsb + 0.5)
-    if p.sense_count > 0:
-        for i in range(4):
-            p.sample[i] = p.z[i]
-        rewrite_sample(p, TICK, 4, 1.0)
-        for i in range(4):
-            p.z[i] = p.sample[i]
+        p.sample[i] = p.speeds[i]
+    rewrite_sample(p, TICK, 4, 1.0)
+    for i in range(4):
+        p.z[i] = p.sample[i] if p.omega_lsb == 0.0 else p.omega_lsb * math.floor(p.sample[i] / p.omega_lsb + 0.5)
     if p.voltage_ref > 0.0:
         # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
         full = 1.05 - 0.1 * p.time / p.battery_life - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)

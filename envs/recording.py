@@ -164,14 +164,15 @@ def record_flight(
         if wrench is not None:
             loop.applied[:] = wrench
         # what the rotors did in the interval that ends here, then the pose that this tick samples
-        samples[k, :4], voltage[k], external[k] = loop.sample[:4], loop.battery, loop.external
+        samples[k, :4], voltage[k], external[k] = loop.unrounded, loop.battery, loop.external
         loop.run(rng.standard_normal((1, NOISE)))
         samples[k, 4:] = loop.sample[4:]
         if not loop.healthy() or loop.position[2] < -0.5:
             raise InputError(f"record: {vehicle.name} crashed after {loop.time:.1f} s: the effects are too large for its "
                              "flight loop")
     # A turn rate is logged as it is at the instant of the pose, between the ticks before and after. That is no even mean:
-    # with semi-implicit steps of half a tick the pose is a quarter of a tick ahead of the clock.
+    # with semi-implicit steps of half a tick the pose is a quarter of a tick ahead of the clock. It is rounded once: rounding
+    # what lies between two rounded rates would bring the later one back.
     samples[:-1, :4] = 0.25 * samples[:-1, :4] + 0.75 * samples[1:, :4]
     if vehicle.omega_lsb > 0:
         samples[:, :4] = vehicle.omega_lsb * np.round(samples[:, :4] / vehicle.omega_lsb)

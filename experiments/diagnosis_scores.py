@@ -8,6 +8,7 @@ from an added effect. A name is *confidently wrong* where it is neither of these
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import erf, sqrt
 from typing import Any
 
 import numpy as np
@@ -191,6 +192,8 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
         _share("1. the same with the presets hummingbird and crazyflie, in part", presets, lambda j: j.right, 0.95),
         _coefficients("1. every coefficient that is not zero within 5 %, where the names are right", alone),
         _coefficients("1. the same with the presets", [j for j in presets if j.right]),
+        _unbiased("1. the same of both, expected of an unbiased fit with the standard deviations that were reported",
+                  [j for j in alone + presets if j.right]),
         _share("2. one effect of a third of that size: right name, no other", third, lambda j: j.right, 0.90),
         _share("2. two effects: both right names, no other", pairs, lambda j: j.right, 0.90),
         _share("3. no effect: nothing named", nothing, lambda j: not j.named and j.outcome != FAILED, 1.0),
@@ -289,6 +292,20 @@ def _coefficients(subject: str, some: Sequence[Judgement]) -> Rule:
     if beyond:
         measured += f"; those beyond are off by {max(beyond):.1f} of their own standard deviations at most"
     return Rule(subject, ">= 95%", measured, within >= 0.95, len(worst))
+
+
+def _unbiased(subject: str, some: Sequence[Judgement]) -> Rule:
+    """Return how many flights a fit would have within the bar whose errors are normal, with mean zero, and as large as said."""
+    shares = []
+    for j in some:
+        # an error e of s standard deviations: the bar is at s * bar / e of them
+        within = [erf(s * COEFFICIENT_BAR / (e * sqrt(2.0))) for e, s in j.errors.values() if e > 0.0 and np.isfinite(s)]
+        if within:
+            shares.append(float(np.prod(within)))
+    every = [s for j in some for _, s in j.errors.values() if np.isfinite(s)]
+    more = f"of flights; {np.mean([s < 1.0 for s in every]):.0%} of the coefficients are within one such deviation, "\
+           f"{np.mean([s < 2.0 for s in every]):.0%} within two" if every else ""
+    return _rule(subject, float(np.mean(shares)) if shares else 0.0, None, len(shares), more)
 
 
 def _floor(subject: str, some: Sequence[Judgement]) -> Rule:

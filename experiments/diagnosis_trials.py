@@ -85,21 +85,22 @@ class Trial:
         return zlib.crc32(self.key.encode())
 
 
-def plan(seeds: int = 1, quick: bool = False) -> list[Trial]:
+def plan(seeds: int = 1, quick: bool = False, first: int = 0) -> list[Trial]:
     """Return the trials of a run; one effect is flown on the trajectory that shows it best.
 
     Args:
         seeds: how often everything is flown, each time with other signs, sizes, paths and noise.
         quick: a part of it only, some minutes long.
+        first: the first seed.
 
     Raises:
-        InputError: ``seeds`` is not positive.
+        InputError: ``seeds`` is not positive, or ``first`` is negative.
     """
-    if seeds < 1:
-        raise InputError(f"trials: --seeds must be at least 1, got {seeds}")
+    if seeds < 1 or first < 0:
+        raise InputError(f"trials: --seeds must be at least 1 and --seed at least 0, got {seeds} and {first}")
     effects = _QUICK_EFFECTS if quick else names()
     out: list[Trial] = []
-    for seed in range(seeds):
+    for seed in range(first, first + seeds):
         for group, size in (("typical", "typical"), ("third", "small")):
             for name in effects:
                 less = list(dict.fromkeys([(name,), (name, *EQUIVALENTS.get(name, ()))]))

@@ -44,7 +44,8 @@ _LOOK: Mapping[str, tuple[str, str, str]] = {
 Cells = Mapping[tuple[str, str], Sequence[str]]  # outcomes by row and column
 
 
-def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Path, seeds: int, quick: bool) -> list[Path]:
+def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Path, seeds: int, quick: bool,
+                  first: int = 0) -> list[Path]:
     """Write ``trials.json`` and ``trials.png`` into a folder, and the page that shows them; return the three paths.
 
     Args:
@@ -53,19 +54,20 @@ def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Pat
         page: where the page goes.
         seeds: that were asked for.
         quick: whether it was the short run.
+        first: the first of the seeds.
 
     Raises:
         InputError: a file cannot be written.
     """
     judged = [j for outcome in outcomes for j in judge(outcome)]
     data, picture = folder / "trials.json", folder / "trials.png"
-    kept = {"version": __version__, "code": code_stamp(), "seeds": seeds, "quick": quick,
+    kept = {"version": __version__, "code": code_stamp(), "seed": first, "seeds": seeds, "quick": quick,
             "rules": [asdict(rule) for rule in rules(judged)], "trials": outcomes}
     with replaced(data) as partial:
         partial.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     with replaced(picture) as partial:
         draw(judged).savefig(partial, format="png", dpi=110, metadata={"Software": None})
-    command = f"windwrench trials --seeds {seeds}{' --quick' if quick else ''}"
+    command = f"windwrench trials --seed {first} --seeds {seeds}{' --quick' if quick else ''}"
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     with replaced(page) as partial:
         partial.write_text(page_text(outcomes, judged, command, where), encoding="utf-8")

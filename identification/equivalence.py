@@ -23,6 +23,7 @@ _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
 _COINCIDE = 0.7  # least of the largest coefficient that all others reach
+_CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
 _EVEN = 0.95  # correlation of voltage and time
 _PLAUSIBLE = 1.2 * PRIOR  # typical sizes
 
@@ -58,8 +59,8 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
 def composites(flights: Flights, fit: Fit) -> list[str]:
     """Return in words which single effect the named ones could be instead, where together they are its exact equivalent.
 
-    Mass is thrust_scale with inertia, thrust_scale is mass with inertia (coefficients that coincide give them away); a
-    battery that falls evenly is a thrust that is off and fades.
+    Mass is thrust_scale with inertia, thrust_scale is mass with inertia, and inertia is mass with thrust_scale
+    (coefficients that coincide give them away); a battery that falls evenly is a thrust that is off and fades.
     """
     found = []
     names = set(fit.effects)
@@ -78,6 +79,11 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         sizes = np.abs(relative)
         if sizes.min() > _COINCIDE * sizes.max():
             found.append("coefficients of inertia and thrust or mass coincide: a single other effect may be behind them")
+    if {"mass", "thrust_scale"} <= names:
+        weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass
+        thrust = 1.0 + fit.setting["thrust_scale"].get("s", 0.0)
+        if abs(thrust / weight - 1.0) < _CANCEL * abs(thrust - 1.0):
+            found.append("more mass and as much more thrust cancel, but for the moments: inertia may be behind them")
     if "thrust_fade" in names and names & {"mass", "thrust_scale", "rotor_efficiency", "constant_force"}:
         drop = [(p.signals.t, p.signals.voltage) for p in flights.pieces({}) if p.signals.voltage is not None]
         even = all(abs(float(np.corrcoef(t, v)[0, 1])) > _EVEN for t, v in drop if v.std() > 0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
 from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
+from .feedback import is_answer
 from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .selection import Gram, columns_of, gram
 from .starts import STARTS, barely_swings
@@ -34,9 +35,11 @@ LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of 
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
-_REFITS = 6
+_LATE = _TIMING | {"motor_lag"}
+_REFITS = 15
 _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
+ANSWERS_SHARE = 0.2  # of what is left unexplained: the flight loop's answer to gusts explains no more
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
 _SHORTLIST = 2
 _HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
@@ -280,6 +283,8 @@ class Search:
             if not better or count == self._most:
                 break
             for gain in better:
+                if not self.flights.commanded and self._is_answer(fit, regression, g, gain):
+                    continue
                 self._report(f"trying {gain.effect}")
                 more = self.refit(gain.fit)
                 if not (self.flights.commanded and barely_swings(more.setting, self.flights.vehicle.gravity)):
@@ -288,6 +293,20 @@ class Search:
                 break
             fit = more
         return fit, first
+
+    def _is_answer(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
+        """Return whether what an effect adds to a fit is rather the flight loop's answer to what the fit leaves."""
+        if gain.share > ANSWERS_SHARE or gain.effect in STARTS or gain.effect in _LATE:  # a swing or a time of its own
+            return False
+        total, residual = g.blocks.sum(axis=0), regression.residual
+
+        def explained(columns: Sequence[Column]) -> Array:
+            x = np.stack([np.zeros_like(residual), *(regression.columns[c] for c in columns)], axis=2)
+            return np.asarray(x[..., 1:] @ g.solve(total, g.index(columns)))
+
+        before = explained(self.base(fit.effects))
+        return is_answer(self.flights, self.whiten, explained(self.base(fit.effects, [gain.effect])) - before,
+                         residual - before)
 
     @staticmethod
     def _plausible(gain: "Gain", count: int) -> bool:

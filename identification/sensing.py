@@ -38,8 +38,8 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     """Return the log with the vehicle's declared sensing effects taken out of its poses and turn rates.
 
     It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows tell the flight of abs(dt)
-    ago, as the filter's estimate does, and the first abs(dt) s after a break of more than 0.1 s have no pose; voltage and
-    truth stay as they are.
+    ago, as the filter's estimate does, and the first abs(dt) s after a break of more than 0.1 s have no pose; the voltage,
+    which is of the row's own instant, is that of then, and the truth stays as it is.
     """
     if not any(get(setting.name).kind == "sensing" for setting in vehicle.effects):
         return log
@@ -50,8 +50,9 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     delay = sum(abs(s.coefficients.get("dt", 0.0)) for s in vehicle.effects if s.name == "clock_offset")
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
+    voltage = None if log.voltage is None else np.interp(log.t - delay, log.t, log.voltage)
     return replace(log, rotor_speeds=samples[:, :4].copy(), position=samples[:, 4:7].copy(),
-                   quaternion=samples[:, 7:].copy(), valid=valid)
+                   quaternion=samples[:, 7:].copy(), voltage=voltage, valid=valid)
 
 
 def _settled(log: FlightLog, delay: float) -> np.ndarray:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
+from .feedback import is_answer
 from .findings import CHANNELS, Structure
 from .regression import CENTRAL, CUTOFF_HZ, Flights, Setting
-from .search import Fit, Search
+from .search import ANSWERS_SHARE, Fit, Search
 from .selection import Gram
 from .signals import low_pass
 
@@ -25,9 +26,11 @@ LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
 LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one part of the flight, but strongly
+ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
 
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
+_NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _BATCH = 24  # columns at a time
 
 Drive = tuple[str, Array]  # in words, (rows,)
@@ -37,6 +40,7 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
     """Return what a force may depend on, with its unit, at the rows."""
     parts: list[list[Drive]] = []
     vehicle = flights.amended(setting)
+    plain = [_is_plain(flights, i) for i in range(3)]
     for piece in flights.pieces(setting):
         s, at = piece.signals, piece.rows
         body = np.einsum("nij,ni->nj", s.rotation[at], s.velocity[at])
@@ -45,15 +49,24 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
         heading = np.arctan2(s.rotation[at, 1, 0], s.rotation[at, 0, 0])
         found: list[Drive] = [(f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")]
         found += [("speed (m/s)", speed), ("squared speed (m2/s2)", speed**2), ("height (m)", s.position[at, 2]),
-                  ("thrust (N)", low_pass(thrust, CUTOFF_HZ, s.period)[at]), ("sine of the heading", np.sin(heading)),
-                  ("cosine of the heading", np.cos(heading)), ("time (s)", s.t[at])]
-        found += [(f"turn rate {a} (rad/s)", low_pass(s.rate[:, i], CUTOFF_HZ, s.period)[at]) for i, a in enumerate("xyz")]
+                  ("sine of the heading", np.sin(heading)), ("cosine of the heading", np.cos(heading)), ("time (s)", s.t[at])]
+        if flights.lively:
+            found.append(("thrust (N)", low_pass(thrust, CUTOFF_HZ, s.period)[at]))
+        found += [(f"turn rate {a} (rad/s)", low_pass(s.rate[:, i], CUTOFF_HZ, s.period)[at]) for i, a in enumerate("xyz")
+                  if plain[i]]
         found += [(f"world position {a} (m)", s.position[at, i]) for i, a in enumerate("xy")]
         if s.voltage is not None:
             found.append(("battery voltage (V)", s.voltage[at]))
         parts.append(found)
     joined = [(name, np.concatenate([p[i][1] for p in parts])) for i, (name, _) in enumerate(parts[0])]
     return [(name, x) for name, x in joined if x.std() > next((least for word, least in _MOVES.items() if word in name), 1e-9)]
+
+
+def _is_plain(flights: Flights, axis: int) -> bool:
+    """Return whether a turn rate, which is also the column of a rate's damping, is more than the sensors' noise."""
+    column = "rate_damping", f"d{'xyz'[axis]}"
+    noise, whole = (x[:, 3 + axis].var() for x in (flights.column_noise[column], flights.columns({}, [column])[column]))
+    return bool(noise <= _NOISE * whole)
 
 
 def scaled(found: list[Drive]) -> dict[str, Array]:
@@ -85,7 +98,8 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
                              for p in pieces])
     for i, a in enumerate("xyz"):
         shapes[f"world velocity {a}"] = velocity[:, i]
-        shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
+        if flights.lively:
+            shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
         shapes[f"tilt {a}"] = rotation[:, 2, i]
     for k in range(6):  # bumps in time and in height
@@ -108,8 +122,6 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
 def structure(search: Search, fit: Fit) -> list[Structure]:
     """Return the signs of a law in what a fit leaves, the strongest first; none for a fit that explains it all."""
     flights = search.flights
-    if not flights.lively:
-        return []
     regression = search.at(fit)
     error = regression.error(np.arange(len(regression.columns)))
     unit = max(1.0, error / regression.design[..., 0].size)  # of chance, where gusts are not what they are taken to be
@@ -131,14 +143,26 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
     named = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
-    least = max(LEAST_GAIN * unit, LEAST_SHARE * error, LEAST_OF_NAMED * named)
+    least = max(LEAST_GAIN * unit, LEAST_SHARE * error, LEAST_OF_NAMED * named) * (1.0 if flights.lively else ROUGH)
     found = []
     for at in range(0, len(columns), _BATCH):
-        gains, spreads = _gains(search, regression, np.stack(columns[at : at + _BATCH], axis=2))
-        for (test, where), gain, spread in zip(words[at : at + _BATCH], gains, spreads, strict=True):
-            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE):
+        batch = columns[at : at + _BATCH]
+        gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
+        for (test, where), column, gain, spread in zip(words[at : at + _BATCH], batch, gains, spreads, strict=True):
+            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE) and not (
+                    gain < ANSWERS_SHARE * error and _is_answer(search, fit, regression, column, residual)):
                 found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
+
+
+def _is_answer(search: Search, fit: Fit, g: Gram, column: Array, residual: Array) -> bool:
+    """Return whether what a column (rows, 6) adds to a fit is rather the flight loop's answer to what the fit leaves."""
+    base = search.flights.columns(fit.setting, g.columns, 0.1)
+    k = len(g.columns)
+    cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
+    weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
+    alone = column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
+    return is_answer(search.flights, search.whiten, alone, residual)
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

@@ -83,10 +83,13 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
     assert len({t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}) == 10
     assert {t.key for t in plan(quick=True)} < set(by_key)
     twice = plan(2)
+    assert [t.key for t in plan(first=1)] == [t.key for t in twice[len(trials):]]
     assert len({t.key for t in twice}) == len(twice) == 2 * len(trials)
     assert len({t.flight_seed for t in twice}) == len(twice)
     with pytest.raises(InputError, match="seeds"):
         plan(0)
+    with pytest.raises(InputError, match="seed"):
+        plan(first=-1)
 
 
 def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell():
@@ -248,21 +251,33 @@ def test_a_flight_is_diagnosed_and_not_again(tmp_path):
 def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, capfd):
     asked = []
 
-    def planned(seeds, quick):
-        asked.append((seeds, quick))
+    def planned(seeds, quick, first):
+        asked.append((seeds, quick, first))
         return [Trial("outsider", ("gremlins",))]
 
     monkeypatch.setattr("windwrench.experiments.diagnosis_trials.plan", planned)
     page = tmp_path / "page.md"
-    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--quick", "--jobs", "1", "--out",
+    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--seed", "5", "--quick", "--jobs", "1", "--out",
                                      str(tmp_path / "out"), "--markdown", str(page)])
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code in (0, None)
-    assert asked == [(3, True)]
+    assert asked == [(3, True, 5)]
     assert "1. one effect of typical size" in capfd.readouterr().out
-    assert "`windwrench trials --seeds 3 --quick`" in page.read_text(encoding="utf-8")
+    assert "`windwrench trials --seed 5 --seeds 3 --quick`" in page.read_text(encoding="utf-8")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"run.json", "trials.json", "trials.jsonl", "trials.png"}
+
+
+def test_an_unbiased_fit_is_expected_within_the_bar_as_often_as_its_deviations_say():
+    (judged,) = judge(outcome("typical", MASS, found(name("mass", dm=0.04))))
+    # one coefficient with a standard deviation of 5 %, another with one of 2.5 %; whatever their errors are
+    some = [replace(judged, errors={"mass.dm": (0.05 * s, s)}) for s in (0.1, 3.0)]
+    expected = rule(some, "1. the same of both")
+    assert expected.measured.startswith("68.3% of flights; 50% of the coefficients are within one")
+    assert expected.met is None
+    both = [replace(judged, errors={"wind.wx": (0.05, 1.0), "wind.wy": (0.025, 1.0)})]
+    assert rule(both, "1. the same of both").measured.startswith("65.2%")
+    assert rule([replace(judged, errors={})], "1. the same of both").count == 0
 
 
 def test_a_diagnosis_that_falls_over_is_an_outcome():

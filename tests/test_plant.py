@@ -137,6 +137,22 @@ def test_logged_rates_are_multiples_of_the_sensor_s_step_and_true_ones_are_not()
     assert bench.plant["z"][0] != 401.0
 
 
+def test_a_recorded_turn_rate_is_rounded_once():
+    vehicle = replace(load_vehicle("ardrone2"), omega_lsb=4.0)
+    late = EffectSetting("clock_offset", {"dt": -0.013})
+    reported = []
+
+    def watch(loop):
+        reported.append(loop.unrounded.copy())
+
+    log = record_flight(vehicle, (late,), seconds=3.0, seed=4, push=watch)["rotor_speeds"][1:-1]
+    before, after = np.array(reported)[1:-1], np.array(reported)[2:]
+    # as it is at the pose's instant, between two ticks
+    assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
+    assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
+
+
+
 def sensed(quaternion, count=400, settings=QUIET, seed=0):
     bench = Bench(settings=settings, quaternion=quaternion)
     rng = np.random.default_rng(seed)

@@ -94,6 +94,13 @@ def test_turn_rates_ahead_of_the_pose_are_delayed(clean):
     np.testing.assert_array_equal(corrected.position[6:], clean.position[6:])
 
 
+@pytest.mark.parametrize("dt", [0.03, -0.03])
+def test_the_voltage_of_a_log_with_a_clock_offset_is_that_of_the_flight_it_tells(clean, dt):
+    log = replace(clean, voltage=11.0 + 0.1 * np.sin(3.0 * clean.t))
+    corrected = undo_log_sensing(log, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": dt})))
+    np.testing.assert_allclose(corrected.voltage[6:], log.voltage[:-6], atol=1e-9)
+
+
 def test_a_lost_pose_stays_lost_without_sensing_effects_too():
     vehicle = VEHICLE.with_effects(EffectSetting("world_tilt", {"ax": 0.02}))
     log = without_pose(fly(seconds=5.0), slice(100, 103))

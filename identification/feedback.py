@@ -1,0 +1,41 @@
+"""Whether what seems to explain a residual is rather the flight loop's answer to it.
+
+A flight loop works against every disturbance, so rotors, attitude and velocity follow a gust, and a law of one of these seems
+to explain it. But a law acts at once, and an answer comes a moment later: shifted in time, what a law explains falls off alike
+to either side, and an answer fits best when it is taken from the near future. (The bias of the direct method in closed loop:
+L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .regression import Flights
+from .whitening import Whitener
+
+Array = NDArray[np.float64]
+
+_LAG = 0.08  # s, about as long as an attitude loop takes
+_SHARE = 0.1  # of what is explained, by which the future may explain more than the past
+_NOISE = 3.0  # standard deviations of that difference
+
+
+def is_answer(flights: Flights, whiten: Whitener, explained: Array, remainder: Array) -> bool:
+    """Return whether ``explained`` (rows, 6), a part of the residual ``remainder`` (rows, 6), comes after what it explains."""
+    lag = max(1, round(_LAG / flights.period))
+    wanted = whiten(remainder)[flights.fit]
+
+    def energy(shift: int) -> float:
+        x = whiten(_shifted(explained, shift, flights))[flights.fit]
+        along = float(np.sum(x * wanted))
+        return along * abs(along) / max(float(np.sum(x * x)), 1e-300)
+
+    now = max(energy(0), 0.0)
+    return energy(lag) - energy(-lag) > _SHARE * now + _NOISE * np.sqrt(now)
+
+
+def _shifted(x: Array, rows: int, flights: Flights) -> Array:
+    """Return ``x`` (rows, 6) as it is ``rows`` later, within each unbroken piece; the last value stands for what is beyond."""
+    begins = np.flatnonzero(flights.start)
+    ends = np.append(begins[1:], len(x))
+    piece = np.cumsum(flights.start) - 1
+    return x[np.clip(np.arange(len(x)) + rows, begins[piece], ends[piece] - 1)]

@@ -1,0 +1,51 @@
+"""A law acts at once, a flight loop's answer a moment later."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from windwrench.identification.feedback import is_answer
+
+PERIOD = 0.04
+ROWS = 1500
+
+
+def flights(pieces=1):
+    start = np.zeros(ROWS, dtype=bool)
+    start[:: ROWS // pieces] = True
+    return SimpleNamespace(period=PERIOD, start=start, fit=np.ones(ROWS, dtype=bool))
+
+
+def white(x):
+    return x
+
+
+def smooth(seed, seconds=0.15):
+    x = gaussian_filter1d(np.random.default_rng(seed).standard_normal((ROWS, 6)), seconds / PERIOD, axis=0)
+    return x / x.std()
+
+
+@pytest.mark.parametrize("late", [0, 1, 2, 3])
+def test_what_comes_after_the_residual_is_an_answer(late):
+    gusts = smooth(0)
+    answer = 0.3 * np.roll(gusts, late, axis=0)
+    assert is_answer(flights(), white, answer, gusts + 0.5 * smooth(1)) == (late > 0)
+    assert not is_answer(flights(), white, 0.3 * np.roll(gusts, -late, axis=0), gusts)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_small_law_in_much_noise_is_none(seed):
+    law, noise = smooth(seed), np.random.default_rng(seed + 100).standard_normal((ROWS, 6))
+    assert not is_answer(flights(), white, law, 0.08 * law + noise)
+
+
+def test_pieces_are_shifted_apart():
+    # what ends one piece would answer what begins the next
+    f = flights(pieces=2)
+    remainder, explained = np.zeros((ROWS, 6)), np.zeros((ROWS, 6))
+    remainder[ROWS // 2 - 2 : ROWS // 2] = 100.0
+    explained[ROWS // 2 : ROWS // 2 + 2] = 1.0
+    assert is_answer(flights(), white, explained, remainder)
+    assert not is_answer(f, white, explained, remainder)
