@@ -14,7 +14,8 @@ from .turning import ALIKE
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
 SHARE_OF_COMMANDS = 0.005  # the same where thrust is a guess
-_HOPEFUL = 0.3  # share of it that it must explain where it is linear, to be worth a fit
+_HOPEFUL = 0.1  # share of it that another one must explain where it is linear, to be worth a fit
+_HOPEFUL_OF_COMMANDS = 0.3
 _NEAR_OF_COMMANDS = 6.0
 _MOST = 0.4  # of what is left without the effect
 _NEAR = 40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
@@ -44,9 +45,9 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         limit = min(limit, _MOST * search.whitened_energy(flights.residual(alone.setting) - whole))
     out = []
     for other in search.gains(less, regression, g):
-        if flights.commanded and other.share < _HOPEFUL:
+        near, hopeful = (_NEAR_OF_COMMANDS, _HOPEFUL_OF_COMMANDS) if flights.commanded else (_NEAR, _HOPEFUL)
+        if other.share < hopeful:
             continue
-        near = _NEAR_OF_COMMANDS if flights.commanded else _NEAR
         if other.effect == effect or other.size > _PLAUSIBLE or other.left > near * limit:
             continue
         # what is far from linear is fitted to the flights themselves

@@ -20,7 +20,7 @@ _NOISE = 3.0  # standard deviations of that difference
 
 
 def is_answer(flights: Flights, whiten: Whitener, explained: Array, remainder: Array) -> bool:
-    """Return whether ``explained`` (rows, 6), a part of the residual ``remainder`` (rows, 6), comes after what it explains."""
+    """Return whether ``explained`` (rows, 6), or a multiple of it, comes after what it explains of ``remainder`` (rows, 6)."""
     lag = max(1, round(_LAG / flights.period))
     wanted = whiten(remainder)[flights.fit]
 
@@ -29,8 +29,8 @@ def is_answer(flights: Flights, whiten: Whitener, explained: Array, remainder: A
         along = float(np.sum(x * wanted))
         return along * abs(along) / max(float(np.sum(x * x)), 1e-300)
 
-    now = max(energy(0), 0.0)
-    return energy(lag) - energy(-lag) > _SHARE * now + _NOISE * np.sqrt(now)
+    now, sign = abs(energy(0)), np.sign(energy(0))
+    return bool(sign * (energy(lag) - energy(-lag)) > _SHARE * now + _NOISE * np.sqrt(now))
 
 
 def _shifted(x: Array, rows: int, flights: Flights) -> Array:

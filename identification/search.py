@@ -36,7 +36,7 @@ FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 _LATE = _TIMING | {"motor_lag"}
-_REFITS = 15
+_REFITS = 6
 _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 ANSWERS_SHARE = 0.2  # of what is left unexplained: the flight loop's answer to gusts explains no more
@@ -255,7 +255,7 @@ class Search:
         asked: list[set[str]] = []
         while True:
             self._report("asking whether every effect is needed")
-            needed = self.prune(fit)
+            needed = self.prune(fit if self.flights.commanded else self.refit(fit))  # by the noise as it is known by now
             if self.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
                 return needed, first
             # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one

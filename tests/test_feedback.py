@@ -31,7 +31,8 @@ def smooth(seed, seconds=0.15):
 def test_what_comes_after_the_residual_is_an_answer(late):
     gusts = smooth(0)
     answer = 0.3 * np.roll(gusts, late, axis=0)
-    assert is_answer(flights(), white, answer, gusts + 0.5 * smooth(1)) == (late > 0)
+    for sign in (1.0, -1.0):
+        assert is_answer(flights(), white, sign * answer, gusts + 0.5 * smooth(1)) == (late > 0)
     assert not is_answer(flights(), white, 0.3 * np.roll(gusts, -late, axis=0), gusts)
 
 
@@ -47,5 +48,6 @@ def test_pieces_are_shifted_apart():
     remainder, explained = np.zeros((ROWS, 6)), np.zeros((ROWS, 6))
     remainder[ROWS // 2 - 2 : ROWS // 2] = 100.0
     explained[ROWS // 2 : ROWS // 2 + 2] = 1.0
+    remainder[100] = explained[100] = 1.0
     assert is_answer(flights(), white, explained, remainder)
     assert not is_answer(f, white, explained, remainder)
