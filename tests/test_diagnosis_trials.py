@@ -268,6 +268,16 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"run.json", "trials.json", "trials.jsonl", "trials.png"}
 
 
+@pytest.mark.parametrize("trial", [
+    Trial("strong turbulence", (), seed=1, trajectory="circle", turbulence=4.0),  # an inertia and two more, once
+    Trial("hover", ("rotor_efficiency",), seed=1),  # and a mass, once
+], ids=lambda trial: trial.group)
+def test_a_flight_loops_answer_to_gusts_and_noise_is_given_no_name(trial):
+    (judged,) = judge(fly_and_diagnose(trial))
+    assert judged.outcome in (RIGHT, SILENT)
+    assert set(judged.truth) == {name.split(" ")[0] for name in judged.named}
+
+
 def test_an_unbiased_fit_is_expected_within_the_bar_as_often_as_its_deviations_say():
     (judged,) = judge(outcome("typical", MASS, found(name("mass", dm=0.04))))
     # one coefficient with a standard deviation of 5 %, another with one of 2.5 %; whatever their errors are
