@@ -21,7 +21,7 @@ from .signals import low_pass
 
 Array = NDArray[np.float64]
 
-LEAST_GAIN = 30.0  # whitened energy on blocks left out; the largest of all columns on flights without any effect is some 12
+LEAST_GAIN = 40.0  # whitened energy on blocks left out; the largest of all columns on flights that lack nothing is some 25
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
