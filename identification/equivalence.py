@@ -70,6 +70,9 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
     if "motor_lag" in names and ("inertia" in names or abs(shift) > _OUT_OF_STEP * SHIFT_RANGE[1]):
         found.append("motor_lag with inertia, or with turn rates out of step, may be a latency")
+    if names and shift < _OUT_OF_STEP * SHIFT_RANGE[0]:
+        found.append("turn rates would act before they are logged, by as much as is allowed: an effect that is not among these "
+                     "names may be behind it")
     if max(fit.setting.get("rotor_efficiency", {"": 0.0}).values()) > _OUT_OF_STEP * BELIEVED["rotor_efficiency"]:
         found.append("a rotor would have to deliver far more than declared: rotor_efficiency may stand for another effect")
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:

@@ -1,0 +1,31 @@
+"""Named effects that together are the exact equivalent of another one."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from windwrench.dynamics import load_vehicle
+from windwrench.identification.equivalence import composites
+from windwrench.identification.search import Fit
+
+FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
+MASS = FLIGHTS.vehicle.mass
+
+
+@pytest.mark.parametrize(("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)])
+def test_mass_and_thrust_that_cancel_may_be_an_inertia(thrust, cancels):
+    fit = Fit({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
+    assert bool(composites(FLIGHTS, fit)) == cancels
+
+
+@pytest.mark.parametrize(("shift", "doubtful"), [(-0.006, True), (-0.005, False), (0.0, False), (0.006, False)])
+def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
+    fit = Fit({"": {"rate_shift": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}})
+    assert bool(composites(FLIGHTS, fit)) == doubtful
+    assert not composites(FLIGHTS, Fit({"": {"rate_shift": shift}}))
+
+
+def test_more_than_two_effects_may_stand_for_one():
+    three = {"mass": {"dm": 0.02}, "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0}, "battery_sag": {"n": 1.0}}
+    assert len(composites(FLIGHTS, Fit(three))) == 1
+    assert not composites(FLIGHTS, Fit({name: three[name] for name in ("mass", "com_offset")}))
