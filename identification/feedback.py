@@ -14,6 +14,7 @@ from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
+ANSWERS_SHARE = 0.2  # of what is left unexplained: an answer to gusts explains no more, and what does need not be asked
 _LAG = 0.08  # s, about as long as an attitude loop takes
 _SHARE = 0.1  # of what is explained, by which the future may explain more than the past
 _NOISE = 3.0  # standard deviations of that difference

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
 from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
-from .feedback import is_answer
+from .feedback import ANSWERS_SHARE, is_answer
 from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
 from .selection import Gram, columns_of, gram
 from .starts import STARTS, barely_swings
@@ -39,7 +39,6 @@ _LATE = _TIMING | {"motor_lag"}
 _REFITS = 6
 _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
-ANSWERS_SHARE = 0.2  # of what is left unexplained: the flight loop's answer to gusts explains no more
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
 _SHORTLIST = 2
 _HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .feedback import is_answer
+from .feedback import ANSWERS_SHARE, is_answer
 from .findings import CHANNELS, Structure
 from .regression import CENTRAL, CUTOFF_HZ, Flights, Setting
-from .search import ANSWERS_SHARE, Fit, Search
+from .search import Fit, Search
 from .selection import Gram
 from .signals import low_pass
 
 Array = NDArray[np.float64]
 
-LEAST_GAIN = 40.0  # whitened energy on blocks left out; the largest of all columns on flights that lack nothing is some 25
+LEAST_GAIN = 40.0  # whitened energy on blocks left out; where nothing is lacking few flights have a column above 25
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
