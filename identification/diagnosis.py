@@ -14,7 +14,7 @@ from ..dynamics.effects import get, names
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import Vehicle
 from .commanded import shared
-from .equivalence import composites, equivalents
+from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .prediction import nis_without_wrench_state, rollout_error
@@ -68,7 +68,7 @@ def diagnose(
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")
     signs = structure(search, fit)
-    mimics = composites(flights, fit)
+    mimics = [*composites(flights, fit), *unlisted(search, fit)]
 
     before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
     held = ~flights.fit

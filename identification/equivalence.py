@@ -5,11 +5,14 @@ the noise, by which the flights can tell the two apart.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .regression import SHIFT, SHIFT_RANGE, Flights
+from .regression import CENTRAL, SHIFT, SHIFT_RANGE, Flights
 from .search import Fit, Search
 from .selection import BELIEVED, PRIOR, gram
 from .turning import ALIKE
+
+Array = NDArray[np.float64]
 
 APART = 30.0  # whitened energy; five standard deviations and a little
 APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
@@ -24,8 +27,12 @@ _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
 _COINCIDE = 0.7  # least of the largest coefficient that all others reach
+_SAME = 3.0  # standard deviations within which coefficients are alike
 _CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
 _EVEN = 0.95  # correlation of voltage and time
+# one with as much inertia is the other: thrust and moments scale alike, or neither does
+_MATES = {"mass": "thrust_scale", "thrust_scale": "mass"}
+_AXES = ("jx", "jy", "jz")
 _PLAUSIBLE = 1.2 * PRIOR  # typical sizes
 
 
@@ -39,7 +46,7 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     whole = flights.residual(fit.setting)
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
-    limit = max(APART, (SHARE_OF_COMMANDS if flights.commanded else APART_SHARE) * search.whitened_energy(part))
+    limit = _limit(search, part)
     if flights.commanded:  # little of such flights is beyond doubt: the other one must explain most of it
         alone = search.refit(less)
         limit = min(limit, _MOST * search.whitened_energy(flights.residual(alone.setting) - whole))
@@ -55,6 +62,43 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         if search.whitened_energy(flights.residual(swapped.setting) - whole) < limit:
             out.append(other.effect)
     return out
+
+
+def unlisted(search: Search, fit: Fit) -> list[str]:
+    """Return in words which name may stand for its mate that the library lacks, where the moments do not tell the two apart."""
+    flights = search.flights
+    found = []
+    for effect, mate in _MATES.items():
+        if effect not in fit.effects or mate in search.library or "inertia" in fit.effects or flights.commanded:
+            continue
+        value = next(iter(fit.setting[effect].values()))
+        share = value / flights.vehicle.mass if effect == "mass" else value
+        whole = flights.residual(fit.setting)
+        moments = flights.residual({**fit.setting, "inertia": dict.fromkeys(_AXES, share)}) - whole
+        g = gram(flights, fit.setting, search.whiten, flights.columns(fit.setting, search.base(fit.effects), 0.1), moments)
+        if g.error(np.arange(len(g.columns))) < _limit(search, flights.residual(fit.without(effect).setting) - whole):
+            found.append(f"whether the moments go with {effect} these flights do not show: an effect that is not among these "
+                         "names may be behind it")
+    return found
+
+
+def _limit(search: Search, part: Array) -> float:
+    """Return the energy from which two explanations of ``part`` (rows, 6) are apart."""
+    return max(APART, (SHARE_OF_COMMANDS if search.flights.commanded else APART_SHARE) * search.whitened_energy(part))
+
+
+def _relative(flights: Flights, fit: Fit) -> tuple[Array, Array]:
+    """Return the relative changes of inertia, mass and thrust in a fit, and their standard deviations."""
+    parts = [(effect, name) for effect in ("inertia", "mass", "thrust_scale", "rotor_efficiency")
+             for name in fit.setting.get(effect, {}) if name != CENTRAL]
+    scale = np.array([1.0 / flights.vehicle.mass if effect == "mass" else 1.0 for effect, _ in parts])
+    return (scale * np.array([fit.setting[effect][name] for effect, name in parts]),
+            scale * np.array([fit.std.get(part, 0.0) for part in parts]))
+
+
+def _weighted(values: Array, std: Array) -> float:
+    """Return the mean of values weighted by their precision; where one is exact, that of all alike."""
+    return float(np.average(values, weights=None if np.any(std == 0.0) else std**-2.0))
 
 
 def composites(flights: Flights, fit: Fit) -> list[str]:
@@ -76,12 +120,9 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     if max(fit.setting.get("rotor_efficiency", {"": 0.0}).values()) > _OUT_OF_STEP * BELIEVED["rotor_efficiency"]:
         found.append("a rotor would have to deliver far more than declared: rotor_efficiency may stand for another effect")
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
-        relative = list(fit.setting["inertia"].values())
-        relative += [v / flights.vehicle.mass for v in fit.setting.get("mass", {}).values()]
-        relative += list(fit.setting.get("thrust_scale", {}).values())
-        relative += list(fit.setting.get("rotor_efficiency", {}).values())
-        sizes = np.abs(relative)
-        if sizes.min() > _COINCIDE * sizes.max():
+        values, std = _relative(flights, fit)
+        sizes = np.abs(values)
+        if sizes.min() > _COINCIDE * sizes.max() or np.all(np.abs(values - _weighted(values, std)) < _SAME * std):
             found.append("coefficients of inertia and thrust or mass coincide: a single other effect may be behind them")
     if {"mass", "thrust_scale"} <= names:
         weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass

@@ -1,9 +1,10 @@
-"""Whether what seems to explain a residual is rather the flight loop's answer to it.
+"""Whether what seems to explain a residual acts as a law does, or is the flight loop's answer to it, or noise that both share.
 
 A flight loop works against every disturbance, so rotors, attitude and velocity follow a gust, and a law of one of these seems
 to explain it. But a law acts at once, and an answer comes a moment later: shifted in time, what a law explains falls off alike
 to either side, and an answer fits best when it is taken from the near future. (The bias of the direct method in closed loop:
-L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+L. Ljung, System Identification, 2nd edition, 1999, section 13.4.) And a law's motion lasts: what explains nothing once it is
+taken a row earlier or later is noise of the pose, which is in the residual and in what is made of the attitude.
 """
 
 import numpy as np
@@ -18,10 +19,11 @@ ANSWERS_SHARE = 0.2  # of what is left unexplained: an answer to gusts explains 
 _LAG = 0.08  # s, about as long as an attitude loop takes
 _SHARE = 0.1  # of what is explained, by which the future may explain more than the past
 _NOISE = 3.0  # standard deviations of that difference
+_LASTS = 0.5  # of what is explained, that a row later or earlier must explain; true laws of all kinds have 0.85 and more
 
 
-def is_answer(flights: Flights, whiten: Whitener, explained: Array, remainder: Array) -> bool:
-    """Return whether ``explained`` (rows, 6), or a multiple of it, comes after what it explains of ``remainder`` (rows, 6)."""
+def is_law(flights: Flights, whiten: Whitener, explained: Array, remainder: Array) -> bool:
+    """Return whether ``explained`` (rows, 6), or a multiple of it, acts on ``remainder`` (rows, 6) at once, and lasts."""
     lag = max(1, round(_LAG / flights.period))
     wanted = whiten(remainder)[flights.fit]
 
@@ -31,7 +33,9 @@ def is_answer(flights: Flights, whiten: Whitener, explained: Array, remainder: A
         return along * abs(along) / max(float(np.sum(x * x)), 1e-300)
 
     now, sign = abs(energy(0)), np.sign(energy(0))
-    return bool(sign * (energy(lag) - energy(-lag)) > _SHARE * now + _NOISE * np.sqrt(now))
+    answers = sign * (energy(lag) - energy(-lag)) > _SHARE * now + _NOISE * np.sqrt(now)
+    lasts = max(sign * energy(1), sign * energy(-1)) > _LASTS * now
+    return bool(lasts and not answers)
 
 
 def _shifted(x: Array, rows: int, flights: Flights) -> Array:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import shift as moved
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.effects import get, names
@@ -37,6 +38,8 @@ _DROWNED_ELSE = 0.1
 _STEPS = 1.4  # rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its own
 # effects of which a flight with less than that says nothing: they would explain the rounding
 _QUICK = frozenset({"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"})
+TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
+LATE = TIMING | {"motor_lag"}
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
@@ -269,6 +272,25 @@ class Flights:
             self._columns[key] = {}
         return self._columns[key]
 
+    def _slope(self, setting: Setting, column: Column, base: Array, delta: float) -> Array:
+        """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the residual at a setting."""
+        effect, name = column
+        value = setting.get(effect, {}).get(name, 0.0)
+
+        def at(moved: float) -> Array:
+            return self.residual({**setting, effect: {**setting.get(effect, {}), name: moved}})
+
+        if effect:
+            c = coefficient(column)
+            if c.typical[0] < 0:
+                delta = -delta
+            # what is moved in time takes its noise along: to both sides, or a step to one would seem to lessen the noise
+            if effect in LATE and abs(value) > abs(delta) and c.minimum <= value - delta and value + delta <= c.maximum:
+                return (at(value - delta) - at(value + delta)) / (2.0 * delta)
+            if not c.minimum <= value + delta <= c.maximum:
+                delta = -delta
+        return (base - at(value + delta)) / delta
+
     def columns(self, setting: Setting, wanted: Iterable[Column], step: float = 0.5) -> dict[Column, Array]:
         """Return what each unit of a coefficient adds to the residual that the model leaves, (rows, 6) each.
 
@@ -285,16 +307,7 @@ class Flights:
             if keep and column in kept:
                 out[column] = kept[column]
                 continue
-            delta = step * typical(column, self.vehicle)
-            value = setting.get(effect, {}).get(name, 0.0)
-            if effect:
-                c = coefficient(column)
-                if c.typical[0] < 0:
-                    delta = -delta
-                if not c.minimum <= value + delta <= c.maximum:
-                    delta = -delta
-            changed = {**setting, effect: {**setting.get(effect, {}), name: value + delta}}
-            out[column] = (base - self.residual(changed)) / delta
+            out[column] = self._slope(setting, column, base, step * typical(column, self.vehicle))
             if keep:
                 kept[column] = out[column]
         for column in wanted:
@@ -317,9 +330,7 @@ def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) 
         signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
     late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
     if late != 0.0:
-        n = len(signals.t)
-        at = np.clip(np.arange(n) - late / signals.period, 0, n - 1)
-        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
+        speeds = np.column_stack([moved(x, late / signals.period, order=3, mode="nearest") for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
     if lean != 0.0:
         turn = Rotation.from_rotvec(-lean * signals.rate).as_matrix()

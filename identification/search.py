@@ -13,8 +13,22 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
 from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
-from .feedback import ANSWERS_SHARE, is_answer
-from .regression import CENTRAL, LEAN, MOMENT, SHIFT, START, Column, Flights, Setting, coefficient, range_of, typical
+from .feedback import ANSWERS_SHARE, is_law
+from .regression import (
+    CENTRAL,
+    LATE,
+    LEAN,
+    MOMENT,
+    SHIFT,
+    START,
+    TIMING,
+    Column,
+    Flights,
+    Setting,
+    coefficient,
+    range_of,
+    typical,
+)
 from .selection import Gram, columns_of, gram
 from .starts import STARTS, barely_swings
 from .turning import EFFECT, turning_delay
@@ -34,8 +48,6 @@ LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain 
 LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
-_TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
-_LATE = _TIMING | {"motor_lag"}
 _REFITS = 6
 _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
@@ -101,7 +113,7 @@ class Search:
 
     def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: its effects', those of effects that are tried, and the shift that any log may have."""
-        shift = [] if self.flights.commanded or _TIMING & {*effects, *tried} else [SHIFT]
+        shift = [] if self.flights.commanded or TIMING & {*effects, *tried} else [SHIFT]
         return [*shift, LEAN, *self.flights.deviations,
                 *(c for e in effects for c in self.columns_of(e, True)), *(c for e in tried for c in self.columns_of(e, False))]
 
@@ -282,7 +294,7 @@ class Search:
             if not better or count == self._most:
                 break
             for gain in better:
-                if not self.flights.commanded and self._is_answer(fit, regression, g, gain):
+                if not self.flights.commanded and not self._is_law(fit, regression, g, gain):
                     continue
                 self._report(f"trying {gain.effect}")
                 more = self.refit(gain.fit)
@@ -293,10 +305,10 @@ class Search:
             fit = more
         return fit, first
 
-    def _is_answer(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
-        """Return whether what an effect adds to a fit is rather the flight loop's answer to what the fit leaves."""
-        if gain.share > ANSWERS_SHARE or gain.effect in STARTS or gain.effect in _LATE:  # a swing or a time of its own
-            return False
+    def _is_law(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
+        """Return whether what an effect adds to a fit acts as a law on what the fit leaves."""
+        if gain.share > ANSWERS_SHARE or gain.effect in STARTS or gain.effect in LATE:  # a swing or a time of its own
+            return True
         total, residual = g.blocks.sum(axis=0), regression.residual
 
         def explained(columns: Sequence[Column]) -> Array:
@@ -304,8 +316,7 @@ class Search:
             return np.asarray(x[..., 1:] @ g.solve(total, g.index(columns)))
 
         before = explained(self.base(fit.effects))
-        return is_answer(self.flights, self.whiten, explained(self.base(fit.effects, [gain.effect])) - before,
-                         residual - before)
+        return is_law(self.flights, self.whiten, explained(self.base(fit.effects, [gain.effect])) - before, residual - before)
 
     @staticmethod
     def _plausible(gain: "Gain", count: int) -> bool:
@@ -423,7 +434,7 @@ def _freedom(effect: str) -> float:
 
     One that sets the timing takes the shift's place. Of exact equivalents a change of the log comes last.
     """
-    return len(get(effect).coefficients) - (effect in _TIMING) + 0.1 * (get(effect).kind == "sensing")
+    return len(get(effect).coefficients) - (effect in TIMING) + 0.1 * (get(effect).kind == "sensing")
 
 
 def _central(columns: Sequence[Column], change: Array, effect: str) -> float:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .feedback import ANSWERS_SHARE, is_answer
+from .feedback import ANSWERS_SHARE, is_law
 from .findings import CHANNELS, Structure
-from .regression import CENTRAL, CUTOFF_HZ, Flights, Setting
+from .regression import CENTRAL, CUTOFF_HZ, LATE, Flights, Setting
 from .search import Fit, Search
 from .selection import Gram
 from .signals import low_pass
@@ -133,7 +133,7 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
     residual = flights.residual(fit.setting)
     known = scaled(drives(flights, fit.setting))
     for effect in fit.effects:
-        share = flights.residual(fit.without(effect).setting) - residual
+        share = _share(flights, fit, effect, residual)
         for name, x in known.items():
             words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
             columns.append(share * x[:, None])
@@ -150,19 +150,32 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for (test, where), column, gain, spread in zip(words[at : at + _BATCH], batch, gains, spreads, strict=True):
             if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE) and not (
-                    gain < ANSWERS_SHARE * error and _is_answer(search, fit, regression, column, residual)):
+                    gain < ANSWERS_SHARE * error and not _is_law(search, fit, regression, column, residual)):
                 found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
 
 
-def _is_answer(search: Search, fit: Fit, g: Gram, column: Array, residual: Array) -> bool:
-    """Return whether what a column (rows, 6) adds to a fit is rather the flight loop's answer to what the fit leaves."""
+def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
+    """Return what an effect explains (rows, 6) of the residual that is left without it.
+
+    What is moved in time differs from what it was by its noise too, which is also in the residual: of such an effect it is
+    what a little more of it would change.
+    """
+    if effect not in LATE:
+        return flights.residual(fit.without(effect).setting) - residual
+    own = fit.setting[effect]
+    columns = flights.columns(fit.setting, [(effect, name) for name in own], 0.1)
+    return sum((value * columns[effect, name] for name, value in own.items()), np.zeros_like(residual))
+
+
+def _is_law(search: Search, fit: Fit, g: Gram, column: Array, residual: Array) -> bool:
+    """Return whether what a column (rows, 6) adds to a fit acts as a law on what the fit leaves."""
     base = search.flights.columns(fit.setting, g.columns, 0.1)
     k = len(g.columns)
     cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
     alone = column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
-    return is_answer(search.flights, search.whiten, alone, residual)
+    return is_law(search.flights, search.whiten, alone, residual)
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

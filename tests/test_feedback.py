@@ -1,4 +1,4 @@
-"""A law acts at once, a flight loop's answer a moment later."""
+"""A law acts at once and lasts; a flight loop's answer comes a moment later, and shared noise is gone a moment later."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from windwrench.identification.feedback import is_answer
+from windwrench.identification.feedback import is_law
 
 PERIOD = 0.04
 ROWS = 1500
@@ -32,14 +32,21 @@ def test_what_comes_after_the_residual_is_an_answer(late):
     gusts = smooth(0)
     answer = 0.3 * np.roll(gusts, late, axis=0)
     for sign in (1.0, -1.0):
-        assert is_answer(flights(), white, sign * answer, gusts + 0.5 * smooth(1)) == (late > 0)
-    assert not is_answer(flights(), white, 0.3 * np.roll(gusts, -late, axis=0), gusts)
+        assert is_law(flights(), white, sign * answer, gusts + 0.5 * smooth(1)) == (late == 0)
+    assert is_law(flights(), white, 0.3 * np.roll(gusts, -late, axis=0), gusts)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_small_law_in_much_noise_is_none(seed):
     law, noise = smooth(seed), np.random.default_rng(seed + 100).standard_normal((ROWS, 6))
-    assert not is_answer(flights(), white, law, 0.08 * law + noise)
+    assert is_law(flights(), white, law, 0.08 * law + noise)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_in_common_is_no_law(seed):
+    law, noise = smooth(seed), np.random.default_rng(seed).standard_normal((ROWS, 6))
+    assert not is_law(flights(), white, law + 0.5 * noise, 0.2 * noise)
+    assert is_law(flights(), white, law + 0.5 * noise, law + 0.2 * noise)
 
 
 def test_pieces_are_shifted_apart():
@@ -48,6 +55,6 @@ def test_pieces_are_shifted_apart():
     remainder, explained = np.zeros((ROWS, 6)), np.zeros((ROWS, 6))
     remainder[ROWS // 2 - 2 : ROWS // 2] = 100.0
     explained[ROWS // 2 : ROWS // 2 + 2] = 1.0
-    remainder[100] = explained[100] = 1.0
-    assert is_answer(flights(), white, explained, remainder)
-    assert not is_answer(f, white, explained, remainder)
+    remainder[100:110] = explained[100:110] = 1.0
+    assert not is_law(flights(), white, explained, remainder)
+    assert is_law(f, white, explained, remainder)

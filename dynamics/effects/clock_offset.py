@@ -1,7 +1,7 @@
 """Clock offset: pose and turn rates of one row of the log are not of the same instant.
 
 With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those of -dt earlier than
-the pose. Between two samples by linear interpolation. An estimator that knows of it delays the other of the two, and so
+the pose. Between samples by a cubic. An estimator that knows of it delays the other of the two, and so
 estimates the flight of dt ago.
 """
 

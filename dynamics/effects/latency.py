@@ -1,7 +1,7 @@
 """Latency: what the rotors do is what was logged a while ago, a pure delay.
 
-The delivered turn rates at t are the logged ones at t - d, between two samples by linear interpolation. In front of the
-first sample the first one holds.
+The delivered turn rates at t are the logged ones at t - d, between samples by a cubic. In front of the first sample the
+first one holds.
 """
 
 from numba import cfunc

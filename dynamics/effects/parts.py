@@ -7,6 +7,7 @@ from ..compiled import compiled
 from .base import COM, RATE, ROTATION, SAMPLE_QUATERNION, VELOCITY, WIND
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line
+_EVEN = 2.5  # the longest of three steps between entries over the shortest, up to which a cubic is drawn through all four
 
 # An array of a C function, in the layout of base.py
 Pointer = Any
@@ -58,8 +59,10 @@ def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Poi
     """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
 
     ``memory`` is the delay line: how many entries there are, the time since the last was added (the caller adds to it),
-    and the entries, each an age and its numbers, the newest first. Between two entries it interpolates linearly; before
-    the oldest it holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
+    and the entries, each an age and its numbers, the newest first. Between entries runs the cubic through the nearest four,
+    within their range: a line between two would damp noise by how far from either it is, and the delay that fits a noisy log
+    best would be the one that damps most. Where the four are not about evenly apart a line must do; before the oldest it
+    holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])
@@ -82,6 +85,23 @@ def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Poi
     share = 0.0
     if j > 0 and memory[here] >= wanted:
         share = (memory[here] - wanted) / (memory[here] - memory[here - size])
+    first = 2 + min(max(j - 2, 0), count - 4) * size
+    a, b, c, d = 1.0, 0.0, 0.0, 0.0
+    cubic = share > 0.0 and count >= 4
+    if cubic:
+        p, q, r, s = memory[first], memory[first + size], memory[first + 2 * size], memory[first + 3 * size]
+        cubic = max(q - p, r - q, s - r) <= _EVEN * min(q - p, r - q, s - r)
+        if cubic:  # Lagrange's weights
+            a = (wanted - q) * (wanted - r) * (wanted - s) / ((p - q) * (p - r) * (p - s))
+            b = (wanted - p) * (wanted - r) * (wanted - s) / ((q - p) * (q - r) * (q - s))
+            c = (wanted - p) * (wanted - q) * (wanted - s) / ((r - p) * (r - q) * (r - s))
+            d = (wanted - p) * (wanted - q) * (wanted - r) / ((s - p) * (s - q) * (s - r))
     for i in range(width):
         late = memory[here + 1 + i]
-        values[at + i] = late if share == 0.0 else late + share * (memory[here - size + 1 + i] - late)
+        if cubic:
+            one = first + 1 + i
+            w, x, y, z = memory[one], memory[one + size], memory[one + 2 * size], memory[one + 3 * size]
+            value = a * w + b * x + c * y + d * z
+            values[at + i] = min(max(value, min(w, x, y, z)), max(w, x, y, z))
+        else:
+            values[at + i] = late if share == 0.0 else late + share * (memory[here - size + 1 + i] - late)
