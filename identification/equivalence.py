@@ -29,6 +29,7 @@ _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translat
 _COINCIDE = 0.7  # least of the largest coefficient that all others reach
 _SAME = 3.0  # standard deviations within which coefficients are alike
 _CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
+_HANGS = 5.0  # times as far along z as across it
 _EVEN = 0.95  # correlation of voltage and time
 # one with as much inertia is the other: thrust and moments scale alike, or neither does
 _MATES = {"mass": "thrust_scale", "thrust_scale": "mass"}
@@ -65,7 +66,10 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
 
 
 def unlisted(search: Search, fit: Fit) -> list[str]:
-    """Return in words which name may stand for its mate that the library lacks, where the moments do not tell the two apart."""
+    """Return in words which names may stand for an exact equivalent that the library lacks, where the flights do not tell.
+
+    Mass and thrust_scale are alike but for the moments. A load on a cable is a mass that does not turn with the body.
+    """
     flights = search.flights
     found = []
     for effect, mate in _MATES.items():
@@ -79,6 +83,11 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
         if g.error(np.arange(len(g.columns))) < _limit(search, flights.residual(fit.without(effect).setting) - whole):
             found.append(f"whether the moments go with {effect} these flights do not show: an effect that is not among these "
                          "names may be behind it")
+    heavier = fit.setting.get("mass", {}).get("dm", 0.0) > 0.0
+    if heavier and "com_offset" in fit.effects and "slung_payload" not in search.library:
+        centre = fit.setting["com_offset"]
+        if abs(centre["cz"]) > _HANGS * max(abs(centre["cx"]), abs(centre["cy"])):
+            found.append("more mass, and a centre of mass that is off along z alone: a load that hangs may be behind them")
     return found
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import shift as moved
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.effects import get, names
@@ -330,7 +329,9 @@ def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) 
         signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
     late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
     if late != 0.0:
-        speeds = np.column_stack([moved(x, late / signals.period, order=3, mode="nearest") for x in signals.rotor_speeds.T])
+        n = len(signals.t)
+        at = np.clip(np.arange(n) - late / signals.period, 0, n - 1)
+        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
     if lean != 0.0:
         turn = Rotation.from_rotvec(-lean * signals.rate).as_matrix()

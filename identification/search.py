@@ -53,6 +53,7 @@ _MOVES = 6
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
 _SHORTLIST = 2
+_FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
 _HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
 
 
@@ -117,11 +118,16 @@ class Search:
         return [*shift, LEAN, *self.flights.deviations,
                 *(c for e in effects for c in self.columns_of(e, True)), *(c for e in tried for c in self.columns_of(e, False))]
 
-    def linearise(self, fit: Fit) -> "Regression":
-        """Return the regression on the whole library at a fit."""
-        linear = [e for e in self.library if e not in STARTS and e not in fit.effects]
-        wanted = self.base(fit.effects, linear)
+    def linearise(self, fit: Fit, near: Fit | None = None) -> "Regression":
+        """Return the regression on the whole library at a fit.
+
+        With a fit ``near`` it, the columns that are only tried are those of there, and effects that it has are not tried.
+        """
+        linear = [e for e in self.library if e not in STARTS and e not in (near or fit).effects]
+        wanted = self.base(fit.effects, () if near else linear)
         columns = self.flights.columns(fit.setting, wanted if SHIFT in wanted else [SHIFT, *wanted])
+        if near:
+            columns |= self.flights.columns(near.setting, [c for e in linear for c in self.columns_of(e, False)])
         residual = self.flights.residual(fit.setting)
         begun: dict[Column, dict[str, float]] = {}
         for effect in self.library:
@@ -224,6 +230,8 @@ class Search:
                 tries = [[*base, c] for c in regression.begun if c[0] == effect]
             else:
                 tries = [self.base(fit.effects, [effect])]
+                if not regression.columns.keys() >= set(tries[0]):
+                    continue
             best = Gain(effect, -np.inf, 0.0, np.inf, 0.0, fit)
             for wanted in tries:
                 index = g.index(wanted)
@@ -348,7 +356,7 @@ class Search:
         for size, allowed in ((2, least), (1, -SWAP_GAIN)):
             for group in itertools.combinations(fit.effects, size):
                 less = fit.without(*group)
-                regression = self.linearise(less)
+                regression = self.linearise(less, fit if len(fit.effects) > _FEW else None)
                 tries = [x for x in self.gains(less, regression, self.gram(less, regression)) if x.effect not in group]
                 for other in tries[:_SHORTLIST]:
                     # what is far from linear may do better than it looks here, but not by any amount

@@ -6,6 +6,7 @@ filter afterwards, ``low_pass``: a causal filter's output against unfiltered reg
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +42,12 @@ def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
     """Return ``x`` (n, ...) through a zero-phase fourth-order low-pass along its first axis."""
     if cutoff_hz >= 0.49 / period:
         return x
-    sections = butter(2, 2.0 * cutoff_hz * period, output="sos")
-    return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64)
+    return np.asarray(sosfiltfilt(_sections(2.0 * cutoff_hz * period), x, axis=0), dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def _sections(share_of_nyquist: float) -> Array:
+    return np.asarray(butter(2, share_of_nyquist, output="sos"))
 
 
 def log_signals(log: FlightLog, wide_hz: float = WIDE_HZ) -> list[Signals]:

@@ -62,6 +62,27 @@ def test_a_neighbour_of_the_missing_effect_is_tentative_or_not_alone():
     assert found.verdict in ("unexplained", "partly explained")
 
 
+def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
+    log = fly("mass", "vertical", dm=-0.013)
+    found = diagnose([log], load_vehicle("ardrone2"), without=["mass"])
+    assert "thrust_scale" in named(found)
+    assert all(e.tentative for e in found.effects)
+    assert any("moments" in note or "coincide" in note for note in found.notes)
+    (sure,) = diagnose([log], load_vehicle("ardrone2")).effects
+    assert not sure.tentative
+    assert "mass" in (sure.name, *sure.indistinguishable_from)
+
+
+def test_turn_rates_that_come_late_are_no_sign_of_structure():
+    """The pose's noise, moved in time with the pose, is in what a clock offset explains and in what it leaves."""
+    log = fly_practice(load_vehicle("ardrone2"), (EffectSetting("clock_offset", {"dt": -0.0306}),), seconds=40.0, seed=3,
+                       turbulence=0.0, sensor=2.0)
+    (found,) = diagnose([log], load_vehicle("ardrone2")).effects
+    assert found.name == "clock_offset"
+    assert not found.tentative
+    assert found.coefficients["dt"] == pytest.approx(-0.0306, abs=4.0 * found.std["dt"])
+
+
 def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
     """Four effects at once fill the model with two that stand for a third; what takes their place leaves room for the last."""
     truth = {"rotor_drag": {"kdx": 1.19e-4, "kdy": 1.19e-4}, "translational_lift": {"kh": 3.39e-3},

@@ -359,6 +359,27 @@ def test_latency_holds_at_a_rate_that_its_memory_could_not():
     np.testing.assert_allclose(out, 400.0 + 10.0 * (0.999 - 0.08), rtol=1e-12)
 
 
+@pytest.mark.parametrize("d", [0.0013, 0.0125, 0.0311])
+def test_latency_takes_nothing_from_what_falls_between_samples(d):
+    rotors, phase = Rotors(setting("latency", d=d)), 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
+    out = np.array([rotors(400.0 + 10.0 * np.sin(x + np.arange(4.0))) for x in phase])
+    wanted = 400.0 + 10.0 * np.sin(phase[:, None] - 2.0 * np.pi * 8.0 * d + np.arange(4.0))
+    np.testing.assert_allclose(out[20:], wanted[20:], atol=0.02)  # a line between two samples would be off by up to 0.08
+
+
+def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
+    rotors = Rotors(setting("latency", d=0.0125))
+    out = [rotors([600.0 * (k > 20)] * 4)[0] for k in range(40)]
+    assert min(out) == 0.0
+    assert max(out) == 600.0
+    rotors, t = Rotors(setting("latency", d=0.0125)), 0.0
+    for k in range(60):
+        dt = 0.03 if k % 4 == 0 else PERIOD
+        t += dt
+        out = rotors(400.0 + 10.0 * t * np.ones(4), dt=dt)
+    np.testing.assert_allclose(out, 400.0 + 10.0 * (t - 0.0125), rtol=1e-12)
+
+
 POSE = np.array([0.4, -1.2, 1.5])
 Q = Rotation.from_matrix(R).as_quat(scalar_first=True)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.equivalence import composites
+from windwrench.identification.equivalence import composites, unlisted
 from windwrench.identification.search import Fit
 
 FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
@@ -23,6 +23,24 @@ def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
     fit = Fit({"": {"rate_shift": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}})
     assert bool(composites(FLIGHTS, fit)) == doubtful
     assert not composites(FLIGHTS, Fit({"": {"rate_shift": shift}}))
+
+
+def test_what_coincides_within_its_noise_may_be_one_effect():
+    fit = Fit({"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}})
+    assert not composites(FLIGHTS, fit)
+    fit.std = {("thrust_scale", "s"): 3e-5, ("inertia", "jx"): 0.021, ("inertia", "jy"): 0.020, ("inertia", "jz"): 0.003}
+    assert len(composites(FLIGHTS, fit)) == 1
+    fit.std["inertia", "jx"] = 0.01
+    assert not composites(FLIGHTS, fit)
+
+
+@pytest.mark.parametrize(("dm", "cx", "hangs"), [(0.02, 0.0, True), (0.02, 0.002, False), (-0.02, 0.0, False)])
+def test_mass_and_a_centre_below_may_be_a_load_that_hangs(dm, cx, hangs):
+    fit = Fit({"mass": {"dm": dm}, "com_offset": {"cx": cx, "cy": 0.0, "cz": 0.004}})
+    library = ("mass", "thrust_scale", "com_offset")
+    assert bool(unlisted(SimpleNamespace(flights=FLIGHTS, library=library), fit)) == hangs
+    # where a load is in the library, it has been tried in their place
+    assert not unlisted(SimpleNamespace(flights=FLIGHTS, library=(*library, "slung_payload")), fit)
 
 
 def test_more_than_two_effects_may_stand_for_one():

@@ -36,6 +36,15 @@ def test_what_comes_after_the_residual_is_an_answer(late):
     assert is_law(flights(), white, 0.3 * np.roll(gusts, -late, axis=0), gusts)
 
 
+def test_an_answer_may_be_of_the_other_sign_and_well_after_a_first_that_is_not():
+    gusts = smooth(0)
+    answer = np.roll(gusts, 1, axis=0) - 1.5 * np.roll(gusts, 5, axis=0)
+    assert np.sum(answer * gusts) > 0.0
+    for sign in (1.0, -1.0):
+        assert not is_law(flights(), white, sign * answer, gusts)
+    assert is_law(flights(), white, answer, answer + 0.1 * gusts)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_small_law_in_much_noise_is_none(seed):
     law, noise = smooth(seed), np.random.default_rng(seed + 100).standard_normal((ROWS, 6))
