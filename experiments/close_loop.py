@@ -30,6 +30,7 @@ from ..dynamics.workers import shared_dict, workers
 from ..envs.fan_tracking import FanTrackingEnv
 from ..identification.diagnosis import diagnose
 from ..training.evaluate import benchmark_seeds, fly_episode
+from .code_stamp import code_stamp
 from .practice_flights import fly_practice, shown_in
 from .result import Progress
 
@@ -88,7 +89,8 @@ class Request:
         digest = hashlib.sha256(dump_vehicle(self.vehicle).encode()).hexdigest()[:16]
         return {"effect": self.effect.name, "coefficients": dict(self.effect.coefficients), "vehicle": self.vehicle.name,
                 "vehicle_digest": digest, "episodes": self.episodes, "seed": self.seed, "seconds": self.seconds,
-                "controller": CONTROLLER, "scenario": SCENARIO, "version": __version__}
+                "controller": CONTROLLER, "scenario": SCENARIO, "version": __version__,
+                "code": code_stamp("close_loop", "practice_flights")}
 
 
 def check_requests(requests: Sequence[Request]) -> None:
@@ -252,8 +254,8 @@ def close_loops(
 ) -> list[dict[str, Any]]:
     """Close the loop for every effect, side by side; keep each result as ``NAME.json`` in the folder as soon as it is there.
 
-    An effect whose result of the same request lies there already is not flown again, so that an interrupted run goes on
-    where it stopped. The results do not depend on ``jobs``.
+    An effect whose result of the same request, by the same code, lies there already is not flown again, so that an interrupted
+    run goes on where it stopped. The results do not depend on ``jobs``.
 
     Args:
         requests: one an effect.

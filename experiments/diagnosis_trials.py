@@ -5,7 +5,6 @@ one line of ``trials.jsonl``: an interrupted run goes on where it stopped, and a
 used. What the outcomes are worth is ``diagnosis_scores``' subject, and the page ``diagnosis_trials_page``'s.
 """
 
-import hashlib
 import json
 import os
 import time
@@ -14,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +29,7 @@ from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
 from ..identification.flight_log import FlightLog
 from ..identification.prediction import rollout_error
+from .code_stamp import code_stamp
 from .held_back_outsiders import HELD_BACK, practise_held_back
 from .outsiders import OUTSIDERS
 from .practice_flights import practise, shown_in
@@ -129,24 +128,14 @@ def plan(seeds: int = 1, quick: bool = False, first: int = 0) -> list[Trial]:
     return out
 
 
-@cache
-def code_stamp() -> str:
-    """Return a digest of the code that flies and diagnoses; outcomes of other code are not comparable."""
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    mine = [root / "experiments" / f"{name}.py" for name in (
-        "diagnosis_trials", "held_back_outsiders", "outsiders", "practice_flights", "rotorpy_flights")]
-    floors = [path for floor in ("dynamics", "estimator", "controllers", "identification", "envs")
-              for path in (root / floor).rglob("*") if path.suffix in (".py", ".yaml", ".xml")]
-    for path in sorted([*mine, *floors]):
-        digest.update(path.relative_to(root).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def stamp() -> str:
+    """Return a digest of the code that flies and diagnoses."""
+    return code_stamp("diagnosis_trials", "held_back_outsiders", "outsiders", "practice_flights", "rotorpy_flights")
 
 
 def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     """Return a trial's outcome as JSON: what was flown, and each diagnosis or the error that ended it."""
-    out: dict[str, Any] = {"key": trial.key, "code": code_stamp(), "trial": _plain(asdict(trial)), "diagnoses": []}
+    out: dict[str, Any] = {"key": trial.key, "code": stamp(), "trial": _plain(asdict(trial)), "diagnoses": []}
     begun = time.perf_counter()
     for attempt in range(_ATTEMPTS):
         # some draws, of two effects above all, no flight loop can fly
@@ -262,7 +251,7 @@ def _read(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         for text in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, KeyError, TypeError):
                 kept = json.loads(text)
-                if kept["code"] == code_stamp():
+                if kept["code"] == stamp():
                     yield kept["key"], kept
 
 

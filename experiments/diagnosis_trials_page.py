@@ -32,7 +32,7 @@ from .diagnosis_scores import (
     rules,
     undecided,
 )
-from .diagnosis_trials import EQUIVALENTS, code_stamp
+from .diagnosis_trials import EQUIVALENTS, stamp
 from .rotorpy_flights import available
 
 # how an outcome is drawn: colour, letter and the letter's colour
@@ -61,7 +61,7 @@ def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Pat
     """
     judged = [j for outcome in outcomes for j in judge(outcome)]
     data, picture = folder / "trials.json", folder / "trials.png"
-    kept = {"version": __version__, "code": code_stamp(), "seed": first, "seeds": seeds, "quick": quick,
+    kept = {"version": __version__, "code": stamp(), "seed": first, "seeds": seeds, "quick": quick,
             "rules": [asdict(rule) for rule in rules(judged)], "trials": outcomes}
     with replaced(data) as partial:
         partial.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")

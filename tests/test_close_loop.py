@@ -66,6 +66,10 @@ def test_what_is_finished_is_kept_and_what_was_asked_otherwise_is_not(short, mon
     assert shares[0] == {r.name: 1.0 for r in requests}
     with pytest.raises(pytest.fail.Exception, match="flown again"):
         close_loops([Request(requests[0].effect, VEHICLE, 2, 1, 20.0)], folder, jobs=1)
+    other = {**results[1], "request": {**results[1]["request"], "code": "0123456789abcdef"}}
+    (folder / f"{requests[1].name}.json").write_text(json.dumps(other), encoding="utf-8")
+    with pytest.raises(pytest.fail.Exception, match="flown again"):
+        close_loops(requests, folder, jobs=1)
     (folder / f"{requests[1].name}.json").write_text("{", encoding="utf-8")
     with pytest.raises(pytest.fail.Exception, match="flown again"):
         close_loops(requests, folder, jobs=1)
