@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.errors import InputError
@@ -81,12 +81,20 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
     q = q * np.concatenate([[1.0], np.cumprod(np.where(signs == 0, 1.0, signs))])[:, None]
     q = low_pass(np.column_stack([np.interp(t, log.t[rows], column) for column in q.T]), wide_hz, period)
     q /= np.linalg.norm(q, axis=1, keepdims=True)
-    dq = np.gradient(q, period, axis=0)
+    dq = _derivative(q, period)
     w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
     rate = 2.0 * (w * dv - dw * v - np.cross(v, dv))
     position = low_pass(even(log.position), wide_hz, period)
-    velocity = np.gradient(position, period, axis=0)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     speeds = np.column_stack([np.interp(t, log.t, column) for column in log.rotor_speeds.T])
-    return Signals(t, period, position, Rotation.from_quat(q, scalar_first=True).as_matrix(), velocity,
-                   np.gradient(velocity, period, axis=0), rate, np.gradient(rate, period, axis=0), speeds, voltage)
+    return Signals(t, period, position, Rotation.from_quat(q, scalar_first=True).as_matrix(), _derivative(position, period),
+                   _derivative(position, period, 2), rate, _derivative(rate, period), speeds, voltage)
+
+
+def _derivative(x: Array, period: float, order: int = 1) -> Array:
+    """Return a derivative of ``x`` (n, k) along its first axis, true to the fourth power of the period.
+
+    Central differences, applied twice, take a third of (omega period)^2 from an acceleration. The direction of thrust loses
+    nothing, and the difference, 0.08 mm times the angular acceleration at 200 Hz, would be a centre of mass that is off.
+    """
+    return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
