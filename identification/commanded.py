@@ -65,6 +65,12 @@ def mates(effect: str) -> frozenset[str]:
     return next((group - {effect} for group in _ALIKE if effect in group), frozenset())
 
 
+def takes_back(setting: Mapping[str, Mapping[str, float]], weight: float) -> bool:
+    """Return whether a constant force works against the thrust's scale, by half as much or more: a guess against a guess."""
+    force, scale = setting.get("constant_force", {}).get("fz", 0.0), setting.get("thrust_scale", {}).get("s", 0.0)
+    return force * scale < 0.0 and abs(force) > 0.5 * abs(scale) * weight
+
+
 def deviations(count: int) -> list[tuple[str, str]]:
     """Return the columns of the deviations of ``count`` flights; none of a single one."""
     return [("", f"{kind} {i}") for kind in SIZES for i in range(1, count)]

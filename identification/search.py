@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
-from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
+from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates, takes_back
 from .feedback import ANSWERS_SHARE, is_law
 from .regression import (
     CENTRAL,
@@ -326,9 +326,10 @@ class Search:
         before = explained(self.base(fit.effects))
         return is_law(self.flights, self.whiten, explained(self.base(fit.effects, [gain.effect])) - before, residual - before)
 
-    @staticmethod
-    def _plausible(gain: "Gain", count: int) -> bool:
+    def _plausible(self, gain: "Gain", count: int) -> bool:
         """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""
+        if takes_back(gain.fit.setting, self.flights.vehicle.weight):
+            return False
         return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (gain.effect not in STARTS or gain.share > LEAST_OF_STARTS)
 
     def prune(self, fit: Fit) -> Fit:
