@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 
 LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
 LEAST_SHARE = 0.01  # and as a share of what is left unexplained
+# and of what is explained already: laws are no truer than a per cent or so in force, if only for the velocity that they ask
+# for and that a log tells some 2 ms late
+LEAST_OF_EXPLAINED = 2e-4
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
 PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
@@ -297,7 +300,7 @@ class Search:
             g = self.gram(fit, regression)
             gains = self.gains(fit, regression, g)
             first = first or gains
-            least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
+            least = self._least(fit, g.error(g.index(self.base(fit.effects))))
             better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
@@ -312,6 +315,13 @@ class Search:
                 break
             fit = more
         return fit, first
+
+    def _least(self, fit: Fit, error: float) -> float:
+        """Return the energy that an effect must explain beside a fit that leaves ``error``."""
+        explained = 0.0
+        if fit.effects and not self.flights.commanded:
+            explained = self.whitened_energy(self.flights.residual({}) - self.flights.residual(fit.setting))
+        return max(self._least_gain, self._least_share * error, LEAST_OF_EXPLAINED * explained)
 
     def _is_law(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
         """Return whether what an effect adds to a fit acts as a law on what the fit leaves."""
@@ -346,7 +356,7 @@ class Search:
         return fit
 
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
-        least = max(self._least_gain, self._least_share * error)
+        least = self._least(fit, error)
         for effect in fit.effects:
             if not self.held(effect) and self.error_without(fit, effect) < error + least:
                 self._report(f"{effect} is not needed")

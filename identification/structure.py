@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from .feedback import ANSWERS_SHARE, is_law
 from .findings import CHANNELS, Structure
-from .regression import CENTRAL, CUTOFF_HZ, LATE, Flights, Setting
+from .regression import CENTRAL, CUTOFF_HZ, LATE, Column, Flights, Setting
 from .search import Fit, Search
 from .selection import Gram
 from .signals import low_pass
@@ -131,6 +131,7 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
         words.append(("a general dictionary", f"{channel_words} with {drive}"))
         columns.append(column)
     residual = flights.residual(fit.setting)
+    base = flights.columns(fit.setting, regression.columns, 0.1)
     known = scaled(drives(flights, fit.setting))
     for effect in fit.effects:
         share = _share(flights, fit, effect, residual)
@@ -150,7 +151,7 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for (test, where), column, gain, spread in zip(words[at : at + _BATCH], batch, gains, spreads, strict=True):
             if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE) and not (
-                    gain < ANSWERS_SHARE * error and not _is_law(search, fit, regression, column, residual)):
+                    gain < ANSWERS_SHARE * error and not _is_law(search, regression, base, column, residual)):
                 found.append(Structure(test, where, float(gain) / error))
     return sorted(found, key=lambda s: -s.gain)
 
@@ -168,9 +169,8 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     return sum((value * columns[effect, name] for name, value in own.items()), np.zeros_like(residual))
 
 
-def _is_law(search: Search, fit: Fit, g: Gram, column: Array, residual: Array) -> bool:
-    """Return whether what a column (rows, 6) adds to a fit acts as a law on what the fit leaves."""
-    base = search.flights.columns(fit.setting, g.columns, 0.1)
+def _is_law(search: Search, g: Gram, base: dict[Column, Array], column: Array, residual: Array) -> bool:
+    """Return whether what a column (rows, 6) adds to a fit, with columns ``base``, acts as a law on what the fit leaves."""
     k = len(g.columns)
     cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
