@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get, names
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import Vehicle
+from .bounds import beyond_belief
 from .commanded import shared
 from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
@@ -69,6 +70,8 @@ def diagnose(
     report("looking for what is left")
     signs = structure(search, fit)
     mimics = [*composites(flights, fit), *unlisted(search, fit)]
+    if not flights.commanded:
+        mimics += beyond_belief(search, fit)
 
     before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
     held = ~flights.fit

@@ -1,0 +1,39 @@
+"""Whether a named effect leaves the range in which its law is believed.
+
+A law that stands for another one is often bent to its limit: a dry friction, named a drag, wants a quadratic part below zero.
+The truth sits at a bound too where a coefficient is zero, but nothing pulls it beyond.
+"""
+
+import numpy as np
+
+from .regression import CENTRAL, typical
+from .search import Fit, Search
+
+_PULL = 3.5  # standard deviations beyond a bound; those of true laws are within 2
+_SHARE = 0.05  # of the effect's own size, by which it must be beyond: laws are no truer than that
+_LARGEST = 10.0  # typical sizes
+_ANY_SIZE = frozenset({"mass", "thrust_scale", "com_offset", "constant_force", "constant_torque"})
+
+
+def beyond_belief(search: Search, fit: Fit) -> list[str]:
+    """Return in words which coefficients would leave their range if they could, or are larger than a law of theirs ever is."""
+    vehicle = search.flights.vehicle
+    found = []
+    size = {effect: max((abs(v) / typical((effect, k), vehicle) for k, v in fit.setting[effect].items() if k != CENTRAL),
+                        default=0.0) for effect in fit.effects}
+    for effect in fit.effects:
+        if size[effect] > _LARGEST and effect not in _ANY_SIZE:
+            found.append(f"{effect} would be {size[effect]:.0f} times what it typically is: another effect may be behind it")
+    g = search.at(fit)
+    total, k = g.blocks.sum(axis=0), len(g.columns)
+    normal = total[:k, :k] + np.diag(g.precision)
+    change = np.linalg.solve(normal, total[:k, -1] - g.precision * g.value)
+    std = np.sqrt(np.diag(np.linalg.inv(normal)))
+    beyond: dict[str, list[str]] = {}
+    for (effect, name), d, s, low, high in zip(g.columns, change, std, g.lower, g.upper, strict=True):
+        least = _SHARE * typical((effect, name), vehicle) * (1.0 if name == CENTRAL else size.get(effect, 0.0))
+        if effect and ((low >= 0.0 and d < 0.0) or (high <= 0.0 and d > 0.0)) and abs(d) > max(_PULL * s, least):
+            beyond.setdefault(effect, []).append(name)
+    found += [f"{effect} would leave its range if it could, with {', '.join(names)}: another effect may be behind the name"
+              for effect, names in beyond.items()]
+    return found

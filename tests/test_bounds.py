@@ -1,0 +1,56 @@
+"""A named effect that is bent to the limits of its law is no sure name."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import load_vehicle
+from windwrench.experiments.practice_flights import fly_practice
+from windwrench.identification.bounds import beyond_belief
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.search import Fit
+from windwrench.identification.selection import Gram
+
+VEHICLE = load_vehicle("ardrone2")
+
+
+def search(columns, pulls, precision=1e8):
+    """A search whose regression would move each coefficient, all at zero, by so many standard deviations."""
+    count = len(columns)
+    std = 1.0 / np.sqrt(precision)
+    block = np.zeros((1, count + 1, count + 1))
+    block[0, :count, :count] = precision * np.eye(count)
+    block[0, :count, -1] = precision * std * np.array(pulls)
+    zero, far = np.zeros(count), np.full(count, np.inf)
+    gram = Gram(tuple(columns), np.zeros((0, 6, count + 1)), np.zeros(1, dtype=np.intp), block, zero, zero, zero, far)
+    return SimpleNamespace(flights=SimpleNamespace(vehicle=VEHICLE), at=lambda fit: gram)
+
+
+@pytest.mark.parametrize(("pull", "doubtful"), [(-6.0, True), (-2.0, False), (0.0, False), (6.0, False)])
+def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
+    columns = [("body_drag", "dx"), ("body_drag", "cx")]
+    fit = Fit({"body_drag": {"dx": 1e-4, "cx": 0.0}})
+    found = beyond_belief(search(columns, [1.0, pull]), fit)
+    assert bool(found) == doubtful
+    assert not doubtful or "cx" in found[0]
+
+
+def test_what_is_small_beside_the_effect_itself_is_no_doubt():
+    columns = [("body_drag", "dx"), ("body_drag", "cx")]
+    fit = Fit({"body_drag": {"dx": 0.1, "cx": 0.0}})
+    assert not beyond_belief(search(columns, [1.0, -6.0]), fit)
+
+
+def test_a_wind_that_no_room_has_is_a_doubt_and_any_mass_is_none():
+    columns = [("wind", "wx"), ("mass", "dm")]
+    assert beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 30.0, "cd": 1e-5}}))
+    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 2.0, "cd": 1e-4}}))
+    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"mass": {"dm": 1.0}}))
+
+
+def test_a_dry_friction_is_no_sure_drag():
+    log = fly_practice(VEHICLE, trajectory="vertical", seconds=40.0, seed=3, outsider="dry_friction", sensor=2.0)
+    found = diagnose([log], VEHICLE)
+    assert found.verdict in ("partly explained", "unexplained")
+    assert all(effect.tentative for effect in found.effects)
