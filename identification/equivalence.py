@@ -7,7 +7,7 @@ the noise, by which the flights can tell the two apart.
 import numpy as np
 from numpy.typing import NDArray
 
-from .regression import CENTRAL, SHIFT, SHIFT_RANGE, Flights
+from .regression import CENTRAL, SHIFT, SHIFT_RANGE, Flights, coefficient
 from .search import Fit, Search
 from .selection import BELIEVED, PRIOR, gram
 from .turning import ALIKE
@@ -76,7 +76,8 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
         if effect not in fit.effects or mate in search.library or "inertia" in fit.effects or flights.commanded:
             continue
         value = next(iter(fit.setting[effect].values()))
-        share = value / flights.vehicle.mass if effect == "mass" else value
+        jx = coefficient(("inertia", "jx"))
+        share = float(np.clip(value / flights.vehicle.mass if effect == "mass" else value, jx.minimum, jx.maximum))
         whole = flights.residual(fit.setting)
         moments = flights.residual({**fit.setting, "inertia": dict.fromkeys(_AXES, share)}) - whole
         g = gram(flights, fit.setting, search.whiten, flights.columns(fit.setting, search.base(fit.effects), 0.1), moments)
