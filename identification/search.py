@@ -40,7 +40,7 @@ LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must expl
 LEAST_SHARE = 0.01  # and as a share of what is left unexplained
 # and of what is explained already: laws are no truer than a per cent or so in force, if only for the velocity that they ask
 # for and that a log tells some 2 ms late
-LEAST_OF_EXPLAINED = 2e-4
+LEAST_OF_EXPLAINED = 1.4e-4
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
 PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
