@@ -57,7 +57,9 @@ START = "start "  # a whole effect at coefficients of its own; the column is a m
 SHIFT_RANGE = (-0.006, 0.006)  # s
 SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
 LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
-NUISANCES = (SHIFT, LEAN)
+# s, by which the velocity that a law asks for is behind the position's: a simulator that holds its forces over a step has it
+LAG = ("", "velocity_shift")
+NUISANCES = (SHIFT, LEAN, LAG)
 
 
 def coefficient(column: Column) -> Coefficient:
@@ -249,7 +251,7 @@ class Flights:
         return self._needs[id(piece)][1]
 
     def _shifted(self, piece: Piece, shifts: Mapping[str, float], scale: float) -> Signals:
-        key = (id(piece), shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0), scale)
+        key = (id(piece), shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0), shifts.get(LAG[1], 0.0), scale)
         if key not in self._moved:
             if len(self._moved) > 4 * len(self._first):
                 self._moved.clear()
@@ -324,7 +326,7 @@ def _rows(signals: Signals) -> Index:
 
 
 def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) -> Signals:
-    """Return the signals with turn rates and attitude moved to when they act, and thrust scaled by 1 + ``scale``."""
+    """Return the signals with turn rates, velocity and attitude moved to when they act, and thrust scaled by 1 + ``scale``."""
     if scale != 0.0:
         signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
     late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
@@ -333,6 +335,8 @@ def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) 
         at = np.clip(np.arange(n) - late / signals.period, 0, n - 1)
         speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
+    if (lag := shifts.get(LAG[1], 0.0)) != 0.0:
+        signals = replace(signals, velocity=signals.velocity - lag * signals.acceleration)
     if lean != 0.0:
         turn = Rotation.from_rotvec(-lean * signals.rate).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)

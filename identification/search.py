@@ -16,6 +16,7 @@ from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates, takes_back
 from .feedback import ANSWERS_SHARE, is_law
 from .regression import (
     CENTRAL,
+    LAG,
     LATE,
     LEAN,
     MOMENT,
@@ -38,9 +39,6 @@ Array = NDArray[np.float64]
 
 LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
 LEAST_SHARE = 0.01  # and as a share of what is left unexplained
-# and of what is explained already: laws are no truer than a per cent or so in force, if only for the velocity that they ask
-# for and that a log tells some 2 ms late
-LEAST_OF_EXPLAINED = 1.4e-4
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
 PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
@@ -118,7 +116,8 @@ class Search:
     def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: its effects', those of effects that are tried, and the shift that any log may have."""
         shift = [] if self.flights.commanded or TIMING & {*effects, *tried} else [SHIFT]
-        return [*shift, LEAN, *self.flights.deviations,
+        lag = [] if self.flights.commanded else [LAG]
+        return [*shift, LEAN, *lag, *self.flights.deviations,
                 *(c for e in effects for c in self.columns_of(e, True)), *(c for e in tried for c in self.columns_of(e, False))]
 
     def linearise(self, fit: Fit, near: Fit | None = None) -> "Regression":
@@ -300,7 +299,7 @@ class Search:
             g = self.gram(fit, regression)
             gains = self.gains(fit, regression, g)
             first = first or gains
-            least = self._least(fit, g.error(g.index(self.base(fit.effects))))
+            least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
             better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
@@ -315,13 +314,6 @@ class Search:
                 break
             fit = more
         return fit, first
-
-    def _least(self, fit: Fit, error: float) -> float:
-        """Return the energy that an effect must explain beside a fit that leaves ``error``."""
-        explained = 0.0
-        if fit.effects and not self.flights.commanded:
-            explained = self.whitened_energy(self.flights.residual({}) - self.flights.residual(fit.setting))
-        return max(self._least_gain, self._least_share * error, LEAST_OF_EXPLAINED * explained)
 
     def _is_law(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
         """Return whether what an effect adds to a fit acts as a law on what the fit leaves."""
@@ -356,7 +348,7 @@ class Search:
         return fit
 
     def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
-        least = self._least(fit, error)
+        least = max(self._least_gain, self._least_share * error)
         for effect in fit.effects:
             if not self.held(effect) and self.error_without(fit, effect) < error + least:
                 self._report(f"{effect} is not needed")
