@@ -9,13 +9,16 @@ import pytest
 from data_paths import data_file
 
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.effects import names
 from windwrench.dynamics.errors import InputError
+from windwrench.envs.plant import TICK
 from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.flight_log import FlightLog, read_log
 from windwrench.identification.floor import sensor_noise, with_noise
 from windwrench.identification.regression import Flights
+from windwrench.identification.search import Search
 from windwrench.identification.whitening import Whitener
 
 
@@ -81,6 +84,17 @@ def test_turn_rates_that_come_late_are_no_sign_of_structure():
     assert found.name == "clock_offset"
     assert not found.tentative
     assert found.coefficients["dt"] == pytest.approx(-0.0306, abs=4.0 * found.std["dt"])
+
+
+def test_the_velocity_of_a_plant_that_holds_its_forces_is_half_a_tick_behind():
+    """Taken as in step, it would be a thrust that is off by 2e-3 of what acceleration asks for, and get a name."""
+    log = fly_practice(load_vehicle("ardrone2"), (EffectSetting("inflow_thrust", {"kz": 2.3e-4}),), seconds=40.0, seed=3,
+                       turbulence=0.0, sensor=0.5)
+    fit, _ = Search(Flights([log], load_vehicle("ardrone2")), names()).find()
+    assert fit.effects == ["inflow_thrust"]
+    assert fit.setting["inflow_thrust"]["kz"] == pytest.approx(2.3e-4, rel=0.01)
+    assert fit.setting[""]["velocity_shift"] == pytest.approx(0.5 * TICK, abs=4.0 * fit.std["", "velocity_shift"])
+    assert fit.std["", "velocity_shift"] < 0.15 * TICK
 
 
 def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
