@@ -17,8 +17,9 @@ from windwrench.envs.scenarios import SCENARIOS
 
 KEPT = json.loads(GOLDEN.read_text(encoding="utf-8"))
 # Not bit for bit: compilers of other processors contract and order sums otherwise, and the loop's feedback lets that grow
-# to some 1e-12 within 3 s. Observations are of single precision.
-TOLERANCE = {"observation": 1e-6, "wrench": 1e-9, "y": 1e-9, "reward": 1e-9}
+# within 3 s, to some 1e-12 on most and to 1.5e-8 (scenario noisy) between two that were tried. Observations are of single
+# precision.
+TOLERANCE = {"observation": 1e-6, "wrench": 1e-6, "y": 1e-6, "reward": 1e-6}
 COMMANDS = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 1)).astype(np.float32)
 
 
