@@ -18,6 +18,7 @@ from .commanded import shared
 from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
+from .innovations import Innovations, at_odds
 from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
 from .screening import LEAST_SECONDS, screen_log
@@ -31,6 +32,7 @@ AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has
 LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
 _FAINT = 0.1  # share of the remainder's energy: a name that explains less beside a large remainder is tentative
 _POINTS = 600  # of a signature
+_LEAST_SHIFT = 0.001  # s, of the turn rates, worth a note
 
 
 def diagnose(
@@ -68,17 +70,17 @@ def diagnose(
     report("asking what else it could be")
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")
-    signs = structure(search, fit)
+    signs, gusty = structure(search, fit)
     mimics = [*composites(flights, fit), *unlisted(search, fit)]
     if not flights.commanded:
-        mimics += beyond_belief(search, fit)
+        mimics += [*beyond_belief(search, fit), *at_odds(flights, fit.setting)]
 
     before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
     held = ~flights.fit
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held]), _rms(after[held])
     noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
-    remainder = "structured" if signs else "random" if noisy else "none"
+    remainder = "structured" if signs else "random" if noisy or gusty else "none"
     effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), noisy) for effect in fit.effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = ("explained" if sure else "partly explained") if effects else (
@@ -87,8 +89,10 @@ def diagnose(
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
-    shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
-    if abs(shift) > 0.001:
+    nuisances = fit.setting.get(SHIFT[0], {})
+    shift = nuisances.get(SHIFT[1], 0.0)
+    if abs(shift) > _LEAST_SHIFT and Innovations(flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}).confirm(
+            fit.setting):
         notes.append(f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than at their sample")
     return Diagnosis(
         verdict=verdict,
@@ -104,7 +108,7 @@ def diagnose(
         candidates=_candidates(first, fit, search),
         traces=tuple(_traces(flights, before, after)),
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
-        structure=tuple(signs[:12]),
+        structure=tuple(signs),
         cutoff_hz=CUTOFF_HZ,
         declared=vehicle,
         amended=amended,

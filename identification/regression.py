@@ -219,6 +219,15 @@ class Flights:
         It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and all, with the mass; and no
         noise of differentiation is multiplied by a coefficient.
         """
+        pieces = zip(self.pieces(setting), self.model(setting), strict=True)
+        return np.concatenate([self._needed(piece) - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
+                               for piece, model in pieces])
+
+    def model(self, setting: Setting) -> list[Array]:
+        """Return the force and the torque (n, 6) of each sample of each piece that these effects say act on the vehicle.
+
+        Force is in the world frame, without the weight; both are by the declared mass and inertia, as the residual is.
+        """
         vehicle = self.amended(setting)
         shifts = setting.get(SHIFT[0], {})
         out = []
@@ -237,8 +246,8 @@ class Flights:
                 turning = np.cross(s.rate, s.rate @ body.inertia.T)
                 model[:, 3:] = (rotors[:, 1:] + effects[:, 3:] - turning) @ np.linalg.solve(body.inertia.T,
                                                                                          self.vehicle.inertia.T)
-            out.append(self._needed(piece) - low_pass(model, CUTOFF_HZ, s.period)[piece.rows])
-        return np.concatenate(out)
+            out.append(model)
+        return out
 
     def _needed(self, piece: Piece) -> Array:
         """Return what the measured motion of a piece needs (rows, 6), by the declared mass and inertia."""

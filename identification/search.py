@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
 from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates, takes_back
-from .feedback import ANSWERS_SHARE, is_law
+from .innovations import Innovations
 from .regression import (
     CENTRAL,
     LAG,
-    LATE,
     LEAN,
     MOMENT,
     SHIFT,
@@ -303,30 +302,20 @@ class Search:
             better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
+            innovations = None if self.flights.commanded else Innovations(self.flights, fit.setting)
             for gain in better:
-                if not self.flights.commanded and not self._is_law(fit, regression, g, gain):
-                    continue
                 self._report(f"trying {gain.effect}")
                 more = self.refit(gain.fit)
-                if not (self.flights.commanded and barely_swings(more.setting, self.flights.vehicle.gravity)):
+                if innovations is None:
+                    taken = not barely_swings(more.setting, self.flights.vehicle.gravity)
+                else:
+                    taken = innovations.confirm(more.setting)
+                if taken:
                     break
             else:
                 break
             fit = more
         return fit, first
-
-    def _is_law(self, fit: Fit, regression: "Regression", g: Gram, gain: "Gain") -> bool:
-        """Return whether what an effect adds to a fit acts as a law on what the fit leaves."""
-        if gain.share > ANSWERS_SHARE or gain.effect in STARTS or gain.effect in LATE:  # a swing or a time of its own
-            return True
-        total, residual = g.blocks.sum(axis=0), regression.residual
-
-        def explained(columns: Sequence[Column]) -> Array:
-            x = np.stack([np.zeros_like(residual), *(regression.columns[c] for c in columns)], axis=2)
-            return np.asarray(x[..., 1:] @ g.solve(total, g.index(columns)))
-
-        before = explained(self.base(fit.effects))
-        return is_law(self.flights, self.whiten, explained(self.base(fit.effects, [gain.effect])) - before, residual - before)
 
     def _plausible(self, gain: "Gain", count: int) -> bool:
         """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""

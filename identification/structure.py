@@ -6,14 +6,15 @@ change with speed, height, load or time, or its force, in one channel, would rat
 Each column is tried alone, on blocks that are left out in turn.
 """
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .feedback import ANSWERS_SHARE, is_law
 from .findings import CHANNELS, Structure
+from .innovations import Innovations
 from .regression import CENTRAL, CUTOFF_HZ, LATE, Column, Flights, Setting
 from .search import Fit, Search
 from .selection import Gram
@@ -32,6 +33,8 @@ _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "tur
           "voltage": 0.05}  # in the drives' units: what varies by less says nothing
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _BATCH = 24  # columns at a time
+MOST = 12  # signs, the strongest
+_ASKED = 36  # of the innovations, which takes its time
 
 Drive = tuple[str, Array]  # in words, (rows,)
 
@@ -102,11 +105,13 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
             shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
         shapes[f"tilt {a}"] = rotation[:, 2, i]
-    for k in range(6):  # bumps in time and in height
-        for name, limits in (("time", flights.t), ("height", np.concatenate([p.signals.position[p.rows, 2] for p in pieces]))):
-            low, high = np.quantile(limits, [0.02, 0.98])
-            shapes[f"{name} near {low + (high - low) * k / 5:.3g}"] = np.maximum(
-                0.0, 1.0 - np.abs(limits - low - (high - low) * k / 5) / (0.2 * (high - low) + 1e-9))
+    limits = {"time": flights.t}
+    if "height" in known:
+        limits["height"] = np.concatenate([p.signals.position[p.rows, 2] for p in pieces])
+    for name, x in limits.items():  # bumps
+        low, high = np.quantile(x, [0.02, 0.98])
+        for center in np.linspace(low, high, 6):
+            shapes[f"{name} near {center:.3g}"] = np.maximum(0.0, 1.0 - np.abs(x - center) / (0.2 * (high - low) + 1e-9))
     shapes["nothing (a constant)"] = np.ones(len(rotation))
     for name, x in shapes.items():
         for channel in range(6):
@@ -119,8 +124,11 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
                 yield f"force along body {'xyz'[channel]}", name, column
 
 
-def structure(search: Search, fit: Fit) -> list[Structure]:
-    """Return the signs of a law in what a fit leaves, the strongest first; none for a fit that explains it all."""
+def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
+    """Return the strongest signs of a law in what a fit leaves, the first first, and whether it looks as if there were any.
+
+    What looks like a law and is not confirmed by the innovations may be the flight loop's answer to gusts.
+    """
     flights = search.flights
     regression = search.at(fit)
     error = regression.error(np.arange(len(regression.columns)))
@@ -150,10 +158,15 @@ def structure(search: Search, fit: Fit) -> list[Structure]:
         batch = columns[at : at + _BATCH]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for (test, where), column, gain, spread in zip(words[at : at + _BATCH], batch, gains, spreads, strict=True):
-            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE) and not (
-                    gain < ANSWERS_SHARE * error and not _is_law(search, regression, base, column, residual)):
-                found.append(Structure(test, where, float(gain) / error))
-    return sorted(found, key=lambda s: -s.gain)
+            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE):
+                found.append((Structure(test, where, float(gain) / error), column))
+    found.sort(key=lambda x: -x[0].gain)
+    if flights.commanded or not found:
+        return [sign for sign, _ in found[:MOST]], bool(found)
+    innovations = Innovations(flights, fit.setting)
+    laws = (sign for sign, column in found[:_ASKED]
+            if innovations.confirm_column(_added(search, regression, base, column)))
+    return list(itertools.islice(laws, MOST)), True
 
 
 def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
@@ -169,13 +182,15 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     return sum((value * columns[effect, name] for name, value in own.items()), np.zeros_like(residual))
 
 
-def _is_law(search: Search, g: Gram, base: dict[Column, Array], column: Array, residual: Array) -> bool:
-    """Return whether what a column (rows, 6) adds to a fit, with columns ``base``, acts as a law on what the fit leaves."""
+def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) -> Array:
+    """Return what the best multiple of a column (rows, 6) adds to a fit with columns ``base``."""
     k = len(g.columns)
-    cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
+    fit = search.flights.fit
+    cross = np.tensordot(g.design[..., :k], search.whiten(column)[fit], axes=([0, 1], [0, 1]))
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
     alone = column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
-    return is_law(search.flights, search.whiten, alone, residual)
+    x = search.whiten(alone)[fit]
+    return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

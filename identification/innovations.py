@@ -1,0 +1,186 @@
+"""Whether what seems to explain a residual acts on the vehicle, or is the flight loop's answer to gusts.
+
+A flight loop works against every gust, so rotors, attitude and velocity follow it, and a law of one of these seems to explain
+it. Looked at from the past alone it does not: what no past pose foretells of the next one, the innovation of a filter that
+knows how gusts last, no answer can have followed yet. So a change of the model is asked how much of itself the innovations
+confirm: all of it if it is a law, nothing if it is an answer, unknown as the loop is. (With a model of the noise, prediction
+errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm, solve_discrete_are
+from scipy.optimize import minimize
+from scipy.signal import lfilter, ss2tf
+from scipy.spatial.transform import Rotation
+
+from .regression import SHIFT, Flights, Piece, Setting
+from .sensing import undo_log_sensing
+from .signals import Signals, log_signals
+
+Array = NDArray[np.float64]
+
+_SHARE = 0.5  # laws have 0.8 to 1.4, answers -5 to 0.2
+_ENERGY = 20.0  # in units of the innovations' variance, that it must explain: chance explains one
+_AT_ODDS, _SURELY = 0.05, 2.0  # of a share beside one, and its standard deviations; 194 true effects had 0.9 of these at most
+_SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
+_GUSTS = (np.log(1e4), np.log(0.25))  # where the search for the gusts begins: their strength and their time (s)
+_BOUNDS = (np.log(1e-3), np.log(1e14)), (np.log(0.02), np.log(2.0))
+_FINE = {"xatol": 0.1, "fatol": 1e-4, "maxiter": 60}
+_LEAST = 1e-300
+_CLOCK = "clock_offset", "dt"
+
+
+class Innovations:
+    """What flights confirm of changes of a model.
+
+    Args:
+        flights: whose rotors are measured.
+        setting: the effects of the model.
+    """
+
+    def __init__(self, flights: Flights, setting: Setting) -> None:
+        self._flights, self._setting = flights, setting
+        self._motions = self._seen(setting)
+        self._counts = []
+        rows = np.split(flights.fit, np.flatnonzero(flights.start)[1:])
+        for piece, fit in zip(flights.pieces(setting), rows, strict=True):
+            t, k = piece.signals.t, np.arange(len(piece.signals.t))
+            near = fit[np.searchsorted(piece.rows, k).clip(max=len(fit) - 1)]
+            self._counts.append(near & (t > t[0] + _SETTLED) & (k <= piece.rows[-1]))
+
+    def confirm(self, after: Setting) -> bool:
+        """Return whether innovations confirm the change to the effects ``after``."""
+        return _confirmed(*self.share(after))
+
+    def share(self, after: Setting) -> tuple[float, float]:
+        """Return the share of that change which makes the innovations least, and the energy that it then explains."""
+        return self._share([new - old for old, new in zip(self._motions, self._seen(self._timed(after)), strict=True)])
+
+    def confirm_column(self, column: Array) -> bool:
+        """Return whether they confirm a change of the model's force (N, world) and torque (Nm, body) at the rows (rows, 6)."""
+        changes = []
+        parts = np.split(column, np.flatnonzero(self._flights.start)[1:])
+        for motion, piece, part in zip(self._motions, self._flights.pieces(self._setting), parts, strict=True):
+            change = np.zeros_like(motion)
+            at = np.arange(motion.shape[1]).clip(piece.rows[0], piece.rows[-1])
+            change[1] = self._accelerations(CubicSpline(piece.rows, part)(at))
+            changes.append(change)
+        return _confirmed(*self._share(changes))
+
+    def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
+        """Return the share of changes of the motions that makes the innovations least, of all axes together, and its energy.
+
+        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration, whose strength and time are those that make its
+        innovations least, together with a share (maximum likelihood).
+        """
+        cross, square = 0.0, _LEAST
+        for axis in range(6):
+            if any(np.any(change[..., axis]) for change in changes):
+                e, x = self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
+                                   for motion, change in zip(self._motions, changes, strict=True)])
+                variance = _left(e, x) / len(e)
+                cross, square = cross + float(e @ x) / variance, square + float(x @ x) / variance
+        return cross / square, cross * cross / square
+
+    def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the innovations (n,) of one axis, and of a change, with the gusts that suit them; each piece is (2, n, 2)."""
+        def innovations(gusts: Array) -> tuple[Array, Array]:
+            found = [_innovations(pose, drive, float(gusts[0]), float(gusts[1]), piece.signals.period)[counts]
+                     for (pose, drive), piece, counts in
+                     zip(both, self._flights.pieces(self._setting), self._counts, strict=True)]
+            e, x = np.concatenate(found).T
+            return e, x
+
+        def loss(gusts: Array) -> float:
+            return float(np.log(_left(*innovations(gusts))))
+
+        return innovations(minimize(loss, np.array(_GUSTS), method="Nelder-Mead", bounds=_BOUNDS, options=_FINE).x)
+
+    def _timed(self, after: Setting) -> Setting:
+        """Return ``after`` with a change of the clock made by moving the turn rates: moved poses take their noise along."""
+        effect, name = _CLOCK
+        if effect not in after:
+            return after
+        own = self._setting.get(effect, {})
+        shifts = dict(after.get(SHIFT[0], {}))
+        shifts[SHIFT[1]] = shifts.get(SHIFT[1], 0.0) + after[effect][name] - own.get(name, 0.0)
+        return {**{k: v for k, v in after.items() if k != effect}, SHIFT[0]: shifts, **({effect: own} if own else {})}
+
+    def _seen(self, setting: Setting) -> list[Array]:
+        """Return of each piece (2, n, 6) the pose as measured, and the model's acceleration, linear (world) and angular (body).
+
+        The pose's angle (rad) is what the body rates add up to. The attitude is always the same: a gain of it would make the
+        innovations small by taking their own noise away.
+        """
+        out = []
+        pieces = self._flights.pieces(setting)
+        for piece, like, model in zip(pieces, self._flights.pieces(self._setting), self._flights.model(setting), strict=True):
+            position, turned = self._raw(setting, piece).position, Rotation.from_matrix(self._raw(self._setting, like).rotation)
+            angle = np.vstack([np.zeros(3), np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)])
+            pose = np.column_stack([position - position[0], angle])
+            begun = np.concatenate([like.signals.velocity[0], like.signals.rate[0]])
+            fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+            out.append(np.stack([pose - np.outer(piece.signals.t - piece.signals.t[0], begun),
+                                 self._accelerations(model) - fallen]))
+        return out
+
+    def _raw(self, setting: Setting, piece: Piece) -> Signals:
+        """Return the motion of a piece as it was measured, without the low-pass that knows of the future."""
+        log = undo_log_sensing(self._flights.logs[piece.log], self._flights.amended(setting))
+        return next(s for s in log_signals(log, np.inf) if s.t[0] == piece.signals.t[0])
+
+    def _accelerations(self, wrench: Array) -> Array:
+        """Return the linear and the angular acceleration (n, 6) of a force and a torque (n, 6)."""
+        vehicle = self._flights.vehicle
+        return np.column_stack([wrench[:, :3] / vehicle.mass, np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T])
+
+
+def _confirmed(share: float, energy: float) -> bool:
+    return share > _SHARE and energy > _ENERGY
+
+
+def at_odds(flights: Flights, setting: Setting) -> list[str]:
+    """Return, in words, which effects of a fitted setting are not what the innovations make of them.
+
+    A law is the same below 5 Hz, from both sides, as it is from the past alone and at all frequencies; what merely stands for
+    another one seldom is. (Two estimates that must agree: J. A. Hausman, Econometrica 46 (1978), 1251-1271.)
+    """
+    out = []
+    for effect in filter(None, setting):
+        share, energy = Innovations(flights, {k: v for k, v in setting.items() if k != effect}).share(setting)
+        if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _LEAST))):
+            out.append(f"{effect}: what no past pose foretells bears out {share:.0%} of it: another effect may be behind it")
+    return out
+
+
+def _left(e: Array, x: Array) -> float:
+    """Return the energy that the best multiple of ``x`` leaves of ``e``."""
+    return max(float(e @ e) - float(e @ x) ** 2 / max(float(x @ x), _LEAST), _LEAST)
+
+
+def _innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
+    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) drives, and gusts.
+
+    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period squared). Strength and time
+    are logarithms: of the gusts' variance, in the acceleration's unit squared, over that of the pose's noise; and of s.
+    """
+    rate = period / np.exp(time)
+    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
+    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a period
+    both = np.zeros((6, 6))
+    both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * np.exp(strength) * period**4
+    both = expm(both)
+    F = both[3:, 3:].T
+    Q = F @ both[:3, 3:]
+    H, B = np.eye(1, 3), np.array([[0.5], [1.0], [0.0]]) * period**2
+    P = solve_discrete_are(F.T, H.T, 0.5 * (Q + Q.T), np.eye(1))
+    K = P @ H.T / (H @ P @ H.T + 1.0)
+    after = F @ (np.eye(3) - K @ H)
+    from_pose, poles = ss2tf(after, F @ K, -H, np.eye(1))
+    from_drive, _ = ss2tf(after, B, -H, np.zeros((1, 1)))
+    acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
+    return np.asarray(lfilter(from_pose[0], poles, pose, axis=0) + lfilter(from_drive[0], poles, acting, axis=0))
