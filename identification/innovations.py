@@ -7,30 +7,32 @@ confirm: all of it if it is a law, nothing if it is an answer, unknown as the lo
 errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm, solve_discrete_are
-from scipy.optimize import minimize
 from scipy.signal import lfilter, ss2tf
 from scipy.spatial.transform import Rotation
 
 from .regression import SHIFT, Flights, Piece, Setting
 from .sensing import undo_log_sensing
-from .signals import Signals, log_signals
+from .signals import log_signals
 
 Array = NDArray[np.float64]
 
 _SHARE = 0.5  # laws have 0.8 to 1.4, answers -5 to 0.2
 _ENERGY = 20.0  # in units of the innovations' variance, that it must explain: chance explains one
-_AT_ODDS, _SURELY = 0.05, 2.0  # of a share beside one, and its standard deviations; 194 true effects had 0.9 of these at most
+_AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
-_GUSTS = (np.log(1e4), np.log(0.25))  # where the search for the gusts begins: their strength and their time (s)
-_BOUNDS = (np.log(1e-3), np.log(1e14)), (np.log(0.02), np.log(2.0))
-_FINE = {"xatol": 0.1, "fatol": 1e-4, "maxiter": 60}
-_LEAST = 1e-300
+_STRENGTHS = 2.0 ** np.arange(-10, 47)  # of gusts, as ``_filters`` has them
+_TIMES = 0.25 * 1.5 ** np.arange(-6, 6)  # s, of gusts
+_GUSTS = (24, 6)  # where among these the search begins
+_STRIDES = (4, 2, 1)  # of that search
+_TINY = 1e-300
 _CLOCK = "clock_offset", "dt"
 
 
@@ -44,6 +46,7 @@ class Innovations:
 
     def __init__(self, flights: Flights, setting: Setting) -> None:
         self._flights, self._setting = flights, setting
+        self._poses: dict[int, tuple[Piece, Array]] = {}
         self._motions = self._seen(setting)
         self._counts = []
         rows = np.split(flights.fit, np.flatnonzero(flights.start)[1:])
@@ -77,7 +80,7 @@ class Innovations:
         Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration, whose strength and time are those that make its
         innovations least, together with a share (maximum likelihood).
         """
-        cross, square = 0.0, _LEAST
+        cross, square = 0.0, _TINY
         for axis in range(6):
             if any(np.any(change[..., axis]) for change in changes):
                 e, x = self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
@@ -88,17 +91,14 @@ class Innovations:
 
     def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
         """Return the innovations (n,) of one axis, and of a change, with the gusts that suit them; each piece is (2, n, 2)."""
-        def innovations(gusts: Array) -> tuple[Array, Array]:
-            found = [_innovations(pose, drive, float(gusts[0]), float(gusts[1]), piece.signals.period)[counts]
+        def innovations(strength: int, time: int) -> tuple[Array, Array]:
+            found = [_innovations(pose, drive, float(_STRENGTHS[strength]), float(_TIMES[time]), piece.signals.period)[counts]
                      for (pose, drive), piece, counts in
                      zip(both, self._flights.pieces(self._setting), self._counts, strict=True)]
             e, x = np.concatenate(found).T
             return e, x
 
-        def loss(gusts: Array) -> float:
-            return float(np.log(_left(*innovations(gusts))))
-
-        return innovations(minimize(loss, np.array(_GUSTS), method="Nelder-Mead", bounds=_BOUNDS, options=_FINE).x)
+        return innovations(*_least(lambda *gusts: _left(*innovations(*gusts))))
 
     def _timed(self, after: Setting) -> Setting:
         """Return ``after`` with a change of the clock made by moving the turn rates: moved poses take their noise along."""
@@ -119,19 +119,22 @@ class Innovations:
         out = []
         pieces = self._flights.pieces(setting)
         for piece, like, model in zip(pieces, self._flights.pieces(self._setting), self._flights.model(setting), strict=True):
-            position, turned = self._raw(setting, piece).position, Rotation.from_matrix(self._raw(self._setting, like).rotation)
-            angle = np.vstack([np.zeros(3), np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)])
-            pose = np.column_stack([position - position[0], angle])
+            pose = np.column_stack([self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]])
             begun = np.concatenate([like.signals.velocity[0], like.signals.rate[0]])
             fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
             out.append(np.stack([pose - np.outer(piece.signals.t - piece.signals.t[0], begun),
                                  self._accelerations(model) - fallen]))
         return out
 
-    def _raw(self, setting: Setting, piece: Piece) -> Signals:
-        """Return the motion of a piece as it was measured, without the low-pass that knows of the future."""
-        log = undo_log_sensing(self._flights.logs[piece.log], self._flights.amended(setting))
-        return next(s for s in log_signals(log, np.inf) if s.t[0] == piece.signals.t[0])
+    def _raw(self, setting: Setting, piece: Piece) -> Array:
+        """Return the pose (n, 6) of a piece, from its start, without the low-pass that knows of the future."""
+        if id(piece) not in self._poses:
+            log = undo_log_sensing(self._flights.logs[piece.log], self._flights.amended(setting))
+            signals = next(s for s in log_signals(log, np.inf) if s.t[0] == piece.signals.t[0])
+            turned = Rotation.from_matrix(signals.rotation)
+            angle = np.vstack([np.zeros(3), np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)])
+            self._poses[id(piece)] = piece, np.column_stack([signals.position - signals.position[0], angle])
+        return self._poses[id(piece)][1]
 
     def _accelerations(self, wrench: Array) -> Array:
         """Return the linear and the angular acceleration (n, 6) of a force and a torque (n, 6)."""
@@ -152,27 +155,54 @@ def at_odds(flights: Flights, setting: Setting) -> list[str]:
     out = []
     for effect in filter(None, setting):
         share, energy = Innovations(flights, {k: v for k, v in setting.items() if k != effect}).share(setting)
-        if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _LEAST))):
+        if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _TINY))):
             out.append(f"{effect}: what no past pose foretells bears out {share:.0%} of it: another effect may be behind it")
     return out
 
 
+def _least(loss: Callable[[int, int], float]) -> tuple[int, int]:
+    """Return which strength and time of gusts make a loss least, by steps to the best neighbour, large ones first."""
+    known = {_GUSTS: loss(*_GUSTS)}
+    at = _GUSTS
+    for stride in _STRIDES:
+        while True:
+            for i, j in itertools.product((-stride, 0, stride), repeat=2):
+                near = (int(np.clip(at[0] + i, 0, len(_STRENGTHS) - 1)), int(np.clip(at[1] + j, 0, len(_TIMES) - 1)))
+                if near not in known:
+                    known[near] = loss(*near)
+            best = min(known, key=known.__getitem__)
+            if best == at:
+                break
+            at = best
+    return at
+
+
 def _left(e: Array, x: Array) -> float:
     """Return the energy that the best multiple of ``x`` leaves of ``e``."""
-    return max(float(e @ e) - float(e @ x) ** 2 / max(float(x @ x), _LEAST), _LEAST)
+    return max(float(e @ e) - float(e @ x) ** 2 / max(float(x @ x), _TINY), _TINY)
 
 
 def _innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
     """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) drives, and gusts.
 
-    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period squared). Strength and time
-    are logarithms: of the gusts' variance, in the acceleration's unit squared, over that of the pose's noise; and of s.
+    ``strength`` is the gusts' variance, in the acceleration's unit squared, over that of the pose's noise; ``time`` (s) theirs.
     """
-    rate = period / np.exp(time)
+    poles, from_pose, from_drive = _filters(strength, time, period)
+    acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
+    return np.asarray(lfilter(from_pose, poles, pose, axis=0) + lfilter(from_drive, poles, acting, axis=0))
+
+
+@lru_cache(maxsize=4096)
+def _filters(strength: float, time: float, period: float) -> tuple[Array, Array, Array]:
+    """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose and of what drives it.
+
+    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period squared).
+    """
+    rate = period / time
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
     # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a period
     both = np.zeros((6, 6))
-    both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * np.exp(strength) * period**4
+    both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * strength * period**4
     both = expm(both)
     F = both[3:, 3:].T
     Q = F @ both[:3, 3:]
@@ -182,5 +212,4 @@ def _innovations(pose: Array, drive: Array, strength: float, time: float, period
     after = F @ (np.eye(3) - K @ H)
     from_pose, poles = ss2tf(after, F @ K, -H, np.eye(1))
     from_drive, _ = ss2tf(after, B, -H, np.zeros((1, 1)))
-    acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
-    return np.asarray(lfilter(from_pose[0], poles, pose, axis=0) + lfilter(from_drive[0], poles, acting, axis=0))
+    return poles, from_pose[0], from_drive[0]

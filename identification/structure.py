@@ -133,13 +133,16 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     regression = search.at(fit)
     error = regression.error(np.arange(len(regression.columns)))
     unit = max(1.0, error / regression.design[..., 0].size)  # of chance, where gusts are not what they are taken to be
+    residual = flights.residual(fit.setting)
+    base = flights.columns(fit.setting, regression.columns, 0.1)
+    every = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
     words: list[tuple[str, str]] = []
     columns: list[Array] = []
+    named: list[float] = []  # energy of what a column may be an untruth of
     for channel_words, drive, column in dictionary(flights, fit):
         words.append(("a general dictionary", f"{channel_words} with {drive}"))
         columns.append(column)
-    residual = flights.residual(fit.setting)
-    base = flights.columns(fit.setting, regression.columns, 0.1)
+        named.append(every)
     known = scaled(drives(flights, fit.setting))
     for effect in fit.effects:
         share = _share(flights, fit, effect, residual)
@@ -151,15 +154,16 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
             words.append((f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs"))
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
-    named = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
-    least = max(LEAST_GAIN * unit, LEAST_SHARE * error, LEAST_OF_NAMED * named) * (1.0 if flights.lively else ROUGH)
+        named += [search.whitened_energy(share)] * (len(columns) - len(named))
+    rough = 1.0 if flights.lively else ROUGH
+    least = rough * np.maximum(max(LEAST_GAIN * unit, LEAST_SHARE * error), LEAST_OF_NAMED * np.array(named))
     found = []
     for at in range(0, len(columns), _BATCH):
         batch = columns[at : at + _BATCH]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
-        for (test, where), column, gain, spread in zip(words[at : at + _BATCH], batch, gains, spreads, strict=True):
-            if gain > least and spread >= (LEAST_SPREAD if gain < LARGE * least else LEAST_OF_LARGE):
-                found.append((Structure(test, where, float(gain) / error), column))
+        for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
+            if gain > least[i] and spread >= (LEAST_SPREAD if gain < LARGE * least[i] else LEAST_OF_LARGE):
+                found.append((Structure(*words[i], float(gain) / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded or not found:
         return [sign for sign, _ in found[:MOST]], bool(found)

@@ -7,7 +7,7 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.innovations import Innovations, _innovations
+from windwrench.identification.innovations import Innovations, _innovations, at_odds
 from windwrench.identification.regression import Flights, typical
 from windwrench.identification.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
 
@@ -40,7 +40,7 @@ def test_innovations_are_white_and_small_with_the_gusts_that_are(strength):
     pose, drive = gusts(strength, 0.25, 40_000, np.random.default_rng(1))
     e = {}
     for factor in (1.0, 0.01, 100.0):
-        e[factor] = _innovations(pose[:, None], drive[:, None], np.log(factor * strength), np.log(0.25), PERIOD)[1000:, 0]
+        e[factor] = _innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[1000:, 0]
     white = np.array([np.corrcoef(e[1.0][k:], e[1.0][:-k])[0, 1] for k in range(1, 20)])
     assert np.abs(white).max() < 0.025
     assert e[1.0].var() < min(e[0.01].var(), e[100.0].var())
@@ -86,3 +86,12 @@ def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
     assert not innovations.confirm_column(-column)
     assert not innovations.confirm_column(3.0 * column)
     assert not Innovations(flights, truth).confirm_column(column)
+
+
+@pytest.mark.parametrize(("library", "doubtful"), [("flapping_moment", False), ("rate_damping", True)])
+def test_what_stands_for_another_law_is_at_odds_with_the_innovations(library, doubtful):
+    flapping = EffectSetting("flapping_moment", {"kflap": 3e-6})
+    flights = Flights([fly_practice(VEHICLE, (flapping,), "excite", 40.0, seed=4)], VEHICLE)
+    fit, _ = Search(flights, [library]).find()
+    assert fit.effects == [library]
+    assert bool(at_odds(flights, fit.setting)) == doubtful
