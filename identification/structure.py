@@ -30,7 +30,7 @@ LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one
 ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
 
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
-          "voltage": 0.05}  # in the drives' units: what varies by less says nothing
+          "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _BATCH = 24  # columns at a time
 MOST = 12  # signs, the strongest
@@ -100,11 +100,13 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
     wrench = np.concatenate([low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[p.rows]
                              for p in pieces])
     for i, a in enumerate("xyz"):
-        shapes[f"world velocity {a}"] = velocity[:, i]
+        if velocity[:, i].std() > _MOVES["velocity"]:
+            shapes[f"world velocity {a}"] = velocity[:, i]
         if flights.lively:
             shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
-        shapes[f"tilt {a}"] = rotation[:, 2, i]
+        if rotation[:, 2, i].std() > _MOVES["tilt"]:
+            shapes[f"tilt {a}"] = rotation[:, 2, i]
     limits = {"time": flights.t}
     if "height" in known:
         limits["height"] = np.concatenate([p.signals.position[p.rows, 2] for p in pieces])
