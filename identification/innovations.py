@@ -9,7 +9,7 @@ errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 19
 
 import itertools
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from .signals import log_signals
 Array = NDArray[np.float64]
 
 _SHARE = 0.5  # laws have 0.8 to 1.4, answers -5 to 0.2
-_ENERGY = 20.0  # in units of the innovations' variance, that it must explain: chance explains one
+_ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
 _AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
 _STRENGTHS = 2.0 ** np.arange(-10, 47)  # of gusts, as ``_filters`` has them
@@ -77,28 +77,35 @@ class Innovations:
     def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
         """Return the share of changes of the motions that makes the innovations least, of all axes together, and its energy.
 
-        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration, whose strength and time are those that make its
-        innovations least, together with a share (maximum likelihood).
+        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration. Their strength and time are those that make its
+        innovations least (maximum likelihood), once together with a share and once without any: the energy is what the share
+        gains over other gusts.
         """
-        cross, square = 0.0, _TINY
-        for axis in range(6):
-            if any(np.any(change[..., axis]) for change in changes):
-                e, x = self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
-                                   for motion, change in zip(self._motions, changes, strict=True)])
-                variance = _left(e, x) / len(e)
-                cross, square = cross + float(e @ x) / variance, square + float(x @ x) / variance
-        return cross / square, cross * cross / square
+        axes = [self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
+                            for motion, change in zip(self._motions, changes, strict=True)])
+                for axis in range(6) if any(np.any(change[..., axis]) for change in changes)]
+        cross, square = (sum(n * x[row, 1] / _left(x) for n, x, _ in axes) for row in (0, 1))
+        share = float(cross / max(square, _TINY))
+        rest = np.array([-1.0, share])
+        energy = sum(n * float(np.log(max(without[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for n, x, without in axes)
+        return share, energy
 
-    def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
-        """Return the innovations (n,) of one axis, and of a change, with the gusts that suit them; each piece is (2, n, 2)."""
-        def innovations(strength: int, time: int) -> tuple[Array, Array]:
-            found = [_innovations(pose, drive, float(_STRENGTHS[strength]), float(_TIMES[time]), piece.signals.period)[counts]
-                     for (pose, drive), piece, counts in
-                     zip(both, self._flights.pieces(self._setting), self._counts, strict=True)]
-            e, x = np.concatenate(found).T
-            return e, x
+    def _axis(self, both: Sequence[Array]) -> tuple[int, Array, Array]:
+        """Return how many innovations one axis has and their sums of products (2, 2), with those of a change.
 
-        return innovations(*_least(lambda *gusts: _left(*innovations(*gusts))))
+        Once with the gusts that suit both, once with those that suit the innovations alone. Each piece is (2, n, 2).
+        """
+        counts, pieces = self._counts, self._flights.pieces(self._setting)
+
+        @cache
+        def products(strength: int, time: int) -> Array:
+            found = [_innovations(pose, drive, float(_STRENGTHS[strength]), float(_TIMES[time]), piece.signals.period)[counted]
+                     for (pose, drive), piece, counted in zip(both, pieces, counts, strict=True)]
+            return np.asarray(sum(x.T @ x for x in found))
+
+        found = [products(*_least(lambda *gusts: _left(products(*gusts)))),
+                 products(*_least(lambda *gusts: float(products(*gusts)[0, 0])))]
+        return sum(int(np.count_nonzero(x)) for x in counts), min(found, key=_left), min(found, key=lambda x: float(x[0, 0]))
 
     def _timed(self, after: Setting) -> Setting:
         """Return ``after`` with a change of the clock made by moving the turn rates: moved poses take their noise along."""
@@ -177,9 +184,9 @@ def _least(loss: Callable[[int, int], float]) -> tuple[int, int]:
     return at
 
 
-def _left(e: Array, x: Array) -> float:
-    """Return the energy that the best multiple of ``x`` leaves of ``e``."""
-    return max(float(e @ e) - float(e @ x) ** 2 / max(float(x @ x), _TINY), _TINY)
+def _left(products: Array) -> float:
+    """Return the energy that the best multiple of a change leaves of innovations, of their sums of products (2, 2)."""
+    return max(float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], _TINY)), _TINY)
 
 
 def _innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:

@@ -302,14 +302,14 @@ class Search:
             better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
-            innovations = None if self.flights.commanded else Innovations(self.flights, fit.setting)
             for gain in better:
                 self._report(f"trying {gain.effect}")
                 more = self.refit(gain.fit)
-                if innovations is None:
+                if self.flights.commanded:
                     taken = not barely_swings(more.setting, self.flights.vehicle.gravity)
                 else:
-                    taken = innovations.confirm(more.setting)
+                    shifts = {SHIFT[0]: more.setting.get(SHIFT[0], {})}  # gusts bend them, and they are not what is asked
+                    taken = Innovations(self.flights, {**fit.setting, **shifts}).confirm({**more.setting, **shifts})
                 if taken:
                     break
             else:
