@@ -47,7 +47,7 @@ def test_innovations_are_white_and_small_with_the_gusts_that_are(strength):
 
 
 def test_what_gusts_suggest_is_not_confirmed(gusty):
-    """The loop's torques follow the gusts: regressed on both, an inertia is off by a tenth, and explains much."""
+    """The loop's torques follow the gusts: regressed on from both sides, an effect that is not there explains much."""
     search = Search(Flights([gusty], VEHICLE), names())
     regression = search.linearise(Fit({}))
     search.set_noise(Fit({}), regression)
