@@ -111,6 +111,12 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
     p["z"][:4] = p["speeds"]
 
 
+def is_a_body(inertia: Array) -> bool:
+    """Return whether any body has an inertia (3, 3): none has a principal moment that exceeds the sum of the others."""
+    moments = np.linalg.eigvalsh(inertia)
+    return bool(moments[0] + moments[1] >= moments[2])
+
+
 def load_world(
     vehicle: Vehicle, load: SuspendedLoad | None = None, drawn: bool = True
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
@@ -125,7 +131,7 @@ def load_world(
     xml = resources.files(__package__).joinpath("quadrotor.xml").read_text(encoding="utf-8")
     spec = mujoco.MjSpec.from_string(xml)
     moments, axes = np.linalg.eigh(vehicle.inertia)
-    if moments[0] + moments[1] < moments[2]:
+    if not is_a_body(vehicle.inertia):
         raise InputError(f"{vehicle.name}: no body has the principal moments of inertia {moments[0]:.4g}, {moments[1]:.4g} and "
                          f"{moments[2]:.4g} kg m2: the largest exceeds the sum of the others")
     if np.linalg.det(axes) < 0:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get, names
 from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import EffectSetting, Vehicle
-from ..envs.plant import TICK
+from ..envs.plant import TICK, is_a_body
 from ..envs.recording import TRAJECTORIES, background, draw_trajectory, record_flight
 from ..identification.flight_log import FlightLog
 from .outsiders import OUTSIDERS, outside_push
@@ -135,6 +135,8 @@ def shown_in(name: str) -> tuple[str, ...]:
 def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator) -> EffectSetting:
     """Return an effect near the library's typical size for the vehicle, with signs and a factor of 0.8 to 1.25 at random.
 
+    An inertia that no body has is drawn anew.
+
     Raises:
         InputError: no such effect or size.
     """
@@ -152,6 +154,9 @@ def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator
             sign = float(rng.choice([-1.0, 1.0])) if name in _SIGNED else 1.0
             most = _MOST.get(name, np.inf)
             coefficients[c.name] = min(max(sign * factor * coefficients[c.name], c.minimum, -most), c.maximum, most)
+    amend = get(name).amend
+    if amend and is_a_body(vehicle.inertia) and not is_a_body(amend(vehicle, coefficients).inertia):
+        return draw_effect(name, vehicle, size, rng)
     return EffectSetting(name, coefficients)
 
 

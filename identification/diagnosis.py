@@ -16,7 +16,7 @@ from ..dynamics.vehicle import Vehicle
 from .bounds import beyond_belief
 from .commanded import shared
 from .equivalence import composites, equivalents, unlisted
-from .findings import CHANNELS, Candidate, Diagnosis, Errors, NamedEffect, Signature, Structure, Trace
+from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .innovations import Innovations, at_odds
 from .prediction import nis_without_wrench_state, rollout_error
@@ -29,6 +29,8 @@ from .turning import COEFFICIENT
 Array = NDArray[np.float64]
 
 AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
+CALM = 0.006, 0.0015  # nor have gusts of up to this share of the weight, and of the weight times the arm, below
+CALM_HZ = 2.0  # quicker ones are noise in part: of the pose, of the step to which turn rates are rounded
 LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
 _FAINT = 0.1  # share of the remainder's energy: a name that explains less beside a large remainder is tentative
 _POINTS = 600  # of a signature
@@ -80,7 +82,11 @@ def diagnose(
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held]), _rms(after[held])
     noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
-    remainder = "structured" if signs else "random" if noisy or gusty else "none"
+    gusts = () if flights.commanded else tuple(
+        Gusts(channel, *found) for channel, found in zip(CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True))
+    calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
+    windy = any(found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False))
+    remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
     effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), noisy) for effect in fit.effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = ("explained" if sure else "partly explained") if effects else (
@@ -109,6 +115,7 @@ def diagnose(
         traces=tuple(_traces(flights, before, after)),
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
         structure=tuple(signs),
+        gusts=gusts,
         cutoff_hz=CUTOFF_HZ,
         declared=vehicle,
         amended=amended,

@@ -4,6 +4,7 @@ Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero
 about the centre of mass in the body frame.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -83,6 +84,19 @@ class Structure:
     gain: float  # share of the remainder's whitened energy that it explains on blocks left out
 
 
+@dataclass(frozen=True)
+class Gusts:
+    """What a model leaves of one channel, taken for gusts: an Ornstein-Uhlenbeck process, by maximum likelihood."""
+
+    channel: str  # one of CHANNELS
+    rms: float  # N, or Nm
+    time: float  # s, in which they decay to 1/e
+
+    def below(self, frequency: float) -> float:
+        """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
+        return self.rms * math.sqrt(2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time))
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What logs of one vehicle say about its model."""
@@ -101,6 +115,7 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     signatures: tuple[Signature, ...]
     structure: tuple[Structure, ...]  # strongest first
+    gusts: tuple[Gusts, ...]  # of each channel; none where turn rates are worked out from commands
     cutoff_hz: float
     declared: Vehicle
     amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment

@@ -7,17 +7,17 @@ confirm: all of it if it is a law, nothing if it is an answer, unknown as the lo
 errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
 """
 
-import itertools
+import math
 from collections.abc import Callable, Sequence
-from functools import cache, lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.linalg import expm, solve_discrete_are
-from scipy.signal import lfilter, ss2tf
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from .gusts import STRENGTHS, TIMES, innovations, likeliest, strength_of
 from .regression import SHIFT, Flights, Piece, Setting
 from .sensing import undo_log_sensing
 from .signals import log_signals
@@ -28,10 +28,7 @@ _SHARE = 0.5  # laws have 0.8 to 1.4, answers -5 to 0.2
 _ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
 _AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
-_STRENGTHS = 2.0 ** np.arange(-10, 47)  # of gusts, as ``_filters`` has them
-_TIMES = 0.25 * 1.5 ** np.arange(-6, 6)  # s, of gusts
-_GUSTS = (24, 6)  # where among these the search begins
-_STRIDES = (4, 2, 1)  # of that search
+_NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
 _TINY = 1e-300
 _CLOCK = "clock_offset", "dt"
 
@@ -54,6 +51,7 @@ class Innovations:
             t, k = piece.signals.t, np.arange(len(piece.signals.t))
             near = fit[np.searchsorted(piece.rows, k).clip(max=len(fit) - 1)]
             self._counts.append(near & (t > t[0] + _SETTLED) & (k <= piece.rows[-1]))
+        self._count = sum(int(np.count_nonzero(x)) for x in self._counts)
 
     def confirm(self, after: Setting) -> bool:
         """Return whether innovations confirm the change to the effects ``after``."""
@@ -74,6 +72,29 @@ class Innovations:
             changes.append(change)
         return _confirmed(*self._share(changes))
 
+    def gusts(self) -> list[tuple[float, float]]:
+        """Return the RMS (N in the world, Nm in the body) and the time (s) of the likeliest gusts of each of the six channels.
+
+        A law that the model lacks counts as gusts too. The steps to which turn rates are rounded look like quick gusts.
+        """
+        inertias = [self._flights.vehicle.mass] * 3 + np.diagonal(self._flights.vehicle.inertia).tolist()
+        return [self._gusts([-motion[..., [axis]] for motion in self._motions], inertia)
+                for axis, inertia in enumerate(inertias)]
+
+    def _gusts(self, motions: Sequence[Array], inertia: float) -> tuple[float, float]:
+        period = self._flights.pieces(self._setting)[0].signals.period
+        products = self._products(motions)
+        i, j = likeliest(lambda strength, time: float(products(strength, time)[0, 0]))
+        begun = np.log([STRENGTHS[i], TIMES[j]])
+
+        def loss(x: Array) -> float:
+            return float(np.log(self._sums(motions, *np.exp(x).tolist())[0, 0]))
+
+        best = minimize(loss, begun, method="Nelder-Mead", bounds=[begun[0] + _NEAR, begun[1] + _NEAR],
+                        options={"xatol": 0.05, "fatol": 1.0 / self._count})
+        strength, time = np.exp(best.x).tolist()
+        return inertia * math.sqrt(strength_of(math.exp(best.fun) / self._count, strength, time, period)), time
+
     def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
         """Return the share of changes of the motions that makes the innovations least, of all axes together, and its energy.
 
@@ -84,28 +105,35 @@ class Innovations:
         axes = [self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
                             for motion, change in zip(self._motions, changes, strict=True)])
                 for axis in range(6) if any(np.any(change[..., axis]) for change in changes)]
-        cross, square = (sum(n * x[row, 1] / _left(x) for n, x, _ in axes) for row in (0, 1))
+        cross, square = (sum(x[row, 1] / _left(x) for x, _ in axes) for row in (0, 1))
         share = float(cross / max(square, _TINY))
         rest = np.array([-1.0, share])
-        energy = sum(n * float(np.log(max(without[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for n, x, without in axes)
+        energy = self._count * sum(float(np.log(max(y[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for x, y in axes)
         return share, energy
 
-    def _axis(self, both: Sequence[Array]) -> tuple[int, Array, Array]:
-        """Return how many innovations one axis has and their sums of products (2, 2), with those of a change.
+    def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the sums of products (2, 2) of one axis' innovations and of a change's, of which each piece is (2, n, 2).
 
-        Once with the gusts that suit both, once with those that suit the innovations alone. Each piece is (2, n, 2).
+        Once with the gusts that suit both, once with those that suit the innovations alone.
         """
-        counts, pieces = self._counts, self._flights.pieces(self._setting)
+        products = self._products(both)
+        found = [products(*likeliest(lambda *gusts: _left(products(*gusts)))),
+                 products(*likeliest(lambda *gusts: float(products(*gusts)[0, 0])))]
+        return min(found, key=_left), min(found, key=lambda x: float(x[0, 0]))
 
+    def _products(self, motions: Sequence[Array]) -> Callable[[int, int], Array]:
+        """Return a function of gusts that gives the sums of products (c, c) of innovations; each piece is (2, n, c)."""
         @cache
         def products(strength: int, time: int) -> Array:
-            found = [_innovations(pose, drive, float(_STRENGTHS[strength]), float(_TIMES[time]), piece.signals.period)[counted]
-                     for (pose, drive), piece, counted in zip(both, pieces, counts, strict=True)]
-            return np.asarray(sum(x.T @ x for x in found))
+            return self._sums(motions, float(STRENGTHS[strength]), float(TIMES[time]))
 
-        found = [products(*_least(lambda *gusts: _left(products(*gusts)))),
-                 products(*_least(lambda *gusts: float(products(*gusts)[0, 0])))]
-        return sum(int(np.count_nonzero(x)) for x in counts), min(found, key=_left), min(found, key=lambda x: float(x[0, 0]))
+        return products
+
+    def _sums(self, motions: Sequence[Array], strength: float, time: float) -> Array:
+        pieces = self._flights.pieces(self._setting)
+        found = [innovations(pose, drive, strength, time, piece.signals.period)[counted]
+                 for (pose, drive), piece, counted in zip(motions, pieces, self._counts, strict=True)]
+        return np.asarray(sum(x.T @ x for x in found))
 
     def _timed(self, after: Setting) -> Setting:
         """Return ``after`` with a change of the clock made by moving the turn rates: moved poses take their noise along."""
@@ -167,56 +195,6 @@ def at_odds(flights: Flights, setting: Setting) -> list[str]:
     return out
 
 
-def _least(loss: Callable[[int, int], float]) -> tuple[int, int]:
-    """Return which strength and time of gusts make a loss least, by steps to the best neighbour, large ones first."""
-    known = {_GUSTS: loss(*_GUSTS)}
-    at = _GUSTS
-    for stride in _STRIDES:
-        while True:
-            for i, j in itertools.product((-stride, 0, stride), repeat=2):
-                near = (int(np.clip(at[0] + i, 0, len(_STRENGTHS) - 1)), int(np.clip(at[1] + j, 0, len(_TIMES) - 1)))
-                if near not in known:
-                    known[near] = loss(*near)
-            best = min(known, key=known.__getitem__)
-            if best == at:
-                break
-            at = best
-    return at
-
-
 def _left(products: Array) -> float:
     """Return the energy that the best multiple of a change leaves of innovations, of their sums of products (2, 2)."""
     return max(float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], _TINY)), _TINY)
-
-
-def _innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
-    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) drives, and gusts.
-
-    ``strength`` is the gusts' variance, in the acceleration's unit squared, over that of the pose's noise; ``time`` (s) theirs.
-    """
-    poles, from_pose, from_drive = _filters(strength, time, period)
-    acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
-    return np.asarray(lfilter(from_pose, poles, pose, axis=0) + lfilter(from_drive, poles, acting, axis=0))
-
-
-@lru_cache(maxsize=4096)
-def _filters(strength: float, time: float, period: float) -> tuple[Array, Array, Array]:
-    """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose and of what drives it.
-
-    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period squared).
-    """
-    rate = period / time
-    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
-    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a period
-    both = np.zeros((6, 6))
-    both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * strength * period**4
-    both = expm(both)
-    F = both[3:, 3:].T
-    Q = F @ both[:3, 3:]
-    H, B = np.eye(1, 3), np.array([[0.5], [1.0], [0.0]]) * period**2
-    P = solve_discrete_are(F.T, H.T, 0.5 * (Q + Q.T), np.eye(1))
-    K = P @ H.T / (H @ P @ H.T + 1.0)
-    after = F @ (np.eye(3) - K @ H)
-    from_pose, poles = ss2tf(after, F @ K, -H, np.eye(1))
-    from_drive, _ = ss2tf(after, B, -H, np.zeros((1, 1)))
-    return poles, from_pose[0], from_drive[0]

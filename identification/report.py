@@ -67,6 +67,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "notes": diagnosis.notes,
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
+        "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
         "logs": diagnosis.logs,
         "test_logs": diagnosis.test_logs,
         "seconds": diagnosis.seconds,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from ..dynamics import effects as library
-from .findings import Diagnosis, NamedEffect
+from .findings import CHANNELS, Diagnosis, NamedEffect
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
@@ -121,14 +121,26 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
 def remainder_sentence(diagnosis: Diagnosis) -> str:
     """Return what is left after the named effects."""
     if diagnosis.remainder == "none":
-        return "What is left is the sensors' noise."
+        return f"What is left is the sensors' noise{_gusts(diagnosis)}."
     if diagnosis.remainder == "random":
-        return "What is left looks random, as turbulence does: no test found a law in it."
+        return f"What is left looks random, as turbulence does{_gusts(diagnosis)}: no test found a law in it."
     if not diagnosis.structure:
         return "What is left still follows a law."
     strongest = diagnosis.structure[0]
     return (f"What is left still follows a law that the model lacks; the strongest sign is in {strongest.where} "
             f"({percent(strongest.gain)} of what is left).")
+
+
+def _gusts(diagnosis: Diagnosis) -> str:
+    """Return the largest gusts, of a force and of a torque, as an insertion."""
+    found = []
+    for unit, channels in (("N", CHANNELS[:3]), ("Nm", CHANNELS[3:])):
+        own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
+        if own:
+            largest = max(own, key=lambda gusts: gusts.rms)
+            factor, unit = scale_of([largest.rms], unit)
+            found.append(f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} that last {rounded(largest.time, 2)}{_SPACE}s")
+    return f", with gusts of up to {in_words(found)}" if found else ""
 
 
 def doubt_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get
 from .findings import CHANNELS, Structure
 from .innovations import Innovations
-from .regression import CENTRAL, CUTOFF_HZ, LATE, Column, Flights, Setting
+from .regression import BLOCK, CENTRAL, CUTOFF_HZ, LATE, Column, Flights, Setting
 from .search import Fit, Search
 from .selection import Gram
 from .signals import low_pass
@@ -33,6 +33,7 @@ _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "tur
           "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _BATCH = 24  # columns at a time
+UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
 MOST = 12  # signs, the strongest
 _ASKED = 36  # of the innovations, which takes its time
 
@@ -167,12 +168,38 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
             if gain > least[i] and spread >= (LEAST_SPREAD if gain < LARGE * least[i] else LEAST_OF_LARGE):
                 found.append((Structure(*words[i], float(gain) / error), column))
     found.sort(key=lambda x: -x[0].gain)
-    if flights.commanded or not found:
+    if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
+    wandering = list(unsteady(search, fit, regression))
+    if not found:
+        return wandering, bool(wandering)
     innovations = Innovations(flights, fit.setting)
     laws = (sign for sign, column in found[:_ASKED]
             if innovations.confirm_column(_added(search, regression, base, column)))
-    return list(itertools.islice(laws, MOST)), True
+    return [*wandering, *itertools.islice(laws, MOST)], True
+
+
+def unsteady(search: Search, fit: Fit, regression: Gram) -> Iterator[Structure]:
+    """Yield a sign for each effect whose coefficients change from one block of flight to the next by more than chance has it.
+
+    A law is the same all along; what comes and goes, and has a mean, looks like one. Each block has a multiple of the effect of
+    its own; by how much these scatter is the moment estimate of a random coefficient's variance (T. S. Breusch and A. R. Pagan,
+    Econometrica 47 (1979), 1287-1294, have the test).
+    """
+    flights = search.flights
+    residual, whole = flights.residual(fit.setting), regression.blocks[:, -1, -1].sum()
+    unit = max(1.0, float(whole) / regression.design[..., 0].size)
+    for effect in fit.effects:
+        x = search.whiten(_share(flights, fit, effect, residual))[flights.fit]
+        slope = np.add.reduceat(np.sum(x * regression.design[..., -1], axis=1), regression.begins)
+        size = np.add.reduceat(np.sum(x * x, axis=1), regression.begins)
+        beyond = float(np.sum(slope**2) - unit * np.sum(size))
+        squares = float(np.sum(size**2))
+        scatter = np.sqrt(max(beyond, 0.0) / max(squares, 1e-30))
+        if beyond > UNSTEADY * unit * np.sqrt(2.0 * squares) and scatter > LEAST_UNSTEADY:
+            words = f"it changes by {scatter:.0%} from one {BLOCK:.0f} s of flight to the next"
+            yield Structure(f"{effect}'s coefficient is not constant", words,
+                            float(np.sum(slope**2 / np.maximum(size, 1e-30)) / max(whole, 1e-30)))
 
 
 def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:

@@ -12,6 +12,7 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.errors import InputError
 from windwrench.envs.plant import TICK
+from windwrench.experiments.held_back_outsiders import practise_held_back
 from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
@@ -74,6 +75,26 @@ def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
     (sure,) = diagnose([log], load_vehicle("ardrone2")).effects
     assert not sure.tentative
     assert "mass" in (sure.name, *sure.indistinguishable_from)
+
+
+def test_what_comes_and_goes_is_no_sure_mass():
+    """A battery's cell fails for seconds: what it costs has a mean, which a mass explains; no law scatters so."""
+    flown = practise_held_back(load_vehicle("ardrone2"), "failing_cell", "small", seed=202)
+    found = diagnose([flown.log], flown.vehicle)
+    assert {e.name: e.tentative for e in found.effects} == {"mass": True}
+    assert any("from one 3 s of flight to the next" in sign.where for sign in found.structure)
+
+
+def test_a_push_that_lies_in_the_noise_is_not_passed_over():
+    """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the floor, and yet not calm."""
+    vehicle = load_vehicle("ardrone2")
+    log = fly_practice(vehicle, seconds=40.0, seed=3, sensor=2.0, outsider="periodic_force", outsider_size=1.0 / 3.0)
+    found = diagnose([log], vehicle)
+    assert found.after.force_rms < 1.2 * found.floor_force_rms
+    assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
+    calm = diagnose([fly_practice(vehicle, seconds=40.0, seed=3, sensor=2.0)], vehicle)
+    assert calm.verdict == "nothing to explain"
+    assert max(g.rms for g in calm.gusts[:3]) < 0.5 * max(g.rms for g in found.gusts[:3])
 
 
 def test_turn_rates_that_come_late_are_no_sign_of_structure():

@@ -7,7 +7,8 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.innovations import Innovations, _innovations, at_odds
+from windwrench.identification.gusts import innovations
+from windwrench.identification.innovations import Innovations, at_odds
 from windwrench.identification.regression import Flights, typical
 from windwrench.identification.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
 
@@ -40,7 +41,7 @@ def test_innovations_are_white_and_small_with_the_gusts_that_are(strength):
     pose, drive = gusts(strength, 0.25, 40_000, np.random.default_rng(1))
     e = {}
     for factor in (1.0, 0.01, 100.0):
-        e[factor] = _innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[1000:, 0]
+        e[factor] = innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[1000:, 0]
     white = np.array([np.corrcoef(e[1.0][k:], e[1.0][:-k])[0, 1] for k in range(1, 20)])
     assert np.abs(white).max() < 0.025
     assert e[1.0].var() < min(e[0.01].var(), e[100.0].var())
@@ -56,6 +57,15 @@ def test_what_gusts_suggest_is_not_confirmed(gusty):
     assert best.energy > 10.0 * LEAST_GAIN
     assert max(abs(value) / typical((best.effect, name), VEHICLE) for name, value in suggested.items()) > LEAST_SIZE
     assert not Innovations(search.flights, {}).confirm({best.effect: suggested})
+
+
+def test_gusts_are_measured(gusty):
+    """Turbulence of 0.06 N and 0.0012 Nm for a quarter of a second, of which the wrench in the log is told nothing."""
+    found = Innovations(Flights([gusty], VEHICLE), {}).gusts()
+    true = [*gusty.force.std(axis=0), *gusty.torque.std(axis=0)]
+    for channel, (gust, rms) in enumerate(zip(found, true, strict=True)):
+        assert gust[0] == pytest.approx(rms, rel=0.25), channel
+        assert 0.1 < gust[1] < 0.6, channel
 
 
 def test_gusts_alone_are_neither_named_nor_a_law(gusty):

@@ -9,7 +9,7 @@ import pytest
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.dynamics.rotation import matrix_of
-from windwrench.envs.plant import TICK
+from windwrench.envs.plant import TICK, is_a_body
 from windwrench.experiments.outsiders import OUTSIDERS, Moment
 from windwrench.experiments.practice_flights import KINDS, SIZES, draw_effect, fly_practice, practice_set, practise
 from windwrench.experiments.rotorpy_flights import (
@@ -156,6 +156,13 @@ def test_noise_and_turbulence_are_as_asked():
     assert sigma(calm) == pytest.approx(0.5 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
     assert np.abs(calm.force).max() == 0.0
     assert 0.5 < noisy.force.std() / (3 * 0.015 * WEIGHT / 4.5126) < 1.5
+
+
+def test_every_drawn_inertia_is_that_of_a_body():
+    for seed in range(30):
+        drawn = draw_effect("inertia", VEHICLE, "large", np.random.default_rng(seed))
+        assert is_a_body(get("inertia").amend(VEHICLE, drawn.coefficients).inertia)
+    assert not is_a_body(np.diag([1.0, 1.0, 2.1]))
 
 
 @pytest.mark.parametrize("size", SIZES)

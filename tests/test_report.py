@@ -18,6 +18,7 @@ from windwrench.identification.findings import (
     Candidate,
     Diagnosis,
     Errors,
+    Gusts,
     NamedEffect,
     Signature,
     Structure,
@@ -92,7 +93,8 @@ def diagnosis():
         signatures=tuple(
             Signature("rotor_drag", CHANNELS[i], f"velocity {'xy'[i]} (m/s)", signals.velocity[inside][:, i], before[:, i],
                       (before - after)[:, i]) for i in range(2)),
-        structure=(), cutoff_hz=CUTOFF, declared=VEHICLE, amended=amended, logs=("flight",), test_logs=(), seconds=20.0)
+        structure=(), gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)),
+        cutoff_hz=CUTOFF, declared=VEHICLE, amended=amended, logs=("flight",), test_logs=(), seconds=20.0)
 
 
 def hard(diagnosis):
