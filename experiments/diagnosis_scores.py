@@ -56,6 +56,7 @@ class Judgement:
     floor_ratio: float  # largest of force's and torque's residual after, over what the sensors leave
     rollout_ratio: float  # one-second prediction error after over before
     rollout_of_truth: float  # that of the true model over before, on the whole flight
+    gusts: float  # in force, found over flown; NaN in still air
     gave_away: str  # strongest sign of structure
     problem: str  # the error's text where it failed
     seconds: float  # that the diagnosis took
@@ -108,6 +109,7 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
         floor_ratio=max((_ratio(after.get(k), floor.get(k)) for k in ("force_rms", "torque_rms")), default=np.nan),
         rollout_ratio=_ratio(after.get("rollout_1s_position_rms"), found.get("before", {}).get("rollout_1s_position_rms")),
         rollout_of_truth=_number(flown.get("rollout_of_truth")),
+        gusts=_ratio(float(np.mean(found["gusts"][:3])), flown.get("gusts")) if found.get("gusts") else np.nan,
         gave_away=f"{structure[0]['test']}: {structure[0]['where']}" if structure else "",
         problem=found.get("error", ""), seconds=found["seconds"],
     )
@@ -226,7 +228,7 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
         met = sum(j.rollout_ratio <= bar for j in some)
         out.append(Rule(rule, f"<= {bar:g}", f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; on that flight "
                         f"the true model comes to {worst.rollout_of_truth:.2f}", met == len(some), len(some)))
-    return out + _rotorpy(of("rotorpy"))
+    return [*out, *_rotorpy(of("rotorpy")), _gusts([j for j in full if j.right])]
 
 
 def doubts(j: Judgement) -> bool:
@@ -312,6 +314,14 @@ def _floor(subject: str, some: Sequence[Judgement]) -> Rule:
     worst = max((j.floor_ratio for j in some), default=np.nan)
     return Rule(subject, f"<= {FLOOR_BAR:g}", f"{worst:.2f} at worst" if some else "not flown",
                 bool(worst <= FLOOR_BAR) if some else None, len(some))
+
+
+def _gusts(some: Sequence[Judgement]) -> Rule:
+    ratios = [j.gusts for j in some if np.isfinite(j.gusts)]
+    low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95]) if ratios else (np.nan,) * 3
+    measured = f"{middle:.2f} times what is flown in the median, {low:.2f} to {high:.2f} on nine flights of ten"
+    return Rule("-. gusts in force as they are found, where names are right and there are any", "-",
+                measured if ratios else "not flown", None, len(ratios))
 
 
 def _rotorpy(some: Sequence[Judgement]) -> list[Rule]:

@@ -24,7 +24,7 @@ from ..dynamics.errors import InputError
 from ..dynamics.files import replaced
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.workers import workers
-from ..envs.recording import TRAJECTORIES
+from ..envs.recording import TRAJECTORIES, background
 from ..identification.diagnosis import diagnose
 from ..identification.findings import Diagnosis
 from ..identification.flight_log import FlightLog
@@ -192,7 +192,7 @@ def _fly(trial: Trial, seed: int) -> tuple[FlightLog, Vehicle, dict[str, Any]]:
                      trial.seconds, trial.turbulence)
     truth = {e.name: dict(e.coefficients) for e in p.effects}
     return p.log, p.vehicle, {"trajectory": p.trajectory, "turbulence": p.turbulence, "sensor": p.sensor, "truth": truth,
-                              "outsider": p.outsider}
+                              "outsider": p.outsider, "gusts": background(vehicle, p.turbulence).disturbance_force}
 
 
 def _findings(found: Diagnosis) -> dict[str, Any]:
@@ -204,6 +204,7 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
         "before": asdict(found.before), "after": asdict(found.after),
         "floor": {"force_rms": found.floor_force_rms, "torque_rms": found.floor_torque_rms},
         "structure": [asdict(sign) for sign in found.structure[:3]],
+        "gusts": [gusts.rms for gusts in found.gusts],
         "notes": found.notes,
     }
     return dict(_plain(summary))

@@ -87,7 +87,8 @@ def diagnose(
     calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
     windy = any(found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False))
     remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
-    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), noisy) for effect in fit.effects)
+    large = noisy if flights.commanded else windy
+    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), large) for effect in fit.effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = ("explained" if sure else "partly explained") if effects else (
         "nothing to explain" if remainder == "none" else "unexplained")

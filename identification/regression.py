@@ -146,9 +146,10 @@ class Flights:
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
         self.drowned: frozenset[str]  # effects whose columns are noise in good part: these flights do not excite them
         self.column_noise: dict[Column, Array]  # (rows, 6) a sample of it in each column
-        self.sensor_noise, self.drowned, self.column_noise = self._listen()
+        self.rotor_noise: Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
+        self.sensor_noise, self.drowned, self.column_noise, self.rotor_noise = self._listen()
 
-    def _listen(self) -> tuple[Array, frozenset[str], dict[Column, Array]]:
+    def _listen(self) -> tuple[Array, frozenset[str], dict[Column, Array], Array]:
         """Add the sensors' noise once more and see what changes.
 
         An effect whose column is noise in good part is not excited; fitted all the same, it would come out too small, or
@@ -175,7 +176,15 @@ class Flights:
             drowned |= NOT_FROM_COMMANDS
         if not self.lively:
             drowned |= _QUICK
-        return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}
+        rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
+        rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
+        return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}, rounded
+
+    def rotor_wrench(self, setting: Setting) -> Array:
+        """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body), low-passed."""
+        vehicle = self.amended(setting)
+        return np.concatenate([low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[p.rows]
+                               for p in self.pieces(setting)])
 
     @property
     def lively(self) -> bool:

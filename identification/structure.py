@@ -32,6 +32,7 @@ ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to w
 _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
           "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
+_ROUNDING = 0.02  # the same of a rotor torque: shares of 0.045 look like a law
 _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
 MOST = 12  # signs, the strongest
@@ -97,13 +98,11 @@ def dictionary(flights: Flights, fit: Fit) -> Iterator[tuple[str, str, Array]]:
     pieces = flights.pieces(fit.setting)
     rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in pieces])
-    vehicle = flights.amended(fit.setting)
-    wrench = np.concatenate([low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[p.rows]
-                             for p in pieces])
+    wrench = flights.rotor_wrench(fit.setting)
     for i, a in enumerate("xyz"):
         if velocity[:, i].std() > _MOVES["velocity"]:
             shapes[f"world velocity {a}"] = velocity[:, i]
-        if flights.lively:
+        if flights.lively and flights.rotor_noise[1 + i] < _ROUNDING:
             shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
         if rotation[:, 2, i].std() > _MOVES["tilt"]:

@@ -169,6 +169,16 @@ def test_the_rules_count_what_they_say():
     assert rule(judged, "6. residual").measured == "1.10 at worst"
 
 
+def test_gusts_are_compared_with_those_flown():
+    right, calm = outcome("nothing", {}, found(gusts=[0.012, 0.018, 0.03, 1.0, 1.0, 1.0])), outcome("nothing", {}, found())
+    right["flown"]["gusts"], calm["flown"]["gusts"] = 0.01, 0.0
+    (windy,), (still,) = judge(right), judge(calm)
+    assert windy.gusts == pytest.approx(2.0)
+    assert np.isnan(still.gusts)
+    assert rule([windy, still], "-. gusts").measured.startswith("2.00 times")
+    assert rule([still], "-. gusts").measured == "not flown"
+
+
 def test_what_a_flight_cannot_tell_is_told_apart_from_what_the_diagnosis_overlooks():
     cannot = outcome("typical", MASS, found(name("mass", like=["thrust_scale"], dm=0.04)),
                      found(name("thrust_scale", like=["battery_sag"]), without=("mass",)))

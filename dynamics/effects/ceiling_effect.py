@@ -30,7 +30,7 @@ EFFECT = Effect(
     name="ceiling_effect",
     kind="wrench",
     coefficients=(
-        Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=50.0),
+        Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=20.0),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
     source="form: the ground effect's (Cheeseman and Bennett, ARC R&M 3021, 1955) mirrored; a ceiling raises thrust too: "
