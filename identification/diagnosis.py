@@ -15,6 +15,7 @@ from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import Vehicle
 from .bounds import beyond_belief
 from .commanded import shared
+from .dictionary import drives
 from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
@@ -23,7 +24,7 @@ from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
 from .screening import LEAST_SECONDS, screen_log
 from .search import Fit, Gain, Search
-from .structure import drives, structure
+from .structure import structure
 from .turning import COEFFICIENT
 
 Array = NDArray[np.float64]

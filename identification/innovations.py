@@ -24,7 +24,7 @@ from .signals import log_signals
 
 Array = NDArray[np.float64]
 
-_SHARE = 0.5  # laws have 0.8 to 1.4, answers -5 to 0.2
+_SHARE = 0.65  # laws have 0.8 to 1.4, answers -5 to 0.2, one had 0.53
 _ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
 _AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts

@@ -276,6 +276,7 @@ class Search:
         while True:
             self._report("asking whether every effect is needed")
             needed = self.prune(fit if self.flights.commanded else self.refit(fit))  # by the noise as it is known by now
+            needed = self._borne_out(needed)
             if self.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
                 return needed, first
             # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
@@ -283,6 +284,16 @@ class Search:
             fit, _ = self.forward(needed)
             if fit.effects == needed.effects:
                 return needed, first
+
+    def _borne_out(self, fit: Fit) -> Fit:
+        """Return a fit less the effects that innovations do not confirm beside those that are left."""
+        if self.flights.commanded:
+            return fit
+        for effect in fit.effects:
+            if not Innovations(self.flights, fit.without(effect).setting).confirm(fit.setting):
+                self._report(f"{effect} is an answer to gusts")
+                return self._borne_out(self.refit(fit.without(effect)))
+        return fit
 
     def forward(self, fit: Fit | None = None) -> tuple[Fit, "list[Gain]"]:
         """Return ``fit`` with the effects that are worth adding one after the other, and what each explained at first."""

@@ -85,6 +85,14 @@ def test_what_comes_and_goes_is_no_sure_mass():
     assert any("from one 3 s of flight to the next" in sign.where for sign in found.structure)
 
 
+def test_a_load_that_the_library_lacks_is_seen_to_swing():
+    """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its swing."""
+    log = fly("slung_payload", m=0.01, l=0.3, damping=1.0)
+    found = diagnose([log], load_vehicle("ardrone2"), without=["slung_payload"])
+    assert {e.name: e.tentative for e in found.effects} == {"mass": True}
+    assert any("what swings at 0." in sign.where or "what swings at 1 Hz" in sign.where for sign in found.structure)
+
+
 def test_a_push_that_lies_in_the_noise_is_not_passed_over():
     """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the floor, and yet not calm."""
     vehicle = load_vehicle("ardrone2")
@@ -181,6 +189,12 @@ def test_flights_of_another_simulator(name):
         return
     assert set(named(found)) == set(truth)
     assert found.verdict == "explained"
+    if label["turbulence_N_Nm_s"]:
+        force, torque, time = label["turbulence_N_Nm_s"]
+        gusts = {"force": found.gusts[:3], "torque": found.gusts[3:5]}
+        assert np.mean([g.rms for g in gusts["force"]]) == pytest.approx(force, rel=0.2)
+        assert np.mean([g.rms for g in gusts["torque"]]) == pytest.approx(torque, rel=0.4)  # rounding is in it
+        assert np.mean([g.time for g in gusts["force"]]) == pytest.approx(time, rel=0.3)
     for effect in found.effects:
         for key, value in effect.coefficients.items():
             if key in truth[effect.name]:
