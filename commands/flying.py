@@ -108,7 +108,8 @@ def record(
     effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect, NAME or NAME:coef=value,...",
                                                        autocompletion=offering(effect_names))] = None,
     trajectory: Annotated[
-        str, typer.Option(help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast or jet.")] = "excite",
+        str, typer.Option(help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, shake or jet.")
+    ] = "excite",
     seconds: Annotated[float, typer.Option(help="Length of the flight.")] = 60.0,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random on the flight.")] = 0,
 ) -> dict[str, Any]:

@@ -75,17 +75,22 @@ def _fast(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
                      1.5 + _waves(rng, t, 0.25, 0.1, 0.5), _waves(rng, t, 0.6, 0.05, 0.2)], axis=1)
 
 
+def _shake(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
+    return np.stack([_waves(rng, t, 0.03, 1.2, 2.2), _waves(rng, t, 0.03, 1.2, 2.2),
+                     1.3 + _waves(rng, t, 0.1, 0.2, 0.7), _waves(rng, t, 0.4, 0.1, 0.6)], axis=1)
+
+
 def _jet(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     return np.stack([_waves(rng, t, 0.25, 0.03, 0.1), _waves(rng, t, 0.7, 0.05, 0.2),
                      1.2 + _waves(rng, t, 0.12, 0.05, 0.2), math.pi + _waves(rng, t, 0.3, 0.05, 0.2)], axis=1)
 
 
 # in this order: hover at 1.2 m; slow waves; waves up to 3 m/s and 0.7 Hz; near the floor; steady yaw; a circle of 1 m at 1.2 to
-# 1.8 m/s; near the ceiling; climbs and descents up to 1.5 m/s; waves up to 4 m/s; across the jet of a fan that stands at
-# x = -2.3 m
+# 1.8 m/s; near the ceiling; climbs and descents up to 1.5 m/s; waves up to 4 m/s; small waves of 1.2 to 2.2 Hz, for
+# angular acceleration; across the jet of a fan that stands at x = -2.3 m
 TRAJECTORIES: dict[str, Callable[[np.random.Generator, Array, float], Array]] = {
     "hover": _hover, "gentle": _gentle, "excite": _excite, "ground": _ground, "yaw": _yaw, "circle": _circle,
-    "ceiling": _ceiling, "vertical": _vertical, "fast": _fast, "jet": _jet,
+    "ceiling": _ceiling, "vertical": _vertical, "fast": _fast, "shake": _shake, "jet": _jet,
 }
 
 

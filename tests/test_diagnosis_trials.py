@@ -10,6 +10,7 @@ from matplotlib import image
 from windwrench.cli import main
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names
+from windwrench.envs.recording import TRAJECTORIES
 from windwrench.experiments.diagnosis_scores import (
     FAILED,
     RIGHT,
@@ -80,7 +81,7 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
             assert trial.libraries[-1] == (effect, *EQUIVALENTS.get(effect, ()))
     assert {t.added[0] for t in trials if t.group == "outsider"} == set(OUTSIDERS)
     assert {t.added[0] for t in trials if t.group == "held back"} == set(HELD_BACK)
-    assert len({t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}) == 10
+    assert len({t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}) == len(TRAJECTORIES)
     assert {t.key for t in plan(quick=True)} < set(by_key)
     twice = plan(2)
     assert [t.key for t in plan(first=1)] == [t.key for t in twice[len(trials):]]

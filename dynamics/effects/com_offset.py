@@ -28,6 +28,7 @@ EFFECT = Effect(
     ),
     source="rigid-body mechanics",
     confused_with=("constant_torque", "rotor_efficiency", "marker_offset"),
-    excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll and pitch for cz",
+    excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll and pitch (trajectory shake) "
+    "for cz",
     amend=amend,
 )

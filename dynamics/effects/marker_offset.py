@@ -29,7 +29,7 @@ EFFECT = Effect(
     ),
     source="definition; the centroid of the markers on a vehicle is seldom its centre",
     confused_with=("com_offset", "attitude_gain"),
-    excitation="quick roll and pitch for mz and fast yaw for mx and my: the point swings about the centre. An offset centre "
-    "of mass also makes a torque in hover; this does not",
+    excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the point swings about "
+    "the centre. An offset centre of mass also makes a torque in hover; this does not",
     law=law,
 )
