@@ -55,7 +55,7 @@ class Judgement:
     remainder: str
     floor_ratio: float  # largest of force's and torque's residual after, over what the sensors leave
     rollout_ratio: float  # one-second prediction error after over before
-    rollout_of_truth: float  # that of the true model over before, on the whole flight
+    rollout_of_truth: float  # that of the true model over before, on the same blocks
     gusts: float  # in force, found over flown; NaN in still air
     gave_away: str  # strongest sign of structure
     problem: str  # the error's text where it failed
@@ -226,7 +226,7 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
             continue
         worst = max(some, key=lambda j: j.rollout_ratio)
         met = sum(j.rollout_ratio <= bar for j in some)
-        out.append(Rule(rule, f"<= {bar:g}", f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; on that flight "
+        out.append(Rule(rule, f"<= {bar:g}", f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; there "
                         f"the true model comes to {worst.rollout_of_truth:.2f}", met == len(some), len(some)))
     return [*out, *_rotorpy(of("rotorpy")), _gusts([j for j in full if j.right])]
 

@@ -9,7 +9,7 @@ import json
 import os
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -147,28 +147,32 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     else:
         return out
     out.pop("error", None)
-    flown["rollout_of_truth"] = None if flown["outsider"] else _rollout_of_truth(log, vehicle, flown["truth"])
+    flown["rollout_of_truth"] = None
     out |= {"flown": _plain(flown), "seconds": _since(begun)}
     for without in trial.libraries:
         begun = time.perf_counter()
         try:
-            found = _findings(diagnose([log], vehicle, without=without))
+            diagnosis = diagnose([log], vehicle, without=without)
+            found = _findings(diagnosis)
+            if not without and not flown["outsider"]:
+                truth = _rollout_of_truth(log, vehicle, flown["truth"], [(a, b) for _, a, b in diagnosis.held_out_segments])
+                out["flown"]["rollout_of_truth"] = _plain(truth)
         except Exception as error:  # a diagnosis that falls over is an outcome too, and a bad one
             found = {"error": f"{type(error).__name__}: {error}"}
         out["diagnoses"].append({"without": list(without), **found, "seconds": _since(begun)})
     return out
 
 
-def _rollout_of_truth(log: FlightLog, vehicle: Vehicle, truth: Mapping[str, Mapping[str, float]]) -> float | None:
-    """Return the one-second prediction error of the true model over that of the declared one, on the whole flight.
+def _rollout_of_truth(log: FlightLog, vehicle: Vehicle, truth: Mapping[str, Mapping[str, float]],
+                      segments: Sequence[tuple[float, float]]) -> float | None:
+    """Return the one-second prediction error of the true model over that of the declared one, on stretches of a flight (s).
 
     What turbulence and the noise of the pose leave; no diagnosis can be far below it.
     """
     if not truth:
         return None
     effects = [EffectSetting(name, dict(coefficients)) for name, coefficients in truth.items()]
-    whole = [(float(log.t[0]), float(log.t[-1]))]
-    before, after = rollout_error(log, vehicle, whole), rollout_error(log, vehicle.with_effects(*effects), whole)
+    before, after = rollout_error(log, vehicle, segments), rollout_error(log, vehicle.with_effects(*effects), segments)
     return after / before if before > 0.0 else None
 
 

@@ -31,6 +31,8 @@ ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to w
 
 _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
+_DRAGS = frozenset({"rotor_drag", "body_drag"})
+LEAST_OF_POWERS = 12.0  # whitened energy, of one question: 62 true drags had up to 5
 MOST = 12  # signs, the strongest
 _ASKED = 36  # of the innovations, which takes its time
 
@@ -79,7 +81,7 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
-    wandering = list(unsteady(search, fit, regression))
+    wandering = [*unsteady(search, fit, regression), *other_powers(search, fit, regression, base)]
     if not found:
         return wandering, bool(wandering)
     innovations = Innovations(flights, fit.setting)
@@ -111,6 +113,23 @@ def unsteady(search: Search, fit: Fit, regression: Gram) -> Iterator[Structure]:
                             float(np.sum(slope**2 / np.maximum(size, 1e-30)) / max(whole, 1e-30)))
 
 
+def other_powers(search: Search, fit: Fit, regression: Gram, base: dict[Column, Array]) -> Iterator[Structure]:
+    """Yield a sign for each named drag whose force would rather grow with another power of speed.
+
+    A question of its own, in all rows together: a flight at one speed has another one only as it begins.
+    """
+    flights = search.flights
+    residual, whole = flights.residual(fit.setting), regression.blocks[:, -1, -1].sum()
+    for effect in _DRAGS & {*fit.effects}:
+        share = _share(flights, fit, effect, residual)
+        speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces(fit.setting)])
+        x = search.whiten(_alone(search, regression, base, share * speed[:, None]))[flights.fit]
+        gain = float(np.sum(x * regression.design[..., -1])) ** 2 / max(float(np.sum(x * x)), 1e-30)
+        if gain > LEAST_OF_POWERS:
+            yield Structure(f"{effect}'s coefficient is not constant", "its force grows with another power of speed",
+                            gain / max(float(whole), 1e-30))
+
+
 def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     """Return what an effect explains (rows, 6) of the residual that is left without it.
 
@@ -126,13 +145,17 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
 
 def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) -> Array:
     """Return what the best multiple of a column (rows, 6) adds to a fit with columns ``base``."""
-    k = len(g.columns)
-    fit = search.flights.fit
-    cross = np.tensordot(g.design[..., :k], search.whiten(column)[fit], axes=([0, 1], [0, 1]))
-    weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
-    alone = column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
-    x = search.whiten(alone)[fit]
+    alone = _alone(search, g, base, column)
+    x = search.whiten(alone)[search.flights.fit]
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
+
+
+def _alone(search: Search, g: Gram, base: dict[Column, Array], column: Array) -> Array:
+    """Return a column (rows, 6) less what the columns ``base`` of a fit make of it."""
+    k = len(g.columns)
+    cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
+    weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
+    return column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

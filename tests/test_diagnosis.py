@@ -85,6 +85,16 @@ def test_what_comes_and_goes_is_no_sure_mass():
     assert any("from one 3 s of flight to the next" in sign.where for sign in found.structure)
 
 
+@pytest.mark.parametrize("friction", [True, False])
+def test_friction_on_a_circle_is_no_sure_drag(friction):
+    """At one speed friction is a drag; how the flight begins says that it is none, if little more."""
+    drag = () if friction else (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),)
+    log = fly_practice(load_vehicle("ardrone2"), drag, "circle", 60.0, 2, "dry_friction" if friction else None, sensor=0.5)
+    found = diagnose([log], load_vehicle("ardrone2"))
+    assert found.effects
+    assert all(e.tentative for e in found.effects) == friction
+
+
 def test_a_load_that_the_library_lacks_is_seen_to_swing():
     """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its swing."""
     log = fly("slung_payload", m=0.01, l=0.3, damping=1.0)

@@ -164,7 +164,7 @@ def test_the_rules_count_what_they_say():
     assert rule(judged, "3. outside the library, a third").met is None
     assert rule(judged, "4. hover: no name").met
     assert rule(judged, "6. one-second prediction error after over before, mass").measured == (
-        "0.30 at worst, 0 of 1 within; on that flight the true model comes to 0.28")
+        "0.30 at worst, 0 of 1 within; there the true model comes to 0.28")
     assert rule(judged, "6. one-second prediction error after over before, rotor_drag").met is None
     assert rule(judged, "2. two effects").measured == "not flown"
     assert rule(judged, "6. residual").measured == "1.10 at worst"
