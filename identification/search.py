@@ -49,10 +49,11 @@ LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of 
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _REFITS = 6
-_MOVES = 6
+_MOVES = 3  # at a time, which takes seconds each where four effects stand for one
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
 _SHORTLIST = 2
+_TRIED = 8  # candidates for one place, the best first, that innovations may turn down
 _FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
 _HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
 
@@ -276,14 +277,14 @@ class Search:
         while True:
             self._report("asking whether every effect is needed")
             needed = self.prune(fit if self.flights.commanded else self.refit(fit))  # by the noise as it is known by now
-            needed = self._borne_out(needed)
             if self.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
-                return needed, first
+                break
             # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
             asked.append(set(needed.effects))
             fit, _ = self.forward(needed)
             if fit.effects == needed.effects:
-                return needed, first
+                break
+        return self._borne_out(needed), first
 
     def _borne_out(self, fit: Fit) -> Fit:
         """Return a fit less the effects that innovations do not confirm beside those that are left."""
@@ -313,7 +314,7 @@ class Search:
             better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
             if not better or count == self._most:
                 break
-            for gain in better:
+            for gain in better[:_TRIED]:
                 self._report(f"trying {gain.effect}")
                 more = self.refit(gain.fit)
                 if self.flights.commanded:
