@@ -120,7 +120,7 @@ def other_powers(search: Search, fit: Fit, regression: Gram, base: dict[Column, 
     """
     flights = search.flights
     residual, whole = flights.residual(fit.setting), regression.blocks[:, -1, -1].sum()
-    for effect in _DRAGS & {*fit.effects}:
+    for effect in filter(_DRAGS.__contains__, fit.effects):
         share = _share(flights, fit, effect, residual)
         speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces(fit.setting)])
         x = search.whiten(_alone(search, regression, base, share * speed[:, None]))[flights.fit]
