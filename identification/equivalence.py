@@ -26,8 +26,8 @@ _OUT_OF_STEP = 0.98  # share of what is allowed
 _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
-_COINCIDE = 0.7  # least of the largest coefficient that all others reach
-_SAME = 3.0  # standard deviations within which coefficients are alike
+_COINCIDE = 0.1  # share of what an inertia explains that one which goes with the mass may leave of it
+_EXACT = 1e-9  # relative; standard deviations are no smaller
 _CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
 _HANGS = 5.0  # times as far along z as across it
 _EVEN = 0.95  # correlation of voltage and time
@@ -79,11 +79,15 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
         jx = coefficient(("inertia", "jx"))
         share = float(np.clip(value / flights.vehicle.mass if effect == "mass" else value, jx.minimum, jx.maximum))
         whole = flights.residual(fit.setting)
-        moments = flights.residual({**fit.setting, "inertia": dict.fromkeys(_AXES, share)}) - whole
-        g = gram(flights, fit.setting, search.whiten, flights.columns(fit.setting, search.base(fit.effects), 0.1), moments)
+        turned = flights.residual({**fit.setting, "inertia": dict.fromkeys(_AXES, share)})
+        columns = flights.columns(fit.setting, search.base(fit.effects), 0.1)
+        g = gram(flights, fit.setting, search.whiten, columns, turned - whole)
         if g.error(np.arange(len(g.columns))) < _limit(search, flights.residual(fit.without(effect).setting) - whole):
             found.append(f"whether the moments go with {effect} these flights do not show: an effect that is not among these "
                          "names may be behind it")
+        elif search.whitened_energy(turned) < search.whitened_energy(whole):
+            found.append(f"moments that do not go as {effect} says fit better: an effect that is not among these names may be "
+                         "behind it")
     heavier = fit.setting.get("mass", {}).get("dm", 0.0) > 0.0
     if heavier and "com_offset" in fit.effects and "slung_payload" not in search.library:
         centre = fit.setting["com_offset"]
@@ -98,7 +102,7 @@ def _limit(search: Search, part: Array) -> float:
 
 
 def _relative(flights: Flights, fit: Fit) -> tuple[Array, Array]:
-    """Return the relative changes of inertia, mass and thrust in a fit, and their standard deviations."""
+    """Return the relative changes of inertia (three), mass and thrust in a fit, and their standard deviations."""
     parts = [(effect, name) for effect in ("inertia", "mass", "thrust_scale", "rotor_efficiency")
              for name in fit.setting.get(effect, {}) if name != CENTRAL]
     scale = np.array([1.0 / flights.vehicle.mass if effect == "mass" else 1.0 for effect, _ in parts])
@@ -131,8 +135,9 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         found.append("a rotor would have to deliver far more than declared: rotor_efficiency may stand for another effect")
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
         values, std = _relative(flights, fit)
-        sizes = np.abs(values)
-        if sizes.min() > _COINCIDE * sizes.max() or np.all(np.abs(values - _weighted(values, std)) < _SAME * std):
+        off = (values - _weighted(values, std)) / np.maximum(std, _EXACT)
+        whole = values[: len(_AXES)] / np.maximum(std[: len(_AXES)], _EXACT)
+        if off @ off < APART + _COINCIDE * whole @ whole:
             found.append("coefficients of inertia and thrust or mass coincide: a single other effect may be behind them")
     if {"mass", "thrust_scale"} <= names:
         weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass

@@ -49,6 +49,7 @@ LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of 
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _REFITS = 6
+_PATIENCE = 3.0  # times what the last turn of a refit gained, which all that are to come may still gain
 _MOVES = 3  # at a time, which takes seconds each where four effects stand for one
 _COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
@@ -177,16 +178,19 @@ class Search:
         """Return the energy of the fit's rows of a residual (rows, 6) once it is whitened."""
         return float(np.sum(np.square(self.whiten(residual)[self.flights.fit])))
 
-    def refit(self, fit: Fit) -> Fit:
-        """Return the fit with all its coefficients at the least squares of the fit's rows (Gauss-Newton)."""
+    def refit(self, fit: Fit, enough: float = np.inf) -> Fit:
+        """Return the fit with all its coefficients at the least squares of the fit's rows (Gauss-Newton).
+
+        One that is on no way to come down to an energy of ``enough`` is given up before it has arrived.
+        """
         if not self.flights.commanded:
-            return self._refit(fit)
+            return self._refit(fit, enough)
         finding, self.whiten = self.whiten, self._whitener(self.noise, MEASURING)
         out = self._refit(fit)
         self.whiten = finding
         return out
 
-    def _refit(self, fit: Fit) -> Fit:
+    def _refit(self, fit: Fit, enough: float = np.inf) -> Fit:
         setting = {k: dict(v) for k, v in fit.setting.items()}
         wanted = self.base(fit.effects)
         if SHIFT not in wanted:
@@ -211,8 +215,8 @@ class Search:
             else:
                 break
             moved = max(abs(d) / s for d, s in zip(change, out.std.values(), strict=True))
-            setting, before = trial, after
-            if moved < 0.05:
+            gained, setting, before = before - after, trial, after
+            if moved < 0.05 or before - enough > _PATIENCE * max(gained, 0.0):
                 break
         out.setting = setting
         return out
@@ -338,8 +342,9 @@ class Search:
     def prune(self, fit: Fit) -> Fit:
         """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced by one."""
         error = self.error(fit)
+        failed: dict[frozenset[str], float] = {}
         for _ in range(_MOVES):
-            better = self._best_move(fit, error)
+            better = self._best_move(fit, error, failed)
             if better is None:
                 break
             fit, error = better
@@ -348,7 +353,11 @@ class Search:
             self.whiten = self._whitener(self.noise, MEASURING)
         return fit
 
-    def _best_move(self, fit: Fit, error: float) -> "tuple[Fit, float] | None":
+    def _best_move(self, fit: Fit, error: float, failed: dict[frozenset[str], float]) -> "tuple[Fit, float] | None":
+        """Return a better fit and its error.
+
+        ``failed`` keeps which effects no other one could bring down to which error, so that it is tried no second time.
+        """
         least = max(self._least_gain, self._least_share * error)
         for effect in fit.effects:
             if not self.held(effect) and self.error_without(fit, effect) < error + least:
@@ -360,6 +369,10 @@ class Search:
         for size, allowed in ((2, least), (1, -SWAP_GAIN)):
             for group in itertools.combinations(fit.effects, size):
                 less = fit.without(*group)
+                rest, enough = frozenset(less.effects), error + allowed + _COMPLEXITY * sum(_freedom(e) for e in group)
+                if enough <= failed.get(rest, -np.inf):
+                    continue
+                failed[rest] = enough
                 regression = self.linearise(less, fit if len(fit.effects) > _FEW else None)
                 tries = [x for x in self.gains(less, regression, self.gram(less, regression)) if x.effect not in group]
                 for other in tries[:_SHORTLIST]:
@@ -368,9 +381,9 @@ class Search:
                         continue
                     if other.size <= LEAST_SIZES.get(other.effect, LEAST_SIZE):
                         continue
-                    swapped = self.refit(other.fit)
-                    more = _freedom(other.effect) - sum(_freedom(e) for e in group)
-                    if (after := self.error(swapped)) < error + allowed - _COMPLEXITY * more:
+                    limit = enough - _COMPLEXITY * _freedom(other.effect)
+                    swapped = self.refit(other.fit, limit)
+                    if self.energy(swapped.setting) < limit and (after := self.error(swapped)) < limit:
                         self._report(f"{other.effect} in place of {' and '.join(group)}")
                         return swapped, after
         return None

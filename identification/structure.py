@@ -7,7 +7,7 @@ Each column is tried alone, on blocks that are left out in turn.
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +58,8 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
         columns.append(column)
         named.append(every)
     known = scaled(drives(flights, fit.setting))
-    for effect in fit.effects:
-        share = _share(flights, fit, effect, residual)
+    shares = {effect: _share(flights, fit, effect, residual) for effect in fit.effects}
+    for effect, share in shares.items():
         for name, x in known.items():
             words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
             columns.append(share * x[:, None])
@@ -81,7 +81,7 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
-    wandering = [*unsteady(search, fit, regression), *other_powers(search, fit, regression, base)]
+    wandering = [*unsteady(search, shares, regression), *other_powers(search, shares, regression, base)]
     if not found:
         return wandering, bool(wandering)
     innovations = Innovations(flights, fit.setting)
@@ -90,18 +90,22 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     return [*wandering, *itertools.islice(laws, MOST)], True
 
 
-def unsteady(search: Search, fit: Fit, regression: Gram) -> Iterator[Structure]:
-    """Yield a sign for each effect whose coefficients change from one block of flight to the next by more than chance has it.
+def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> Iterator[Structure]:
+    """Yield a sign for each effect that changes from one block of flight to the next by more than chance has it.
+
+    Args:
+        search: that found the effects.
+        shares: what each explains (rows, 6).
+        regression: on the columns of the fit.
 
     A law is the same all along; what comes and goes, and has a mean, looks like one. Each block has a multiple of the effect of
     its own; by how much these scatter is the moment estimate of a random coefficient's variance (T. S. Breusch and A. R. Pagan,
     Econometrica 47 (1979), 1287-1294, have the test).
     """
-    flights = search.flights
-    residual, whole = flights.residual(fit.setting), regression.blocks[:, -1, -1].sum()
+    whole = regression.blocks[:, -1, -1].sum()
     unit = max(1.0, float(whole) / regression.design[..., 0].size)
-    for effect in fit.effects:
-        x = search.whiten(_share(flights, fit, effect, residual))[flights.fit]
+    for effect, share in shares.items():
+        x = search.whiten(share)[search.flights.fit]
         slope = np.add.reduceat(np.sum(x * regression.design[..., -1], axis=1), regression.begins)
         size = np.add.reduceat(np.sum(x * x, axis=1), regression.begins)
         beyond = float(np.sum(slope**2) - unit * np.sum(size))
@@ -113,17 +117,23 @@ def unsteady(search: Search, fit: Fit, regression: Gram) -> Iterator[Structure]:
                             float(np.sum(slope**2 / np.maximum(size, 1e-30)) / max(whole, 1e-30)))
 
 
-def other_powers(search: Search, fit: Fit, regression: Gram, base: dict[Column, Array]) -> Iterator[Structure]:
+def other_powers(search: Search, shares: Mapping[str, Array], regression: Gram,
+                 base: Mapping[Column, Array]) -> Iterator[Structure]:
     """Yield a sign for each named drag whose force would rather grow with another power of speed.
+
+    Args:
+        search: that found the effects.
+        shares: what each explains (rows, 6).
+        regression: on the columns of the fit.
+        base: these columns (rows, 6) each.
 
     A question of its own, in all rows together: a flight at one speed has another one only as it begins.
     """
     flights = search.flights
-    residual, whole = flights.residual(fit.setting), regression.blocks[:, -1, -1].sum()
-    for effect in filter(_DRAGS.__contains__, fit.effects):
-        share = _share(flights, fit, effect, residual)
-        speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces(fit.setting)])
-        x = search.whiten(_alone(search, regression, base, share * speed[:, None]))[flights.fit]
+    whole = regression.blocks[:, -1, -1].sum()
+    for effect in filter(_DRAGS.__contains__, shares):
+        speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})])
+        x = search.whiten(_alone(search, regression, base, shares[effect] * speed[:, None]))[flights.fit]
         gain = float(np.sum(x * regression.design[..., -1])) ** 2 / max(float(np.sum(x * x)), 1e-30)
         if gain > LEAST_OF_POWERS:
             yield Structure(f"{effect}'s coefficient is not constant", "its force grows with another power of speed",
@@ -150,7 +160,7 @@ def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) ->
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
-def _alone(search: Search, g: Gram, base: dict[Column, Array], column: Array) -> Array:
+def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
     """Return a column (rows, 6) less what the columns ``base`` of a fit make of it."""
     k = len(g.columns)
     cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))

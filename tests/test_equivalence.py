@@ -30,7 +30,7 @@ def test_what_coincides_within_its_noise_may_be_one_effect():
     assert not composites(FLIGHTS, fit)
     fit.std = {("thrust_scale", "s"): 3e-5, ("inertia", "jx"): 0.021, ("inertia", "jy"): 0.020, ("inertia", "jz"): 0.003}
     assert len(composites(FLIGHTS, fit)) == 1
-    fit.std["inertia", "jx"] = 0.01
+    fit.std["inertia", "jx"] = 0.004
     assert not composites(FLIGHTS, fit)
 
 
