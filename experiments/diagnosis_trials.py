@@ -130,7 +130,8 @@ def plan(seeds: int = 1, quick: bool = False, first: int = 0) -> list[Trial]:
 
 def stamp() -> str:
     """Return a digest of the code that flies and diagnoses."""
-    return code_stamp("diagnosis_trials", "held_back_outsiders", "outsiders", "practice_flights", "rotorpy_flights")
+    return code_stamp("diagnosis_trials", "held_back_outsiders", "outsiders", "practice_flights", "rotorpy_flights",
+                      "unseen_outsiders")
 
 
 def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
