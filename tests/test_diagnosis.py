@@ -13,7 +13,7 @@ from windwrench.dynamics.effects import names
 from windwrench.dynamics.errors import InputError
 from windwrench.envs.plant import TICK
 from windwrench.experiments.held_back_outsiders import practise_held_back
-from windwrench.experiments.practice_flights import fly_practice
+from windwrench.experiments.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.flight_log import FlightLog, read_log
@@ -75,6 +75,19 @@ def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
     (sure,) = diagnose([log], load_vehicle("ardrone2")).effects
     assert not sure.tentative
     assert "mass" in (sure.name, *sure.indistinguishable_from)
+
+
+@pytest.mark.parametrize(("effect", "without", "seed", "word"), [
+    ("thrust_scale", ("thrust_scale", "rotor_efficiency"), 2380884864, "fit better"),
+    ("mass", ("mass",), 4024130846, "coincide"),
+])
+def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
+    """More thrust is less mass and less inertia: an inertia that is named coincides, and one that is not would fit better."""
+    flown = practise(load_vehicle("ardrone2"), "effect", (effect,), "typical", "vertical", seed, 60.0)
+    found = diagnose([flown.log], flown.vehicle, without=without)
+    assert found.effects
+    assert all(e.tentative for e in found.effects)
+    assert any(word in note for note in found.notes)
 
 
 def test_what_comes_and_goes_is_no_sure_mass():
