@@ -20,6 +20,7 @@ from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .innovations import Innovations, at_odds
+from .moves import find
 from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
 from .screening import LEAST_SECONDS, screen_log
@@ -69,7 +70,7 @@ def diagnose(
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
-    fit, first = search.find()
+    fit, first = find(search)
     report("asking what else it could be")
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")

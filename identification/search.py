@@ -1,9 +1,8 @@
-"""The search for the effects that a model lacks: whole effects are added, refitted, removed and swapped.
+"""What the search for missing effects asks of flights: fits of sets of effects, and what each other effect would explain.
 
 Effects are judged on blocks of the fit that are left out in turn; nothing here looks at the held-out rows.
 """
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -12,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..dynamics.effects import get
 from ..dynamics.errors import InputError
-from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates, takes_back
-from .innovations import Innovations
+from .commanded import AFTER_SAG, SECOND, SECOND_SHARE, mates
 from .regression import (
     CENTRAL,
     LAG,
@@ -30,33 +28,19 @@ from .regression import (
     typical,
 )
 from .selection import Gram, columns_of, gram
-from .starts import STARTS, barely_swings
+from .starts import STARTS
 from .turning import EFFECT, turning_delay
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
 LEAST_GAIN = 40.0  # whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
-LEAST_SHARE = 0.01  # and as a share of what is left unexplained
 LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
-PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
-LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
-SWAP_GAIN = 12.0
-MOST_EFFECTS = 4
-LEAST_OF_COMMANDS = 25.0, 0.018  # the same; effects that cannot be there explain up to 25, and 0.01, of real flights
-LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
-LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
+COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
-MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _REFITS = 6
 _PATIENCE = 3.0  # times what the last turn of a refit gained, which all that are to come may still gain
-_MOVES = 3  # at a time, which takes seconds each where four effects stand for one
-_COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 _DROWNED = 0.3  # share of noise in what a column adds that is too much
-_SHORTLIST = 2
-_TRIED = 8  # candidates for one place, the best first, that innovations may turn down
-_FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
-_HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
 
 
 @dataclass(eq=False)
@@ -91,9 +75,7 @@ class Search:
         # a law with a place or a swing of its own imitates too much where thrust itself is a guess: it must be declared
         self.library = tuple(e for e in library if e not in flights.drowned
                              and (e not in STARTS or e in declared or not flights.commanded))
-        self._most = MOST_OF_COMMANDS if flights.commanded else MOST_EFFECTS
-        self._least_gain, self._least_share = LEAST_OF_COMMANDS if flights.commanded else (LEAST_GAIN, LEAST_SHARE)
-        self._report = report
+        self.report = report
         self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
         # how late commands come true shows in how the vehicle turns; the search takes it as it is
         delay = turning_delay([p.signals for p in flights.pieces({}) if p.log < flights.own], flights.vehicle)
@@ -185,10 +167,15 @@ class Search:
         """
         if not self.flights.commanded:
             return self._refit(fit, enough)
-        finding, self.whiten = self.whiten, self._whitener(self.noise, MEASURING)
+        finding = self.whiten
+        self.weigh_to_measure()
         out = self._refit(fit)
         self.whiten = finding
         return out
+
+    def weigh_to_measure(self) -> None:
+        """Weigh frequencies of flights known from commands as their coefficients need it, not as finding effects does."""
+        self.whiten = self._whitener(self.noise, MEASURING)
 
     def _refit(self, fit: Fit, enough: float = np.inf) -> Fit:
         setting = {k: dict(v) for k, v in fit.setting.items()}
@@ -245,24 +232,25 @@ class Search:
                 if gain <= best.energy:
                     continue
                 change = g.solve(total, index)
-                size = max((abs(d) / typical(c, self.flights.vehicle) for c, d in zip(wanted, change, strict=True)
-                            if c[0] == effect and not c[1].startswith(MOMENT) and typical(c, self.flights.vehicle)),
-                           default=0.0)
-                start = _moved(fit.setting, wanted, change)
-                if any(c[0] == effect and c[1].startswith(MOMENT) for c in wanted):
-                    start[effect][CENTRAL] = _central(wanted, change, effect)
+                start = started(fit, wanted, change, effect)
                 last = wanted[-1]
                 if last in regression.begun:
-                    start[effect] = dict(regression.begun[last])
-                elif self._drowned(g, total, wanted, change, effect):
+                    start.setting[effect] = dict(regression.begun[last])
+                elif self.drowned(g, total, wanted, change, effect):
                     continue
-                best = Gain(effect, gain, gain / error, error - gain, size, Fit(start))
+                size = self.size(wanted, change, effect)
+                best = Gain(effect, gain, gain / error, error - gain, size, start)
             out.append(best)
         found = [x for x in out if np.isfinite(x.energy)]
-        return sorted(found, key=lambda x: _COMPLEXITY * _freedom(x.effect)
+        return sorted(found, key=lambda x: COMPLEXITY * freedom(x.effect)
                       - x.energy * (SECOND_SHARE if self.flights.commanded and x.effect in SECOND else 1.0))
 
-    def _drowned(self, g: Gram, total: Array, wanted: Sequence[Column], change: Array, effect: str) -> bool:
+    def size(self, wanted: Sequence[Column], change: Array, effect: str) -> float:
+        """Return the largest of an effect's coefficients in typical sizes."""
+        return max((abs(d) / typical(c, self.flights.vehicle) for c, d in zip(wanted, change, strict=True)
+                    if c[0] == effect and not c[1].startswith(MOMENT) and typical(c, self.flights.vehicle)), default=0.0)
+
+    def drowned(self, g: Gram, total: Array, wanted: Sequence[Column], change: Array, effect: str) -> bool:
         """Return whether what an effect adds to the other columns is noise of the sensors in good part."""
         own = [c for c in wanted if c[0] == effect]
         shape = change[[wanted.index(c) for c in own]]
@@ -273,120 +261,6 @@ class Search:
             energy -= cross @ np.linalg.lstsq(total[np.ix_(rest, rest)] + np.diag(g.precision[rest]), cross, rcond=None)[0]
         noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in own], axis=2), shape, axes=(2, 0))
         return bool(self.whitened_energy(noise) > _DROWNED * energy)
-
-    def find(self) -> tuple[Fit, "list[Gain]"]:
-        """Return the effects that are needed, and what each of the library explained at first, alone."""
-        fit, first = self.forward()
-        asked: list[set[str]] = []
-        while True:
-            self._report("asking whether every effect is needed")
-            needed = self.prune(fit if self.flights.commanded else self.refit(fit))  # by the noise as it is known by now
-            if self.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
-                break
-            # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
-            asked.append(set(needed.effects))
-            fit, _ = self.forward(needed)
-            if fit.effects == needed.effects:
-                break
-        return self._borne_out(needed), first
-
-    def _borne_out(self, fit: Fit) -> Fit:
-        """Return a fit less the effects that innovations do not confirm beside those that are left."""
-        if self.flights.commanded:
-            return fit
-        for effect in fit.effects:
-            if not Innovations(self.flights, fit.without(effect).setting).confirm(fit.setting):
-                self._report(f"{effect} is an answer to gusts")
-                return self._borne_out(self.refit(fit.without(effect)))
-        return fit
-
-    def forward(self, fit: Fit | None = None) -> tuple[Fit, "list[Gain]"]:
-        """Return ``fit`` with the effects that are worth adding one after the other, and what each explained at first."""
-        fit = Fit(self.delay.setting if self.delay else {}) if fit is None else fit
-        first: list[Gain] = []
-        for count in range(len([e for e in fit.effects if not self.held(e)]), self._most + 1):
-            regression = self.linearise(fit)
-            if count == 0:
-                self.set_noise(fit, regression)
-                fit = self.refit(fit)
-            else:
-                self.set_noise(fit, regression)
-            g = self.gram(fit, regression)
-            gains = self.gains(fit, regression, g)
-            first = first or gains
-            least = max(self._least_gain, self._least_share * g.error(g.index(self.base(fit.effects))))
-            better = [x for x in gains if _worth(x, least) and (not self.flights.commanded or self._plausible(x, count))]
-            if not better or count == self._most:
-                break
-            for gain in better[:_TRIED]:
-                self._report(f"trying {gain.effect}")
-                more = self.refit(gain.fit)
-                if self.flights.commanded:
-                    taken = not barely_swings(more.setting, self.flights.vehicle.gravity)
-                else:
-                    shifts = {SHIFT[0]: more.setting.get(SHIFT[0], {})}  # gusts bend them, and they are not what is asked
-                    taken = Innovations(self.flights, {**fit.setting, **shifts}).confirm({**more.setting, **shifts})
-                if taken:
-                    break
-            else:
-                break
-            fit = more
-        return fit, first
-
-    def _plausible(self, gain: "Gain", count: int) -> bool:
-        """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""
-        if takes_back(gain.fit.setting, self.flights.vehicle.weight):
-            return False
-        return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (gain.effect not in STARTS or gain.share > LEAST_OF_STARTS)
-
-    def prune(self, fit: Fit) -> Fit:
-        """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced by one."""
-        error = self.error(fit)
-        failed: dict[frozenset[str], float] = {}
-        for _ in range(_MOVES):
-            better = self._best_move(fit, error, failed)
-            if better is None:
-                break
-            fit, error = better
-        if self.flights.commanded:
-            fit = self.refit(fit)
-            self.whiten = self._whitener(self.noise, MEASURING)
-        return fit
-
-    def _best_move(self, fit: Fit, error: float, failed: dict[frozenset[str], float]) -> "tuple[Fit, float] | None":
-        """Return a better fit and its error.
-
-        ``failed`` keeps which effects no other one could bring down to which error, so that it is tried no second time.
-        """
-        least = max(self._least_gain, self._least_share * error)
-        for effect in fit.effects:
-            if not self.held(effect) and self.error_without(fit, effect) < error + least:
-                self._report(f"{effect} is not needed")
-                less = self.refit(fit.without(effect))
-                return less, self.error(less)
-        if self.flights.commanded:  # whose effects are far apart: no two of those that are alike are ever named
-            return None
-        for size, allowed in ((2, least), (1, -SWAP_GAIN)):
-            for group in itertools.combinations(fit.effects, size):
-                less = fit.without(*group)
-                rest, enough = frozenset(less.effects), error + allowed + _COMPLEXITY * sum(_freedom(e) for e in group)
-                if enough <= failed.get(rest, -np.inf):
-                    continue
-                failed[rest] = enough
-                regression = self.linearise(less, fit if len(fit.effects) > _FEW else None)
-                tries = [x for x in self.gains(less, regression, self.gram(less, regression)) if x.effect not in group]
-                for other in tries[:_SHORTLIST]:
-                    # what is far from linear may do better than it looks here, but not by any amount
-                    if other.left > error + allowed + _HOPE * (other.left + other.energy - error):
-                        continue
-                    if other.size <= LEAST_SIZES.get(other.effect, LEAST_SIZE):
-                        continue
-                    limit = enough - _COMPLEXITY * _freedom(other.effect)
-                    swapped = self.refit(other.fit, limit)
-                    if self.energy(swapped.setting) < limit and (after := self.error(swapped)) < limit:
-                        self._report(f"{other.effect} in place of {' and '.join(group)}")
-                        return swapped, after
-        return None
 
     def error_without(self, fit: Fit, effect: str) -> float:
         """Return the whitened energy on blocks left out once an effect is taken away and all others are fitted anew."""
@@ -427,12 +301,6 @@ class Gain:
     fit: Fit  # with it added, before it is refitted
 
 
-def _worth(gain: Gain, least: float) -> bool:
-    """Return whether an effect explains enough, and is large enough, to be named."""
-    size = LEAST_SIZES.get(gain.effect, LEAST_SIZE)
-    return gain.energy > least and gain.size > (size if gain.energy < PLAIN * least else 0.5 * size)
-
-
 def _follows(effect: str, named: Sequence[str]) -> bool:
     """Return whether an effect may join those that are named of flights known from commands."""
     return not mates(effect) & set(named) and (effect not in AFTER_SAG or "battery_sag" in named)
@@ -454,7 +322,16 @@ def _moved(setting: Setting, columns: Sequence[Column], change: Array) -> dict[s
     return out
 
 
-def _freedom(effect: str) -> float:
+def started(fit: Fit, columns: Sequence[Column], change: Array, *effects: str) -> Fit:
+    """Return a fit with changes and these effects added, before it is refitted."""
+    start = _moved(fit.setting, columns, change)
+    for effect in effects:
+        if any(c[0] == effect and c[1].startswith(MOMENT) for c in columns):
+            start[effect][CENTRAL] = _central(columns, change, effect)
+    return Fit(start)
+
+
+def freedom(effect: str) -> float:
     """Return how many coefficients an effect brings with it.
 
     One that sets the timing takes the shift's place. Of exact equivalents a change of the log comes last.

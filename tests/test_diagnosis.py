@@ -18,6 +18,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.flight_log import FlightLog, read_log
 from windwrench.identification.floor import sensor_noise, with_noise
+from windwrench.identification.moves import find
 from windwrench.identification.regression import Flights
 from windwrench.identification.search import Search
 from windwrench.identification.whitening import Whitener
@@ -90,6 +91,18 @@ def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
     assert any(word in note for note in found.notes)
 
 
+def test_what_takes_two_to_replace_it_gives_way():
+    """Heavier, with thrust that grows more steeply: on climbs one constant force does better than either of the two."""
+    added = EffectSetting("mass", {"dm": 0.045}), EffectSetting("thrust_curvature", {"a": 0.1})
+    log = fly_practice(load_vehicle("ardrone2"), added, "vertical", 40.0, 2, sensor=0.5)
+    found = diagnose([log], load_vehicle("ardrone2"))
+    assert found.candidates[0].name == "constant_force"
+    assert {e.name: e.tentative for e in found.effects} == {"mass": False, "thrust_curvature": False}
+    for effect in added:
+        (mine,) = (e for e in found.effects if e.name == effect.name)
+        assert mine.coefficients == pytest.approx(dict(effect.coefficients), rel=0.05)
+
+
 def test_what_comes_and_goes_is_no_sure_mass():
     """A battery's cell fails for seconds: what it costs has a mean, which a mass explains; no law scatters so."""
     flown = practise_held_back(load_vehicle("ardrone2"), "failing_cell", "small", seed=202)
@@ -142,7 +155,7 @@ def test_the_velocity_of_a_plant_that_holds_its_forces_is_half_a_tick_behind():
     """Taken as in step, it would be a thrust that is off by 2e-3 of what acceleration asks for, and get a name."""
     log = fly_practice(load_vehicle("ardrone2"), (EffectSetting("inflow_thrust", {"kz": 2.3e-4}),), seconds=40.0, seed=3,
                        turbulence=0.0, sensor=0.5)
-    fit, _ = Search(Flights([log], load_vehicle("ardrone2")), names()).find()
+    fit, _ = find(Search(Flights([log], load_vehicle("ardrone2")), names()))
     assert fit.effects == ["inflow_thrust"]
     assert fit.setting["inflow_thrust"]["kz"] == pytest.approx(2.3e-4, rel=0.01)
     assert fit.setting[""]["velocity_shift"] == pytest.approx(0.5 * TICK, abs=4.0 * fit.std["", "velocity_shift"])

@@ -9,6 +9,7 @@ from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.gusts import innovations
 from windwrench.identification.innovations import Innovations, at_odds
+from windwrench.identification.moves import find
 from windwrench.identification.regression import Flights, typical
 from windwrench.identification.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
 
@@ -102,6 +103,6 @@ def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
 def test_what_stands_for_another_law_is_at_odds_with_the_innovations(library, doubtful):
     flapping = EffectSetting("flapping_moment", {"kflap": 3e-6})
     flights = Flights([fly_practice(VEHICLE, (flapping,), "excite", 40.0, seed=4)], VEHICLE)
-    fit, _ = Search(flights, [library]).find()
+    fit, _ = find(Search(flights, [library]))
     assert fit.effects == [library]
     assert bool(at_odds(flights, fit.setting)) == doubtful
