@@ -51,6 +51,8 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     if flights.commanded:  # little of such flights is beyond doubt: the other one must explain most of it
         alone = search.refit(less)
         limit = min(limit, _MOST * search.whitened_energy(flights.residual(alone.setting) - whole))
+    # no farther apart than that, by the triangle's inequality
+    enough = (np.sqrt(search.whitened_energy(whole)) + np.sqrt(limit)) ** 2
     out = []
     for other in search.gains(less, regression, g):
         near, hopeful = (_NEAR_OF_COMMANDS, _HOPEFUL_OF_COMMANDS) if flights.commanded else (_NEAR, _HOPEFUL)
@@ -59,7 +61,7 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         if other.effect == effect or other.size > _PLAUSIBLE or other.left > near * limit:
             continue
         # what is far from linear is fitted to the flights themselves
-        swapped = search.refit(other.fit)
+        swapped = search.refit(other.fit, enough)
         if search.whitened_energy(flights.residual(swapped.setting) - whole) < limit:
             out.append(other.effect)
     return out

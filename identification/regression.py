@@ -20,7 +20,7 @@ from .commanded import LEAN_X, LEAN_Y, NOT_FROM_COMMANDS, SCALE, commanded, devi
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .floor import noisy_logs
-from .residual import centre_acceleration, model_wrench
+from .residual import declared_wrench
 from .sensing import undo_log_sensing
 from .signals import Signals, log_signals, low_pass
 
@@ -243,18 +243,10 @@ class Flights:
         for piece in self.pieces(setting):
             scale, *lean = (deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y))
             s = self._shifted(piece, shifts, scale)
-            rotors, effects, body = model_wrench(s, vehicle)
-            model = np.empty_like(effects)
-            model[:, :3] = (self.vehicle.mass / body.mass) * (s.rotation[:, :, 2] * rotors[:, :1] + effects[:, :3])
+            model = declared_wrench(s, vehicle, self.vehicle)
             model[:, :2] += self.vehicle.weight * np.array(lean)
-            if np.any(body.com):
-                model[:, :3] -= self.vehicle.mass * centre_acceleration(s, body)
             if self.commanded:
                 model[:, 3:] = 0.0
-            else:
-                turning = np.cross(s.rate, s.rate @ body.inertia.T)
-                model[:, 3:] = (rotors[:, 1:] + effects[:, 3:] - turning) @ np.linalg.solve(body.inertia.T,
-                                                                                         self.vehicle.inertia.T)
             out.append(model)
         return out
 

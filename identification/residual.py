@@ -48,6 +48,41 @@ def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehi
     return rotors, effects, body
 
 
+@compiled
+def _accelerate(rotors: Array, effects: Array, rotation: Array, rate: Array, turning: Array, com: Array, inertia: Array,
+                mass: float, share: float, turn: Array, out: Array) -> None:
+    """Write what rotors and effects give, and a centre of mass off the pose's point needs, as by another mass and inertia."""
+    needed, moment, spin = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(len(rotors)):
+        w, a = rate[k], turning[k]
+        along = w[0] * com[0] + w[1] * com[1] + w[2] * com[2]
+        square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        for i in range(3):
+            spin[i] = inertia[i, 0] * w[0] + inertia[i, 1] * w[1] + inertia[i, 2] * w[2]
+        for i in range(3):
+            x, y = (i + 1) % 3, (i + 2) % 3  # of a cross product
+            needed[i] = a[x] * com[y] - a[y] * com[x] + along * w[i] - square * com[i]
+            moment[i] = rotors[k, 1 + i] + effects[k, 3 + i] - (w[x] * spin[y] - w[y] * spin[x])
+        for i in range(3):
+            r = rotation[k, i]
+            out[k, i] = (share * (r[2] * rotors[k, 0] + effects[k, i])
+                         - mass * (r[0] * needed[0] + r[1] * needed[1] + r[2] * needed[2]))
+            out[k, 3 + i] = turn[i, 0] * moment[0] + turn[i, 1] * moment[1] + turn[i, 2] * moment[2]
+
+
+def declared_wrench(signals: Signals, vehicle: Vehicle, declared: Vehicle) -> Array:
+    """Return the force (N, world) and torque (Nm, body) that a model says act (n, 6), without the weight.
+
+    Both are as if the vehicle had the mass and inertia of ``declared``: the accelerations that the model says are right.
+    """
+    rotors, effects, body = model_wrench(signals, vehicle)
+    out = np.empty_like(effects)
+    _accelerate(rotors, effects, np.ascontiguousarray(signals.rotation), np.ascontiguousarray(signals.rate),
+                np.ascontiguousarray(signals.angular_acceleration), body.com, body.inertia, declared.mass,
+                declared.mass / body.mass, declared.inertia @ np.linalg.inv(body.inertia), out)
+    return out
+
+
 def residual_wrench(signals: Signals, vehicle: Vehicle) -> Array:
     """Return the residual (n, 6): force in the world frame (N), torque about the centre of mass in the body frame (Nm)."""
     rotors, effects, body = model_wrench(signals, vehicle)
