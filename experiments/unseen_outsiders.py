@@ -1,4 +1,4 @@
-"""Disturbances that were written after every rule of the diagnosis stood, and first diagnosed when flown for its score.
+"""Disturbances that no rule of the diagnosis has seen: none was diagnosed before it was flown for the score.
 
 They are of other kinds than ``outsiders.OUTSIDERS``, and than those that were held back before.
 """
