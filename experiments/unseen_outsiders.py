@@ -1,4 +1,4 @@
-"""Disturbances that no rule of the diagnosis has seen: none was diagnosed before it was flown for the score.
+"""Disturbances that no rule of the diagnosis has seen: none was diagnosed before it was flown for the score (seed 20).
 
 They are of other kinds than ``outsiders.OUTSIDERS``, and than those that were held back before.
 """

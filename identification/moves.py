@@ -4,7 +4,7 @@ Each is judged on blocks of the fit that are left out in turn; nothing here look
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,6 @@ LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of 
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
 _MOVES = 3  # at a time, which takes seconds each where four effects stand for one
 _SHORTLIST = 2
-_RIVALS = 4  # of one effect, that are tried with any other one
 _TRIED = 8  # candidates for one place, the best first, that innovations may turn down
 _FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
 _HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
@@ -117,7 +116,7 @@ def _prune(search: Search, fit: Fit) -> Fit:
 
 
 def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]) -> tuple[Fit, float] | None:
-    """Return a better fit and its error: with an effect less, with one in place of two or one, or with two in place of one.
+    """Return a better fit and its error: with an effect less, one in place of two or one, or two in place of one or of many.
 
     ``failed`` keeps which effects no other one could bring down to which error, so that it is tried no second time.
     """
@@ -130,6 +129,12 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
     if search.flights.commanded:  # whose effects are far apart: no two of those that are alike are ever named
         return None
     few = len(fit.effects) <= _FEW
+    if not few:  # what stands for two effects with three or four is left by no small step
+        less, spared = fit.without(*fit.effects), COMPLEXITY * sum(map(freedom, fit.effects))
+        regression = search.linearise(less)
+        couple = _couple(search, less, regression, search.gram(less, regression), error - SWAP_GAIN + spared)
+        if better := _swapped(search, couple, fit.effects):
+            return better
     for size, allowed in ((2, least), (1, -SWAP_GAIN)):
         for group in itertools.combinations(fit.effects, size):
             less, spared = fit.without(*group), COMPLEXITY * sum(map(freedom, group))
@@ -142,12 +147,9 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
             rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
             swaps = _singles(rivals, error, allowed, bar)
             if few and size == 1:
-                swaps = itertools.chain(swaps, _couple(search, less, regression, g, rivals, error - least + spared))
-            for swap in swaps:
-                swapped = search.refit(swap.fit, swap.limit)
-                if search.energy(swapped.setting) < swap.limit and (after := search.error(swapped)) < swap.limit:
-                    search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
-                    return swapped, after
+                swaps = itertools.chain(swaps, _couple(search, less, regression, g, error - least + spared))
+            if better := _swapped(search, swaps, group):
+                return better
     return None
 
 
@@ -160,6 +162,16 @@ class Swap:
     limit: float  # whitened energy that it must come below
 
 
+def _swapped(search: Search, swaps: Iterable[Swap], group: Sequence[str]) -> tuple[Fit, float] | None:
+    """Return the first of the swaps for a group of effects that keeps what it promises, refitted, and its error."""
+    for swap in swaps:
+        fit = search.refit(swap.fit, swap.limit)
+        if search.energy(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit:
+            search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
+            return fit, error
+    return None
+
+
 def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -> Iterator[Swap]:
     """Yield the rivals that may do better than ``bar``, less what their coefficients cost."""
     for rival in rivals[:_SHORTLIST]:
@@ -169,24 +181,24 @@ def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -
             yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
 
 
-def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, rivals: Sequence[Gain], bar: float) -> Iterator[Swap]:
-    """Yield the one of the rivals and the effect beside it that do best beyond a fit, if they do better than ``bar``.
+def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, bar: float) -> Iterator[Swap]:
+    """Yield the two effects that do best together beyond a fit, if they do better than ``bar``, less what they cost.
 
     What takes two to replace it is passed on the way to neither of them. Two together are nearly linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
-    others = [e for e in search.library if e not in STARTS and e not in fit.effects]
-    for one, other in itertools.product([x.effect for x in rivals[:_RIVALS] if x.effect not in STARTS], others):
-        wanted = search.base(fit.effects, (one, other))
-        if one == other or not regression.columns.keys() >= set(wanted):
+    library = [e for e in search.library if e not in STARTS and e not in fit.effects]
+    for both in itertools.combinations(library, 2):
+        wanted = search.base(fit.effects, both)
+        if not regression.columns.keys() >= set(wanted):
             continue
-        cost = COMPLEXITY * (freedom(one) + freedom(other))
+        cost = COMPLEXITY * sum(map(freedom, both))
         if (left := g.error(g.index(wanted)) + cost) >= least:
             continue
         change = g.solve(total, g.index(wanted))
         if not any(search.drowned(g, total, wanted, change, e) or search.size(wanted, change, e) <= _least_size(e)
-                   for e in (one, other)):
-            least, best = left, Swap((one, other), started(fit, wanted, change, one, other), bar - cost)
+                   for e in both):
+            least, best = left, Swap(both, started(fit, wanted, change, *both), bar - cost)
     if best:
         yield best
 

@@ -103,6 +103,16 @@ def test_what_takes_two_to_replace_it_gives_way():
         assert mine.coefficients == pytest.approx(dict(effect.coefficients), rel=0.05)
 
 
+def test_two_effects_are_found_behind_four_that_stand_for_them():
+    """A gain of the attitude and a battery's sag: innovations turn the sag down alone, and four others come in their place."""
+    flown = practise(load_vehicle("ardrone2"), "pair", (), "typical", None, 3127511905, 60.0)
+    assert set(flown.truth) == {"attitude_gain", "battery_sag"}
+    said: list[str] = []
+    found = diagnose([flown.log], flown.vehicle, report=said.append)
+    assert any(words.startswith("attitude_gain and battery_sag in place of") for words in said)
+    assert {e.name: e.tentative for e in found.effects} == {"attitude_gain": False, "battery_sag": False}
+
+
 def test_what_comes_and_goes_is_no_sure_mass():
     """A battery's cell fails for seconds: what it costs has a mean, which a mass explains; no law scatters so."""
     flown = practise_held_back(load_vehicle("ardrone2"), "failing_cell", "small", seed=202)
