@@ -55,10 +55,14 @@ def _borne_out(search: Search, fit: Fit) -> Fit:
     if search.flights.commanded:
         return fit
     for effect in fit.effects:
-        if not Innovations(search.flights, fit.without(effect).setting).confirm(fit.setting):
+        if not _is_borne_out(search, fit, effect):
             search.report(f"{effect} is an answer to gusts")
             return _borne_out(search, search.refit(fit.without(effect)))
     return fit
+
+
+def _is_borne_out(search: Search, fit: Fit, effect: str) -> bool:
+    return Innovations(search.flights, fit.without(effect).setting).confirm(fit.setting)
 
 
 def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
@@ -132,7 +136,8 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
     if not few:  # what stands for two effects with three or four is left by no small step
         less, spared = fit.without(*fit.effects), COMPLEXITY * sum(map(freedom, fit.effects))
         regression = search.linearise(less)
-        couple = _couple(search, less, regression, search.gram(less, regression), error - SWAP_GAIN + spared)
+        g, bar = search.gram(less, regression), error - SWAP_GAIN + spared
+        couple = _couple(search, less, regression, g, search.library, bar)
         if better := _swapped(search, couple, fit.effects):
             return better
     for size, allowed in ((2, least), (1, -SWAP_GAIN)):
@@ -145,11 +150,13 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
             regression = search.linearise(less, None if few else fit)
             g = search.gram(less, regression)
             rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
-            swaps = _singles(rivals, error, allowed, bar)
-            if few and size == 1:
-                swaps = itertools.chain(swaps, _couple(search, less, regression, g, error - least + spared))
-            if better := _swapped(search, swaps, group):
+            if better := _swapped(search, _singles(rivals, error, allowed, bar), group):
                 return better
+            if few and size == 1:
+                others = [e for e in search.library if e not in group]  # one that only joins has been asked already
+                couple = _couple(search, less, regression, g, others, error - least + spared)
+                if better := _swapped(search, couple, group):
+                    return better
     return None
 
 
@@ -166,7 +173,8 @@ def _swapped(search: Search, swaps: Iterable[Swap], group: Sequence[str]) -> tup
     """Return the first of the swaps for a group of effects that keeps what it promises, refitted, and its error."""
     for swap in swaps:
         fit = search.refit(swap.fit, swap.limit)
-        if search.energy(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit:
+        better = search.energy(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit
+        if better and (len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error
     return None
@@ -181,14 +189,13 @@ def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -
             yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
 
 
-def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, bar: float) -> Iterator[Swap]:
-    """Yield the two effects that do best together beyond a fit, if they do better than ``bar``, less what they cost.
+def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float) -> Iterator[Swap]:
+    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than ``bar``, less what they cost.
 
     What takes two to replace it is passed on the way to neither of them. Two together are nearly linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
-    library = [e for e in search.library if e not in STARTS and e not in fit.effects]
-    for both in itertools.combinations(library, 2):
+    for both in itertools.combinations([e for e in library if e not in STARTS and e not in fit.effects], 2):
         wanted = search.base(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
