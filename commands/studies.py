@@ -73,6 +73,7 @@ def trials(
     seeds: Annotated[int, typer.Option(min=1, help="How often everything is flown, each time anew.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="A part of it only, some minutes long.")] = False,
+    group: Annotated[list[str] | None, typer.Option(help="Fly this group alone, such as pair; again for more.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
     markdown: Annotated[Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")] = None,
     out: Out = Path("results/trials"),
@@ -85,12 +86,13 @@ def trials(
     from ..experiments.diagnosis_trials import plan, run_trials
     from ..experiments.diagnosis_trials_page import write_results
 
-    wanted = plan(seeds, quick, seed)
+    wanted = plan(seeds, quick, seed, group or ())
     folder = results_folder(out, flights=len(wanted), diagnoses=sum(len(trial.libraries) for trial in wanted), jobs=jobs)
     with progress_bar() as progress:
         task = progress.add_task("diagnosing flights", total=len(wanted))
         outcomes = run_trials(wanted, folder, jobs, lambda done: progress.update(task, completed=done))
-    paths = write_results(outcomes, folder, folder / "trials.md" if markdown is None else markdown, seeds, quick, seed)
+    paths = write_results(outcomes, folder, folder / "trials.md" if markdown is None else markdown, seeds, quick, seed,
+                          group or ())
     measured = rules(j for outcome in outcomes for j in judge(outcome))
     for rule in measured:
         met = {True: "met", False: "not met", None: "-"}[rule.met]

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..dynamics import EffectSetting, load_vehicle
 from ..dynamics.effects import names
-from ..dynamics.errors import InputError
+from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.files import replaced
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.workers import workers
@@ -56,13 +56,14 @@ _ROTORPY_PATHS = ("excite", "fast")
 _BLAS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _KIND = {"typical": "effect", "third": "effect", "preset": "effect", "pair": "pair", "nothing": "nothing",
          "strong turbulence": "nothing", "hover": "hover", "outsider": "outsider"}  # of practice flight, by group
+GROUPS = (*_KIND, "held back", "rotorpy")
 
 
 @dataclass(frozen=True)
 class Trial:
     """One flight and what it is diagnosed with."""
 
-    group: str  # typical, third, preset, pair, nothing, strong turbulence, hover, outsider, held back or rotorpy
+    group: str  # one of GROUPS
     added: tuple[str, ...] = ()  # effects, or the disturbance; nothing for a pair, which is drawn
     size: str = "typical"
     seed: int = 0
@@ -84,17 +85,21 @@ class Trial:
         return zlib.crc32(self.key.encode())
 
 
-def plan(seeds: int = 1, quick: bool = False, first: int = 0) -> list[Trial]:
+def plan(seeds: int = 1, quick: bool = False, first: int = 0, groups: Sequence[str] = ()) -> list[Trial]:
     """Return the trials of a run; one effect is flown on the trajectory that shows it best.
 
     Args:
         seeds: how often everything is flown, each time with other signs, sizes, paths and noise.
         quick: a part of it only, some minutes long.
         first: the first seed.
+        groups: those of ``GROUPS`` that are wanted; default: all.
 
     Raises:
-        InputError: ``seeds`` is not positive, or ``first`` is negative.
+        InputError: ``seeds`` is not positive, ``first`` is negative, or no group has this name.
     """
+    for group in groups:
+        if group not in GROUPS:
+            raise unknown_name("group", group, GROUPS)
     if seeds < 1 or first < 0:
         raise InputError(f"trials: --seeds must be at least 1 and --seed at least 0, got {seeds} and {first}")
     effects = _QUICK_EFFECTS if quick else names()
@@ -125,7 +130,7 @@ def plan(seeds: int = 1, quick: bool = False, first: int = 0) -> list[Trial]:
             for path in _ROTORPY_PATHS[:1] if quick else _ROTORPY_PATHS:
                 out += [Trial("rotorpy", added, seed=seed, trajectory=path, vehicle="rotorpy", seconds=_ROTORPY_SECONDS)
                         for added in (("aero",), ())]
-    return out
+    return [trial for trial in out if trial.group in (groups or GROUPS)]
 
 
 def stamp() -> str:

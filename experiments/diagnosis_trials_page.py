@@ -46,7 +46,7 @@ Cells = Mapping[tuple[str, str], Sequence[str]]  # outcomes by row and column
 
 
 def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Path, seeds: int, quick: bool,
-                  first: int = 0) -> list[Path]:
+                  first: int = 0, groups: Sequence[str] = ()) -> list[Path]:
     """Write ``trials.json`` and ``trials.png`` into a folder, and the page that shows them; return the three paths.
 
     Args:
@@ -56,6 +56,7 @@ def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Pat
         seeds: that were asked for.
         quick: whether it was the short run.
         first: the first of the seeds.
+        groups: that were asked for; default: all.
 
     Raises:
         InputError: a file cannot be written.
@@ -68,7 +69,8 @@ def write_results(outcomes: Sequence[Mapping[str, Any]], folder: Path, page: Pat
         partial.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     with replaced(picture) as partial:
         draw(judged).savefig(partial, format="png", dpi=110, metadata={"Software": None})
-    command = f"windwrench trials --seed {first} --seeds {seeds}{' --quick' if quick else ''}"
+    command = " ".join([f"windwrench trials --seed {first} --seeds {seeds}", *["--quick"] * quick,
+                        *(f"--group '{group}'" if " " in group else f"--group {group}" for group in groups)])
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     with replaced(page) as partial:
         partial.write_text(page_text(outcomes, judged, command, where), encoding="utf-8")
@@ -92,7 +94,7 @@ def page_text(outcomes: Sequence[Mapping[str, Any]], judged: Sequence[Judgement]
         "two of them (failing_cell, high_hull) the search for structure got rules of its own. Six more ("
         + ", ".join(UNSEEN) + ") were written last and first diagnosed on seed 20: eleven of twelve were `unexplained` or "
         "`partly explained`, a third of a loose gimbal on a fast flight in twice the noise `nothing to explain`; no rule came "
-        "of them. Seeds 0 to 21, 101 to 107, 201 to 203 and 401 to 404, and two effects of seeds 2000 to 2049, were looked at "
+        "of them. Seeds 0 to 21, 101 to 107, 201 to 203 and 401 to 404, and two effects of seeds 200 to 204, were looked at "
         "while the rules were made, and no other.", "",
         "A name counts as right where it is the added effect's, or where the diagnosis says that these flights cannot tell it "
         "from the added effect. It is *confidently wrong* where it is neither, and not called tentative.", "",

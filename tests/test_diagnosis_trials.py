@@ -87,6 +87,9 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
     assert [t.key for t in plan(first=1)] == [t.key for t in twice[len(trials):]]
     assert len({t.key for t in twice}) == len(twice) == 2 * len(trials)
     assert len({t.flight_seed for t in twice}) == len(twice)
+    assert plan(groups=("pair", "hover")) == [t for t in trials if t.group in ("pair", "hover")]
+    with pytest.raises(InputError, match="pairs"):
+        plan(groups=("pairs",))
     with pytest.raises(InputError, match="seeds"):
         plan(0)
     with pytest.raises(InputError, match="seed"):
