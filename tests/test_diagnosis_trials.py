@@ -265,20 +265,20 @@ def test_a_flight_is_diagnosed_and_not_again(tmp_path):
 def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, capfd):
     asked = []
 
-    def planned(seeds, quick, first):
-        asked.append((seeds, quick, first))
+    def planned(seeds, quick, first, groups):
+        asked.append((seeds, quick, first, *groups))
         return [Trial("outsider", ("gremlins",))]
 
     monkeypatch.setattr("windwrench.experiments.diagnosis_trials.plan", planned)
     page = tmp_path / "page.md"
-    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--seed", "5", "--quick", "--jobs", "1", "--out",
-                                     str(tmp_path / "out"), "--markdown", str(page)])
+    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--seed", "5", "--quick", "--group",
+                                     "outsider", "--jobs", "1", "--out", str(tmp_path / "out"), "--markdown", str(page)])
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code in (0, None)
-    assert asked == [(3, True, 5)]
+    assert asked == [(3, True, 5, "outsider")]
     assert "1. one effect of typical size" in capfd.readouterr().out
-    assert "`windwrench trials --seed 5 --seeds 3 --quick`" in page.read_text(encoding="utf-8")
+    assert "`windwrench trials --seed 5 --seeds 3 --quick --group outsider`" in page.read_text(encoding="utf-8")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"run.json", "trials.json", "trials.jsonl", "trials.png"}
 
 
