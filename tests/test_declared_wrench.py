@@ -15,7 +15,7 @@ def test_the_balance_by_the_declared_body_is_that_of_the_residual():
                                     EffectSetting("com_offset", {"cx": 0.01, "cy": 0.003, "cz": -0.02}))
     (s,) = log_signals(fly_practice(declared, seconds=6.0, seed=1))
     body = model_wrench(s, vehicle)[2]
-    needed = np.column_stack([declared.mass * ([*s.acceleration, 0.0, 0.0, declared.gravity]),
+    needed = np.column_stack([declared.mass * (s.acceleration + np.array([0.0, 0.0, declared.gravity])),
                               s.angular_acceleration @ declared.inertia.T])
     r = residual_wrench(s, vehicle)
     r = np.column_stack([declared.mass / body.mass * r[:, :3],
