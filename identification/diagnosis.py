@@ -20,6 +20,7 @@ from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .innovations import Innovations, at_odds
+from .measuring import measured
 from .moves import find
 from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
@@ -75,6 +76,7 @@ def diagnose(
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
     report("looking for what is left")
     signs, gusty = structure(search, fit)
+    fit = measured(search, fit)
     mimics = [*composites(flights, fit), *unlisted(search, fit)]
     if not flights.commanded:
         mimics += [*beyond_belief(search, fit), *at_odds(flights, fit.setting)]

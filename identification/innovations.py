@@ -17,8 +17,10 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from ..dynamics.effects import get
 from .gusts import STRENGTHS, TIMES, innovations, likeliest, strength_of
-from .regression import SHIFT, Flights, Piece, Setting
+from .regression import SHIFT, Column, Flights, Piece, Setting, coefficient, typical
+from .selection import Gram, room
 from .sensing import undo_log_sensing
 from .signals import log_signals
 
@@ -29,6 +31,7 @@ _ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must hav
 _AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
 _NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
+_STEP = 0.1  # typical sizes, over which slopes are taken
 _TINY = 1e-300
 _CLOCK = "clock_offset", "dt"
 
@@ -71,6 +74,33 @@ class Innovations:
             change[1] = self._accelerations(CubicSpline(piece.rows, part)(at))
             changes.append(change)
         return _confirmed(*self._share(changes))
+
+    def gram(self, columns: Sequence[Column]) -> Gram:
+        """Return the regression of the innovations on coefficients, in one block, each axis by its standard deviation.
+
+        Gusts are those that suit the innovations as they are.
+        """
+        slopes = [self._slope(column) for column in columns]
+        total = np.zeros((len(columns) + 1, len(columns) + 1))
+        for axis in range(6):
+            parts = [np.stack([*(slope[i][..., axis] for slope in slopes), -motion[..., axis]], axis=-1)
+                     for i, motion in enumerate(self._motions)]
+            products = self._products([part[..., -1:] for part in parts])
+            strength, time = likeliest(lambda *gusts, of=products: float(of(*gusts)[0, 0]))
+            sums = self._sums(parts, float(STRENGTHS[strength]), float(TIMES[time]))
+            total += sums * self._count / max(sums[-1, -1], _TINY)
+        return Gram(tuple(columns), np.zeros((0, 6, len(total))), np.zeros(1, dtype=np.intp), total[None],
+                    *room(self._flights, self._setting, columns))
+
+    def _slope(self, column: Column) -> list[Array]:
+        """Return what a unit of a coefficient adds to the motions (2, n, 6)."""
+        effect, name = column
+        own = self._setting.get(effect, {})
+        value, delta = own.get(name, 0.0), _STEP * typical(column, self._flights.vehicle)
+        if effect and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum:
+            delta = -delta
+        after = {**self._setting, effect: {**own, name: value + delta}}
+        return [(new - old) / delta for new, old in zip(self._seen(self._timed(after)), self._motions, strict=True)]
 
     def gusts(self) -> list[tuple[float, float]]:
         """Return the RMS (N in the world, Nm in the body) and the time (s) of the likeliest gusts of each of the six channels.
@@ -188,7 +218,9 @@ def at_odds(flights: Flights, setting: Setting) -> list[str]:
     another one seldom is. (Two estimates that must agree: J. A. Hausman, Econometrica 46 (1978), 1251-1271.)
     """
     out = []
-    for effect in filter(None, setting):
+    for effect in setting:
+        if not effect or get(effect).kind == "sensing":  # of what is seen, not of what acts: bent by its own noise
+            continue
         share, energy = Innovations(flights, {k: v for k, v in setting.items() if k != effect}).share(setting)
         if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _TINY))):
             out.append(f"{effect}: what no past pose foretells bears out {share:.0%} of it: another effect may be behind it")

@@ -121,10 +121,15 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
     begins = np.flatnonzero(np.diff(flights.block[flights.fit], prepend=-1))
     parts = (part.reshape(-1, len(names) + 1) for part in np.split(x, begins[1:]))
     blocks = np.array([part.T @ part for part in parts])
-    size = np.array([typical(c, flights.vehicle) for c in names])
-    value = np.array([setting.get(c[0], {}).get(c[1], 0.0) for c in names])
-    low, high = np.empty(len(names)), np.empty(len(names))
-    for i, c in enumerate(names):
+    return Gram(names, x, begins, blocks, *room(flights, setting, names))
+
+
+def room(flights: Flights, setting: Setting, columns: Sequence[Column]) -> tuple[Array, Array, Array, Array]:
+    """Return of each column (columns,) its prior's precision, its value, and by how much this may fall and rise."""
+    size = np.array([typical(c, flights.vehicle) for c in columns])
+    value = np.array([setting.get(c[0], {}).get(c[1], 0.0) for c in columns])
+    low, high = np.empty(len(columns)), np.empty(len(columns))
+    for i, c in enumerate(columns):
         if not c[0]:
             low[i], high[i] = range_of(c)
         elif c[1].startswith(MOMENT):
@@ -137,4 +142,4 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
                 low[i] = max(low[i], -_MOST_MISSING * flights.vehicle.mass)
     prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
-    return Gram(names, x, begins, blocks, prior, value, low - value, high - value)
+    return prior, value, low - value, high - value

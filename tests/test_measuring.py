@@ -1,0 +1,58 @@
+"""What the flight loop's answer to noise bends in the residual's least squares, innovations measure as it is."""
+
+import pytest
+
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.effects import names
+from windwrench.experiments.practice_flights import fly_practice
+from windwrench.identification.equivalence import composites
+from windwrench.identification.innovations import at_odds
+from windwrench.identification.measuring import measured
+from windwrench.identification.regression import SHIFT, Flights
+from windwrench.identification.search import Fit, Search
+
+VEHICLE = load_vehicle("ardrone2")
+
+
+def fitted(truth, guess, seconds=40.0, **flight):
+    """Return the search, and the least-squares fit of the effects of ``guess``, on a flight with those of ``truth``."""
+    settings = tuple(EffectSetting(name, dict(values)) for name, values in truth.items())
+    search = Search(Flights([fly_practice(VEHICLE, settings, seconds=seconds, **flight)], VEHICLE), names())
+    fit = Fit({name: dict(values) for name, values in guess.items()})
+    search.set_noise(fit, search.linearise(fit))
+    return search, search.refit(fit)
+
+
+def test_a_lag_is_no_delay_of_the_turn_rates():
+    truth = {"motor_lag": {"tau": 0.0134}}
+    search, fit = fitted(truth, truth, seed=2, sensor=0.5, turbulence=0.0)
+    found = measured(search, fit)
+    by_residual, by_innovations = (abs(x.setting["motor_lag"]["tau"] - 0.0134) for x in (fit, found))
+    assert by_residual > 0.002, "if least squares is right, nothing needs measuring anew"
+    assert by_innovations < 0.5 * by_residual
+    assert abs(found.setting[SHIFT[0]][SHIFT[1]]) < 0.5 * abs(fit.setting[SHIFT[0]][SHIFT[1]])
+    assert all(found.std[column] >= fit.std[column] for column in fit.std)
+    assert not composites(search.flights, found)
+
+
+def test_a_lag_that_stands_for_a_latency_has_its_turn_rates_late():
+    search, fit = fitted({"latency": {"d": 0.01}}, {"motor_lag": {"tau": 0.01}}, seed=3, turbulence=1.0)
+    found = measured(search, fit)
+    assert found.setting[SHIFT[0]][SHIFT[1]] > 0.004
+    assert composites(search.flights, found)
+
+
+def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
+    """On a gentle flight in twice the noise."""
+    truth = {"attitude_gain": {"g": 0.05}}
+    search, fit = fitted(truth, truth, trajectory="gentle", seed=0, sensor=2.0, turbulence=1.0)
+    by_residual, by_innovations = (x.setting["attitude_gain"]["g"] - 0.05 for x in (fit, measured(search, fit)))
+    assert by_residual > 0.02
+    assert abs(by_innovations) < 0.3 * by_residual
+    # that the residual's share of noise is there is known: it is no sign of another effect
+    assert not at_odds(search.flights, fit.setting)
+
+
+def test_other_effects_stay_as_they_are():
+    search, fit = fitted({"mass": {"dm": 0.03}}, {"mass": {"dm": 0.03}}, seconds=20.0, seed=4)
+    assert measured(search, fit) is fit
