@@ -47,7 +47,7 @@ _ROTORPY_SECONDS = 40.0  # RotorPy is slow
 STRONG_TURBULENCE = 4.0  # times the background's
 HOVERED = ("mass", "thrust_scale", "constant_force", "com_offset", "constant_torque", "rotor_efficiency", "world_tilt",
            "thrust_axis_tilt")
-PAIRS = 10  # a seed
+PAIRS = 30  # a seed
 PRESETS = ("hummingbird", "crazyflie")  # flown in part
 _PRESET_EFFECTS = ("rotor_drag", "mass", "com_offset", "motor_lag", "thrust_curvature")
 _QUICK_EFFECTS = ("rotor_drag", "mass", "inflow_thrust", "ground_effect", "com_offset", "latency")

@@ -94,8 +94,8 @@ def page_text(outcomes: Sequence[Mapping[str, Any]], judged: Sequence[Judgement]
         "two of them (failing_cell, high_hull) the search for structure got rules of its own. Six more ("
         + ", ".join(UNSEEN) + ") were written last and first diagnosed on seed 20: eleven of twelve were `unexplained` or "
         "`partly explained`, a third of a loose gimbal on a fast flight in twice the noise `nothing to explain`; no rule came "
-        "of them. Seeds 0 to 21, 101 to 107, 201 to 203 and 401 to 404, and two effects of seeds 200 to 204, were looked at "
-        "while the rules were made, and no other.", "",
+        "of them. Seeds 0 to 22, 101 to 107, 201 to 203 and 401 to 404, flights 0 to 229, 2000 to 2049 and 3000 to 3049 with two "
+        "effects, and lags and delays of seeds 500 to 505, were looked at while the rules were made, and no other.", "",
         "A name counts as right where it is the added effect's, or where the diagnosis says that these flights cannot tell it "
         "from the added effect. It is *confidently wrong* where it is neither, and not called tentative.", "",
         "## The rules", "", *_table(("rule", "target", "measured", "diagnoses", "met"), (
@@ -232,8 +232,8 @@ def _not_flown(outcomes: Iterable[Mapping[str, Any]]) -> list[str]:
 
 def draw(judged: Sequence[Judgement]) -> Figure:
     """Draw every outcome as a cell: effects by what was asked of them, and beside them all other flights."""
-    figure = Figure(figsize=(12.5, 10.5), layout="constrained")
-    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.15, 1.0))[0]
+    figure = Figure(figsize=(16.5, 10.5), layout="constrained")
+    left, *others = figure.subfigures(1, 3, squeeze=False, width_ratios=(1.25, 0.9, 0.9))[0]
     asked: tuple[tuple[str, Callable[[Judgement], bool]], ...] = (
         ("typical", lambda j: j.group == "typical" and not j.without),
         ("a third", lambda j: j.group == "third" and not j.without),
@@ -248,21 +248,23 @@ def draw(judged: Sequence[Judgement]) -> Figure:
         ("typical", lambda j: j.size == "typical"), ("a third", lambda j: j.size == "small"))
     calm: tuple[tuple[str, Callable[[Judgement], bool]], ...] = (
         ("background", lambda j: j.group == "nothing"), ("strong\nturbulence", lambda j: j.group == "strong turbulence"))
-    panels = [
+    panels = ([
         ("outside the library (* held back)", _cells([j for j in judged if j.group in ("outsider", "held back")], sizes,
                                                      lambda j: j.cause + ("*" if j.group == "held back" else ""))),
         ("no effect", _cells([j for j in judged if j.group in ("nothing", "strong turbulence")], calm,
                              lambda j: j.flight.split(",")[0])),
+    ], [
         ("two effects", _cells([j for j in judged if j.group == "pair"], (("typical", lambda j: True),), lambda j: j.cause)),
         ("RotorPy's Hummingbird", _cells([j for j in judged if j.group == "rotorpy"], (
             ("aerodynamics\non", lambda j: bool(j.truth)), ("off", lambda j: not j.truth)), lambda j: j.flight.split(",")[0])),
-    ]
-    flown = [(title, cells) for title, cells in panels if cells]
-    if flown:
-        heights = [2.0 + len({row for row, _ in cells}) for _, cells in flown]
-        axes = right.subplots(len(flown), 1, squeeze=False, height_ratios=heights)[:, 0]
-        for axis, (title, cells) in zip(axes, flown, strict=True):
-            _matrix(axis, title, cells)
+    ])
+    for part, column in zip(others, panels, strict=True):
+        flown = [(title, cells) for title, cells in column if cells]
+        if flown:
+            heights = [2.0 + len({row for row, _ in cells}) for _, cells in flown]
+            axes = part.subplots(len(flown), 1, squeeze=False, height_ratios=heights)[:, 0]
+            for axis, (title, cells) in zip(axes, flown, strict=True):
+                _matrix(axis, title, cells)
     figure.legend(handles=[Patch(color=_LOOK[name][0], label=f"{_LOOK[name][1]}: {name}") for name in OUTCOMES],
                   loc="outside lower center", ncols=len(OUTCOMES), fontsize=8, frameon=False)
     return figure

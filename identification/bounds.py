@@ -12,11 +12,12 @@ from .search import Fit, Search
 _PULL = 3.5  # standard deviations beyond a bound; those of true laws are within 2
 _SHARE = 0.05  # of the effect's own size, by which it must be beyond: laws are no truer than that
 _LARGEST = 10.0  # typical sizes
+_YAW_ALONE = 0.3  # of the damping about z, about x and y: rotors that climb and sink at the arms damp these more than that
 _ANY_SIZE = frozenset({"mass", "thrust_scale", "com_offset", "constant_force", "constant_torque"})
 
 
 def beyond_belief(search: Search, fit: Fit) -> list[str]:
-    """Return in words which coefficients would leave their range if they could, or are larger than a law of theirs ever is."""
+    """Return in words which coefficients would leave their range if they could, or are such as no law of theirs has."""
     vehicle = search.flights.vehicle
     found = []
     size = {effect: max((abs(v) / typical((effect, k), vehicle) for k, v in fit.setting[effect].items() if k != CENTRAL),
@@ -24,6 +25,10 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
     for effect in fit.effects:
         if size[effect] > _LARGEST and effect not in _ANY_SIZE:
             found.append(f"{effect} would be {size[effect]:.0f} times what it typically is: another effect may be behind it")
+    damping = fit.setting.get("rate_damping", {})
+    if damping and 0.5 * (damping["dx"] + damping["dy"]) < _YAW_ALONE * damping["dz"]:
+        found.append("rate_damping would be about z alone, and the arms' rotors damp the other axes more: another effect may "
+                     "be behind it")
     g = search.at(fit)
     total, k = g.blocks.sum(axis=0), len(g.columns)
     normal = total[:k, :k] + np.diag(g.precision)

@@ -20,7 +20,7 @@ from .equivalence import composites, equivalents, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .innovations import Innovations, at_odds
-from .measuring import measured
+from .measuring import lag_or_delay, lateness, measured, others_late, with_lag
 from .moves import find
 from .prediction import nis_without_wrench_state, rollout_error
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
@@ -72,14 +72,18 @@ def diagnose(
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = find(search)
+    follow = lateness(search, fit)
+    if follow == "as behind a lag":
+        fit = with_lag(search, fit)
     report("asking what else it could be")
     classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
+    classes |= {e: tuple(dict.fromkeys([*classes[e], *more])) for e, more in others_late(search, fit, follow).items()}
     report("looking for what is left")
     signs, gusty = structure(search, fit)
     fit = measured(search, fit)
     mimics = [*composites(flights, fit), *unlisted(search, fit)]
     if not flights.commanded:
-        mimics += [*beyond_belief(search, fit), *at_odds(flights, fit.setting)]
+        mimics += [*beyond_belief(search, fit), *at_odds(flights, fit.setting), *lag_or_delay(search, fit, follow)]
 
     before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
     held = ~flights.fit

@@ -23,7 +23,6 @@ _NEAR_OF_COMMANDS = 6.0
 _MOST = 0.4  # of what is left without the effect
 _NEAR = 40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
 _OUT_OF_STEP = 0.98  # share of what is allowed
-_LATE = 0.5  # the same beside a motor_lag: true ones have 0.2 by innovations, those that stand for a latency 0.7 to 1
 _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
@@ -129,8 +128,6 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     if len(names - _AERODYNAMICS) + bool(names & _AERODYNAMICS) > _MOST_SURE:
         found.append(f"{len(names)} effects at once may stand for one that the library lacks")
     shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
-    if "motor_lag" in names and ("inertia" in names or abs(shift) > _LATE * SHIFT_RANGE[1]):
-        found.append("motor_lag with inertia, or with turn rates out of step, may be a latency")
     if names and shift < _OUT_OF_STEP * SHIFT_RANGE[0]:
         found.append("turn rates would act before they are logged, by as much as is allowed: an effect that is not among these "
                      "names may be behind it")

@@ -19,6 +19,7 @@ _LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of a cable
 _HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
 _THINNED = 20  # every so many samples of a flight are enough for a map of the jet
 _KEPT = 4
+_STILL = 1e-9  # m/s
 _RINGS = 0.2  # damping ratio of a swing, at most
 
 
@@ -37,13 +38,20 @@ def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) ->
 
 
 def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return winds along the mean force and across it."""
+    """Return winds along the mean force, and along what of the force goes with a slow wind's part of a drag.
+
+    That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may be.
+    """
     speed = typical(("wind", "wx"), flights.vehicle)
     drag = typical(("wind", "cd"), flights.vehicle)
-    mean = residual[flights.fit, :2].mean(axis=0)
-    heading = math.atan2(mean[1], mean[0])
+    force = residual[flights.fit, :2]
+    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[flights.fit]
+    v = np.linalg.norm(velocity, axis=1) + _STILL
+    steady = np.tile(np.eye(2), (len(v), 1))
+    with_wind = v[:, None, None] * np.eye(2) + velocity[:, :2, None] * velocity[:, None, :2] / v[:, None, None]
+    slope = np.linalg.lstsq(np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None)[0][:2]
     return [{"wx": scale * speed * math.cos(heading), "wy": scale * speed * math.sin(heading), "wz": 0.0, "cd": drag}
-            for scale in (0.5, 1.0, 2.0)]
+            for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope)) for scale in (0.5, 1.0, 2.0)]
 
 
 def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:

@@ -36,6 +36,12 @@ def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     assert not doubtful or "cx" in found[0]
 
 
+@pytest.mark.parametrize(("dx", "dz", "doubtful"), [(0.0, 1e-3, True), (1e-3, 1e-3, False), (1e-3, 0.0, False)])
+def test_air_that_damps_yaw_alone_is_a_doubt(dx, dz, doubtful):
+    fit = Fit({"rate_damping": {"dx": dx, "dy": dx, "dz": dz}})
+    assert bool(beyond_belief(search([("rate_damping", "dz")], [1.0]), fit)) == doubtful
+
+
 def test_what_is_small_beside_the_effect_itself_is_no_doubt():
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
     fit = Fit({"body_drag": {"dx": 0.1, "cx": 0.0}})

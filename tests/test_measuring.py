@@ -1,13 +1,14 @@
 """What the flight loop's answer to noise bends in the residual's least squares, innovations measure as it is."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.equivalence import composites
 from windwrench.identification.innovations import at_odds
-from windwrench.identification.measuring import measured
+from windwrench.identification.measuring import lag_or_delay, lateness, measured, others_late, with_lag
 from windwrench.identification.regression import SHIFT, Flights
 from windwrench.identification.search import Fit, Search
 
@@ -32,14 +33,38 @@ def test_a_lag_is_no_delay_of_the_turn_rates():
     assert by_innovations < 0.5 * by_residual
     assert abs(found.setting[SHIFT[0]][SHIFT[1]]) < 0.5 * abs(fit.setting[SHIFT[0]][SHIFT[1]])
     assert all(found.std[column] >= fit.std[column] for column in fit.std)
-    assert not composites(search.flights, found)
 
 
-def test_a_lag_that_stands_for_a_latency_has_its_turn_rates_late():
-    search, fit = fitted({"latency": {"d": 0.01}}, {"motor_lag": {"tau": 0.01}}, seed=3, turbulence=1.0)
-    found = measured(search, fit)
-    assert found.setting[SHIFT[0]][SHIFT[1]] > 0.004
-    assert composites(search.flights, found)
+@pytest.mark.parametrize("guess", [{"motor_lag": {"tau": 0.01}}, {"latency": {"d": 0.01}}])
+@pytest.mark.parametrize("truth", [{"motor_lag": {"tau": 0.012}}, {"latency": {"d": 0.012}}])
+def test_lag_and_delay_are_told_apart(truth, guess):
+    """To the residual they are the same, at a third of their typical size."""
+    search, fit = fitted(truth, guess, seed=4, turbulence=1.0)
+    follow = lateness(search, fit)
+    assert follow == ("as behind a lag" if "motor_lag" in truth else "as behind a delay")
+    assert bool(lag_or_delay(search, fit, follow)) == (truth.keys() != guess.keys())
+    assert not others_late(search, fit, follow)
+    if "motor_lag" in truth:
+        named = with_lag(search, fit)
+        assert named.effects == ["motor_lag"]
+        assert measured(search, named).setting["motor_lag"]["tau"] == pytest.approx(0.012, rel=0.2)
+
+
+def test_a_lag_takes_no_delay_s_place_that_the_library_lacks():
+    search, fit = fitted({"motor_lag": {"tau": 0.012}}, {"latency": {"d": 0.01}}, seconds=20.0, seed=4, turbulence=0.0)
+    search.library = tuple(name for name in search.library if name != "motor_lag")
+    assert with_lag(search, fit) is fit
+
+
+@pytest.mark.parametrize(("effect", "other"), [("motor_lag", "latency"), ("latency", "motor_lag")])
+def test_what_flights_do_not_tell_may_be_the_other_or_what_the_library_lacks(effect, other):
+    search = SimpleNamespace(library=names())
+    fit = Fit({effect: {}})
+    assert other in others_late(search, fit, "either way")[effect]
+    assert not lag_or_delay(search, fit, "either way")
+    search.library = (effect, "mass")
+    assert not others_late(search, fit, "either way")[effect]
+    assert lag_or_delay(search, fit, "either way")
 
 
 def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
