@@ -20,7 +20,7 @@ from .commanded import LEAN_X, LEAN_Y, NOT_FROM_COMMANDS, SCALE, commanded, devi
 from .excerpt import excerpt
 from .flight_log import FlightLog
 from .floor import noisy_logs
-from .residual import declared_wrench
+from .residual import acting_wrench, needed_wrench
 from .sensing import undo_log_sensing
 from .signals import Signals, log_signals, low_pass
 
@@ -243,7 +243,7 @@ class Flights:
         for piece in self.pieces(setting):
             scale, *lean = (deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y))
             s = self._shifted(piece, shifts, scale)
-            model = declared_wrench(s, vehicle, self.vehicle)
+            model, _ = acting_wrench(s, vehicle, self.vehicle)
             model[:, :2] += self.vehicle.weight * np.array(lean)
             if self.commanded:
                 model[:, 3:] = 0.0
@@ -253,11 +253,10 @@ class Flights:
     def _needed(self, piece: Piece) -> Array:
         """Return what the measured motion of a piece needs (rows, 6), by the declared mass and inertia."""
         if id(piece) not in self._needs:
-            s = piece.signals
-            force = self.vehicle.mass * (s.acceleration + np.array([0.0, 0.0, self.vehicle.gravity]))
-            torque = 0.0 * force if self.commanded else s.angular_acceleration @ self.vehicle.inertia.T
-            needed = low_pass(np.column_stack([force, torque]), CUTOFF_HZ, s.period)[piece.rows]
-            self._needs[id(piece)] = piece, needed
+            needed = needed_wrench(piece.signals, self.vehicle)
+            if self.commanded:
+                needed[:, 3:] = 0.0
+            self._needs[id(piece)] = piece, low_pass(needed, CUTOFF_HZ, piece.signals.period)[piece.rows]
         return self._needs[id(piece)][1]
 
     def _shifted(self, piece: Piece, shifts: Mapping[str, float], scale: float) -> Signals:

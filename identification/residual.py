@@ -49,8 +49,8 @@ def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehi
 
 
 @compiled
-def _accelerate(rotors: Array, effects: Array, rotation: Array, rate: Array, turning: Array, com: Array, inertia: Array,
-                mass: float, share: float, turn: Array, out: Array) -> None:
+def _balance(rotors: Array, effects: Array, rotation: Array, rate: Array, turning: Array, com: Array, inertia: Array,
+             mass: float, share: float, turn: Array, out: Array) -> None:
     """Write what rotors and effects give, and a centre of mass off the pose's point needs, as by another mass and inertia."""
     needed, moment, spin = np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(rotors)):
@@ -70,33 +70,31 @@ def _accelerate(rotors: Array, effects: Array, rotation: Array, rate: Array, tur
             out[k, 3 + i] = turn[i, 0] * moment[0] + turn[i, 1] * moment[1] + turn[i, 2] * moment[2]
 
 
-def declared_wrench(signals: Signals, vehicle: Vehicle, declared: Vehicle) -> Array:
-    """Return the force (N, world) and torque (Nm, body) that a model says act (n, 6), without the weight.
+def acting_wrench(signals: Signals, vehicle: Vehicle, body: Vehicle | None = None) -> tuple[Array, Vehicle]:
+    """Return the force (N, world) and torque (Nm, body) that a model says act (n, 6), without the weight, and by which body.
 
-    Both are as if the vehicle had the mass and inertia of ``declared``: the accelerations that the model says are right.
+    Both are as if the vehicle had the mass and inertia of ``body``: the accelerations that the model says are right. By
+    default it is the vehicle's own, with its body effects applied.
     """
-    rotors, effects, body = model_wrench(signals, vehicle)
+    rotors, effects, own = model_wrench(signals, vehicle)
+    body = body or own
     out = np.empty_like(effects)
-    _accelerate(rotors, effects, np.ascontiguousarray(signals.rotation), np.ascontiguousarray(signals.rate),
-                np.ascontiguousarray(signals.angular_acceleration), body.com, body.inertia, declared.mass,
-                declared.mass / body.mass, declared.inertia @ np.linalg.inv(body.inertia), out)
-    return out
+    _balance(rotors, effects, np.ascontiguousarray(signals.rotation), np.ascontiguousarray(signals.rate),
+             np.ascontiguousarray(signals.angular_acceleration), own.com, own.inertia, body.mass, body.mass / own.mass,
+             body.inertia @ np.linalg.inv(own.inertia), out)
+    return out, body
+
+
+def needed_wrench(signals: Signals, body: Vehicle) -> Array:
+    """Return the force (N, world) beside the weight and the torque (Nm, body) that a body's measured motion needs (n, 6).
+
+    But for the inertia's torque of turning, and a centre of mass that is off: these are the model's to know.
+    """
+    return np.column_stack([body.mass * (signals.acceleration + np.array([0.0, 0.0, body.gravity])),
+                            signals.angular_acceleration @ body.inertia.T])
 
 
 def residual_wrench(signals: Signals, vehicle: Vehicle) -> Array:
     """Return the residual (n, 6): force in the world frame (N), torque about the centre of mass in the body frame (Nm)."""
-    rotors, effects, body = model_wrench(signals, vehicle)
-    R, omega, alpha = signals.rotation, signals.rate, signals.angular_acceleration
-    acceleration = signals.acceleration + np.array([0.0, 0.0, vehicle.gravity])
-    if np.any(body.com):
-        acceleration = acceleration + centre_acceleration(signals, body)
-    force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1] - effects[:, :3]
-    torque = alpha @ body.inertia.T + np.cross(omega, omega @ body.inertia.T) - rotors[:, 1:] - effects[:, 3:]
-    return np.column_stack([force, torque])
-
-
-def centre_acceleration(signals: Signals, body: Vehicle) -> Array:
-    """Return the acceleration (n, 3) in m/s2, world, of the centre of mass beyond that of the geometric centre."""
-    omega = signals.rate
-    turning = np.cross(signals.angular_acceleration, body.com) + np.cross(omega, np.cross(omega, body.com))
-    return np.asarray(np.einsum("nij,nj->ni", signals.rotation, turning))
+    acting, body = acting_wrench(signals, vehicle)
+    return needed_wrench(signals, body) - acting
