@@ -27,6 +27,7 @@ _MOST_SURE = 2  # effects at once
 # a vehicle that is declared without aerodynamics lacks all of these together
 _AERODYNAMICS = frozenset({"rotor_drag", "body_drag", "inflow_thrust", "translational_lift", "rate_damping", "flapping_moment"})
 _COINCIDE = 0.1  # share of what an inertia explains that one which goes with the mass may leave of it
+_SAME, _NOTHING = 3.0, 0.01  # standard deviations between efficiencies that are the same, and one that is as good as zero
 _EXACT = 1e-9  # relative; standard deviations are no smaller
 _CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
 _HANGS = 5.0  # times as far along z as across it
@@ -117,6 +118,16 @@ def _weighted(values: Array, std: Array) -> float:
     return float(np.average(values, weights=None if np.any(std == 0.0) else std**-2.0))
 
 
+def _three_alike(fit: Fit) -> bool:
+    """Return whether the efficiencies of just three rotors are the same, and not zero."""
+    rotors = [f"e{i + 1}" for i in range(4)]
+    off = np.array([fit.setting["rotor_efficiency"].get(name, 0.0) for name in rotors])
+    std = max(fit.std.get(("rotor_efficiency", name), 0.0) for name in rotors)
+    middle = float(np.median(off))
+    same = np.abs(off - middle) < max(_SAME * std, _COINCIDE * abs(middle))
+    return np.count_nonzero(same) == len(rotors) - 1 and abs(middle) > max(_SAME * std, _NOTHING)
+
+
 def composites(flights: Flights, fit: Fit) -> list[str]:
     """Return in words which single effect the named ones could be instead, where together they are its exact equivalent.
 
@@ -133,6 +144,8 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
                      "names may be behind it")
     if max(fit.setting.get("rotor_efficiency", {"": 0.0}).values()) > _OUT_OF_STEP * BELIEVED["rotor_efficiency"]:
         found.append("a rotor would have to deliver far more than declared: rotor_efficiency may stand for another effect")
+    if "rotor_efficiency" in names and _three_alike(fit):
+        found.append("three rotors are off by the same: a mass or a thrust_scale, and one rotor, may be behind them")
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
         values, std = _relative(flights, fit)
         off = (values - _weighted(values, std)) / np.maximum(std, _EXACT)

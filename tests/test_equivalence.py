@@ -47,3 +47,12 @@ def test_more_than_two_effects_may_stand_for_one():
     three = {"mass": {"dm": 0.02}, "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0}, "battery_sag": {"n": 1.0}}
     assert len(composites(FLIGHTS, Fit(three))) == 1
     assert not composites(FLIGHTS, Fit({name: three[name] for name in ("mass", "com_offset")}))
+
+
+@pytest.mark.parametrize(("off", "doubtful"), [
+    ((-0.066, -0.067, -0.066, -0.14), True), ((0.0, 0.001, 0.0, -0.14), False), ((-0.066, -0.067, -0.066, -0.067), False),
+    ((-0.066, -0.02, 0.03, -0.14), False)])
+def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
+    rotors = {f"e{i + 1}": value for i, value in enumerate(off)}
+    fit = Fit({"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors})
+    assert bool(composites(FLIGHTS, fit)) == doubtful
