@@ -21,7 +21,7 @@ _LAG = "motor_lag", "tau"
 _ANY_DELAY = 0.1  # s
 _BEGIN = 0.3  # share of a lag where the search for it begins
 _DELAY_TURNS = 5
-_SURE = 3.0  # standard deviations of a lag
+_SURE = 6.0  # standard deviations of a lag, which know nothing of rounded turn rates: a delay of 9 ms has looked like 4 of them
 _LAGS, _MAY_LAG = 0.5, 0.3  # share of a lag, that is one and that may be one; behind delays it has been up to 0.47
 
 Lateness = Literal["as behind a lag", "as behind a delay", "either way"]
