@@ -138,7 +138,7 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
         regression = search.linearise(less)
         g, bar = search.gram(less, regression), error - SWAP_GAIN + spared
         couple = _couple(search, less, regression, g, search.library, bar)
-        if better := _swapped(search, couple, fit.effects):
+        if better := _swapped(search, couple, fit, fit.effects):
             return better
     for size, allowed in ((2, least), (1, -SWAP_GAIN)):
         for group in itertools.combinations(fit.effects, size):
@@ -150,12 +150,12 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
             regression = search.linearise(less, None if few else fit)
             g = search.gram(less, regression)
             rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
-            if better := _swapped(search, _singles(rivals, error, allowed, bar), group):
+            if better := _swapped(search, _singles(rivals, error, allowed, bar), fit, group):
                 return better
             if few and size == 1:
                 others = [e for e in search.library if e not in group]  # one that only joins has been asked already
                 couple = _couple(search, less, regression, g, others, error - least + spared)
-                if better := _swapped(search, couple, group):
+                if better := _swapped(search, couple, fit, group):
                     return better
     return None
 
@@ -169,11 +169,16 @@ class Swap:
     limit: float  # whitened energy that it must come below
 
 
-def _swapped(search: Search, swaps: Iterable[Swap], group: Sequence[str]) -> tuple[Fit, float] | None:
-    """Return the first of the swaps for a group of effects that keeps what it promises, refitted, and its error."""
+def _swapped(search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]) -> tuple[Fit, float] | None:
+    """Return the first of the swaps for a group of a fit's effects that keeps what it promises, refitted, and its error.
+
+    What it gains by less noise of the sensors does not count.
+    """
+    quiet = search.noise_explained(old)
     for swap in swaps:
         fit = search.refit(swap.fit, swap.limit)
-        better = search.energy(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit
+        limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
+        better = search.energy(fit.setting) < limit and (error := search.error(fit)) < limit
         if better and (len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error

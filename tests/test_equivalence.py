@@ -4,9 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from windwrench.dynamics import load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.equivalence import composites, unlisted
-from windwrench.identification.search import Fit
+from windwrench.identification.regression import Flights
+from windwrench.identification.search import Fit, Search
 
 FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
 MASS = FLIGHTS.vehicle.mass
@@ -56,3 +58,17 @@ def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
     rotors = {f"e{i + 1}": value for i, value in enumerate(off)}
     fit = Fit({"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors})
     assert bool(composites(FLIGHTS, fit)) == doubtful
+
+
+@pytest.mark.parametrize("trajectory", ["hover", "vertical"])
+def test_a_thrust_beside_a_steady_force_needs_flight_that_tells_them_apart(trajectory):
+    """In hover they are the same but for a hundred-thousandth; the attitude's noise would have less thrust, and more force."""
+    truth = {"constant_force": {"fx": -0.23, "fy": -0.23, "fz": -0.23}}
+    log = fly_practice(FLIGHTS.vehicle, tuple(EffectSetting(k, v) for k, v in truth.items()), trajectory, 40.0, seed=1,
+                       turbulence=0.0, sensor=0.5)
+    search = Search(Flights([log], FLIGHTS.vehicle), ("constant_force", "thrust_scale", "mass"))
+    fit = Fit(truth)
+    regression = search.linearise(fit)
+    search.set_noise(fit, regression)
+    asked = [gain.effect for gain in search.gains(fit, regression, search.gram(fit, regression))]
+    assert ("thrust_scale" in asked) == (trajectory == "vertical")
