@@ -94,7 +94,7 @@ def page_text(outcomes: Sequence[Mapping[str, Any]], judged: Sequence[Judgement]
         "two of them (failing_cell, high_hull) the search for structure got rules of its own. Six more ("
         + ", ".join(UNSEEN) + ") were written last and first diagnosed on seed 20: eleven of twelve were `unexplained` or "
         "`partly explained`, a third of a loose gimbal on a fast flight in twice the noise `nothing to explain`; no rule came "
-        "of them. Seeds 0 to 23, 101 to 107, 201 to 203 and 401 to 404, two effects of flights 0 to 229, 690 to 719, 2000 to "
+        "of them. Seeds 0 to 24, 101 to 107, 201 to 203 and 401 to 404, two effects of flights 0 to 229, 690 to 749, 2000 to "
         "2049 and 3000 to 3049, lags and delays of seeds 500 to 505, and hovers of seeds 510 to 527 were looked at while the "
         "rules were made, and no other.", "",
         "A name counts as right where it is the added effect's, or where the diagnosis says that these flights cannot tell it "

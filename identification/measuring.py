@@ -11,18 +11,19 @@ from typing import Literal
 import numpy as np
 
 from .innovations import Innovations
-from .regression import LATE, SHIFT, SHIFT_RANGE, TIMING, Column
+from .regression import LATE, SHIFT, SHIFT_RANGE, TIMING, Column, coefficient
 from .search import LEAST_GAIN, Fit, Search, started
 
 _BENT = frozenset({"attitude_gain", "motor_lag"})  # effects of which that is known
 _TURNS = 3  # of Gauss-Newton; the second changes little
 _WORSE = 1.05  # of the residual's energy: what is worse for the residual than that is not measured
 _LAG = "motor_lag", "tau"
+_DELAYS = ("latency", "d"), ("clock_offset", "dt")
 _ANY_DELAY = 0.1  # s
 _BEGIN = 0.3  # share of a lag where the search for it begins
 _DELAY_TURNS = 5
 _SURE = 6.0  # standard deviations of a lag, which know nothing of rounded turn rates: a delay of 9 ms has looked like 4 of them
-_LAGS, _MAY_LAG = 0.5, 0.3  # share of a lag, that is one and that may be one; behind delays it has been up to 0.47
+_LAGS, _MAY_LAG = 0.5, 0.3  # share of a lag, that is one and that may be one; behind 34 delays it was up to 0.47, and once 0.7
 
 Lateness = Literal["as behind a lag", "as behind a delay", "either way"]
 
@@ -32,9 +33,17 @@ def measured(search: Search, fit: Fit) -> Fit:
 
     Standard deviations are no smaller than those of the residual.
     """
-    if search.flights.commanded or not _BENT & set(fit.effects):
+    late = [(effect, name) for effect, name in _DELAYS if effect in fit.effects]
+    if search.flights.commanded or not _BENT & set(fit.effects) or len(late) > 1:
         return fit
-    found = _likeliest(search, fit, SHIFT_RANGE[1], _TURNS)
+    # what delays is measured as turn rates that act late: a pose that is moved would take its noise along
+    found = _likeliest(search, _shifted(fit), _ANY_DELAY if late else SHIFT_RANGE[1], _TURNS)
+    for effect, name in late:
+        found.setting = {k: found.setting[k] if k in found.setting else {name: found.setting[SHIFT[0]].pop(SHIFT[1])}
+                         for k in fit.setting}
+        found.std[effect, name] = found.std.pop(SHIFT)
+        c = coefficient((effect, name))
+        found.setting[effect][name] = float(np.clip(found.setting[effect][name], c.minimum, c.maximum))
     found.std = {column: max(value, fit.std.get(column, 0.0)) for column, value in found.std.items()}
     return found if _is_close(search, found, fit) else fit
 
@@ -44,9 +53,10 @@ def lateness(search: Search, fit: Fit) -> Lateness | None:
     late = LATE & set(fit.effects)
     if search.flights.commanded or len(late) != 1 or (behind := _behind(fit)) <= 0.0:
         return None
-    setting = {**fit.without(*TIMING).setting, _LAG[0]: {_LAG[1]: _BEGIN * behind}}
-    setting[SHIFT[0]] = {**setting.get(SHIFT[0], {}), SHIFT[1]: (1.0 - _BEGIN) * behind}
-    found = _likeliest(search, Fit(setting), _ANY_DELAY, _DELAY_TURNS)
+    begun = _shifted(fit)
+    begun.setting[_LAG[0]] = {_LAG[1]: _BEGIN * behind}
+    begun.setting[SHIFT[0]][SHIFT[1]] = (1.0 - _BEGIN) * behind
+    found = _likeliest(search, begun, _ANY_DELAY, _DELAY_TURNS)
     lag, delay = found.setting[_LAG[0]][_LAG[1]], abs(found.setting[SHIFT[0]][SHIFT[1]])
     if lag > _SURE * found.std[_LAG] and lag > _LAGS * (lag + delay):
         return "as behind a lag"
@@ -81,8 +91,15 @@ def lag_or_delay(search: Search, fit: Fit, follow: Lateness | None) -> list[str]
 
 def _behind(fit: Fit) -> float:
     """Return by how much (s) the rotors follow late in a fit, by whatever it has for that."""
-    of = fit.setting
-    return sum(of.get(effect, {}).get(name, 0.0) for effect, name in (_LAG, SHIFT, ("latency", "d"), ("clock_offset", "dt")))
+    return sum(fit.setting.get(effect, {}).get(name, 0.0) for effect, name in (_LAG, SHIFT, *_DELAYS))
+
+
+def _shifted(fit: Fit) -> Fit:
+    """Return the fit with turn rates that act late in place of a latency or a clock_offset."""
+    setting = {effect: dict(values) for effect, values in fit.without(*TIMING).setting.items()}
+    nuisances = setting.setdefault(SHIFT[0], {})
+    nuisances[SHIFT[1]] = _behind(fit) - fit.setting.get(_LAG[0], {}).get(_LAG[1], 0.0)
+    return Fit(setting)
 
 
 def _likeliest(search: Search, fit: Fit, latest: float, turns: int) -> Fit:

@@ -81,3 +81,13 @@ def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
 def test_other_effects_stay_as_they_are():
     search, fit = fitted({"mass": {"dm": 0.03}}, {"mass": {"dm": 0.03}}, seconds=20.0, seed=4)
     assert measured(search, fit) is fit
+
+
+def test_a_clock_beside_a_gain_of_the_attitude_is_measured_as_late_turn_rates():
+    truth = {"attitude_gain": {"g": 0.05}, "clock_offset": {"dt": -0.026}}
+    search, fit = fitted(truth, truth, trajectory="fast", seed=5, turbulence=1.0)
+    found = measured(search, fit)
+    assert found.effects == fit.effects
+    assert found.std.keys() == fit.std.keys()
+    assert found.setting["clock_offset"]["dt"] == pytest.approx(-0.026, rel=0.1)
+    assert found.setting["attitude_gain"]["g"] == pytest.approx(0.05, rel=0.1)
