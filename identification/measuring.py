@@ -39,11 +39,10 @@ def measured(search: Search, fit: Fit) -> Fit:
     # what delays is measured as turn rates that act late: a pose that is moved would take its noise along
     found = _likeliest(search, _shifted(fit), _ANY_DELAY if late else SHIFT_RANGE[1], _TURNS)
     for effect, name in late:
-        found.setting = {k: found.setting[k] if k in found.setting else {name: found.setting[SHIFT[0]].pop(SHIFT[1])}
-                         for k in fit.setting}
-        found.std[effect, name] = found.std.pop(SHIFT)
         c = coefficient((effect, name))
-        found.setting[effect][name] = float(np.clip(found.setting[effect][name], c.minimum, c.maximum))
+        delay = {name: float(np.clip(found.setting[SHIFT[0]].pop(SHIFT[1]), c.minimum, c.maximum))}
+        found.setting = {k: found.setting.get(k, delay) for k in fit.setting}  # in the order in which they were found
+        found.std[effect, name] = found.std.pop(SHIFT)
     found.std = {column: max(value, fit.std.get(column, 0.0)) for column, value in found.std.items()}
     return found if _is_close(search, found, fit) else fit
 
