@@ -1,7 +1,7 @@
 """Disturbances that most thresholds of the diagnosis were not tuned on, and those of ``unseen_outsiders``.
 
-They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the same, and failing_cell and
-high_hull led to rules of their own; the unseen ones did not.
+They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the same, and failing_cell,
+high_hull and loose_gimbal led to rules of their own; the unseen ones did not.
 """
 
 import math
@@ -104,8 +104,28 @@ def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     return law
 
 
+def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A camera turns about the pitch axis on a soft mount of 2 Hz; it adds 0.3 of the vehicle's inertia there.
+
+    With s its angle to the body and a the body's angular acceleration, s'' = -a - w^2 s - 2 zeta w s', and the body feels
+    the mount's torque, inertia (w^2 s + 2 zeta w s'); zeta is 0.05.
+    """
+    inertia, w, zeta = 0.3 * float(vehicle.inertia[1, 1]), 2.0 * math.pi * 2.0, 0.05
+    angle, speed, last = 0.0, 0.0, 0.0
+
+    def law(m: Moment) -> Array:
+        nonlocal angle, speed, last
+        turning, last = (float(m.rate[1]) - last) / TICK, float(m.rate[1])
+        spring = w * w * angle + 2.0 * zeta * w * speed
+        speed -= TICK * (spring + turning)
+        angle += TICK * speed
+        return _wrench(np.zeros(3), inertia * spring * m.rotation[:, 1])
+
+    return law
+
+
 HELD_BACK: dict[str, Maker] = {
-    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm)
+    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm, loose_gimbal)
 } | UNSEEN
 
 

@@ -2,7 +2,7 @@
 
 A library that lacks the true effect explains it by a neighbour, down to the floor of the residual. What gives the neighbour
 away is small: something systematic is left over (columns of a general dictionary), or its own coefficient would rather
-change with speed, height, load or time, or its force, in one channel, would rather be larger than in another.
+change with speed, height, load, time or frequency, or its force, in one channel, would rather be larger than in another.
 Each column is tried alone, on blocks that are left out in turn.
 """
 
@@ -19,6 +19,7 @@ from .innovations import Innovations
 from .regression import BLOCK, CENTRAL, LATE, Column, Flights
 from .search import Fit, Search
 from .selection import Gram
+from .signals import low_pass
 
 Array = NDArray[np.float64]
 
@@ -33,6 +34,9 @@ _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
 _DRAGS = frozenset({"rotor_drag", "body_drag"})
 LEAST_OF_POWERS = 12.0  # whitened energy, of one question: 62 true drags had up to 5
+RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
+SLOW_HZ = 3.0  # of the 5 that the residual has
+LEAST_OF_LOOSE = 0.02  # of what such an effect explains: 150 true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
 MOST = 12  # signs, the strongest
 _ASKED = 36  # of the innovations, which takes its time
 
@@ -81,7 +85,8 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
-    wandering = [*unsteady(search, shares, regression), *other_powers(search, shares, regression, base)]
+    wandering = [*unsteady(search, shares, regression), *other_powers(search, shares, regression, base),
+                 *loose(search, shares, regression, base)]
     if not found:
         return wandering, bool(wandering)
     innovations = Innovations(flights, fit.setting)
@@ -133,11 +138,33 @@ def other_powers(search: Search, shares: Mapping[str, Array], regression: Gram,
     whole = regression.blocks[:, -1, -1].sum()
     for effect in filter(_DRAGS.__contains__, shares):
         speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})])
-        x = search.whiten(_alone(search, regression, base, shares[effect] * speed[:, None]))[flights.fit]
-        gain = float(np.sum(x * regression.design[..., -1])) ** 2 / max(float(np.sum(x * x)), 1e-30)
+        gain = _gain(search, regression, base, shares[effect] * speed[:, None])
         if gain > LEAST_OF_POWERS:
             yield Structure(f"{effect}'s coefficient is not constant", "its force grows with another power of speed",
                             gain / max(float(whole), 1e-30))
+
+
+def loose(search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]) -> Iterator[Structure]:
+    """Yield a sign for each named mass, inertia or place of one that is another one for slow motion than for quick motion.
+
+    Args:
+        search: that found the effects.
+        shares: what each explains (rows, 6).
+        regression: on the columns of the fit.
+        base: these columns (rows, 6) each.
+
+    What is on a soft mount follows slow motion as if it were bolted on, and quick motion hardly.
+    """
+    flights = search.flights
+    whole = float(regression.blocks[:, -1, -1].sum())
+    least = LEAST_GAIN * max(1.0, whole / regression.design[..., 0].size)
+    for effect in filter(RIGID.__contains__, shares):
+        pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
+        slow = np.concatenate([low_pass(piece, SLOW_HZ, flights.period) for piece in pieces])
+        gain = _gain(search, regression, base, slow)
+        if gain > max(least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])):
+            yield Structure(f"{effect}'s coefficient is not constant", f"it changes below {SLOW_HZ:.0f} Hz",
+                            gain / max(whole, 1e-30))
 
 
 def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
@@ -158,6 +185,12 @@ def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) ->
     alone = _alone(search, g, base, column)
     x = search.whiten(alone)[search.flights.fit]
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
+
+
+def _gain(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> float:
+    """Return the energy that a column (rows, 6) explains beside the columns ``base`` of a fit, in all rows together."""
+    x = search.whiten(_alone(search, g, base, column))[search.flights.fit]
+    return float(np.sum(x * g.design[..., -1])) ** 2 / max(float(np.sum(x * x)), 1e-30)
 
 
 def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:

@@ -121,6 +121,14 @@ def test_what_comes_and_goes_is_no_sure_mass():
     assert any("from one 3 s of flight to the next" in sign.where for sign in found.structure)
 
 
+def test_what_is_on_a_soft_mount_is_no_sure_inertia():
+    """A camera on a mount of 2 Hz: slow turns are those of a larger inertia, quick ones are not."""
+    flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", seed=30)
+    found = diagnose([flown.log], flown.vehicle)
+    assert {e.name: e.tentative for e in found.effects} == {"inertia": True}
+    assert any("below 3 Hz" in sign.where for sign in found.structure)
+
+
 @pytest.mark.parametrize("friction", [True, False])
 def test_friction_on_a_circle_is_no_sure_drag(friction):
     """At one speed friction is a drag; how the flight begins says that it is none, if little more."""
