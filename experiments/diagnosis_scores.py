@@ -281,7 +281,7 @@ def _by_kind(subject: str, some: Sequence[Judgement], bar: float) -> Rule:
     kinds = sorted({j.cause for j in some})
     shares = [float(np.mean([_not_wrong(j) for j in some if j.cause == kind])) for kind in kinds]
     return _rule(subject, float(np.mean(shares)) if shares else 0.0, bar, len(some),
-                 f"({sum(shares):g} of {len(kinds)} kinds)")
+                 f"({round(sum(shares), 1):g} of {len(kinds)} kinds)")
 
 
 def _coefficients(subject: str, some: Sequence[Judgement]) -> Rule:

@@ -42,6 +42,7 @@ _LOOK: Mapping[str, tuple[str, str, str]] = {
     TENTATIVE: ("#92c5de", "T", "black"), UNEXPLAINED: ("#2166ac", "U", "white"), SILENT: ("#dddddd", "S", "black"),
     WRONG: ("#d6402b", "X", "white"), FAILED: ("#222222", "F", "white"),
 }
+_LINES = 520.0  # points, of the names of a column's rows
 Cells = Mapping[tuple[str, str], Sequence[str]]  # outcomes by row and column
 
 
@@ -285,6 +286,7 @@ def _cells(some: Sequence[Judgement], columns: Sequence[tuple[str, Callable[[Jud
 
 def _matrix(axis: Axes, title: str, cells: Cells) -> None:
     rows, columns = list(dict.fromkeys(row for row, _ in cells)), list(dict.fromkeys(column for _, column in cells))
+    size = min(8.0, _LINES / max(len(rows), 1))
     for (row, column), outcomes in cells.items():
         x, y = columns.index(column), rows.index(row)
         for i, outcome in enumerate(outcomes):
@@ -292,10 +294,11 @@ def _matrix(axis: Axes, title: str, cells: Cells) -> None:
             width = 0.94 / len(outcomes)
             axis.add_patch(Rectangle((x + 0.03 + i * width, y + 0.05), width, 0.9, facecolor=colour, edgecolor="white"))
             if len(outcomes) <= 6:
-                axis.text(x + 0.03 + (i + 0.5) * width, y + 0.5, letter, color=ink, ha="center", va="center", fontsize=7)
+                axis.text(x + 0.03 + (i + 0.5) * width, y + 0.5, letter, color=ink, ha="center", va="center",
+                          fontsize=0.9 * size)
     axis.set(xlim=(0, max(len(columns), 1)), ylim=(max(len(rows), 1), 0))
     axis.set_xticks(np.arange(len(columns)) + 0.5, columns, fontsize=8)
-    axis.set_yticks(np.arange(len(rows)) + 0.5, rows, fontsize=8)
+    axis.set_yticks(np.arange(len(rows)) + 0.5, rows, fontsize=size)
     axis.xaxis.tick_top()
     axis.tick_params(length=0)
     axis.set_title(title, fontsize=10, loc="left", fontweight="bold")
