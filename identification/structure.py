@@ -36,7 +36,7 @@ _DRAGS = frozenset({"rotor_drag", "body_drag"})
 LEAST_OF_POWERS = 12.0  # whitened energy, of one question: 62 true drags had up to 5
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
 SLOW_HZ = 3.0  # of the 5 that the residual has
-LEAST_OF_LOOSE = 0.02  # of what such an effect explains: 150 true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
+LEAST_OF_LOOSE = 0.02  # of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
 MOST = 12  # signs, the strongest
 _ASKED = 36  # of the innovations, which takes its time
 
