@@ -6,6 +6,7 @@ fit's blocks of flight; the errors before and after are those of blocks, or logs
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,8 @@ def diagnose(
     remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
     large = noisy if flights.commanded else windy
     effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), large) for effect in fit.effects)
+    if not flights.commanded and any(effect.tentative for effect in effects):  # what one name has too much, another one lacks
+        effects = tuple(replace(effect, tentative=True) for effect in effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = ("explained" if sure else "partly explained") if effects else (
         "nothing to explain" if remainder == "none" else "unexplained")

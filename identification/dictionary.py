@@ -20,6 +20,9 @@ _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "tur
           "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _ROUNDING = 0.02  # the same of a rotor torque: shares of 0.045 look like a law
+_PLACES = 5  # along either horizontal axis
+_SEEN = 0.01  # of the mean of a bump: places where the vehicle hardly was say nothing
+_PLACES, _SEEN = 5, 0.01  # along either horizontal axis; the least mean of a bump, for places where the vehicle hardly was
 _SWINGS_HZ, _DAMPING = np.geomspace(0.4, 1.5, 11), 0.08  # of a load on a cable of 0.1 to 1.5 m, critical; loops answer faster
 
 Drive = tuple[str, Array]  # in words, (rows,)
@@ -108,6 +111,24 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
                 column = np.zeros((len(x), 6))
                 column[:, :3] = rotation[:, :, channel] * x[:, None]
                 yield f"force along body {'xyz'[channel]}", name, column
+
+
+def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and the place in words."""
+    at = np.concatenate([p.signals.position[p.rows, :2] for p in flights.pieces(setting)])
+    if at.std(axis=0).min() <= _MOVES["position"]:
+        return
+    low, high = np.quantile(at, [0.02, 0.98], axis=0)
+    apart = (high - low) / (_PLACES - 1)
+    for i, j in np.ndindex(_PLACES, _PLACES):
+        place = low + apart * [i, j]
+        bump = np.prod(np.maximum(0.0, 1.0 - np.abs(at - place) / apart), axis=1)
+        if bump.mean() < _SEEN:
+            continue
+        for channel in range(6):
+            column = np.zeros((len(at), 6))
+            column[:, channel] = bump
+            yield CHANNELS[channel], f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m", column
 
 
 def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:

@@ -25,6 +25,7 @@ LEAST_OF_COMMANDS = 25.0, 0.018  # gain and share; effects that cannot be there 
 LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
 LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
 MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
+_ROUNDS = 3  # of adding and pruning: what wanders on stands for a law that the library lacks
 _MOVES = 3  # at a time, which takes seconds each where four effects stand for one
 _SHORTLIST = 2
 _TRIED = 8  # candidates for one place, the best first, that innovations may turn down
@@ -34,9 +35,14 @@ _HOPE = 0.2  # share of what effects explain that a fit of its own may still gai
 
 def find(search: Search) -> tuple[Fit, list[Gain]]:
     """Return the effects that are needed, and what each of the library explained at first, alone."""
-    fit, first = _forward(search, Fit(search.delay.setting if search.delay else {}))
+    needed = Fit(search.delay.setting if search.delay else {})
+    first: list[Gain] = []
     asked: list[set[str]] = []
-    while True:
+    for _ in range(_ROUNDS):
+        fit, gains = _forward(search, needed)
+        first = first or gains
+        if asked and fit.effects == needed.effects:
+            break
         search.report("asking whether every effect is needed")
         # by the noise as it is known by now
         needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
@@ -44,9 +50,6 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
             break
         # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
         asked.append(set(needed.effects))
-        fit, _ = _forward(search, needed)
-        if fit.effects == needed.effects:
-            break
     return _borne_out(search, needed), first
 
 

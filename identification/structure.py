@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .dictionary import dictionary, drives, scaled, swings
+from .dictionary import dictionary, drives, places, scaled, swings
 from .findings import CHANNELS, Structure
 from .innovations import Innovations
 from .regression import BLOCK, CENTRAL, LATE, Column, Flights
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 LEAST_GAIN = 40.0  # whitened energy on blocks left out; where nothing is lacking few flights have a column above 25
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
-LEAST_SPREAD = 2.0  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
+LEAST_SPREAD = 1.5  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
 LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one part of the flight, but strongly
 ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
 
@@ -56,8 +56,8 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     words: list[tuple[str, str]] = []
     columns: list[Array] = []
     named: list[float] = []  # energy of what a column may be an untruth of
-    swinging = iter(()) if flights.commanded else swings(flights, fit.setting)
-    for channel_words, drive, column in itertools.chain(dictionary(flights, fit.setting), swinging):
+    asked = [dictionary] if flights.commanded else [dictionary, places, swings]
+    for channel_words, drive, column in itertools.chain.from_iterable(ask(flights, fit.setting) for ask in asked):
         words.append(("a general dictionary", f"{channel_words} with {drive}"))
         columns.append(column)
         named.append(every)
