@@ -147,6 +147,22 @@ def test_a_load_that_the_library_lacks_is_seen_to_swing():
     assert any("what swings at 0." in sign.where or "what swings at 1 Hz" in sign.where for sign in found.structure)
 
 
+def test_what_acts_in_one_place_of_the_room_is_seen():
+    """Air that rises in one place, crossed a few times: in all of the flight it is worth little, and there it is plain."""
+    flown = practise(load_vehicle("ardrone2"), "outsider", ("thermal_column",), "small", None, 1782317122, 60.0)
+    found = diagnose([flown.log], flown.vehicle)
+    assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
+    assert "near x = " in found.structure[0].where
+
+
+def test_names_are_sure_together_or_not_at_all():
+    """A hull's drag far above the centre of mass is two laws' in good part, and the third, for what they lack, is faint."""
+    flown = practise_held_back(load_vehicle("ardrone2"), "high_hull", "small", 2838459735, 60.0)
+    found = diagnose([flown.log], flown.vehicle)
+    assert {e.name: e.tentative for e in found.effects} == {"flapping_moment": True, "inflow_thrust": True, "rotor_drag": True}
+    assert found.remainder == "random"
+
+
 def test_a_push_that_lies_in_the_noise_is_not_passed_over():
     """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the floor, and yet not calm."""
     vehicle = load_vehicle("ardrone2")
