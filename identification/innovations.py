@@ -27,7 +27,7 @@ from .signals import log_signals
 Array = NDArray[np.float64]
 
 _SHARE = 0.65  # laws have 0.8 to 1.4, answers -5 to 0.2, one had 0.53
-_ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
+LEAST_ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
 _AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
 _NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
@@ -56,9 +56,9 @@ class Innovations:
             self._counts.append(near & (t > t[0] + _SETTLED) & (k <= piece.rows[-1]))
         self._count = sum(int(np.count_nonzero(x)) for x in self._counts)
 
-    def confirm(self, after: Setting) -> bool:
-        """Return whether innovations confirm the change to the effects ``after``."""
-        return _confirmed(*self.share(after))
+    def confirm(self, after: Setting, least: float = LEAST_ENERGY) -> bool:
+        """Return whether innovations confirm the change to the effects ``after``, with an energy of at least ``least``."""
+        return _confirmed(*self.share(after), least)
 
     def share(self, after: Setting) -> tuple[float, float]:
         """Return the share of that change which makes the innovations least, and the energy that it then explains."""
@@ -207,8 +207,17 @@ class Innovations:
         return np.column_stack([wrench[:, :3] / vehicle.mass, np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T])
 
 
-def _confirmed(share: float, energy: float) -> bool:
-    return share > _SHARE and energy > _ENERGY
+def _confirmed(share: float, energy: float, least: float = LEAST_ENERGY) -> bool:
+    return share > _SHARE and energy > least
+
+
+def adds(flights: Flights, before: Setting, after: Setting, least: float = LEAST_ENERGY) -> bool:
+    """Return whether innovations confirm what a fit has beyond a smaller one, with an energy of at least ``least``.
+
+    Both have the shifts of ``after``: gusts bend them, and they are not what is asked.
+    """
+    shifts = {SHIFT[0]: after.get(SHIFT[0], {})}
+    return Innovations(flights, {**before, **shifts}).confirm({**after, **shifts}, least)
 
 
 def at_odds(flights: Flights, setting: Setting) -> list[str]:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .commanded import takes_back
-from .innovations import Innovations
-from .regression import SHIFT
+from .innovations import Innovations, adds
 from .search import COMPLEXITY, LEAST_GAIN, LEAST_SIZE, Fit, Gain, Regression, Search, freedom, started
 from .selection import Gram
 from .starts import STARTS, barely_swings
@@ -90,8 +89,7 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
             if commanded:
                 taken = not barely_swings(more.setting, search.flights.vehicle.gravity)
             else:
-                shifts = {SHIFT[0]: more.setting.get(SHIFT[0], {})}  # gusts bend them, and they are not what is asked
-                taken = Innovations(search.flights, {**fit.setting, **shifts}).confirm({**more.setting, **shifts})
+                taken = adds(search.flights, fit.setting, more.setting)
             if taken:
                 break
         else:

@@ -129,6 +129,14 @@ def test_what_is_on_a_soft_mount_is_no_sure_inertia():
     assert any("below 3 Hz" in sign.where for sign in found.structure)
 
 
+def test_an_inertia_that_only_innovations_show_is_not_passed_over():
+    """A third of such a camera, in calm air: the residual, which ends at 5 Hz, shows too little for a name."""
+    flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", 2585664215, 60.0)
+    found = diagnose([flown.log], flown.vehicle)
+    assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
+    assert [sign.where for sign in found.structure] == ["of inertia"]
+
+
 @pytest.mark.parametrize("friction", [True, False])
 def test_friction_on_a_circle_is_no_sure_drag(friction):
     """At one speed friction is a drag; how the flight begins says that it is none, if little more."""
