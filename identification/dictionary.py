@@ -131,6 +131,15 @@ def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
             yield CHANNELS[channel], f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m", column
 
 
+def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield columns (rows, 6) of a linear drag that changes with something, in the mean nothing, and with what in words."""
+    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
+    if velocity.std(axis=0).max() <= _MOVES["velocity"]:
+        return
+    for name, x in scaled(drives(flights, setting)).items():
+        yield "a drag", name, np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)])
+
+
 def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
     """Yield what a load would pull (rows, 6) that the vehicle's own acceleration makes swing, with the channel and how fast."""
     pieces = flights.pieces(setting)

@@ -43,6 +43,7 @@ LATE = TIMING | {"motor_lag"}
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
 _ROOM = 2**28  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
+_LATEST = 16  # residuals that are kept: a fit asks several times for that of its setting
 _SAMPLE = 400  # bytes of a piece, a sample
 BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
 _HELD_OUT = 4  # every fourth block
@@ -121,6 +122,7 @@ class Flights:
         self._needs: dict[int, tuple[Piece, Array]] = {}
         self._moved: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
         self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
+        self._residuals: dict[tuple[object, ...], Array] = {}
         self._first: list[Piece] = []
         self._first = pieces = self.pieces({})
         log, block, fit, start, t = [], [], [], [], []
@@ -156,7 +158,7 @@ class Flights:
         explain the noise of the residual by taking it out of the pose.
         """
         noisy = copy(self)  # the same rows of louder logs
-        noisy._pieces, noisy._columns, noisy._needs, noisy._moved = {}, {}, {}, {}
+        noisy._pieces, noisy._columns, noisy._needs, noisy._moved, noisy._residuals = {}, {}, {}, {}, {}
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
@@ -228,9 +230,16 @@ class Flights:
         It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and all, with the mass; and no
         noise of differentiation is multiplied by a coefficient.
         """
-        pieces = zip(self.pieces(setting), self.model(setting), strict=True)
-        return np.concatenate([self._needed(piece) - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
-                               for piece, model in pieces])
+        key = tuple((name, *sorted(values.items())) for name, values in setting.items())
+        if key not in self._residuals:
+            pieces = zip(self.pieces(setting), self.model(setting), strict=True)
+            found = np.concatenate([self._needed(piece) - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
+                                    for piece, model in pieces])
+            found.setflags(write=False)
+            if len(self._residuals) == _LATEST:
+                self._residuals.pop(next(iter(self._residuals)))
+            self._residuals[key] = found
+        return self._residuals[key]
 
     def model(self, setting: Setting) -> list[Array]:
         """Return the force and the torque (n, 6) of each sample of each piece that these effects say act on the vehicle.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .dictionary import dictionary, drives, places, scaled, swings
+from .dictionary import dictionary, drags, drives, places, scaled, swings
 from .findings import CHANNELS, Structure
 from .innovations import Innovations, adds
 from .regression import BLOCK, CENTRAL, LATE, Column, Flights
@@ -27,6 +27,7 @@ LEAST_GAIN = 40.0  # whitened energy on blocks left out; where nothing is lackin
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 1.5  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
+LEAST_OF_COMMANDS = 2.0  # the same of flights known from commands, where nothing is confirmed by innovations
 LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one part of the flight, but strongly
 ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
 
@@ -57,7 +58,7 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     words: list[tuple[str, str]] = []
     columns: list[Array] = []
     named: list[float] = []  # energy of what a column may be an untruth of
-    asked = [dictionary] if flights.commanded else [dictionary, places, swings]
+    asked = [dictionary] if flights.commanded else [dictionary, places, drags, swings]
     for channel_words, drive, column in itertools.chain.from_iterable(ask(flights, fit.setting) for ask in asked):
         words.append(("a general dictionary", f"{channel_words} with {drive}"))
         columns.append(column)
@@ -76,12 +77,13 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
         named += [search.whitened_energy(share)] * (len(columns) - len(named))
     rough = 1.0 if flights.lively else ROUGH
     least = rough * np.maximum(max(LEAST_GAIN * unit, LEAST_SHARE * error), LEAST_OF_NAMED * np.array(named))
+    steady = LEAST_OF_COMMANDS if flights.commanded else LEAST_SPREAD
     found = []
     for at in range(0, len(columns), _BATCH):
         batch = columns[at : at + _BATCH]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
-            if gain > least[i] and spread >= (LEAST_SPREAD if gain < LARGE * least[i] else LEAST_OF_LARGE):
+            if gain > least[i] and spread >= (steady if gain < LARGE * least[i] else LEAST_OF_LARGE):
                 found.append((Structure(*words[i], float(gain) / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
