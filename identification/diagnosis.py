@@ -53,7 +53,7 @@ def diagnose(
     Args:
         logs: flights to learn from.
         vehicle: as it is declared. An effect that it declares with some coefficients left out has those fitted.
-        test: flights on which alone the error is reported; default: every fourth 3 s of ``logs``, which the fit never sees.
+        test: flights on which alone the error is reported; default: 3 s of each 12 s of ``logs``, which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
 

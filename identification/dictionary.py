@@ -4,6 +4,7 @@ Drives are scaled to one standard deviation, a column is one of them in one chan
 in part, is left out: the noise is in the residual as well.
 """
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,10 +21,9 @@ _MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "tur
           "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
 _NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
 _ROUNDING = 0.02  # the same of a rotor torque: shares of 0.045 look like a law
-_PLACES = 5  # along either horizontal axis
-_SEEN = 0.01  # of the mean of a bump: places where the vehicle hardly was say nothing
 _PLACES, _SEEN = 5, 0.01  # along either horizontal axis; the least mean of a bump, for places where the vehicle hardly was
 _SWINGS_HZ, _DAMPING = np.geomspace(0.4, 1.5, 11), 0.08  # of a load on a cable of 0.1 to 1.5 m, critical; loops answer faster
+_MOUNTS_HZ = np.geomspace(1.0, 4.0, 12)  # of a part on a soft mount; the residual ends at 5
 
 Drive = tuple[str, Array]  # in words, (rows,)
 
@@ -140,17 +140,44 @@ def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]
         yield "a drag", name, np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)])
 
 
+def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
+    """Return columns (rows, 6) of a linear drag, and of one that changes with place, with heading and with both at once."""
+    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
+    if velocity.std(axis=0).max() <= _MOVES["velocity"]:
+        return []
+    known = scaled(drives(flights, setting))
+    places = [x for name, x in known.items() if "position" in name]
+    headings = [x for name, x in known.items() if "heading" in name]
+    shapes = [np.ones(len(velocity)), *places, *headings, *(x * y for x in places for y in headings)]
+    return [np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)]) for x in shapes]
+
+
 def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield what a load would pull (rows, 6) that the vehicle's own acceleration makes swing, with the channel and how fast."""
+    """Yield what a part would pull or twist (rows, 6) that the vehicle's own motion makes swing, with the channel and how fast.
+
+    A load on a cable is driven by the vehicle's acceleration, what is on a soft mount by the angular one. Differentiated, the
+    attitude's noise would be in column and residual alike: it is what the rotors' torque, hardly noisy, makes of the inertia.
+    """
     pieces = flights.pieces(setting)
     for hertz in _SWINGS_HZ:
-        rate = 2.0 * np.pi * hertz
-        parts = []
-        for piece in pieces:
-            # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
-            shape = bilinear([-2.0 * _DAMPING * rate, -(rate**2)], [1.0, 2.0 * _DAMPING * rate, rate**2],
-                             1.0 / piece.signals.period)
-            pull = lfilter(*shape, piece.signals.acceleration[:, :2], axis=0)
-            parts.append(low_pass(pull, CUTOFF_HZ, piece.signals.period)[piece.rows])
+        parts = [low_pass(_swung(p.signals.acceleration[:, :2], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[p.rows]
+                 for p in pieces]
         pull = np.concatenate(parts)
         yield "Fx and Fy", f"what swings at {hertz:.2g} Hz", np.column_stack([pull, np.zeros((len(pull), 4))])
+    vehicle = flights.amended(setting)
+    torques = [vehicle.rotor_wrench(p.signals.rotor_speeds)[:, 1:] for p in pieces]
+    plain = [i for i in range(3) if flights.lively and flights.rotor_noise[1 + i] < _ROUNDING]
+    for hertz, i in itertools.product(_MOUNTS_HZ, plain):
+        parts = [low_pass(_swung(torque[:, i], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[p.rows]
+                 for torque, p in zip(torques, pieces, strict=True)]
+        column = np.zeros((sum(map(len, parts)), 6))
+        column[:, 3 + i] = np.concatenate(parts)
+        yield CHANNELS[3 + i], f"what swings at {hertz:.2g} Hz", column
+
+
+def _swung(drive: Array, hertz: float, period: float) -> Array:
+    """Return what a pendulum or a spring gives back (n, ...) of how its base is accelerated, sample by sample."""
+    # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
+    rate = 2.0 * np.pi * hertz
+    shape = bilinear([-2.0 * _DAMPING * rate, -(rate**2)], [1.0, 2.0 * _DAMPING * rate, rate**2], 1.0 / period)
+    return np.asarray(lfilter(*shape, drive, axis=0))

@@ -46,7 +46,7 @@ _ROOM = 2**28  # bytes, for what was worked out and may be asked for again: of p
 _LATEST = 16  # residuals that are kept: a fit asks several times for that of its setting
 _SAMPLE = 400  # bytes of a piece, a sample
 BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
-_HELD_OUT = 4  # every fourth block
+_HELD_OUT, _GOLDEN = 4, 0.5 * (5.0**0.5 - 1.0)  # one block of four; which one changes so that no flight keeps step with it
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
@@ -106,7 +106,7 @@ class Flights:
     Args:
         logs: of the fit.
         vehicle: as it is declared.
-        test: further logs, which the fit never sees; without any, every fourth block of 3 s is held out.
+        test: further logs, which the fit never sees; without any, one block of 3 s of each four is held out.
     """
 
     def __init__(self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()) -> None:
@@ -134,7 +134,7 @@ class Flights:
             number = ((time - time[0]) // length).astype(np.int64)
             log.append(np.full(len(time), piece.log))
             block.append(number + count)
-            seen = np.full(len(time), piece.log < len(logs)) if test else number % _HELD_OUT != _HELD_OUT - 1
+            seen = np.full(len(time), piece.log < len(logs)) if test else number % _HELD_OUT != held_out(number)
             fit.append(seen)
             start.append(np.arange(len(time)) == 0)
             t.append(time)
@@ -335,6 +335,12 @@ class Flights:
                 part[:, :3] = 0.0
                 out[column] = part
         return out
+
+
+def held_out(number: Index) -> Index:
+    """Return which block of its four is held out, of each block: the last of the first, then as evenly as can be."""
+    turn = (0.75 + _GOLDEN * (number // _HELD_OUT)) % 1.0
+    return np.asarray(_HELD_OUT * turn, dtype=np.int64)
 
 
 def _rows(signals: Signals) -> Index:

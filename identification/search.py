@@ -39,6 +39,7 @@ LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
 COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
 FINDING, MEASURING = (1.0, 2.0), (0.2, 0.5)  # Hz; noise in commands makes a lag too long if quick changes weigh much
 _REFITS = 6
+_IDLE = 1.0  # whitened energy; a turn of a refit that gains less is idle, and two in a row are the last
 _PATIENCE = 3.0  # times what the last turn of a refit gained, which all that are to come may still gain
 _DROWNED = 0.3  # share of noise in what a column adds, or explains, that is too much: of true effects it is up to 0.02
 # share of an effect's energy that other named ones must leave of it: in hover, a thrust and a steady force leave 0.00001 of
@@ -188,7 +189,8 @@ class Search:
         out = Fit(setting)
         if not wanted:
             return out
-        before = self.energy(setting)
+        before = least = self.energy(setting)
+        risen, idle = False, 0
         for _ in range(_REFITS):
             columns = self.flights.columns(setting, wanted, 0.1)
             g = gram(self.flights, setting, self.whiten, columns, self.flights.residual(setting))
@@ -196,19 +198,22 @@ class Search:
             total = g.blocks.sum(axis=0)
             change = g.solve(total, index)
             covariance = np.linalg.inv(total[np.ix_(index, index)] + np.diag(g.precision[index]))
-            out.std = dict(zip(wanted, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-            for scale in (1.0, 0.5, 0.25, 0.1):
+            std = dict(zip(wanted, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+            out.std = out.std or std
+            for scale in (1.0, 0.5, 0.25, 0.1)[risen:]:  # what has gone too far would come back as far
                 trial = _moved(setting, wanted, scale * change)
                 after = self.energy(trial)
                 if after < 1.02 * before + 5.0:
                     break
             else:
                 break
-            moved = max(abs(d) / s for d, s in zip(change, out.std.values(), strict=True))
-            gained, setting, before = before - after, trial, after
-            if moved < 0.05 or before - enough > _PATIENCE * max(gained, 0.0):
+            moved = max(abs(d) / s for d, s in zip(change, std.values(), strict=True))
+            idle = 0 if least - after > _IDLE else idle + 1
+            gained, risen, setting, before = before - after, after > before, trial, after
+            if after <= least:
+                out.setting, out.std, least = setting, std, after
+            if moved < 0.05 or idle == 2 or before - enough > _PATIENCE * max(gained, 0.0):
                 break
-        out.setting = setting
         return out
 
     # ---- selection -------------------------------------------------------------------------------------------------

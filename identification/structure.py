@@ -7,13 +7,13 @@ Each column is tried alone, on blocks that are left out in turn.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get
-from .dictionary import dictionary, drags, drives, places, scaled, swings
+from .dictionary import dictionary, drag_by_place, drags, drives, places, scaled, swings
 from .findings import CHANNELS, Structure
 from .innovations import Innovations, adds
 from .regression import BLOCK, CENTRAL, LATE, Column, Flights
@@ -27,14 +27,15 @@ LEAST_GAIN = 40.0  # whitened energy on blocks left out; where nothing is lackin
 LEAST_SHARE = 0.004  # and as a share of the remainder's energy
 LEAST_OF_NAMED = 1e-4  # and of what the named effects explain: laws, and the plant they act in, are no truer than one per cent
 LEAST_SPREAD = 1.5  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
-LEAST_OF_COMMANDS = 2.0  # the same of flights known from commands, where nothing is confirmed by innovations
+LEAST_SPREAD_OF_COMMANDS = 2.0  # the same of flights known from commands, where nothing is confirmed by innovations
 LARGE, LEAST_OF_LARGE = 3.0, 1.0  # times the least gain: a law that acts in one part of the flight, but strongly
+RIDGE = 0.1  # of columns that are tried together, as a share of their mean energy; from 0.03 to 0.3 little changes
 ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
 
 _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
 _DRAGS = frozenset({"rotor_drag", "body_drag"})
-LEAST_OF_POWERS = 12.0  # whitened energy, of one question: 62 true drags had up to 5
+LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5, a third of a friction on a circle 7.8
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
 SLOW_HZ = 3.0  # of the 5 that the residual has
 LEAST_OF_LOOSE = 0.02  # of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
@@ -76,8 +77,9 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
             columns[-1][:, channel] = share[:, channel]
         named += [search.whitened_energy(share)] * (len(columns) - len(named))
     rough = 1.0 if flights.lively else ROUGH
-    least = rough * np.maximum(max(LEAST_GAIN * unit, LEAST_SHARE * error), LEAST_OF_NAMED * np.array(named))
-    steady = LEAST_OF_COMMANDS if flights.commanded else LEAST_SPREAD
+    least_of_all = max(LEAST_GAIN * unit, LEAST_SHARE * error)
+    least = rough * np.maximum(least_of_all, LEAST_OF_NAMED * np.array(named))
+    steady = LEAST_SPREAD_OF_COMMANDS if flights.commanded else LEAST_SPREAD
     found = []
     for at in range(0, len(columns), _BATCH):
         batch = columns[at : at + _BATCH]
@@ -85,6 +87,11 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
             if gain > least[i] and spread >= (steady if gain < LARGE * least[i] else LEAST_OF_LARGE):
                 found.append((Structure(*words[i], float(gain) / error), column))
+    if not flights.commanded and (group := drag_by_place(flights, fit.setting)):
+        together, column = _together(search, regression, group)
+        if together > rough * max(least_of_all, LEAST_OF_NAMED * every):
+            where = "a drag with place and heading together"
+            found.append((Structure("a general dictionary", where, together / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
@@ -221,6 +228,29 @@ def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array)
     cross = np.tensordot(g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1]))
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
     return column - sum((w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column))
+
+
+def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
+    """Return the energy that columns (rows, 6) explain together on blocks left out, and what of them (rows, 6) does it best.
+
+    A ridge keeps each small: what many columns make of noise would cost more than what a law is worth.
+    """
+    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit]
+    k, n = len(g.columns), len(g.columns) + len(columns)
+    design = np.concatenate([g.design[..., :k], x, g.design[..., -1:]], axis=2)
+    parts = (part.reshape(-1, n + 1) for part in np.split(design, g.begins[1:]))
+    blocks = np.array([part.T @ part for part in parts])
+    total = blocks.sum(axis=0)
+    ridge = np.concatenate([g.precision, np.full(len(columns), RIDGE * np.trace(total[k:n, k:n]) / len(columns))])
+
+    def error(size: int) -> float:
+        rest = total - blocks
+        weights = np.linalg.solve(rest[:, :size, :size] + np.diag(ridge[:size]), rest[:, :size, -1:])[..., 0]
+        square = np.einsum("bi,bij,bj->", weights, blocks[:, :size, :size], weights)
+        return float(total[-1, -1] - 2.0 * np.sum(weights * blocks[:, :size, -1]) + square)
+
+    weights = np.linalg.solve(total[:n, :n] + np.diag(ridge), total[:n, -1])[k:]
+    return error(k) - error(n), np.tensordot(np.stack(columns, axis=2), weights, axes=(2, 0))
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
