@@ -65,7 +65,8 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
         columns.append(column)
         named.append(every)
     known = scaled(drives(flights, fit.setting))
-    shares = {effect: _share(flights, fit, effect, residual) for effect in fit.effects}
+    # what is known from elsewhere was not fitted to these forces
+    shares = {e: _share(flights, fit, e, residual) for e in fit.effects if not search.held(e)}
     for effect, share in shares.items():
         for name, x in known.items():
             words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
