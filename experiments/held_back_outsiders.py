@@ -1,7 +1,7 @@
 """Disturbances that most thresholds of the diagnosis were not tuned on, and those of ``unseen_outsiders``.
 
 They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the same, and failing_cell,
-high_hull and loose_gimbal led to rules of their own; the unseen ones did not.
+high_hull, loose_gimbal and winding_cord led to rules of their own; the unseen ones did not.
 """
 
 import math
@@ -124,8 +124,24 @@ def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
     return law
 
 
+def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A cord winds up as the nose turns, and turns it back: 0.02 weights times the arm for each radian from the start."""
+    turned, last = 0.0, math.nan
+
+    def law(m: Moment) -> Array:
+        nonlocal turned, last
+        heading = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
+        if not math.isnan(last):
+            turned += math.remainder(heading - last, 2.0 * math.pi)
+        last = heading
+        return _wrench(np.zeros(3), np.array([0.0, 0.0, -0.02 * vehicle.weight * vehicle.arm_l * turned]))
+
+    return law
+
+
 HELD_BACK: dict[str, Maker] = {
-    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm, loose_gimbal)
+    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm, loose_gimbal,
+                               winding_cord)
 } | UNSEEN
 
 

@@ -68,21 +68,6 @@ def room_swirl(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     return law
 
 
-def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A cord winds up as the nose turns, and turns it back: 0.02 weights times the arm for each radian from the start."""
-    turned, last = 0.0, math.nan
-
-    def law(m: Moment) -> Array:
-        nonlocal turned, last
-        heading = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
-        if not math.isnan(last):
-            turned += math.remainder(heading - last, 2.0 * math.pi)
-        last = heading
-        return _wrench(np.zeros(3), np.array([0.0, 0.0, -0.02 * vehicle.weight * vehicle.arm_l * turned]))
-
-    return law
-
-
 def beating_rotors(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     """Two rotors that are out of balance beat: 0.04 weights along body z at the difference of the turn rates of 1 and 3."""
     phase = rng.uniform(-math.pi, math.pi)
@@ -109,5 +94,5 @@ def spinning_lidar(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 UNSEEN: dict[str, Maker] = {
-    law.__name__: law for law in (passing_wash, counterweight, room_swirl, winding_cord, beating_rotors, spinning_lidar)
+    law.__name__: law for law in (passing_wash, counterweight, room_swirl, beating_rotors, spinning_lidar)
 }

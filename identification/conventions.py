@@ -15,6 +15,7 @@ from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ..dynamics.vehicle import Vehicle
 from .flight_log import FlightLog
@@ -208,6 +209,8 @@ class Balances:
                                 for s, mask in zip(signals, self._masks, strict=True)])
         self._delayed = [self._rotors.at(delay) for delay in _DELAYS]
         height = np.concatenate([s.position[mask, 2] for s, mask in zip(signals, self._masks, strict=True)])
+        self._turned = np.concatenate([low_pass(np.unwrap(np.arctan2(s.rotation[:, 1, 0], s.rotation[:, 0, 0])), CUTOFF_HZ,
+                                                s.period)[mask] for s, mask in zip(signals, self._masks, strict=True)])
         self.height = float(np.median(height)) if height.size else 0.0  # m, as the log has it
 
     @property
@@ -262,6 +265,22 @@ class Balances:
             given[:, 2] *= -1.0
         x, y, z = (_share(needed[there, i : i + 1], given[:, i : i + 1], _TORQUE_GAIN) for i in range(3))
         return x, y, z
+
+    def pulled_back(self, needed: Array) -> float:
+        """Return the share of the yaw torque of ``needed`` (n, 3) that rotors as declared leave beside a pull on the heading.
+
+        Rotors that work against what turns the nose back give the opposite of what slow turns need.
+        """
+        best = _WORST
+        for squares in self._delayed:
+            there = np.isfinite(squares[:, 0])
+            yaw = np.column_stack([squares[there] @ self._vehicle.mixing[3], -self._turned[there], needed[there, 2]])
+            yaw -= yaw.mean(axis=0)
+            given, back, wanted = (yaw / np.maximum(yaw.std(axis=0), 1e-30)).T
+            least, most = np.array(_TORQUE_GAIN) * max(float(yaw[:, 0].std()), 1e-30) / max(float(yaw[:, 2].std()), 1e-30)
+            found = lsq_linear(np.column_stack([given, back]), wanted, bounds=([least, 0.0], [most, np.inf]))
+            best = min(best, 2.0 * float(found.cost) / len(wanted))
+        return best
 
     def shift(self) -> tuple[float, float, float]:
         """Return the shift of rotors against pose (s, positive: rotors late) that fits best, its share and that within 0.1 s.
@@ -335,6 +354,9 @@ def recognise(balances: Balances) -> tuple[Reading, ...]:
     fits = [(reading, balances.fit(reading)) for reading in POSE_READINGS]
     fits += [(reading, replace(declared, torques=balances.torques(needed, reading))) for reading in ROTOR_READINGS]
     winners = [(reading, fit) for reading, fit in fits if _wins(fit, declared)]
+    if any(_only_mirrored(reading) for reading, _ in winners):
+        pulled = balances.pulled_back(needed)
+        winners = [(reading, fit) for reading, fit in winners if not _only_mirrored(reading) or fit.torques[2] < pulled]
     if not winners:
         return ()
 
@@ -346,6 +368,10 @@ def recognise(balances: Balances) -> tuple[Reading, ...]:
     # a vehicle seldom flies below its origin
     above = [reading for reading in alike if (reading.position[2, 2] < 0) == (balances.height < 0)]
     return tuple(above if above else alike)
+
+
+def _only_mirrored(reading: Reading) -> bool:
+    return reading.mirrored and reading.order == (0, 1, 2, 3)
 
 
 def _wins(fit: Fit, declared: Fit) -> bool:

@@ -35,7 +35,10 @@ ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to w
 _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
 _DRAGS = frozenset({"rotor_drag", "body_drag"})
-LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5, a third of a friction on a circle 7.8
+LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5
+# the same of an exponent that is off by half or more; two thirds of frictions on a circle, at one speed, had 6.4 and 8.1
+OFF, LEAST_OF_OFF = 0.5, 4.0
+SLOW = 0.05  # m/s, below which speed is noise
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
 SLOW_HZ = 3.0  # of the 5 that the residual has
 LEAST_OF_LOOSE = 0.02  # of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
@@ -150,8 +153,11 @@ def other_powers(search: Search, shares: Mapping[str, Array], regression: Gram,
     whole = regression.blocks[:, -1, -1].sum()
     for effect in filter(_DRAGS.__contains__, shares):
         speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})])
-        gain = _gain(search, regression, base, shares[effect] * speed[:, None])
-        if gain > LEAST_OF_POWERS:
+        # what slow flight tells, and what quick flight tells
+        asked = (_beside(search, regression, base, shares[effect] * x[:, None]) for x in (np.log(speed.clip(SLOW)), speed))
+        (exponent, slow), (_, quick) = asked
+        gain = max(slow, quick)
+        if gain > LEAST_OF_POWERS or (slow > LEAST_OF_OFF and abs(exponent) > OFF):
             yield Structure(f"{effect}'s coefficient is not constant", "its force grows with another power of speed",
                             gain / max(float(whole), 1e-30))
 
@@ -173,7 +179,7 @@ def loose(search: Search, shares: Mapping[str, Array], regression: Gram, base: M
     for effect in filter(RIGID.__contains__, shares):
         pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
         slow = np.concatenate([low_pass(piece, SLOW_HZ, flights.period) for piece in pieces])
-        gain = _gain(search, regression, base, slow)
+        _, gain = _beside(search, regression, base, slow)
         if gain > max(least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])):
             yield Structure(f"{effect}'s coefficient is not constant", f"it changes below {SLOW_HZ:.0f} Hz",
                             gain / max(whole, 1e-30))
@@ -217,10 +223,11 @@ def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) ->
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
-def _gain(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> float:
-    """Return the energy that a column (rows, 6) explains beside the columns ``base`` of a fit, in all rows together."""
+def _beside(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> tuple[float, float]:
+    """Return the best multiple of a column (rows, 6) beside the columns ``base`` of a fit, and the energy that it explains."""
     x = search.whiten(_alone(search, g, base, column))[search.flights.fit]
-    return float(np.sum(x * g.design[..., -1])) ** 2 / max(float(np.sum(x * x)), 1e-30)
+    slope, size = float(np.sum(x * g.design[..., -1])), max(float(np.sum(x * x)), 1e-30)
+    return slope / size, slope**2 / size
 
 
 def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:

@@ -155,8 +155,9 @@ def test_friction_on_a_circle_is_no_sure_drag(friction):
     assert all(e.tentative for e in found.effects) == friction
 
 
-def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag():
-    flown = practise(load_vehicle("ardrone2"), "outsider", ("dry_friction",), "small", None, 3326783031, 60.0)
+@pytest.mark.parametrize("seed", [3326783031, 984713566])
+def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag(seed):
+    flown = practise(load_vehicle("ardrone2"), "outsider", ("dry_friction",), "small", None, seed, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert [e.name for e in found.effects] == ["rotor_drag"]
     assert found.effects[0].tentative

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
+from windwrench.experiments.held_back_outsiders import practise_held_back
 from windwrench.identification.conventions import Balances, Reading, recognise
 from windwrench.identification.flight_log import FlightLog, read_log, write_log
 from windwrench.identification.screening import screen_log
@@ -106,6 +107,14 @@ def test_every_order_of_rotors_is_told_apart(trajectory):
             found = recognise(Balances(replace(log, rotor_speeds=log.rotor_speeds[:, order]), vehicle))
             expected = [] if order == (0, 1, 2, 3) and not mirrored else [(order, mirrored)]
             assert [(reading.order, reading.mirrored) for reading in found] == expected
+
+
+def test_rotors_that_work_against_a_cord_turn_as_declared():
+    """Slow turns against a spring of the heading need the opposite of what rotors give, as if these turned the other way."""
+    flown = practise_held_back(VEHICLE, "winding_cord", "typical", 2714764493, 60.0)
+    balances = Balances(flown.log, flown.vehicle)
+    assert balances.fit(Reading("", "", mirrored=True)).torques[2] < 0.25 * balances.fit(Reading("", "")).torques[2]
+    assert screen_log(flown.log, flown.vehicle) == ()
 
 
 def test_a_negated_height_is_named():
