@@ -204,7 +204,7 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
                  [j for j in outside if j.size == size], doubts, 1.0)
           for size, words in (("typical", "typical size"), ("small", "a third of it"))),
         _share("3. the same, held-back disturbances of both sizes alone", of("held back"), doubts, 1.0),
-        _share("3. the same, the five that no rule has seen alone", [j for j in of("held back") if j.cause in UNSEEN],
+        _share("3. the same, the six that no rule has seen alone", [j for j in of("held back") if j.cause in UNSEEN],
                doubts, 1.0),
         _share("4. hover: no name confidently wrong", of("hover"), _not_wrong, 1.0),
         _share("4. hover: the truth is among what is named and what that cannot be told from", of("hover"),

@@ -1,7 +1,7 @@
 """Disturbances that most thresholds of the diagnosis were not tuned on, and those of ``unseen_outsiders``.
 
 They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the same, and failing_cell,
-high_hull, loose_gimbal and winding_cord led to rules of their own; the unseen ones did not.
+high_hull, loose_gimbal, winding_cord and passing_wash led to rules of their own; the unseen ones did not.
 """
 
 import math
@@ -139,9 +139,34 @@ def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
     return law
 
 
+def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """Another vehicle crosses above, every 6 s in the mean, at 1 m/s: its wash, 0.3 m in radius, weighs up to 0.15 weights.
+
+    Each rotor is in a draught of its own. The other one passes within 0.3 m of where this one ought to be by then.
+    """
+    rotors, speed = vehicle.positions - vehicle.com, 1.0
+    when, through, along = -10.0, np.zeros(2), np.array([1.0, 0.0])
+
+    def law(m: Moment) -> Array:
+        nonlocal when, through, along
+        if m.t > when + 2.0:
+            when = m.t + 2.0 + rng.exponential(2.0)
+            at = min(round(when / TICK), len(path) - 1)
+            through = path[at, :2] + rng.uniform(-0.3, 0.3, 2)
+            heading = rng.uniform(-math.pi, math.pi)
+            along = np.array([math.cos(heading), math.sin(heading)])
+        centre = through + speed * (m.t - when) * along
+        arms = rotors @ m.rotation.T
+        away = m.position[:2] + arms[:, :2] - centre
+        push = -0.15 / 4.0 * vehicle.weight * np.exp(-0.5 / 0.3**2 * (away * away).sum(axis=1))
+        return np.array([0.0, 0.0, push.sum(), arms[:, 1] @ push, -(arms[:, 0] @ push), 0.0])
+
+    return law
+
+
 HELD_BACK: dict[str, Maker] = {
     law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm, loose_gimbal,
-                               winding_cord)
+                                  winding_cord, passing_wash)
 } | UNSEEN
 
 

@@ -6,13 +6,14 @@ The truth sits at a bound too where a coefficient is zero, but nothing pulls it 
 
 import numpy as np
 
-from .regression import CENTRAL, typical
+from .regression import CENTRAL, DRAGS, typical
 from .search import Fit, Search
 
 _PULL = 3.5  # standard deviations beyond a bound; those of true laws are within 2
 _SHARE = 0.05  # of the effect's own size, by which it must be beyond: laws are no truer than that
 _LARGEST = 10.0  # typical sizes
 _YAW_ALONE = 0.3  # of the damping about z, about x and y: rotors that climb and sink at the arms damp these more than that
+_LEAST_DRAG = 0.1  # typical sizes of a wind's own drag: true winds had 0.98 to 1.3, leaning frames 0.01 to 0.04
 _ANY_SIZE = frozenset({"mass", "thrust_scale", "com_offset", "constant_force", "constant_torque"})
 
 
@@ -25,6 +26,11 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
     for effect in fit.effects:
         if size[effect] > _LARGEST and effect not in _ANY_SIZE:
             found.append(f"{effect} would be {size[effect]:.0f} times what it typically is: another effect may be behind it")
+    wind = fit.setting.get("wind", {})
+    named = {*fit.effects, *(e.name for e in vehicle.effects)}
+    if wind and not DRAGS & named and wind["cd"] < _LEAST_DRAG * typical(("wind", "cd"), vehicle):  # drags feel a wind too
+        found.append("wind would act on hardly any drag, as a steady force does whatever the speed: another effect may be behind "
+                     "it")
     damping = fit.setting.get("rate_damping", {})
     if damping and 0.5 * (damping["dx"] + damping["dy"]) < _YAW_ALONE * damping["dz"]:
         found.append("rate_damping would be about z alone, and the arms' rotors damp the other axes more: another effect may "

@@ -24,6 +24,7 @@ from .innovations import Innovations, at_odds
 from .measuring import lag_or_delay, lateness, measured, others_late, with_lag
 from .moves import find
 from .prediction import nis_without_wrench_state, rollout_error
+from .pushes import pushes
 from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
 from .screening import LEAST_SECONDS, screen_log
 from .search import Fit, Gain, Search
@@ -94,7 +95,8 @@ def diagnose(
     gusts = () if flights.commanded else tuple(
         Gusts(channel, *found) for channel, found in zip(CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True))
     calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
-    windy = any(found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False))
+    pushed = () if flights.commanded else tuple(pushes(flights, fit.setting))
+    windy = bool(pushed) or any(found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False))
     remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
     large = noisy if flights.commanded else windy
     effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), large) for effect in fit.effects)
@@ -128,6 +130,7 @@ def diagnose(
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
         structure=tuple(signs),
         gusts=gusts,
+        pushes=pushed,
         cutoff_hz=CUTOFF_HZ,
         declared=vehicle,
         amended=amended,

@@ -97,6 +97,16 @@ class Gusts:
         return self.rms * math.sqrt(2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time))
 
 
+@dataclass(frozen=True)
+class Push:
+    """The largest of what a model leaves of one channel now and then, and not in between."""
+
+    channel: str  # one of CHANNELS
+    log: str
+    t: float  # s, of its peak
+    peak: float  # N, or Nm
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What logs of one vehicle say about its model."""
@@ -116,6 +126,7 @@ class Diagnosis:
     signatures: tuple[Signature, ...]
     structure: tuple[Structure, ...]  # strongest first
     gusts: tuple[Gusts, ...]  # of each channel; none where turn rates are worked out from commands
+    pushes: tuple[Push, ...]  # one a channel at most, the plainest first; none where turn rates are worked out from commands
     cutoff_hz: float
     declared: Vehicle
     amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment

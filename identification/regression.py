@@ -39,6 +39,7 @@ _STEPS = 1.4  # rounding steps by which turn rates must vary: below, their round
 _QUICK = frozenset({"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"})
 TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 LATE = TIMING | {"motor_lag"}
+DRAGS = frozenset({"rotor_drag", "body_drag"})
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown

@@ -68,6 +68,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
+        "pushes": [{"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak} for p in diagnosis.pushes],
         "logs": diagnosis.logs,
         "test_logs": diagnosis.test_logs,
         "seconds": diagnosis.seconds,
@@ -112,6 +113,7 @@ def _printable_names(diagnosis: Diagnosis) -> Diagnosis:
         test_logs=tuple(map(_printable, diagnosis.test_logs)),
         notes=tuple(map(_printable, diagnosis.notes)),
         traces=tuple(replace(trace, log=_printable(trace.log)) for trace in diagnosis.traces),
+        pushes=tuple(replace(push, log=_printable(push.log)) for push in diagnosis.pushes),
         held_out_segments=tuple((_printable(log), start, end) for log, start, end in diagnosis.held_out_segments),
     )
 

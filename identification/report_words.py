@@ -123,6 +123,8 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.remainder == "none":
         return f"What is left is the sensors' noise{_gusts(diagnosis)}."
     if diagnosis.remainder == "random":
+        if diagnosis.pushes:
+            return f"What is left comes now and then, as pushes do: {_push(diagnosis)}. No test found a law in it."
         return f"What is left looks random, as turbulence does{_gusts(diagnosis)}: no test found a law in it."
     if not diagnosis.structure:
         return "What is left still follows a law."
@@ -141,6 +143,14 @@ def _gusts(diagnosis: Diagnosis) -> str:
             factor, unit = scale_of([largest.rms], unit)
             found.append(f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} that last {rounded(largest.time, 2)}{_SPACE}s")
     return f", with gusts of up to {in_words(found)}" if found else ""
+
+
+def _push(diagnosis: Diagnosis) -> str:
+    """Return when the plainest push was, and how strong."""
+    push = diagnosis.pushes[0]
+    factor, unit = scale_of([push.peak], "Nm" if push.channel.startswith("tau") else "N")
+    where = f" of {push.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
+    return f"{rounded(factor * push.peak, 2)}{_SPACE}{unit} in {push.channel} at {rounded(push.t)}{_SPACE}s{where}"
 
 
 def doubt_sentences(diagnosis: Diagnosis) -> list[str]:

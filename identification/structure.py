@@ -16,7 +16,7 @@ from ..dynamics.effects import get
 from .dictionary import dictionary, drag_by_place, drags, drives, places, scaled, swings
 from .findings import CHANNELS, Structure
 from .innovations import Innovations, adds
-from .regression import BLOCK, CENTRAL, LATE, Column, Flights
+from .regression import BLOCK, CENTRAL, DRAGS, LATE, Column, Flights
 from .search import LEAST_SIZE, Fit, Search
 from .selection import Gram
 from .signals import low_pass
@@ -34,9 +34,9 @@ ROUGH = 4.0  # times the least gain, where turn rates hardly leave the step to w
 
 _BATCH = 24  # columns at a time
 UNSTEADY, LEAST_UNSTEADY = 5.0, 0.1  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
-_DRAGS = frozenset({"rotor_drag", "body_drag"})
 LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5
-# the same of an exponent that is off by half or more; two thirds of frictions on a circle, at one speed, had 6.4 and 8.1
+# the same of an exponent that is off by half or more; on two flights on a circle, at one speed, a third of a friction had 6.4
+# and 8.1
 OFF, LEAST_OF_OFF = 0.5, 4.0
 SLOW = 0.05  # m/s, below which speed is noise
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
@@ -151,7 +151,7 @@ def other_powers(search: Search, shares: Mapping[str, Array], regression: Gram,
     """
     flights = search.flights
     whole = regression.blocks[:, -1, -1].sum()
-    for effect in filter(_DRAGS.__contains__, shares):
+    for effect in filter(DRAGS.__contains__, shares):
         speed = np.concatenate([np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})])
         # what slow flight tells, and what quick flight tells
         asked = (_beside(search, regression, base, shares[effect] * x[:, None]) for x in (np.log(speed.clip(SLOW)), speed))
@@ -171,7 +171,8 @@ def loose(search: Search, shares: Mapping[str, Array], regression: Gram, base: M
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    What is on a soft mount follows slow motion as if it were bolted on, and quick motion hardly.
+    What is on a soft mount follows slow motion as if it were bolted on, and quick motion hardly: below its own frequency it
+    is the larger one.
     """
     flights = search.flights
     whole = float(regression.blocks[:, -1, -1].sum())
@@ -179,8 +180,8 @@ def loose(search: Search, shares: Mapping[str, Array], regression: Gram, base: M
     for effect in filter(RIGID.__contains__, shares):
         pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
         slow = np.concatenate([low_pass(piece, SLOW_HZ, flights.period) for piece in pieces])
-        _, gain = _beside(search, regression, base, slow)
-        if gain > max(least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])):
+        more, gain = _beside(search, regression, base, slow)
+        if more > 0.0 and gain > max(least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])):
             yield Structure(f"{effect}'s coefficient is not constant", f"it changes below {SLOW_HZ:.0f} Hz",
                             gain / max(whole, 1e-30))
 
