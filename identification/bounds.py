@@ -29,8 +29,8 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
     wind = fit.setting.get("wind", {})
     named = {*fit.effects, *(e.name for e in vehicle.effects)}
     if wind and not DRAGS & named and wind["cd"] < _LEAST_DRAG * typical(("wind", "cd"), vehicle):  # drags feel a wind too
-        found.append("wind would act on hardly any drag, as a steady force does whatever the speed: another effect may be behind "
-                     "it")
+        found.append("wind would act on hardly any drag, as a steady force does whatever the speed: another effect may be "
+                     "behind it")
     damping = fit.setting.get("rate_damping", {})
     if damping and 0.5 * (damping["dx"] + damping["dy"]) < _YAW_ALONE * damping["dz"]:
         found.append("rate_damping would be about z alone, and the arms' rotors damp the other axes more: another effect may "

@@ -14,7 +14,7 @@ from .signals import low_pass
 Array = NDArray[np.float64]
 
 _CUTOFFS_HZ = 1.5, 3.0  # as long as pushes last, sensors' noise is weakest below these
-_LEAST = 10.0  # standard deviations; 480 flights that a model explains had up to 6.6, in strong turbulence up to 4.6
+_LEAST = 10.0  # standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up to 4.6
 _LEAST_SIZE = 0.01  # of the weight, or of the weight times the arm
 _EDGE = 1.0  # s at either end of a piece, where the filters have only half of what they need
 

@@ -51,8 +51,15 @@ def test_what_is_small_beside_the_effect_itself_is_no_doubt():
 def test_a_wind_that_no_room_has_is_a_doubt_and_any_mass_is_none():
     columns = [("wind", "wx"), ("mass", "dm")]
     assert beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 30.0, "cd": 1e-5}}))
-    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 2.0, "cd": 1e-4}}))
+    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 2.0, "cd": 0.04}}))
     assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"mass": {"dm": 1.0}}))
+
+
+def test_a_wind_on_hardly_any_drag_is_a_steady_force_unless_another_drag_feels_it():
+    columns, wind = [("wind", "wx")], {"wx": 6.0, "cd": 1e-3}
+    (doubt,) = beyond_belief(search(columns, [0.0]), Fit({"wind": wind}))
+    assert "hardly any drag" in doubt
+    assert not beyond_belief(search(columns, [0.0]), Fit({"wind": wind, "rotor_drag": {"kdx": 1e-4}}))
 
 
 def test_a_dry_friction_is_no_sure_drag():

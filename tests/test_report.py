@@ -93,7 +93,7 @@ def diagnosis():
         signatures=tuple(
             Signature("rotor_drag", CHANNELS[i], f"velocity {'xy'[i]} (m/s)", signals.velocity[inside][:, i], before[:, i],
                       (before - after)[:, i]) for i in range(2)),
-        structure=(), gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)),
+        structure=(), gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)), pushes=(),
         cutoff_hz=CUTOFF, declared=VEHICLE, amended=amended, logs=("flight",), test_logs=(), seconds=20.0)
 
 
