@@ -175,6 +175,16 @@ def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag(seed):
     assert [sign.where for sign in found.structure] == ["its force grows with another power of speed"]
 
 
+def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
+    """A tenth of the thrust beyond a tenth more than at hover is lost, in few moments of this flight: too few for a law."""
+    flown = practise(load_vehicle("ardrone2"), "outsider", ("thrust_saturation",), "small", None, 2343211471, 60.0)
+    found = diagnose([flown.log], flown.vehicle)
+    assert {e.name: e.tentative for e in found.effects} == {"thrust_curvature": True}
+    assert found.structure[0].where == "thrust bends at one point rather than all along"
+    (curved,) = diagnose([fly("thrust_curvature", a=-0.05)], load_vehicle("ardrone2")).effects
+    assert (curved.name, curved.tentative) == ("thrust_curvature", False)
+
+
 def test_a_load_that_the_library_lacks_is_seen_to_swing():
     """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its swing."""
     log = fly("slung_payload", m=0.01, l=0.3, damping=1.0)
