@@ -17,7 +17,7 @@ from ..dynamics.vehicle import Vehicle
 from .bounds import beyond_belief
 from .commanded import shared
 from .dictionary import drives
-from .equivalence import composites, equivalents, unlisted
+from .equivalence import composites, equivalents, overshadowed, unlisted
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
 from .flight_log import FlightLog
 from .innovations import Innovations, at_odds
@@ -78,7 +78,7 @@ def diagnose(
     if follow == "as behind a lag":
         fit = with_lag(search, fit)
     report("asking what else it could be")
-    classes = {effect: tuple(equivalents(search, fit, effect)) for effect in fit.effects}
+    classes = {e: (*equivalents(search, fit, e), *overshadowed(search, fit, e)) for e in fit.effects}
     classes |= {e: tuple(dict.fromkeys([*classes[e], *more])) for e, more in others_late(search, fit, follow).items()}
     report("looking for what is left")
     signs, gusty = structure(search, fit)

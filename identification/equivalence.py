@@ -4,11 +4,13 @@ An effect's own part of the residual is projected on the columns of another one.
 the noise, by which the flights can tell the two apart.
 """
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .regression import CENTRAL, SHIFT, SHIFT_RANGE, Flights, coefficient
-from .search import Fit, Search
+from .search import COMPLEXITY, LEAST_SIZE, Fit, Search, freedom
 from .selection import BELIEVED, PRIOR, gram
 from .turning import ALIKE
 
@@ -66,6 +68,22 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         if search.whitened_energy(flights.residual(swapped.setting) - whole) < limit:
             out.append(other.effect)
     return out
+
+
+def overshadowed(search: Search, fit: Fit, effect: str) -> list[str]:
+    """Return the effects that explain more than ``effect`` in its place, and that the flights hardly excite.
+
+    Their columns are noise of the sensors in good part, so they are not searched for; what is named in the place of one may be
+    it all the same.
+    """
+    if not search.hidden:
+        return []
+    less, wider = fit.without(effect), copy(search)
+    wider.library = search.hidden
+    regression = wider.linearise(less)
+    own = search.error_without(fit, effect) - search.error(fit) - COMPLEXITY * freedom(effect)
+    return [x.effect for x in wider.gains(less, regression, wider.gram(less, regression))
+            if x.energy - COMPLEXITY * freedom(x.effect) > own and LEAST_SIZE < x.size <= _PLAUSIBLE]
 
 
 def unlisted(search: Search, fit: Fit) -> list[str]:

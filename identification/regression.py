@@ -177,8 +177,7 @@ class Flights:
                 drowned.add(effect)
         if self.commanded:
             drowned |= NOT_FROM_COMMANDS
-        if not self.lively:
-            drowned |= _QUICK
+        drowned |= self.rounded
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
         return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}, rounded
@@ -194,6 +193,11 @@ class Flights:
         """Whether the turn rates vary by enough of the steps to which they are rounded."""
         speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in self._first])
         return float(np.median(speeds.std(axis=0))) > _STEPS * self.vehicle.omega_lsb
+
+    @property
+    def rounded(self) -> frozenset[str]:
+        """The effects that would explain the rounding of turn rates, where these hardly leave its steps."""
+        return frozenset() if self.lively else _QUICK
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""

@@ -43,8 +43,8 @@ _IDLE = 1.0  # whitened energy; a turn of a refit that gains less is idle, and t
 _PATIENCE = 3.0  # times what the last turn of a refit gained, which all that are to come may still gain
 _DROWNED = 0.3  # share of noise in what a column adds, or explains, that is too much: of true effects it is up to 0.02
 # share of an effect's energy that other named ones must leave of it: in hover, a thrust and a steady force leave 0.00001 of
-# each other; on 78 flights where two effects were found, each left at least 0.019 of the other
-_APART = 0.001
+# each other; on 78 flights where two effects were found, each left at least 0.019 of the other, and on a slow one 0.0007
+_APART = 0.0003
 
 
 @dataclass(eq=False)
@@ -79,6 +79,8 @@ class Search:
         # a law with a place or a swing of its own imitates too much where thrust itself is a guess: it must be declared
         self.library = tuple(e for e in library if e not in flights.drowned
                              and (e not in STARTS or e in declared or not flights.commanded))
+        # what these flights hardly excite is not asked for, and may all the same be behind what is
+        self.hidden = () if flights.commanded else tuple(e for e in library if e in flights.drowned - flights.rounded)
         self.report = report
         self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
         # how late commands come true shows in how the vehicle turns; the search takes it as it is

@@ -214,6 +214,24 @@ def test_names_are_sure_together_or_not_at_all():
     assert found.remainder == "random"
 
 
+def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
+    """Markers off centre, on steady turns in twice the noise: too much of them is noise for a name, and a tilt explains less."""
+    flown = practise(load_vehicle("ardrone2"), "pair", seed=508285241)
+    assert {e.name for e in flown.effects} == {"marker_offset", "battery_sag"}
+    assert "marker_offset" in Flights([flown.log], flown.vehicle).drowned
+    found = diagnose([flown.log], flown.vehicle)
+    assert {e.name: e.indistinguishable_from for e in found.effects} == {
+        "battery_sag": (), "thrust_axis_tilt": ("marker_offset",)}
+    assert any("thrust_axis_tilt or marker_offset" in advice for advice in found.advice)
+
+
+def test_a_mass_beside_a_steady_force_is_no_load_that_swings():
+    """On a slow flight a mass and a force leave a thousandth of each other, which is still two hundred units."""
+    flown = practise(load_vehicle("ardrone2"), "pair", seed=4007009)
+    assert {e.name for e in flown.effects} == {"constant_force", "mass"}
+    assert set(named(diagnose([flown.log], flown.vehicle))) == {"constant_force", "mass"}
+
+
 def test_a_push_that_lies_in_the_noise_is_not_passed_over():
     """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the floor, and yet not calm."""
     vehicle = load_vehicle("ardrone2")
