@@ -95,7 +95,7 @@ class Innovations:
     def _slope(self, column: Column) -> list[Array]:
         """Return what a unit of a coefficient adds to the motions (2, n, 6)."""
         effect, name = column
-        own = self._setting.get(effect, {})
+        own = self._flights.coefficients(self._setting, effect)
         value, delta = own.get(name, 0.0), _STEP * typical(column, self._flights.vehicle)
         if effect and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum:
             delta = -delta
@@ -170,7 +170,7 @@ class Innovations:
         effect, name = _CLOCK
         if effect not in after:
             return after
-        own = self._setting.get(effect, {})
+        own = self._flights.coefficients(self._setting, effect)
         shifts = dict(after.get(SHIFT[0], {}))
         shifts[SHIFT[1]] = shifts.get(SHIFT[1], 0.0) + after[effect][name] - own.get(name, 0.0)
         return {**{k: v for k, v in after.items() if k != effect}, SHIFT[0]: shifts, **({effect: own} if own else {})}

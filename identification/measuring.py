@@ -113,7 +113,7 @@ def _likeliest(search: Search, fit: Fit, latest: float, turns: int) -> Fit:
             gram.lower[at], gram.upper[at] = -latest - gram.value[at], latest - gram.value[at]
         total = gram.blocks.sum(axis=0)
         change = gram.solve(total, every)
-        found = started(found, columns, change)
+        found = started(search.flights, found, columns, change)
         if SHIFT in columns:
             found.setting[SHIFT[0]][SHIFT[1]] = float(gram.value[at] + change[at])
         std = np.sqrt(np.diag(np.linalg.inv(total[:-1, :-1] + np.diag(gram.precision))))

@@ -201,7 +201,7 @@ def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: 
     What takes two to replace it is passed on the way to neither of them. Two together are nearly linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
-    for both in itertools.combinations([e for e in library if e not in STARTS and e not in fit.effects], 2):
+    for both in itertools.combinations([e for e in library if e not in search.begun and e not in fit.effects], 2):
         wanted = search.base(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
@@ -211,7 +211,7 @@ def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: 
         change = g.solve(total, g.index(wanted))
         if not any(search.drowned(g, total, wanted, change, e) or search.size(wanted, change, e) <= _least_size(e)
                    for e in both):
-            least, best = left, Swap(both, started(fit, wanted, change, *both), bar - cost)
+            least, best = left, Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost)
     if best:
         yield best
 

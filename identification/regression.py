@@ -112,6 +112,7 @@ class Flights:
 
     def __init__(self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()) -> None:
         self.vehicle = vehicle
+        self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
         self.commanded = commanded(self.logs)  # torque is left out, and only the time in the air counts
         if self.commanded:
@@ -229,6 +230,10 @@ class Flights:
         effects = tuple(EffectSetting(name, dict(values)) for name, values in setting.items() if name)
         return replace(self.vehicle, effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects))
 
+    def coefficients(self, setting: Setting, effect: str) -> Mapping[str, float]:
+        """Return an effect's coefficients at a setting; of one that it does not have, those that the vehicle declares."""
+        return setting[effect] if effect in setting else self._declared.get(effect, {})
+
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
 
@@ -299,10 +304,11 @@ class Flights:
     def _slope(self, setting: Setting, column: Column, base: Array, delta: float) -> Array:
         """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the residual at a setting."""
         effect, name = column
-        value = setting.get(effect, {}).get(name, 0.0)
+        own = self.coefficients(setting, effect)
+        value = own.get(name, 0.0)
 
         def at(moved: float) -> Array:
-            return self.residual({**setting, effect: {**setting.get(effect, {}), name: moved}})
+            return self.residual({**setting, effect: {**own, name: moved}})
 
         if effect:
             c = coefficient(column)

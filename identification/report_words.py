@@ -84,17 +84,31 @@ def coefficient_meaning(effect: str, coefficient: str) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict in one plain sentence."""
-    sure = [e.name for e in diagnosis.effects if not e.tentative]
-    unsure = [e.name for e in diagnosis.effects if e.tentative]
+    sure = [e for e in diagnosis.effects if not e.tentative]
+    unsure = [e for e in diagnosis.effects if e.tentative]
     if diagnosis.verdict == "nothing to explain":
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
         if diagnosis.remainder == "random":
             return "The model errs, but at random: no effect in the library explains it."
         return "The model is wrong in a way that no effect in the library explains."
-    lacked = (f"The model lacked {in_words(sure)}" + (f", and perhaps {in_words(unsure)}" if unsure else "")
-              if sure else f"The model perhaps lacked {in_words(unsure)}")
+    lacked = (f"The model {_lacked(diagnosis, sure)}" + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
+              if sure else f"The model perhaps {_lacked(diagnosis, unsure)}")
     return f"{lacked}, but that is not all." if diagnosis.verdict == "partly explained" else f"{lacked}."
+
+
+def _lacked(diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()) -> str:
+    """Return what effects are to the model, in words: new to it, or declared with other coefficients.
+
+    After effects ``before`` that are all new as these are, the verb is not said again.
+    """
+    declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
+    changed = [e.name for e in (*before, *effects) if e.name in declared and e.coefficients.keys() <= declared[e.name]]
+    if before and not changed:
+        return in_words([e.name for e in effects])
+    lacked = in_words([e.name for e in effects if e.name not in changed])
+    other = in_words([e.name for e in effects if e.name in changed])
+    return in_words([*([f"lacked {lacked}"] if lacked else []), *([f"has {other} other than declared"] if other else [])])
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -82,7 +82,11 @@ class Search:
         # what these flights hardly excite is not asked for, and may all the same be behind what is
         self.hidden = () if flights.commanded else tuple(e for e in library if e in flights.drowned - flights.rounded)
         self.report = report
-        self._stated = {e.name: e.coefficients for e in flights.vehicle.effects}
+        # what the vehicle's file states is known, unless it states all of an effect: then that is what may have changed
+        self._stated = {e.name: e.coefficients for e in flights.vehicle.effects
+                        if {c.name for c in get(e.name).coefficients} - {CENTRAL} - set(e.coefficients)}
+        # effects that are looked for from several starts; what is declared is one
+        self.begun = frozenset(STARTS) - (declared - self._stated.keys())
         # how late commands come true shows in how the vehicle turns; the search takes it as it is
         delay = turning_delay([p.signals for p in flights.pieces({}) if p.log < flights.own], flights.vehicle)
         self.delay = delay if flights.commanded and EFFECT in self.library else None
@@ -95,8 +99,8 @@ class Search:
         """Return the columns of an effect, less the coefficients that the vehicle's file states for it."""
         if self.held(effect):
             return []
-        stated, every = self._stated.get(effect, {}), columns_of(effect, fitted)
-        return [c for c in every if c[1].removeprefix(MOMENT) not in stated] or every
+        stated = self._stated.get(effect, {})
+        return [c for c in columns_of(effect, fitted) if c[1].removeprefix(MOMENT) not in stated]
 
     def held(self, effect: str) -> bool:
         """Return whether an effect is known from elsewhere than the residual: it is neither fitted nor taken away."""
@@ -114,7 +118,7 @@ class Search:
 
         With a fit ``near`` it, the columns that are only tried are those of there, and effects that it has are not tried.
         """
-        linear = [e for e in self.library if e not in STARTS and e not in (near or fit).effects]
+        linear = [e for e in self.library if e not in self.begun and e not in (near or fit).effects]
         wanted = self.base(fit.effects, () if near else linear)
         columns = self.flights.columns(fit.setting, wanted if SHIFT in wanted else [SHIFT, *wanted])
         if near:
@@ -122,7 +126,7 @@ class Search:
         residual = self.flights.residual(fit.setting)
         begun: dict[Column, dict[str, float]] = {}
         for effect in self.library:
-            if effect in STARTS and effect not in fit.effects:
+            if effect in self.begun and effect not in fit.effects:
                 stated = self._stated.get(effect, {})
                 for i, start in enumerate(STARTS[effect](self.flights, residual, stated)):
                     column = (effect, f"{START}{i}")
@@ -203,7 +207,7 @@ class Search:
             std = dict(zip(wanted, np.sqrt(np.diag(covariance)).tolist(), strict=True))
             out.std = out.std or std
             for scale in (1.0, 0.5, 0.25, 0.1)[risen:]:  # what has gone too far would come back as far
-                trial = _moved(setting, wanted, scale * change)
+                trial = _moved(self.flights, setting, wanted, scale * change)
                 after = self.energy(trial)
                 if after < 1.02 * before + 5.0:
                     break
@@ -229,7 +233,7 @@ class Search:
         for effect in self.library:
             if effect in fit.effects or (self.flights.commanded and not _follows(effect, fit.effects)):
                 continue
-            if effect in STARTS:
+            if effect in self.begun:
                 tries = [[*base, c] for c in regression.begun if c[0] == effect]
             else:
                 tries = [self.base(fit.effects, [effect])]
@@ -242,7 +246,7 @@ class Search:
                 if gain <= best.energy:
                     continue
                 change = g.solve(total, index)
-                start = started(fit, wanted, change, effect)
+                start = started(self.flights, fit, wanted, change, effect)
                 last = wanted[-1]
                 if last in regression.begun:
                     start.setting[effect] = dict(regression.begun[last])
@@ -276,14 +280,15 @@ class Search:
     def noise_explained(self, fit: Fit) -> float:
         """Return by how much a fit lowers the whitened energy because it makes the sensors' noise smaller."""
         columns = (c for effect in fit.effects for c in self.columns_of(effect, True))
-        own, with_floor = self._noise({c: fit.setting[c[0]].get(c[1], 0.0) for c in columns if c in self.flights.column_noise})
+        own, with_floor = self._noise({c: fit.setting[c[0]].get(c[1], 0.0) for c in columns})
         return 2.0 * with_floor - own
 
     def _noise(self, shape: Mapping[Column, float]) -> tuple[float, float]:
-        """Return the whitened energy of the noise in a sum of columns, and how much of the floor's goes with it."""
-        if not shape:
+        """Return the whitened energy of the noise in a sum of columns, if known, and how much of the floor's goes with it."""
+        known = {c: value for c, value in shape.items() if c in self.flights.column_noise}
+        if not known:
             return 0.0, 0.0
-        noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in shape], axis=2), [*shape.values()], axes=(2, 0))
+        noise = np.tensordot(np.stack([self.flights.column_noise[c] for c in known], axis=2), [*known.values()], axes=(2, 0))
         noise, floor = (self.whiten(x)[self.flights.fit] for x in (noise, self.flights.sensor_noise))
         return float(np.sum(noise * noise)), float(np.sum(noise * floor))
 
@@ -341,25 +346,26 @@ def _follows(effect: str, named: Sequence[str]) -> bool:
     return not mates(effect) & set(named) and (effect not in AFTER_SAG or "battery_sag" in named)
 
 
-def _moved(setting: Setting, columns: Sequence[Column], change: Array) -> dict[str, dict[str, float]]:
+def _moved(flights: Flights, setting: Setting, columns: Sequence[Column], change: Array) -> dict[str, dict[str, float]]:
     """Return a setting with changes added, kept in range."""
     out = {k: dict(v) for k, v in setting.items()}
     for (effect, name), delta in zip(columns, change, strict=True):
         if name.startswith((MOMENT, START)):
             continue
-        value = out.get(effect, {}).get(name, 0.0) + float(delta)
+        own = out.setdefault(effect, dict(flights.coefficients(setting, effect)))
+        value = own.get(name, 0.0) + float(delta)
         if not effect:
             value = float(np.clip(value, *range_of((effect, name))))
         else:
             c = coefficient((effect, name))
             value = float(np.clip(value, c.minimum, c.maximum))
-        out.setdefault(effect, {})[name] = value
+        own[name] = value
     return out
 
 
-def started(fit: Fit, columns: Sequence[Column], change: Array, *effects: str) -> Fit:
+def started(flights: Flights, fit: Fit, columns: Sequence[Column], change: Array, *effects: str) -> Fit:
     """Return a fit with changes and these effects added, before it is refitted."""
-    start = _moved(fit.setting, columns, change)
+    start = _moved(flights, fit.setting, columns, change)
     for effect in effects:
         if any(c[0] == effect and c[1].startswith(MOMENT) for c in columns):
             start[effect][CENTRAL] = _central(columns, change, effect)

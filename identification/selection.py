@@ -127,7 +127,7 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
 def room(flights: Flights, setting: Setting, columns: Sequence[Column]) -> tuple[Array, Array, Array, Array]:
     """Return of each column (columns,) its prior's precision, its value, and by how much this may fall and rise."""
     size = np.array([typical(c, flights.vehicle) for c in columns])
-    value = np.array([setting.get(c[0], {}).get(c[1], 0.0) for c in columns])
+    value = np.array([flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns])
     low, high = np.empty(len(columns)), np.empty(len(columns))
     for i, c in enumerate(columns):
         if not c[0]:

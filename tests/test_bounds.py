@@ -13,6 +13,7 @@ from windwrench.identification.search import Fit
 from windwrench.identification.selection import Gram
 
 VEHICLE = load_vehicle("ardrone2")
+LEVEL = SimpleNamespace(signals=SimpleNamespace(velocity=np.tile([1.0, 0.0, 0.0], (5, 1))), rows=np.arange(5))  # at 1 m/s
 
 
 def search(columns, pulls, precision=1e8):
@@ -24,13 +25,13 @@ def search(columns, pulls, precision=1e8):
     block[0, :count, -1] = precision * std * np.array(pulls)
     zero, far = np.zeros(count), np.full(count, np.inf)
     gram = Gram(tuple(columns), np.zeros((0, 6, count + 1)), np.zeros(1, dtype=np.intp), block, zero, zero, zero, far)
-    return SimpleNamespace(flights=SimpleNamespace(vehicle=VEHICLE), at=lambda fit: gram)
+    return SimpleNamespace(flights=SimpleNamespace(vehicle=VEHICLE, pieces=lambda setting: [LEVEL]), at=lambda fit: gram)
 
 
 @pytest.mark.parametrize(("pull", "doubtful"), [(-6.0, True), (-2.0, False), (0.0, False), (6.0, False)])
 def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = Fit({"body_drag": {"dx": 1e-4, "cx": 0.0}})
+    fit = Fit({"body_drag": {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}})
     found = beyond_belief(search(columns, [1.0, pull]), fit)
     assert bool(found) == doubtful
     assert not doubtful or "cx" in found[0]
@@ -44,8 +45,15 @@ def test_air_that_damps_yaw_alone_is_a_doubt(dx, dz, doubtful):
 
 def test_what_is_small_beside_the_effect_itself_is_no_doubt():
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = Fit({"body_drag": {"dx": 0.1, "cx": 0.0}})
+    fit = Fit({"body_drag": {"dx": 0.1, "dy": 0.1, "dz": 0.1, "cx": 0.0}})
     assert not beyond_belief(search(columns, [1.0, -6.0]), fit)
+
+
+@pytest.mark.parametrize(("dx", "cx", "std", "doubtful"), [
+    (0.0, 0.0, 0.003, True), (0.0, 0.0, 0.01, False), (0.02, 0.0, 0.001, False), (0.0, 0.02, 0.001, False)])
+def test_a_body_that_air_drags_along_some_axes_alone_is_a_doubt(dx, cx, std, doubtful):
+    fit = Fit({"body_drag": {"dx": dx, "dy": 0.05, "dz": 0.1, "cx": cx}}, {("body_drag", "dx"): std})
+    assert bool(beyond_belief(search([("body_drag", "dx")], [0.0]), fit)) == doubtful
 
 
 def test_a_wind_that_no_room_has_is_a_doubt_and_any_mass_is_none():

@@ -224,6 +224,19 @@ def test_verdicts_in_one_sentence(diagnosis):
         "The model explains these logs: nothing needs to be added to it."]
 
 
+def test_what_is_declared_is_not_said_to_be_lacking(diagnosis):
+    (drag,) = diagnosis.effects
+    mass, wind = replace(drag, name="mass"), replace(drag, name="wind", tentative=True)
+    known = replace(diagnosis, declared=diagnosis.declared.with_effects(EffectSetting("rotor_drag", drag.coefficients)))
+    told = [headline(replace(known, effects=effects)) for effects in [
+        (drag,), (mass, drag), (mass, drag, wind), (drag, wind), (mass, wind), (replace(drag, tentative=True),)]]
+    assert told == [
+        "The model has rotor_drag other than declared.", "The model lacked mass and has rotor_drag other than declared.",
+        "The model lacked mass and has rotor_drag other than declared, and perhaps lacked wind.",
+        "The model has rotor_drag other than declared, and perhaps lacked wind.", "The model lacked mass, and perhaps wind.",
+        "The model perhaps has rotor_drag other than declared."]
+
+
 class Page(HTMLParser):
     """The tags of a page, and its text."""
 
