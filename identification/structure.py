@@ -16,7 +16,7 @@ from ..dynamics.effects import get
 from .dictionary import dictionary, drag_by_place, drags, drives, places, scaled, swings
 from .findings import CHANNELS, Structure
 from .innovations import Innovations, adds
-from .regression import BLOCK, CENTRAL, CUTOFF_HZ, DRAGS, LATE, Column, Flights
+from .regression import BLOCK, CENTRAL, CUTOFF_HZ, DRAGS, LATE, Column, Flights, Setting
 from .search import LEAST_SIZE, Fit, Search
 from .selection import Gram
 from .signals import low_pass
@@ -39,7 +39,10 @@ LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up 
 # and 8.1
 OFF, LEAST_OF_OFF = 0.5, 4.0
 SLOW = 0.05  # m/s, below which speed is noise
-LEAST_OF_KINKS = 12.0  # whitened energy, of one question: 36 true curvatures had up to 4, rotors that stall 29 to 680
+KINKS = 0.9, 1.0, 1.1, 1.2, 1.3  # of the thrust of hover
+# whitened energy, of one question: 36 true curvatures had up to 4, rotors that stall 29 to 680; and where no curvature is
+# named, 93 flights without a kink up to 17, a rotor that stalls 56
+LEAST_OF_KINKS, LEAST_OF_STALLS = 12.0, 25.0
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
 SLOW_HZ = 3.0  # of the 5 that the residual has
 LEAST_OF_LOOSE = 0.02  # of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
@@ -101,7 +104,7 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     if flights.commanded:
         return [sign for sign, _ in found[:MOST]], bool(found)
     wandering = [*unsteady(search, shares, regression), *other_powers(search, shares, regression, base),
-                 *kinked(search, shares, regression, base), *loose(search, shares, regression, base)]
+                 *kinked(search, fit, regression, base), *loose(search, shares, regression, base)]
     if not found:
         signs = wandering or list(overlooked(search, fit))
         return signs, bool(signs)
@@ -163,30 +166,45 @@ def other_powers(search: Search, shares: Mapping[str, Array], regression: Gram,
                             gain / max(float(whole), 1e-30))
 
 
-def kinked(search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]) -> Iterator[Structure]:
-    """Yield a sign for a named thrust_curvature whose thrust would rather bend at one point than all along.
+def kinked(search: Search, fit: Fit, regression: Gram, base: Mapping[Column, Array]) -> Iterator[Structure]:
+    """Yield a sign where rotors would rather deliver less, or more, beyond some thrust.
 
     Args:
         search: that found the effects.
-        shares: what each explains (rows, 6).
+        fit: the effects.
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few blocks for a law.
+    A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few blocks for a law, and a
+    thrust_curvature takes it up in good part: a question of its own, in all rows together. Where one is named it is asked, too,
+    whether thrust would rather bend at hover than all along, and nothing needs to be borne out.
     """
-    if "thrust_curvature" not in shares:
+    flights, bent = search.flights, "thrust_curvature" in fit.effects
+    if not flights.lively:
         return
-    flights, vehicle = search.flights, search.flights.vehicle
-    hover, parts = vehicle.weight / 4.0, []
-    for piece in flights.pieces({}):
-        off = np.abs(vehicle.k * piece.signals.rotor_speeds**2 - hover)  # a kink at the thrust of hover
-        wrench = vehicle.rotor_wrench(np.sqrt(off / vehicle.k))
+    asked = [(f"what rotors deliver beyond {share:.1f} times the thrust of hover", _bent(flights, fit.setting, share, 0.0))
+             for share in KINKS]
+    if bent:
+        asked.append(("thrust, which bends at one point rather than all along", _bent(flights, fit.setting, 1.0, -1.0)))
+    gains = [_beside(search, regression, base, column)[1] for _, column in asked]
+    best = int(np.argmax(gains))
+    where, column = asked[best]
+    stalls = gains[best] > LEAST_OF_STALLS and Innovations(flights, fit.setting).confirm_column(
+        _added(search, regression, base, column))
+    if stalls or (bent and gains[best] > LEAST_OF_KINKS):
+        yield Structure("a general dictionary", where, gains[best] / max(float(regression.blocks[:, -1, -1].sum()), 1e-30))
+
+
+def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Array:
+    """Return what rotors deliver (rows, 6) beyond so many times their share of the weight, and ``below`` times what below."""
+    vehicle, parts = flights.amended(setting), []
+    for piece in flights.pieces(setting):
+        off = vehicle.k * piece.signals.rotor_speeds**2 - share * flights.vehicle.weight / 4.0
+        thrust = np.where(off > 0.0, off, below * off)
+        wrench = vehicle.rotor_wrench(np.sqrt(thrust / vehicle.k))
         force = piece.signals.rotation[:, :, 2] * wrench[:, :1]
         parts.append(low_pass(np.concatenate([force, wrench[:, 1:]], axis=1), CUTOFF_HZ, piece.signals.period)[piece.rows])
-    _, gain = _beside(search, regression, base, np.concatenate(parts))
-    if gain > LEAST_OF_KINKS:
-        yield Structure("thrust_curvature's coefficient is not constant", "thrust bends at one point rather than all along",
-                        gain / max(float(regression.blocks[:, -1, -1].sum()), 1e-30))
+    return np.concatenate(parts)
 
 
 def loose(search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]) -> Iterator[Structure]:
