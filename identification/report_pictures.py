@@ -34,6 +34,7 @@ _COLOURS = {"ink": "#1c2430", "muted": "#6b7483", "grid": "#dfe3e8", "bar": "#b4
 _BINS = 320  # columns that a line over time is thinned to: its lowest and highest point in each
 _POINTS = 600  # of a signature
 _LABEL = 46  # letters in a line below a signature
+_FEW_DECADES = 100.0  # between the ends of an axis, whose powers of ten are too few to read a number off
 _BARS = 14  # candidates that are drawn, besides the named ones
 _SVG = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
@@ -102,6 +103,8 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
 @_style()
 def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
     """Draw amplitude spectra of force and torque (root of the sum over three axes, mean removed), before and after."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
     traces = [trace for trace in diagnosis.traces if len(trace.t) >= 16]
     if not traces:
         return []
@@ -116,6 +119,9 @@ def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
             panel.plot(grid, factor * np.maximum(amplitude, 1e-12), color=_COLOURS[colour], lw=1.3)
         panel.set_yscale("log")
         panel.yaxis.set_major_formatter("{x:g}")
+        low, high = panel.get_ylim()
+        panel.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+        panel.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}") if high < _FEW_DECADES * low else NullFormatter())
         panel.set_xlim(0.0, grid[-1])
         _title(panel, f"{what} ({unit}/√Hz)")
         panel.set_xlabel("frequency (Hz)")
@@ -201,7 +207,7 @@ def _panel(width: float, height: float, left: float = 0.135, lines: int = 1) -> 
     panel.spines[["left", "bottom"]].set_color(_COLOURS["muted"])
     panel.grid(color=_COLOURS["grid"], lw=0.6)
     panel.set_axisbelow(True)
-    panel.tick_params(colors=_COLOURS["muted"], labelsize=7.5, length=2.0, width=0.6, pad=2.0)
+    panel.tick_params(which="both", colors=_COLOURS["muted"], labelsize=7.5, length=2.0, width=0.6, pad=2.0)
     panel.xaxis.label.set_color(_COLOURS["muted"])
     panel.locator_params(axis="both", nbins=5)
     panel.xaxis.labelpad = 1.5

@@ -26,7 +26,7 @@ from windwrench.identification.findings import (
 )
 from windwrench.identification.flight_log import FlightLog
 from windwrench.identification.report import write_report
-from windwrench.identification.report_pictures import draw_over_time
+from windwrench.identification.report_pictures import draw_over_frequency, draw_over_time
 from windwrench.identification.report_words import headline, percent, rounded, with_std
 from windwrench.identification.residual import residual_wrench
 from windwrench.identification.signals import log_signals, low_pass
@@ -317,6 +317,19 @@ def test_a_spike_is_not_thinned_away(diagnosis, tmp_path):
     heights = [float(y) for d in re.findall(r' d="(M[^"]+)"', made.svg) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", d)]
     # an axis of +-1.08 times the spike: it stands by half its length above zero, the figure being 126 points high
     assert min(y for y in heights if y > 17.3) < 25.0
+
+
+@pytest.mark.parametrize("decades", [0.3, 4.0])
+def test_an_axis_of_powers_of_ten_has_plain_numbers(diagnosis, decades):
+    """Without mathematical text, matplotlib's own words for 0.02 are a row of braces."""
+    t = np.arange(2000) / 25.0
+    sine = np.tile(np.sin(2.0 * np.pi * t)[:, None], (1, 6))
+    noise = 10.0**-decades * np.random.default_rng(0).standard_normal((len(t), 6))
+    trace = Trace("flight", 0.04, t, sine + noise, noise, np.zeros(len(t), dtype=bool))
+    for picture in draw_over_frequency(replace(diagnosis, traces=(trace,))):
+        labels = re.findall(r">([^<>]*)</text>", picture.svg)
+        assert len([label for label in labels if re.fullmatch(r"[\d.]+(e[-+]\d+)?", label)]) >= 6 + 2
+        assert not [label for label in labels if set("{$\\") & set(label)]
 
 
 def test_nothing_to_draw(diagnosis, tmp_path):
