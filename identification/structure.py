@@ -262,7 +262,7 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     return sum((value * columns[effect, name] for name, value in own.items()), np.zeros_like(residual))
 
 
-def _added(search: Search, g: Gram, base: dict[Column, Array], column: Array) -> Array:
+def _added(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
     """Return what the best multiple of a column (rows, 6) adds to a fit with columns ``base``."""
     alone = _alone(search, g, base, column)
     x = search.whiten(alone)[search.flights.fit]
