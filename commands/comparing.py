@@ -86,6 +86,8 @@ def speed(
         progress.update(task, description="growth and profile", total=None)
         sections = [*profiles(rounds), over_threads(rounds), over_vehicles(rounds), over_steps(), over_formats(rounds),
                     over_logs((60.0, 600.0, 3600.0) if hour else (60.0, 600.0)), cold_start()]
+    if markdown is not None:
+        write_markdown(figures, rounds, markdown, sections, " --hour" if hour else "")
     table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
     for row in rows_of(figures):
         table.add_row(*row[:-1])
@@ -97,7 +99,6 @@ def speed(
         console.print(table)
         console.print(section.words, highlight=False)
     if markdown is not None:
-        write_markdown(figures, rounds, markdown, sections, " --hour" if hour else "")
         say(markdown)
     return {"figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
             "sections": {section.title: [dict(zip(section.header, row, strict=True)) for row in section.rows]

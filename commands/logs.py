@@ -89,6 +89,8 @@ def diagnose(
     folder = results_folder(out)
     with working("looking at the logs") as progress:
         found = run(flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text))
+    # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
+    written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
     for text in found.notes:
         note(text)
     for sentence in (headline(found), *error_sentences(found), remainder_sentence(found)):
@@ -108,7 +110,7 @@ def diagnose(
     console.print(table)
     for line in found.advice:
         console.print(line, highlight=False, markup=False)
-    say(*write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]])))
+    say(*written)
     return report_data(found)
 
 

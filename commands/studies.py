@@ -162,6 +162,8 @@ def close_loop(
 
         results = close_loops(requests, folder, jobs, report)
     picture = write_picture(results, folder)
+    if markdown is not None:
+        write_page(results, folder, markdown)
     table = Table(Column("added", no_wrap=True), "named", *(m.title for m in MEASURES), box=box.SIMPLE_HEAD)
     for r in results:
         ratios = [r["summary"][m.key] for m in MEASURES]
@@ -172,7 +174,5 @@ def close_loop(
     console.print(f"after by before (95 %), {episodes} paired episodes an effect, seed {seed}", highlight=False)
     for sentence in conclusions(results):
         console.print(sentence.replace("**", ""), highlight=False, markup=False)
-    if markdown is not None:
-        write_page(results, folder, markdown)
     say(picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else []))
     return {r["name"]: {"summary": r["summary"], "diagnosis": r["diagnosis"]} for r in results}

@@ -116,6 +116,17 @@ def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight,
     assert results(cut) == results(whole)
 
 
+def test_a_reader_who_goes_away_costs_no_results(tmp_path, flight):
+    """As a pipe to ``head`` does: what is written comes before what is said."""
+    (tmp_path / "flight.csv").write_bytes(flight)
+    words = [sys.executable, "-c", START, *DIAGNOSE]
+    run = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    run.stdout.close()
+    run.wait()
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.json", "report.html", "vehicle.yaml"}
+    assert_whole(tmp_path / "out")
+
+
 def test_what_a_killed_writer_left_is_swept_away(tmp_path):
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
