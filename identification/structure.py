@@ -41,7 +41,7 @@ OFF, LEAST_OF_OFF = 0.5, 4.0
 SLOW = 0.05  # m/s, below which speed is noise
 KINKS = 0.9, 1.0, 1.1, 1.2, 1.3  # of the thrust of hover
 # whitened energy, of one question: 36 true curvatures had up to 4, rotors that stall 29 to 680; and where no curvature is
-# named, 93 flights without a kink up to 17, a rotor that stalls 56
+# named, 93 flights without a kink had up to 17 that innovations bore out, a rotor that stalls 56
 LEAST_OF_KINKS, LEAST_OF_STALLS = 12.0, 25.0
 RIGID = frozenset({"mass", "inertia", "com_offset", "marker_offset"})  # what is bolted on moves along, however fast
 SLOW_HZ = 3.0  # of the 5 that the residual has
