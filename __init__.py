@@ -5,6 +5,8 @@ Importing the package registers the environment ``windwrench/FanTracking-v0`` wi
 
 import gymnasium
 
+from .runtime.moved_modules import keep_old_paths
+
 __version__ = "0.1.0"
 
 if "windwrench/FanTracking-v0" not in gymnasium.registry:  # pytest imports this file a second time, as a folder's
@@ -14,3 +16,5 @@ if "windwrench/FanTracking-v0" not in gymnasium.registry:  # pytest imports this
         vector_entry_point="windwrench.envs.vector:FanTrackingVectorEnv",
         max_episode_steps=250,
     )
+
+keep_old_paths()

@@ -9,13 +9,14 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
-from .commands.learning import imitate, leaderboard, train, tune
+from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.logs import diagnose, estimate, replay
+from .commands.paper import reproduce
 from .commands.running import as_command, command_name
-from .commands.studies import close_loop, real_flights, reproduce, trials
+from .commands.studies import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.terminal import errors
-from .dynamics.errors import InputError, unknown_name
+from .runtime.errors import InputError, unknown_name
 
 
 class _Commands(TyperGroup):
@@ -55,9 +56,10 @@ def windwrench(
     """
 
 
-for command in (fly, benchmark, estimate, diagnose, record, replay, reproduce, trials, speed, real_flights, effects, close_loop,
-                train, imitate, tune, leaderboard):
+for command in (fly, benchmark, estimate, diagnose, record, replay, reproduce, speed, effects, train, imitate, tune):
     app.command(command_name(command))(as_command(command))
+for command in (trials, real_flights, close_loop, leaderboard):
+    app.command(command_name(command), hidden=not has_studies())(as_command(command))
 
 
 def main() -> None:

@@ -38,8 +38,14 @@ def benchmark(
 
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
     """
-    from ..training.benchmark import check_request, count_flights, fly_all, leaderboard, write_leaderboard
-    from ..training.pictures import draw_leaderboard
+    from ..evaluation.benchmark import (
+        check_request,
+        count_flights,
+        fly_all,
+        leaderboard,
+        write_leaderboard,
+    )
+    from ..evaluation.pictures import draw_leaderboard
 
     names, worlds = names_in(controllers, "--controllers"), names_in(scenarios, "--scenarios")
     check_request(names, worlds, episodes, seed)
@@ -73,10 +79,18 @@ def speed(
 
     Example: windwrench speed --rounds 7
     """
-    from ..benchmarks.environment_profile import profiles
-    from ..benchmarks.flight_speed import flights
-    from ..benchmarks.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
-    from ..benchmarks.speed import HEADER, cold_start, filters, measure, rows_of, starts, write_markdown
+    from ..speed.contenders import (
+        HEADER,
+        cold_start,
+        filters,
+        measure,
+        rows_of,
+        starts,
+        write_markdown,
+    )
+    from ..speed.environment_profile import profiles
+    from ..speed.flight_speed import flights
+    from ..speed.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
 
     with progress_bar() as progress:
         task = progress.add_task("measuring", total=None)

@@ -8,7 +8,7 @@ import typer
 from rich import box
 from rich.table import Table
 
-from ..dynamics.errors import InputError
+from ..runtime.errors import InputError
 from .terminal import (
     Out,
     VehicleOption,
@@ -50,9 +50,9 @@ def fly(
     from ..dynamics.effects import parse_setting
     from ..envs.fan_tracking import FanTrackingEnv
     from ..envs.video import Film, save_picture
-    from ..training.benchmark import make_pilot
-    from ..training.evaluate import DECISIONS, fly_episode
-    from ..training.pictures import draw_episode
+    from ..evaluation.benchmark import make_pilot
+    from ..evaluation.episodes import DECISIONS, fly_episode
+    from ..evaluation.pictures import draw_episode
 
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     if view and kinds:
@@ -120,8 +120,8 @@ def record(
     from ..dynamics.effects import parse_setting
     from ..dynamics.vehicle_file import load_vehicle
     from ..envs.recording import record_flight
-    from ..identification.files import file_kind
-    from ..identification.flight_log import FlightLog, log_name, write_log
+    from ..identification.logs.flight_log import FlightLog, log_name, write_log
+    from ..identification.logs.tables import file_kind
 
     model = load_vehicle(vehicle)
     effects = tuple(parse_setting(e, model) for e in effect or [])

@@ -1,6 +1,5 @@
 """Learning: policies trained, tuned, and compared with the laws that were designed."""
 
-import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from rich import box
 from rich.table import Table
 
 from .running import expensive
-from .terminal import Out, console, names_in, offering, progress_bar, results_folder, say, share_bars
+from .terminal import Out, console, offering, progress_bar, results_folder, say
 
 
 def algorithm_names() -> list[str]:
@@ -23,7 +22,7 @@ def algorithm_names() -> list[str]:
 def world_names() -> list[str]:
     """Return what can be trained in."""
     from ..envs.scenarios import SCENARIOS
-    from ..training.worlds import TIERS
+    from ..training.training_envs import TIERS
 
     return [*SCENARIOS, *TIERS]
 
@@ -56,8 +55,8 @@ def train(
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
-    from ..dynamics.errors import unknown_name
-    from ..training.extras import need
+    from ..runtime.errors import unknown_name
+    from ..runtime.extras import need
 
     if algorithm not in algorithm_names():
         raise unknown_name("algorithm", algorithm, algorithm_names())
@@ -73,9 +72,9 @@ def train(
 
 def _sweep(algorithm: str, scenario: str, seeds: range, steps: int | None, setting: list[str] | None, search: list[str],
            config: Path | None, cluster: str | None, out: Path) -> dict[str, Any]:
-    from ..training.cluster import jobs_of, run_job, run_jobs
-    from ..training.extras import need
-    from ..training.worlds import check_world
+    from ..runtime.extras import need
+    from ..training.sweep import jobs_of, run_job, run_jobs
+    from ..training.training_envs import check_world
 
     check_world(scenario)
     if cluster:
@@ -113,7 +112,7 @@ def imitate(
 
     Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
     """
-    from ..training.extras import need
+    from ..runtime.extras import need
 
     need("torch", "rl")
     from ..training.imitate import imitate as work
@@ -125,7 +124,7 @@ def _learn(work: Callable[..., Path], algorithm: str, scenario: str, seed: int, 
            setting: list[str] | None, config: Path | None, out: Path) -> dict[str, Any]:
     from ..training.configuration import load_config
     from ..training.train import Progress, read_progress
-    from ..training.worlds import check_world
+    from ..training.training_envs import check_world
 
     check_world(scenario)
     given = load_config(algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config)
@@ -164,9 +163,9 @@ def tune(
 
     Example: windwrench tune admittance --scenario fast --trials 30 --episodes 60
     """
-    from ..training.extras import need
+    from ..runtime.extras import need
     from ..training.seeds import validation_seeds
-    from ..training.worlds import check_world
+    from ..training.training_envs import check_world
 
     need("optuna", "rl")
     from ..training.tune import check_law, keep_gains
@@ -185,69 +184,3 @@ def tune(
                   f"(as it comes: {found['default_rmse_m']:.3f} m)", highlight=False)
     say(folder / "tuned.yaml")
     return found
-
-
-@expensive
-def leaderboard(
-    train: Annotated[bool, typer.Option("--train", help="Train and score what is missing, not only write the page.")] = False,
-    only: Annotated[str, typer.Option(help="Parts of the study, with commas: designed, learned, ablation, or names of lines.")
-                    ] = "",
-    plan: Annotated[Path | None, typer.Option(help="A plan like training/configs/study.yaml, in its place.")] = None,
-    results: Annotated[Path, typer.Option(help="Folder of the result files, one for each line and seed.")] = Path(
-        "docs/results/learning"),
-    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path("training/policies"),
-    markdown: Annotated[Path | None, typer.Option(help="The page; its pictures go to a folder of its name beside it.")] = Path(
-        "docs/leaderboard.md"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")] = Path(
-        "results/leaderboard"),
-) -> dict[str, Any]:
-    """Write the page of the leaderboard from its result files; with --train, first do what is missing of the study.
-
-    What a run has finished, the next does not repeat; a training run that was stopped goes on where it was.
-
-    Example: windwrench leaderboard --train --only sac,sac-wide
-    """
-    from ..training.study import Places, entries_of, is_done, load_plan, read_results, run_study
-
-    study = load_plan(plan)
-    wanted = entries_of(study, names_in(only, "--only") if only else ())
-    places = Places(out, results, policies)
-    missing = [e.file for e in wanted if not is_done(e, study, places)]
-    folder = results_folder(out, lines=len(wanted), missing=missing if train else "left alone (no --train)")
-    for one in (places.results, places.policies):
-        results_folder(one)
-    results_folder(folder)
-    if train:
-        from ..training.extras import need
-
-        need("stable_baselines3", "rl")
-        need("sb3_contrib", "rl")
-        with share_bars() as bars:
-            total = bars.add_task("all", total=max(len(missing), 1))
-            tasks: dict[str, Any] = {}
-
-            def report(shares: dict[str, tuple[str, float]], done: int) -> None:
-                bars.update(total, completed=done)
-                for name in [n for n in tasks if n not in shares]:
-                    bars.remove_task(tasks.pop(name))
-                for name, (text, share) in shares.items():
-                    if name not in tasks:
-                        tasks[name] = bars.add_task(text, total=1.0)
-                    bars.update(tasks[name], completed=share, description=text)
-
-            run_study(wanted, study, places, jobs or os.cpu_count() or 1, report)
-    found = read_results(places)
-    if markdown is None:
-        return {"lines": len(found), "missing": missing}
-    from ..training.leaderboard_page import rows_of, write_page
-
-    written = write_page(found, study, places, markdown)
-    table = Table("world", "controller", "RMSE (m)", "95 %", "lost", "against the best admittance", box=box.SIMPLE_HEAD)
-    for row in rows_of(found, study):
-        if row.world in ("base", "fast"):
-            table.add_row(row.world, row.name, f"{row.rmse_m:.3f}", f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
-                          f"{row.lost_fraction:.1%}", f"{row.change:+.0%}")
-    console.print(table)
-    say(*written)
-    return {"lines": len(found), "missing": [e.file for e in wanted if not is_done(e, study, places)]}

@@ -20,8 +20,8 @@ def effects(
     from ..dynamics.effects import get, names
 
     if markdown is not None:
-        from ..dynamics.effect_page import effects_page
-        from ..dynamics.files import replaced
+        from ..runtime.whole_files import replaced
+        from .effect_page import effects_page
 
         with replaced(markdown) as partial:
             partial.write_text(effects_page(), encoding="utf-8")

@@ -12,7 +12,7 @@ import typer
 from rich import box
 from rich.table import Table
 
-from ..dynamics.errors import InputError
+from ..runtime.errors import InputError
 from .terminal import Out, ReaderOption, VehicleOption, console, effect_names, note, offering, results_folder, say, working
 
 # of a diagnosis' time, where its stages begin
@@ -31,8 +31,9 @@ def estimate(
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
     from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.estimate import estimate_log, plot_wrench, truth_rmse, write_wrench
-    from ..identification.flight_log import read_log
+    from ..identification.logs.reading import read_log
+    from ..identification.report.wrench_picture import plot_wrench
+    from ..identification.wrench_series import estimate_log, truth_rmse, write_wrench
 
     model = load_vehicle(vehicle)
     with warnings.catch_warnings():
@@ -77,9 +78,9 @@ def diagnose(
     """
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.diagnosis import diagnose as run
-    from ..identification.flight_log import read_log
-    from ..identification.report import report_data, write_report
-    from ..identification.report_words import error_sentences, headline, remainder_sentence
+    from ..identification.logs.reading import read_log
+    from ..identification.report.files import report_data, write_report
+    from ..identification.report.words import error_sentences, headline, remainder_sentence
 
     model = load_vehicle(vehicle)
     with warnings.catch_warnings():
@@ -136,8 +137,8 @@ def replay(
     from ..envs.drawing import Viewer
     from ..envs.replay import Flight, pictures
     from ..envs.video import FPS, Film, save_picture
-    from ..identification.estimate import estimate_log
-    from ..identification.flight_log import read_log
+    from ..identification.logs.reading import read_log
+    from ..identification.wrench_series import estimate_log
 
     model = load_vehicle(vehicle)
     with warnings.catch_warnings():

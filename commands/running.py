@@ -16,7 +16,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from .. import __version__
-from ..dynamics.files import replaced
+from ..runtime.whole_files import replaced
 from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])

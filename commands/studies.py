@@ -1,19 +1,24 @@
-"""Studies: runs of many flights that write a page."""
+"""Studies: runs of many flights that write a page of this repository. They run from a checkout alone."""
 
-from collections.abc import Mapping
+import functools
+import os
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, cast
 
 import typer
 from rich import box
 from rich.table import Column, Table
 
+from ..runtime.errors import InputError
 from .running import expensive
 from .terminal import (
     Out,
     VehicleOption,
     console,
     effect_names,
+    names_in,
     offering,
     progress_bar,
     results_folder,
@@ -22,53 +27,31 @@ from .terminal import (
     working,
 )
 
+Work = TypeVar("Work", bound=Callable[..., Any])
 
-@expensive
-def reproduce(
-    figure: Annotated[str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")] = "all",
-    out: Out = Path("results/reproduction"),
-    seeds: Annotated[int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    page: Annotated[Path | None, typer.Option(help="Where to write the page; default: reproduction.md in the folder.")] = None,
-) -> dict[str, Any]:
-    """Reproduce the paper's figures; what a run has finished, the next does not repeat.
 
-    Example: windwrench reproduce fig6 --out results/reproduction
-    """
-    import json
+def has_studies() -> bool:
+    """Return whether this is a checkout, which has the studies; an installed wheel has none."""
+    return find_spec("windwrench.studies") is not None
 
-    from ..experiments import NAMES
-    from ..experiments.reproduce import chosen, is_done, numbers_of_seeds, write_page
-    from ..experiments.reproduce import reproduce as run
 
-    names = chosen(figure)
-    numbers = numbers_of_seeds(names, seeds)
-    folder = results_folder(out, seeds={name: n for name, n in numbers.items() if not is_done(out, name, n)},
-                            kept=[name for name, n in numbers.items() if is_done(out, name, n)], jobs=jobs)
-    with share_bars() as progress:
-        tasks = {name: progress.add_task(name, total=1.0) for name in names}
+def from_a_checkout(work: Work) -> Work:
+    """Mark a command that needs the studies: elsewhere it ends in one line that says where to find them."""
 
-        def report(shares: Mapping[str, float]) -> None:
-            for name, share in shares.items():
-                progress.update(tasks[name], completed=share)
+    @functools.wraps(work)
+    def checked(**options: Any) -> Any:
+        if not has_studies():
+            raise InputError(
+                f"{work.__name__.replace('_', '-')}: expected a checkout of windwrench's repository, whose pages this "
+                "command writes; an installed package has no studies"
+            )
+        return work(**options)
 
-        fresh = run(names, folder, seeds, jobs, report)
-    target = folder / "reproduction.md" if page is None else page
-    write_page(NAMES, folder, target)
-    result: dict[str, Any] = {}
-    for name in names:
-        kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        result[name] = {"title": kept["title"], "figures": kept["figures"], "comparison": kept["comparison"],
-                        "kept": not fresh[name]}
-        console.print(f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"), style="bold", highlight=False)
-        for row in kept["comparison"]:
-            paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
-            console.print(f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False)
-    say(*(folder / f"{name}.png" for name in names), target)
-    return result
+    return cast(Work, checked)
 
 
 @expensive
+@from_a_checkout
 def trials(
     seeds: Annotated[int, typer.Option(min=1, help="How often everything is flown, each time anew.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
@@ -82,9 +65,9 @@ def trials(
 
     Example: windwrench trials --quick --out results/trials
     """
-    from ..experiments.diagnosis_scores import judge, rules
-    from ..experiments.diagnosis_trials import plan, run_trials
-    from ..experiments.diagnosis_trials_page import write_results
+    from ..studies.trials.page import write_results
+    from ..studies.trials.scores import judge, rules
+    from ..studies.trials.trials import plan, run_trials
 
     wanted = plan(seeds, quick, seed, group or ())
     folder = results_folder(out, flights=len(wanted), diagnoses=sum(len(trial.libraries) for trial in wanted), jobs=jobs)
@@ -103,6 +86,7 @@ def trials(
 
 
 @expensive
+@from_a_checkout
 def real_flights(
     data: Annotated[Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")],
     markdown: Annotated[Path, typer.Option(help="The page; pictures and numbers go to a folder of its name beside it.")] = Path(
@@ -112,8 +96,8 @@ def real_flights(
 
     Example: windwrench real-flights --data ../shared/data --markdown docs/real-flights.md
     """
-    from ..dynamics.files import replaced
-    from ..experiments.real_flights import page, plan, run
+    from ..runtime.whole_files import replaced
+    from ..studies.measured_flights.measured_flights import page, plan, run
 
     sources = data / "nanobench", data / "crazyswarm2_payload" / "csv"
     folder = results_folder(markdown.with_suffix(""), **plan(*sources))
@@ -126,6 +110,7 @@ def real_flights(
 
 
 @expensive
+@from_a_checkout
 def close_loop(
     effect: Annotated[list[str] | None, typer.Option(
         help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten of typical size.",
@@ -145,9 +130,15 @@ def close_loop(
     """
     from ..dynamics.effects import parse_setting
     from ..dynamics.vehicle_file import load_vehicle
-    from ..experiments.close_loop import DEFAULT_EFFECTS, MEASURES, Request, check_requests, close_loops
-    from ..experiments.close_loop_page import conclusions, write_page
-    from ..experiments.close_loop_picture import write_picture
+    from ..studies.closed_loop.closed_loop import (
+        DEFAULT_EFFECTS,
+        MEASURES,
+        Request,
+        check_requests,
+        close_loops,
+    )
+    from ..studies.closed_loop.page import conclusions, write_page
+    from ..studies.closed_loop.picture import write_picture
 
     model = load_vehicle(vehicle)
     requests = [Request(parse_setting(e, model), model, episodes, seed) for e in effect or DEFAULT_EFFECTS]
@@ -176,3 +167,77 @@ def close_loop(
         console.print(sentence.replace("**", ""), highlight=False, markup=False)
     say(picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else []))
     return {r["name"]: {"summary": r["summary"], "diagnosis": r["diagnosis"]} for r in results}
+
+
+@expensive
+@from_a_checkout
+def leaderboard(
+    train: Annotated[bool, typer.Option("--train", help="Train and score what is missing, not only write the page.")] = False,
+    only: Annotated[str, typer.Option(help="Parts of the study, with commas: designed, learned, ablation, or names of lines.")
+                    ] = "",
+    plan: Annotated[Path | None, typer.Option(help="A plan like studies/learning/study.yaml, in its place.")] = None,
+    results: Annotated[Path, typer.Option(help="Folder of the result files, one for each line and seed.")] = Path(
+        "docs/results/learning"),
+    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path("training/policies"),
+    markdown: Annotated[Path | None, typer.Option(help="The page; its pictures go to a folder of its name beside it.")] = Path(
+        "docs/leaderboard.md"),
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")] = Path(
+        "results/leaderboard"),
+) -> dict[str, Any]:
+    """Write the page of the leaderboard from its result files; with --train, first do what is missing of the study.
+
+    What a run has finished, the next does not repeat; a training run that was stopped goes on where it was.
+
+    Example: windwrench leaderboard --train --only sac,sac-wide
+    """
+    from ..studies.learning.study import (
+        Places,
+        entries_of,
+        is_done,
+        load_plan,
+        read_results,
+        run_study,
+    )
+
+    study = load_plan(plan)
+    wanted = entries_of(study, names_in(only, "--only") if only else ())
+    places = Places(out, results, policies)
+    missing = [e.file for e in wanted if not is_done(e, study, places)]
+    folder = results_folder(out, lines=len(wanted), missing=missing if train else "left alone (no --train)")
+    for one in (places.results, places.policies):
+        results_folder(one)
+    results_folder(folder)
+    if train:
+        from ..runtime.extras import need
+
+        need("stable_baselines3", "rl")
+        need("sb3_contrib", "rl")
+        with share_bars() as bars:
+            total = bars.add_task("all", total=max(len(missing), 1))
+            tasks: dict[str, Any] = {}
+
+            def report(shares: dict[str, tuple[str, float]], done: int) -> None:
+                bars.update(total, completed=done)
+                for name in [n for n in tasks if n not in shares]:
+                    bars.remove_task(tasks.pop(name))
+                for name, (text, share) in shares.items():
+                    if name not in tasks:
+                        tasks[name] = bars.add_task(text, total=1.0)
+                    bars.update(tasks[name], completed=share, description=text)
+
+            run_study(wanted, study, places, jobs or os.cpu_count() or 1, report)
+    found = read_results(places)
+    if markdown is None:
+        return {"lines": len(found), "missing": missing}
+    from ..studies.learning.leaderboard_page import rows_of, write_page
+
+    written = write_page(found, study, places, markdown)
+    table = Table("world", "controller", "RMSE (m)", "95 %", "lost", "against the best admittance", box=box.SIMPLE_HEAD)
+    for row in rows_of(found, study):
+        if row.world in ("base", "fast"):
+            table.add_row(row.world, row.name, f"{row.rmse_m:.3f}", f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
+                          f"{row.lost_fraction:.1%}", f"{row.change:+.0%}")
+    console.print(table)
+    say(*written)
+    return {"lines": len(found), "missing": [e.file for e in wanted if not is_done(e, study, places)]}

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..dynamics.errors import InputError
+from ..runtime.errors import InputError
 
 console = Console()
 errors = Console(stderr=True)
@@ -88,7 +88,7 @@ def controller_names() -> Iterable[str]:
 
 def reader_names() -> Iterable[str]:
     """Return the readers of logs of other forms."""
-    from ..identification.readers import READERS
+    from ..identification.logs.readers import READERS
 
     return READERS
 

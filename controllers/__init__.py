@@ -6,9 +6,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.errors import unknown_name
+from ..runtime.errors import unknown_name
 from .admittance import Admittance, Ratio
-from .bounds import Hover, Oracle
+from .references import Hover, Oracle
 from .tuned import tuned_controllers
 
 __all__ = ["CONTROLLERS", "Admittance", "Controller", "Hover", "Oracle", "Ratio", "make_controller"]

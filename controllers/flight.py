@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import BODY, Array, body_record
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
 
 # set point: position 0-2, velocity 3-5, acceleration 6-8, yaw 9, yaw rate 10
 SETPOINT_SIZE = 11

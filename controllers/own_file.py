@@ -3,8 +3,8 @@
 import inspect
 from typing import Any
 
-from ..dynamics.errors import InputError, unknown_name
-from ..dynamics.python_file import import_file
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.python_file import import_file
 
 _WHAT = "a Python file with a class whose objects have reset() and __call__(observation, info)"
 

@@ -5,7 +5,8 @@ Filter and plant each hold one: the filter's has the declared effects, the plant
 
 import numpy as np
 
-from .compiled import Record, compiled
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
 from .effects import compile_effects
 from .effects.base import (
     HIDDEN,
@@ -21,7 +22,6 @@ from .effects.base import (
     Array,
 )
 from .effects.call import advance, deliver, report
-from .errors import InputError
 from .motion import BODY, body_record, effect_wrench, fill_state, rotor_wrench
 from .vehicle import Vehicle
 

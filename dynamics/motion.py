@@ -6,7 +6,7 @@ Zero-order hold: attitude, thrust, torque and wrench are those of the start of t
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import Record, compiled
+from ..runtime.compiled import Record, compiled
 from .effects.base import (
     POSITION,
     RATE,

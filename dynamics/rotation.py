@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
-from .lanes import any_of, choose
+from ..runtime.compiled import compiled
+from ..runtime.vector_lanes import any_of, choose
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.whole_files import replaced
+from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
-from .errors import InputError, unknown_name
-from .files import replaced
 from .vehicle import Array, EffectSetting, Mocap, Vehicle
-from .yaml_file import parse_yaml, read_yaml
 
 _ROTOR_STEPS = 255  # an 8-bit turn rate
 _LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow

@@ -1,8 +1,8 @@
 """Worlds: the plant in MuJoCo, the fan and its jet, and the fan-tracking environment."""
 
 from . import headless  # noqa: F401  before anything that imports MuJoCo
+from .fan import Fan
 from .fan_tracking import FanTrackingEnv
-from .jet import Fan
 from .scenarios import SCENARIOS, Scenario
 
 __all__ = ["SCENARIOS", "Fan", "FanTrackingEnv", "Scenario"]

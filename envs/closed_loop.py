@@ -10,22 +10,22 @@ import numpy as np
 from numba import carray, types
 
 from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
-from ..dynamics.compiled import Record, announced, compiled, compiled_meanwhile
 from ..dynamics.effects import compile_effects
-from ..dynamics.errors import InputError, unknown_name
-from ..dynamics.jet import COUNT_R, COUNT_X
+from ..dynamics.mean_jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_of_yaw
 from ..dynamics.vehicle import Vehicle
-from ..estimator.by_address import address_of, call_at, call_step, numbers_at, pointer_to
 from ..estimator.constant_gain import ConstantGainFilter
-from ..estimator.direct import direct, released
 from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF, correct_parts
-from .jet import FAN, Fan, fan_record, jet_table
+from ..runtime.addresses import address_of, call_at, call_step, numbers_at, pointer_to
+from ..runtime.compiled import Record, announced, compiled, compiled_meanwhile
+from ..runtime.direct_call import direct, released
+from ..runtime.errors import InputError, unknown_name
+from .fan import FAN, Fan, fan_record, jet_table
+from .native_functions import clock_address, mj_step_address
 from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
-from .stepping import clock_address, mj_step_address
 from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.errors import InputError
+from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop
-from .jet import jet_at
-from .marks import add_path, add_shadow, add_shape, add_wrench
+from .fan import jet_at
+from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 
 _TRACERS = 260
 _SCALES = (1.6, 25.0)  # m per N, m per Nm

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
 from ..dynamics.effects import check_setting
-from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
-from ..estimator.direct import direct
 from ..estimator.tuning import UKFTuning
+from ..runtime.direct_call import direct
+from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, run_address
-from .jet import Fan
-from .outcome import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
+from .decision import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
+from .fan import Fan
+from .native_functions import bits_address, normals_address
 from .plant import NOISE, TICK, PlantSettings
 from .scenarios import Scenario, draw_fan_path, get_scenario
-from .stepping import bits_address, normals_address
 
 EPISODE_SECONDS = 20.0
 SETTLE_TICKS = 300  # the filter settles in the jet before an episode starts

@@ -11,13 +11,13 @@ from importlib import resources
 import mujoco
 import numpy as np
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model, reset_model, rewrite_sample
 from ..dynamics.motion import Array
 from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from .jet import STATIONS, gust, jet_wrench
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
+from .fan import STATIONS, gust, jet_wrench
 from .suspended_load import SuspendedLoad, add_load
 
 TICK = 0.005  # s

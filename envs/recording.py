@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ClosedLoop
 from .plant import NOISE, TICK, PlantSettings
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
 from .drawing import Viewer
-from .marks import add_path, add_shadow, add_wrench
 from .plant import load_world
+from .scene_shapes import add_path, add_shadow, add_wrench
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..dynamics.errors import InputError
-from ..dynamics.files import replaced
 from ..dynamics.vehicle import Vehicle
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
 from .replay import Flight, arrow_scales
 
 _ESTIMATED, _TRUE, _ROTOR, _FAN = (230, 38, 26), (26, 140, 51), (64, 72, 84), (51, 89, 140)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.errors import unknown_name
+from ..runtime.errors import unknown_name
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from ..dynamics.errors import InputError
 from ..dynamics.motion import Array
+from ..runtime.errors import InputError
 
 _NAME = "load"
 _RADIUS = 0.0115  # m, a 53 g ball of steel; for inertia and drawing

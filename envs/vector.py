@@ -10,11 +10,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from ..dynamics.errors import InputError
-from ..estimator.direct import direct
+from ..runtime.direct_call import direct
+from ..runtime.errors import InputError
+from ..runtime.work_sharing import PATIENCE, open_turns, watch
+from .decision import DECISION_TICKS, EPISODE, INFO, decide
 from .fan_tracking import FanTrackingEnv
-from .outcome import DECISION_TICKS, EPISODE, INFO, decide
-from .turns import PATIENCE, open_turns, watch
 
 Frames = NDArray[np.float32]
 Flags = NDArray[np.bool_]

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.image import imsave
 from numpy.typing import NDArray
 
-from ..dynamics.errors import InputError
-from ..dynamics.files import replaced
-from .marks import MARKS
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
+from .scene_shapes import MARKS
 
 Picture = NDArray[np.uint8]
 

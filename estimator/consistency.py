@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
 from .estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array, WrenchEstimate
 from .filter_record import N, drive, filter_record, propagate
 from .tuning import UKFTuning

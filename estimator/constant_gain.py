@@ -14,11 +14,11 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
-from .direct import released
+from ..runtime.compiled import Record, compiled
+from ..runtime.direct_call import released
+from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import NIS, Array, WrenchEstimate
 from .filter_record import FILTER, N, drive, propagate

@@ -6,10 +6,10 @@ column, several rows at once, nothing that could be another array in memory. Sum
 
 import math
 
-from ..dynamics.compiled import Record
+from ..runtime.compiled import Record
+from ..runtime.vector_loops import inlined, side_by_side
 from .estimate import Array
 from .filter_record import N
-from .side_by_side import inlined, side_by_side
 
 
 @side_by_side

@@ -7,8 +7,8 @@ world-frame MRP rho, on the left of the attitude: R_true = exp([4 rho]x) R for s
 
 import math
 
-from ..dynamics.compiled import Record, compiled
 from ..dynamics.motion import effect_wrench
+from ..runtime.compiled import Record, compiled
 from .covariance import add_noise
 from .error_state import symmetrise
 from .estimate import NIS, Array

@@ -2,9 +2,9 @@
 
 import math
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.lanes import any_of, choose
 from ..dynamics.rotation import attitude_error, normalise, quaternion_from_mrp, quaternion_multiply
+from ..runtime.compiled import Record, compiled
+from ..runtime.vector_lanes import any_of, choose
 from .estimate import Array
 
 _SPREAD = 0.25  # largest variance of an MRP (a standard deviation of about 115 degrees)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..dynamics.compiled import Record, compiled
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ..dynamics.motion import Array, accelerations
 from ..dynamics.rotation import quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
 from .estimate import STATE_SIZE
 from .tuning import UKFTuning
 

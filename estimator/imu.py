@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from ..dynamics.compiled import Record, compiled
 from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
+from ..runtime.compiled import Record, compiled
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
 from .filter_record import N

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
 from .covariance import add_noise
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, Array, WrenchEstimate

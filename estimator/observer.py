@@ -26,11 +26,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.model import apply_effects
 from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
 from .estimate import NIS, Array, WrenchEstimate
 from .filter_record import drive
 from .sample import Sample, check_sample, copy_estimate, empty_estimate, undo_sensing

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.model import rewrite_sample
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
 from .estimate import STATE_SIZE, Array
 from .filter_record import N
 

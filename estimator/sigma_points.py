@@ -7,9 +7,9 @@ so are the results, bit for bit. Arrays here have a row for each number and a co
 
 import math
 
-from ..dynamics.compiled import Record
-from ..dynamics.lanes import any_of, choose
-from .side_by_side import side_by_side
+from ..runtime.compiled import Record
+from ..runtime.vector_lanes import any_of, choose
+from ..runtime.vector_loops import side_by_side
 
 PAIRS = 6  # columns of the root that turn or spin the vehicle
 POINTS = 2 * PAIRS  # forwards along each, then backwards

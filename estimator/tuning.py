@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..dynamics.errors import InputError
 from ..dynamics.vehicle import Vehicle
+from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
 

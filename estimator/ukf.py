@@ -19,13 +19,14 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
-from ..dynamics.lanes import all_of, any_of, choose
 from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from .by_address import address_of
+from ..runtime.addresses import address_of
+from ..runtime.compiled import Record, compiled
+from ..runtime.direct_call import direct
+from ..runtime.errors import InputError
+from ..runtime.vector_lanes import all_of, any_of, choose
 from .covariance import (
     add_more_pairs,
     add_noise,
@@ -36,7 +37,6 @@ from .covariance import (
     subtract_squares,
     whiten,
 )
-from .direct import direct
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
 from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, move, propagate

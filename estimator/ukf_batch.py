@@ -11,10 +11,10 @@ from contextlib import nullcontext
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..dynamics.compiled import announced
-from ..dynamics.errors import InputError
 from ..dynamics.vehicle import Vehicle
-from .direct import released
+from ..runtime.compiled import announced
+from ..runtime.direct_call import released
+from ..runtime.errors import InputError
 from .estimate import FORCE, NIS, POSITION, QUATERNION, RATE, STATE_SIZE, TORQUE, VELOCITY, Array
 from .filter_record import N
 from .tuning import UKFTuning

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.lanes import WIDTH, LaneRecord, choose
 from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
-from .direct import released
+from ..runtime.compiled import Record, compiled
+from ..runtime.direct_call import released
+from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
 from .estimate import STATE_SIZE, Array
 from .filter_record import FILTER, N
 from .ukf import carry, correct

@@ -14,7 +14,7 @@ from windwrench.dynamics.effects import add_folder
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.flight_log import FlightLog
+from windwrench.identification.logs.flight_log import FlightLog
 
 
 def main(seconds=60.0, stiffness=0.1, seed=0):

@@ -14,9 +14,9 @@ from functools import partial
 from pathlib import Path
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.dynamics.workers import workers
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.flight_log import read_log
+from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.workers import workers
 
 COLUMNS = ("log", "verdict", "effects", "force_before_N", "force_after_N", "error")
 

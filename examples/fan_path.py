@@ -11,7 +11,7 @@ import numpy as np
 
 from windwrench.controllers import make_controller
 from windwrench.envs import FanTrackingEnv
-from windwrench.training.evaluate import fly_episode
+from windwrench.evaluation.episodes import fly_episode
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

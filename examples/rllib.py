@@ -9,7 +9,7 @@ Run:      python examples/rllib.py
 import ray
 from ray.rllib.algorithms.ppo import PPOConfig
 
-from windwrench.training.cluster import register_with_rllib
+from windwrench.training.rllib import register_with_rllib
 
 
 def main(iterations=1, steps=1000, scenario="base"):

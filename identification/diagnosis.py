@@ -12,24 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.effects import get, names
-from ..dynamics.errors import InputError, unknown_name
 from ..dynamics.vehicle import Vehicle
-from .bounds import beyond_belief
-from .commanded import shared
-from .dictionary import drives
-from .equivalence import composites, equivalents, overshadowed, unlisted
+from ..runtime.errors import InputError, unknown_name
 from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
-from .flight_log import FlightLog
-from .innovations import Innovations, at_odds
-from .measuring import lag_or_delay, lateness, measured, others_late, with_lag
-from .moves import find
+from .inference.candidate_regressors import drives
+from .inference.coefficient_range import beyond_belief
+from .inference.commanded_rotors import shared
+from .inference.equivalence import composites, equivalents, overshadowed, unlisted
+from .inference.innovations import Innovations, at_odds
+from .inference.likelihood_refit import lag_or_delay, lateness, measured, others_late, with_lag
+from .inference.regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
+from .inference.residual_structure import structure
+from .inference.search import Fit, Gain, Search
+from .inference.stepwise_search import find
+from .inference.transient_disturbances import pushes
+from .inference.turning_delay import COEFFICIENT
+from .logs.flight_log import FlightLog
+from .logs.screening import LEAST_SECONDS, screen_log
 from .prediction import nis_without_wrench_state, rollout_error
-from .pushes import pushes
-from .regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
-from .screening import LEAST_SECONDS, screen_log
-from .search import Fit, Gain, Search
-from .structure import structure
-from .turning import COEFFICIENT
 
 Array = NDArray[np.float64]
 

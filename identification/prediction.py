@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..dynamics.compiled import Record, compiled
-from ..dynamics.errors import InputError
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import turn_body
@@ -23,9 +21,11 @@ from ..estimator import UKFTuning, WrenchUKF
 from ..estimator.estimate import NIS, STATE_SIZE
 from ..estimator.filter_record import propagate
 from ..estimator.ukf import default_covariance, step
-from .flight_log import FlightLog
-from .sensing import undo_log_sensing
-from .signals import Signals, log_signals, low_pass
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
+from .logs.flight_log import FlightLog
+from .motion.sensing_effects import undo_log_sensing
+from .motion.signals import Signals, log_signals, low_pass
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]

@@ -5,7 +5,7 @@ from rosbags import rosbag2
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
-from windwrench.benchmarks.ulog_writer import ulog_bytes
+from tests.fuzz.ulog_writer import ulog_bytes
 
 FLIP = np.diag([1.0, -1.0, -1.0])  # our world and body seen from PX4's, each half a turn about x
 START = 1_700_000_000_000_000_000  # ns

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.training.benchmark import fly_all, leaderboard
+from windwrench.evaluation.benchmark import fly_all, leaderboard
 
 CONTROLLERS = ["hover", "admittance", "ratio", "oracle"]
 

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.residual import acting_wrench, model_wrench, needed_wrench, residual_wrench
-from windwrench.identification.signals import log_signals
+from windwrench.identification.motion.residual import (
+    acting_wrench,
+    model_wrench,
+    needed_wrench,
+    residual_wrench,
+)
+from windwrench.identification.motion.signals import log_signals
+from windwrench.studies.trials.practice_flights import fly_practice
 
 DECLARED = load_vehicle("ardrone2")
 VEHICLE = DECLARED.with_effects(EffectSetting("mass", {"dm": 0.05}),

@@ -9,8 +9,8 @@ import pytest
 from windwrench.controllers import make_controller
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.training.benchmark import count_flights, fly_all, leaderboard, write_leaderboard
-from windwrench.training.evaluate import DECISIONS, FIRST_TEST_SEED, benchmark_seeds, fly_episode
+from windwrench.evaluation.benchmark import count_flights, fly_all, leaderboard, write_leaderboard
+from windwrench.evaluation.episodes import DECISIONS, FIRST_TEST_SEED, benchmark_seeds, fly_episode
 
 NAMES = ["hover", "admittance", "ratio", "oracle"]
 EPISODES = 6

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.bounds import beyond_belief
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.search import Fit
-from windwrench.identification.selection import Gram
+from windwrench.identification.inference.coefficient_range import beyond_belief
+from windwrench.identification.inference.gram_matrix import Gram
+from windwrench.identification.inference.search import Fit
+from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 LEVEL = SimpleNamespace(signals=SimpleNamespace(velocity=np.tile([1.0, 0.0, 0.0], (5, 1))), rows=np.arange(5))  # at 1 m/s

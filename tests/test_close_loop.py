@@ -9,11 +9,12 @@ from typer.testing import CliRunner
 from windwrench.controllers import Admittance
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import parse_setting
-from windwrench.dynamics.errors import InputError
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.experiments import close_loop
-from windwrench.experiments.close_loop import (
+from windwrench.evaluation.episodes import fly_episode
+from windwrench.runtime.errors import InputError
+from windwrench.studies.closed_loop import closed_loop as close_loop
+from windwrench.studies.closed_loop.closed_loop import (
     Request,
     check_requests,
     close_loops,
@@ -22,9 +23,8 @@ from windwrench.experiments.close_loop import (
     ratio_of_means,
     verdict,
 )
-from windwrench.experiments.close_loop_page import conclusions, write_page
-from windwrench.experiments.close_loop_picture import write_picture
-from windwrench.training.evaluate import fly_episode
+from windwrench.studies.closed_loop.page import conclusions, write_page
+from windwrench.studies.closed_loop.picture import write_picture
 
 VEHICLE = load_vehicle("ardrone2")
 HEAVY = EffectSetting("mass", {"dm": 0.06})

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.training.benchmark import fly_all
-from windwrench.training.cluster import jobs_of, register_with_rllib, run_job, run_jobs, spread
+from windwrench.evaluation.benchmark import fly_all
+from windwrench.runtime.cluster import spread
+from windwrench.training.rllib import register_with_rllib
+from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
 TINY = ["steps=240", "environments=2", "net=[8]", "learner.learning_starts=40", "learner.batch_size=16", "checkpoint=60",
         "validation.every=120", "validation.episodes=1"]

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 
-from windwrench.dynamics.compiled import announced
+from windwrench.runtime.compiled import announced
 
 CODE = ("import gymnasium, windwrench\nenv = gymnasium.make('windwrench/FanTracking-v0')\nenv.reset(seed=0)\n"
         "print(env.step([0.1])[0].tobytes().hex())")

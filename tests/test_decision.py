@@ -11,12 +11,12 @@ import pytest
 
 from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv
+from windwrench.envs.native_functions import bits_address, clock_address, normals_address
 from windwrench.envs.plant import NOISE
-from windwrench.envs.stepping import bits_address, clock_address, normals_address
 from windwrench.envs.vector import FanTrackingVectorEnv
-from windwrench.estimator.by_address import call_at
-from windwrench.estimator.direct import released
-from windwrench.training.sensing import SensingFanTracking
+from windwrench.envs.watched_fan_tracking import SensingFanTracking
+from windwrench.runtime.addresses import call_at
+from windwrench.runtime.direct_call import released
 
 
 @released

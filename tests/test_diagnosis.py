@@ -10,19 +10,20 @@ from data_paths import data_file
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
-from windwrench.dynamics.errors import InputError
 from windwrench.envs.plant import TICK
-from windwrench.experiments.held_back_outsiders import practise_held_back
-from windwrench.experiments.practice_flights import fly_practice, practise
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
-from windwrench.identification.flight_log import FlightLog, read_log
-from windwrench.identification.floor import sensor_noise, with_noise
-from windwrench.identification.moves import find
-from windwrench.identification.regression import Flights, held_out
-from windwrench.identification.search import Search
-from windwrench.identification.structure import overlooked
-from windwrench.identification.whitening import Whitener
+from windwrench.identification.inference.regression import Flights, held_out
+from windwrench.identification.inference.residual_structure import overlooked
+from windwrench.identification.inference.search import Search
+from windwrench.identification.inference.stepwise_search import find
+from windwrench.identification.inference.whitening import Whitener
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
+from windwrench.runtime.errors import InputError
+from windwrench.studies.trials.held_back_outsiders import practise_held_back
+from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 
 @cache

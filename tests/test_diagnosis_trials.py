@@ -11,7 +11,12 @@ from windwrench.cli import main
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
-from windwrench.experiments.diagnosis_scores import (
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
+from windwrench.studies.trials.outsiders import OUTSIDERS
+from windwrench.studies.trials.page import write_results
+from windwrench.studies.trials.scores import (
     FAILED,
     RIGHT,
     RIGHT_TENTATIVE,
@@ -24,12 +29,7 @@ from windwrench.experiments.diagnosis_scores import (
     match,
     rules,
 )
-from windwrench.experiments.diagnosis_trials import EQUIVALENTS, Trial, fly_and_diagnose, plan, run_trials
-from windwrench.experiments.diagnosis_trials_page import write_results
-from windwrench.experiments.held_back_outsiders import HELD_BACK, practise_held_back
-from windwrench.experiments.outsiders import OUTSIDERS
-from windwrench.identification.residual import residual_wrench
-from windwrench.identification.signals import log_signals, low_pass
+from windwrench.studies.trials.trials import EQUIVALENTS, Trial, fly_and_diagnose, plan, run_trials
 
 SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, seconds=20.0)
 
@@ -269,7 +269,7 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
         asked.append((seeds, quick, first, *groups))
         return [Trial("outsider", ("gremlins",))]
 
-    monkeypatch.setattr("windwrench.experiments.diagnosis_trials.plan", planned)
+    monkeypatch.setattr("windwrench.studies.trials.trials.plan", planned)
     page = tmp_path / "page.md"
     monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--seed", "5", "--quick", "--group",
                                      "outsider", "--jobs", "1", "--out", str(tmp_path / "out"), "--markdown", str(page)])

@@ -82,7 +82,7 @@ def prepare(page, folder):
         from converted_flights import write_bag, write_ulog
 
         from windwrench.cli import app
-        from windwrench.identification.flight_log import read_log
+        from windwrench.identification.logs.reading import read_log
 
         app(["record", "--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1", "--quiet",
              "--out", str(folder / "given.csv")], standalone_mode=False)

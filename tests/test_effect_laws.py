@@ -22,7 +22,7 @@ from windwrench.dynamics.effects.base import (
 )
 from windwrench.dynamics.effects.call import add_wrenches, advance, deliver, report
 from windwrench.dynamics.motion import body_record, effect_wrench, fill_state
-from windwrench.envs.jet import Fan, fan_record, jet_table, jet_wrench
+from windwrench.envs.fan import Fan, fan_record, jet_table, jet_wrench
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005

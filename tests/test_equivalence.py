@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.equivalence import composites, unlisted
-from windwrench.identification.regression import Flights
-from windwrench.identification.search import Fit, Search
+from windwrench.identification.inference.equivalence import composites, unlisted
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.search import Fit, Search
+from windwrench.studies.trials.practice_flights import fly_practice
 
 FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
 MASS = FLIGHTS.vehicle.mass

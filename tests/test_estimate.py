@@ -9,9 +9,17 @@ from hypothesis import strategies as st
 
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning
-from windwrench.identification.estimate import estimate_log, plot_wrench, truth_rmse, write_wrench
-from windwrench.identification.flight_log import FlightLog, read_log
-from windwrench.identification.phases import FLIGHT, GROUND, LANDING, TAKE_OFF, flight_phases
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.flight_phases import (
+    FLIGHT,
+    GROUND,
+    LANDING,
+    TAKE_OFF,
+    flight_phases,
+)
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.report.wrench_picture import plot_wrench
+from windwrench.identification.wrench_series import estimate_log, truth_rmse, write_wrench
 
 HEADER = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "std_fx", "std_fy", "std_fz", "std_tx", "std_ty", "std_tz", "nis"]
 

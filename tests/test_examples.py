@@ -11,7 +11,7 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics import effects as library
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
-from windwrench.identification.flight_log import FlightLog, write_log
+from windwrench.identification.logs.flight_log import FlightLog, write_log
 
 FOLDER = Path(__file__).parents[1] / "examples"
 

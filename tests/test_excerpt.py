@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from windwrench.identification.excerpt import LONGEST, excerpt
-from windwrench.identification.flight_log import FlightLog
-from windwrench.identification.signals import log_signals
+from windwrench.identification.logs.excerpt import LONGEST, excerpt
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.signals import log_signals
 
 
 def long_log(seconds, period=0.02):

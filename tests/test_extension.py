@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.experiments import extension
+from windwrench.paper import extension
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from windwrench.controllers.features import Features, History
 from windwrench.dynamics import InputError
-from windwrench.training.evaluate import FIRST_TEST_SEED, benchmark_seeds
-from windwrench.training.features import Features, History
+from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds
 from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
 
 

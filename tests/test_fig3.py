@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.errors import InputError
-from windwrench.experiments import fig3
+from windwrench.paper import fig3
+from windwrench.runtime.errors import InputError
 
 pytest.importorskip("sklearn")
 

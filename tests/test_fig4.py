@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from windwrench.experiments import fig4
+from windwrench.paper import fig4
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from windwrench.estimator import UKFTuning
-from windwrench.experiments import fig5
-from windwrench.experiments.fig5_estimators import ukf_runner
-from windwrench.experiments.fig5_flights import FLIGHTS, NOISES, PLANTS, TICK, fly, vehicle_at
-from windwrench.experiments.fig5_peer import installed, run_peer
+from windwrench.paper import fig5
+from windwrench.paper.fig5_estimators import ukf_runner
+from windwrench.paper.fig5_flights import FLIGHTS, NOISES, PLANTS, TICK, fly, vehicle_at
+from windwrench.paper.fig5_peer import installed, run_peer
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.experiments import fig6
+from windwrench.paper import fig6
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import pytest
 
 from windwrench.controllers import Admittance, Hover
 from windwrench.dynamics import InputError
-from windwrench.experiments import fig7
-from windwrench.training.evaluate import fly_episode
+from windwrench.evaluation.episodes import fly_episode
+from windwrench.paper import fig7
 
 SHORT = {"GAINS": (12.0, 36.0), "SHOWN_GAINS": (18.0,), "RISE_TIMES": (0.45,), "FAN_SPEEDS": (0.2,), "HALVINGS": 3}
 

@@ -12,8 +12,9 @@ from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.flight_log import POSE, REQUIRED, ROTORS, FlightLog, read_log, write_log
-from windwrench.identification.readers.nanobench import motor_thrust
+from windwrench.identification.logs.flight_log import POSE, REQUIRED, ROTORS, FlightLog, write_log
+from windwrench.identification.logs.readers.nanobench import motor_thrust
+from windwrench.identification.logs.reading import read_log
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
 

@@ -12,18 +12,18 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from windwrench.benchmarks.fuzz import attempt, fuzz, fuzz_chunk, run_command, spoiled, table
-from windwrench.benchmarks.fuzz_forms import Form, forms, lay_out
-from windwrench.benchmarks.fuzz_mutations import LAUGHS, TOKENS
+from tests.fuzz.forms import Form, forms, lay_out
+from tests.fuzz.mutations import LAUGHS, TOKENS
+from tests.fuzz.run import attempt, fuzz, fuzz_chunk, run_command, spoiled, table
+from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
 from windwrench.dynamics.vehicle_file import parse_vehicle
-from windwrench.dynamics.yaml_file import LARGEST, parse_yaml, read_yaml
 from windwrench.envs.scenarios import get_scenario
 from windwrench.estimator import UKFTuning
-from windwrench.identification import files
-from windwrench.identification.flight_log import read_log
-from windwrench.training.policy import load_policy
+from windwrench.identification.logs import tables as files
+from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.yaml_file import LARGEST, parse_yaml, read_yaml
 
 FORMS = forms()
 INPUTS = 60  # of each form, here; the command spoils 20,000

@@ -5,13 +5,13 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
-from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.gusts import innovations
-from windwrench.identification.innovations import Innovations, at_odds
-from windwrench.identification.moves import find
-from windwrench.identification.regression import Flights, typical
-from windwrench.identification.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
+from windwrench.identification.inference.disturbance_filter import innovations
+from windwrench.identification.inference.innovations import Innovations, at_odds
+from windwrench.identification.inference.regression import Flights, typical
+from windwrench.identification.inference.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
+from windwrench.identification.inference.stepwise_search import find
+from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005

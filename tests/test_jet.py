@@ -6,7 +6,16 @@ from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
-from windwrench.envs.jet import HULL_RADIUS, STATIONS, Fan, fan_record, gust, jet_at, jet_table, jet_wrench
+from windwrench.envs.fan import (
+    HULL_RADIUS,
+    STATIONS,
+    Fan,
+    fan_record,
+    gust,
+    jet_at,
+    jet_table,
+    jet_wrench,
+)
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.dynamics.files import replaced
+from windwrench.runtime.whole_files import replaced
 
 START = "from windwrench.cli import main; main()"
 TRIALS = """
 from pathlib import Path
-from windwrench.experiments.diagnosis_trials import Trial, run_trials
+from windwrench.studies.trials.trials import Trial, run_trials
 if __name__ == "__main__":
     trials = [Trial("nothing", (), seed=s, trajectory="gentle", seconds=12.0) for s in range(1)]
     Path("out").mkdir(exist_ok=True)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from windwrench.dynamics.lanes import WIDTH, LaneRecord, all_of, any_of, choose
+from windwrench.runtime.vector_lanes import WIDTH, LaneRecord, all_of, any_of, choose
 
 SINGLE = np.dtype([("a", "f8"), ("b", "f8", (2,)), ("out", "f8", (12,)), ("gain", "f8"), ("count", "i8")])
 RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"))

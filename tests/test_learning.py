@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.training.benchmark import fly_all
+from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.configuration import load_config
 
 pytest.importorskip("stable_baselines3")

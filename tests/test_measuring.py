@@ -6,11 +6,17 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
-from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.innovations import at_odds
-from windwrench.identification.measuring import lag_or_delay, lateness, measured, others_late, with_lag
-from windwrench.identification.regression import SHIFT, Flights
-from windwrench.identification.search import Fit, Search
+from windwrench.identification.inference.innovations import at_odds
+from windwrench.identification.inference.likelihood_refit import (
+    lag_or_delay,
+    lateness,
+    measured,
+    others_late,
+    with_lag,
+)
+from windwrench.identification.inference.regression import SHIFT, Flights
+from windwrench.identification.inference.search import Fit, Search
+from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 

@@ -11,8 +11,8 @@ from windwrench.cli import app
 from windwrench.controllers.own_file import is_file_name, load_controller
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
-from windwrench.identification.report_words import effect_summary
-from windwrench.training.benchmark import make_pilot
+from windwrench.evaluation.benchmark import make_pilot
+from windwrench.identification.report.files.words import effect_summary
 
 LAWS = """
 import numpy as np

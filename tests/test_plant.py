@@ -9,9 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, Mocap, load_vehicle
-from windwrench.dynamics.errors import InputError
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.jet import Fan, fan_record, jet_table
+from windwrench.envs.fan import Fan, fan_record, jet_table
 from windwrench.envs.plant import (
     NOISE,
     SUBSTEPS,
@@ -24,8 +23,9 @@ from windwrench.envs.plant import (
     sense,
 )
 from windwrench.envs.recording import TRAJECTORIES, record_flight
-from windwrench.identification.estimate import estimate_log
-from windwrench.identification.flight_log import FlightLog
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.wrench_series import estimate_log
+from windwrench.runtime.errors import InputError
 
 QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False)
 VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0)

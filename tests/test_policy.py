@@ -6,11 +6,11 @@ import json
 import numpy as np
 import pytest
 
+from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, lstm, save_policy
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.training.benchmark import fly_all, leaderboard
-from windwrench.training.evaluate import fly_episode
-from windwrench.training.policy import TrainedPolicy, load_policy, lstm, save_policy
+from windwrench.evaluation.benchmark import fly_all, leaderboard
+from windwrench.evaluation.episodes import fly_episode
 
 CARD = {"algorithm": "test", "features": {"frame": ["torque_z"], "history": 1, "scale": [0.03]}, "repeat": 1,
         "activation": "relu", "squash": False}

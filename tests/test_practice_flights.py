@@ -10,17 +10,24 @@ from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.dynamics.rotation import matrix_of
 from windwrench.envs.plant import TICK, is_a_body
-from windwrench.experiments.outsiders import OUTSIDERS, Moment
-from windwrench.experiments.practice_flights import KINDS, SIZES, draw_effect, fly_practice, practice_set, practise
-from windwrench.experiments.rotorpy_flights import (
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.studies.trials.outsiders import OUTSIDERS, Moment
+from windwrench.studies.trials.practice_flights import (
+    KINDS,
+    SIZES,
+    draw_effect,
+    fly_practice,
+    practice_set,
+    practise,
+)
+from windwrench.studies.trials.rotorpy_flights import (
     aero_settings,
     available,
     hummingbird_aero,
     hummingbird_vehicle,
     rotorpy_flight,
 )
-from windwrench.identification.residual import residual_wrench
-from windwrench.identification.signals import log_signals, low_pass
 
 VEHICLE = load_vehicle("ardrone2")
 WEIGHT, ARM = VEHICLE.weight, VEHICLE.arm_l
@@ -285,7 +292,7 @@ def test_a_rotorpy_flight_out_of_range_is_refused():
 
 
 def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
-    from windwrench.experiments import rotorpy_flights
+    from windwrench.studies.trials import rotorpy_flights
 
     monkeypatch.setattr(rotorpy_flights, "available", lambda: False)
     rotorpy_flights._parameters.cache_clear()

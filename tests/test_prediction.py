@@ -11,12 +11,12 @@ from windwrench.dynamics.effects import get
 from windwrench.envs.plant import PlantSettings
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning
-from windwrench.identification.estimate import estimate_log
-from windwrench.identification.flight_log import FlightLog
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.sensing_effects import undo_log_sensing
+from windwrench.identification.motion.signals import log_signals, low_pass
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
-from windwrench.identification.residual import residual_wrench
-from windwrench.identification.sensing import undo_log_sensing
-from windwrench.identification.signals import log_signals, low_pass
+from windwrench.identification.wrench_series import estimate_log
 
 VEHICLE = load_vehicle("ardrone2")
 QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.experiments.held_back_outsiders import practise_held_back
-from windwrench.experiments.practice_flights import fly_practice
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.pushes import pushes
-from windwrench.identification.regression import Flights
-from windwrench.identification.report_words import remainder_sentence
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.transient_disturbances import pushes
+from windwrench.identification.report.files.words import remainder_sentence
+from windwrench.studies.trials.held_back_outsiders import practise_held_back
+from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 

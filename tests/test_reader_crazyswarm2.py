@@ -5,8 +5,8 @@ from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.estimate import estimate_log
-from windwrench.identification.flight_log import read_log
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.wrench_series import estimate_log
 
 FLIGHTS = (100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204)
 LOADED = (201, 202, 204)

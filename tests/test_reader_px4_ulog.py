@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from windwrench.benchmarks.ulog_writer import ulog_bytes
+from tests.fuzz.ulog_writer import ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.flight_log import read_log
+from windwrench.identification.logs.reading import read_log
 
 pytest.importorskip("pyulog")
 

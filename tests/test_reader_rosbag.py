@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.flight_log import read_log
-from windwrench.identification.readers import unpacking
+from windwrench.identification.logs.readers import unpacking
+from windwrench.identification.logs.reading import read_log
 
 pytest.importorskip("rosbags")
 

@@ -1,6 +1,6 @@
 """The diagnosis on measured flights, each judged on flights that the fit never saw.
 
-The NanoBench fold is B5 from B2 and B3; the page of ``experiments.real_flights`` has all seven and what each misses.
+The NanoBench fold is B5 from B2 and B3; the page of ``studies.measured_flights`` has all seven and what each misses.
 """
 
 import numpy as np
@@ -8,7 +8,17 @@ import pytest
 from data_paths import data_file
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.experiments.real_flights import (
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.inference.commanded_rotors import (
+    deviation,
+    deviations,
+    in_flight,
+    shared,
+    thinned,
+)
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.motion.signals import log_signals
+from windwrench.studies.measured_flights.measured_flights import (
     CARRIER,
     compare,
     imu_check,
@@ -22,10 +32,6 @@ from windwrench.experiments.real_flights import (
     swing,
     unmet,
 )
-from windwrench.identification.commanded import deviation, deviations, in_flight, shared, thinned
-from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.flight_log import read_log
-from windwrench.identification.signals import log_signals
 
 SAME_DAY = ("B2_circle_fast_rep3", "B3_figure8_medium_rep3", "B5_helix_fast_rep2")
 

@@ -24,12 +24,12 @@ from windwrench.identification.findings import (
     Structure,
     Trace,
 )
-from windwrench.identification.flight_log import FlightLog
-from windwrench.identification.report import write_report
-from windwrench.identification.report_pictures import draw_over_frequency, draw_over_time
-from windwrench.identification.report_words import headline, percent, rounded, with_std
-from windwrench.identification.residual import residual_wrench
-from windwrench.identification.signals import log_signals, low_pass
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.report.files.files import write_report
+from windwrench.identification.report.files.pictures import draw_over_frequency, draw_over_time
+from windwrench.identification.report.files.words import headline, percent, rounded, with_std
 
 VEHICLE = load_vehicle("ardrone2")
 DRAG = {"kdx": 2.4e-4, "kdy": 1.8e-4}

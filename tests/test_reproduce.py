@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from windwrench.dynamics import InputError
-from windwrench.experiments import NAMES
-from windwrench.experiments.reproduce import _module, chosen, reproduce, write_page, write_result
-from windwrench.experiments.result import Comparison, Result
+from windwrench.paper import NAMES
+from windwrench.paper.reproduce import _module, chosen, reproduce, write_page, write_result
+from windwrench.paper.result import Comparison, Result
 
 
 def small_result(value=1.0):

@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
-from windwrench.experiments.held_back_outsiders import practise_held_back
-from windwrench.identification.conventions import Balances, Reading, recognise
-from windwrench.identification.flight_log import FlightLog, read_log, write_log
-from windwrench.identification.screening import screen_log
+from windwrench.identification.logs.conventions import Balances, Reading, recognise
+from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.screening import screen_log
+from windwrench.studies.trials.held_back_outsiders import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from windwrench.identification.selection import Gram
+from windwrench.identification.inference.gram_matrix import Gram
 
 
 @pytest.mark.parametrize("seed", range(40))

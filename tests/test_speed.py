@@ -2,10 +2,18 @@
 
 import pytest
 
-from windwrench.benchmarks.environment_profile import profile
-from windwrench.benchmarks.flight_speed import flights
-from windwrench.benchmarks.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
-from windwrench.benchmarks.speed import HEADER, Contender, Section, filters, measure, rows_of, write_markdown
+from windwrench.speed.contenders import (
+    HEADER,
+    Contender,
+    Section,
+    filters,
+    measure,
+    rows_of,
+    write_markdown,
+)
+from windwrench.speed.environment_profile import profile
+from windwrench.speed.flight_speed import flights
+from windwrench.speed.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
 
 
 def test_medians_and_ratios_are_taken_round_by_round(tmp_path):

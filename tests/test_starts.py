@@ -3,9 +3,9 @@
 import math
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.experiments.practice_flights import fly_practice
-from windwrench.identification.regression import Flights
-from windwrench.identification.starts import wind
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.starting_points import wind
+from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 

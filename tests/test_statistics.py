@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 
 from windwrench.dynamics import InputError
-from windwrench.training.statistics import (
+from windwrench.evaluation.statistics import (
     interquartile_mean,
     mean,
     optimality_gap,

@@ -8,10 +8,18 @@ import pytest
 import yaml
 
 from windwrench.dynamics import InputError
-from windwrench.training.benchmark import fly_all
-from windwrench.training.leaderboard_page import write_page
-from windwrench.training.leaderboard_rows import aggregate, lines_of, rows_of
-from windwrench.training.study import Places, do_entry, entries_of, is_done, load_plan, read_results, run_study
+from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.leaderboard import aggregate, lines_of, rows_of
+from windwrench.studies.learning.leaderboard_page import write_page
+from windwrench.studies.learning.study import (
+    Places,
+    do_entry,
+    entries_of,
+    is_done,
+    load_plan,
+    read_results,
+    run_study,
+)
 
 pytest.importorskip("stable_baselines3")
 

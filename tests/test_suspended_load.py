@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.errors import InputError
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE, PlantSettings, load_world
 from windwrench.envs.suspended_load import SuspendedLoad, hang, pull
+from windwrench.runtime.errors import InputError
 
 VEHICLE = load_vehicle("ardrone2")
 STILL = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, sensor_noise=False)

@@ -10,9 +10,9 @@ import time
 import numpy as np
 import pytest
 
+from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.dynamics import InputError
 from windwrench.training.configuration import ALGORITHMS, load_config
-from windwrench.training.policy import TrainedPolicy, load_policy
 
 pytest.importorskip("torch")
 pytest.importorskip("stable_baselines3")
@@ -24,8 +24,8 @@ from windwrench.training.configuration import features_of
 from windwrench.training.imitate import imitate
 from windwrench.training.learners import make_learner, squashes, weights_of
 from windwrench.training.train import card_of, read_progress, train
+from windwrench.training.training_envs import make_worlds
 from windwrench.training.vec_env import FeatureVecEnv
-from windwrench.training.worlds import make_worlds
 
 LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
 TINY = {

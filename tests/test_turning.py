@@ -7,9 +7,9 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.flight_log import FlightLog
-from windwrench.identification.signals import log_signals
-from windwrench.identification.turning import turning_delay
+from windwrench.identification.inference.turning_delay import turning_delay
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.signals import log_signals
 
 
 def flown(vehicle, *effects):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from windwrench.controllers.features import Features, History
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.vector import FanTrackingVectorEnv
-from windwrench.training.features import Features, History
-from windwrench.training.worlds import make_worlds
+from windwrench.training.training_envs import make_worlds
 
 pytest.importorskip("stable_baselines3")
 from windwrench.training.vec_env import FeatureVecEnv

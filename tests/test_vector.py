@@ -9,8 +9,15 @@ import pytest
 
 import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError
-from windwrench.envs.turns import leave, more_turns, open_turns, take_turn, turn_done, watch
-from windwrench.estimator.direct import released
+from windwrench.runtime.direct_call import released
+from windwrench.runtime.work_sharing import (
+    leave,
+    more_turns,
+    open_turns,
+    take_turn,
+    turn_done,
+    watch,
+)
 
 NAME = "windwrench/FanTracking-v0"
 

@@ -13,6 +13,8 @@ import pytest
 from windwrench.cli import app
 
 ROOT = Path(__file__).parents[1]
+CHECKOUT_ONLY = ("studies", "tests")
+MOST_BYTES = 1_500_000  # of the wheel
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +72,30 @@ def call(empty, folder, *arguments):
 def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     package = installed / "windwrench"
     for name in ("py.typed", "cli.py", "envs/quadrotor.xml", "dynamics/vehicles/ardrone2.yaml",
-                 "dynamics/effects/rotor_drag.py", "identification/readers/nanobench.py"):
+                 "dynamics/effects/rotor_drag.py", "identification/logs/readers/nanobench.py"):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()
-    sources = {str(p.relative_to(ROOT)) for folder in ("dynamics", "estimator", "controllers", "envs", "identification",
-                                                       "training", "experiments", "benchmarks", "commands")
-               for p in (ROOT / folder).rglob("*.py")}
-    assert sources <= {str(p.relative_to(package)) for p in package.rglob("*.py")}
+    rooms = [path.name for path in ROOT.iterdir() if (path / "__init__.py").is_file() and path.name not in CHECKOUT_ONLY]
+    sources = {str(p.relative_to(ROOT)) for room in rooms for p in (ROOT / room).rglob("*.py")}
+    wrapped = {str(p.relative_to(package)) for p in package.rglob("*.py")}
+    assert sources <= wrapped
+    assert not [name for name in wrapped if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name]
     entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
     assert "windwrench = windwrench.cli:main" in entry.read_text()
+
+
+def test_the_wheel_is_small(wheel):
+    assert wheel.stat().st_size <= MOST_BYTES
+
+
+def test_a_study_says_where_it_runs(empty, tmp_path):
+    for name in ("trials", "real-flights", "close-loop", "leaderboard"):
+        needed = ["--data", "."] if name == "real-flights" else []
+        done = call(empty, tmp_path, name, *needed)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1, done.stderr
+        assert f"{name}: expected a checkout" in done.stderr
+        assert f" {name} " not in call(empty, tmp_path, "--help").stdout
 
 
 def test_it_runs_from_any_folder(installed, tmp_path):

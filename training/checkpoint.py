@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..dynamics.errors import InputError
-from ..dynamics.files import replaced
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
 from .vec_env import FeatureVecEnv
 
 _REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")

@@ -8,9 +8,9 @@ from typing import Any
 
 import yaml
 
-from ..dynamics.errors import InputError, unknown_name
-from ..dynamics.yaml_file import parse_yaml, read_yaml
-from .features import Features
+from ..controllers.features import Features
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
 ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation")

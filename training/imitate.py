@@ -14,15 +14,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from ..controllers.bounds import Oracle
+from ..controllers.features import History
+from ..controllers.references import Oracle
+from ..controllers.trained_policy import TrainedPolicy, Weights
+from ..evaluation.episodes import DECISIONS
 from .configuration import Config, features_of
-from .evaluate import DECISIONS
-from .features import History
 from .learners import dense_weights
-from .policy import TrainedPolicy, Weights
 from .seeds import training_seed, validation_seeds
 from .train import Progress, card_of, claim, read_progress, take_stock, write_json
-from .worlds import check_world, make_world
+from .training_envs import check_world, make_world
 
 Array = NDArray[np.float32]
 

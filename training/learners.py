@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from stable_baselines3.common.vec_env import VecEnv
 
+from ..controllers.trained_policy import Weights
 from .configuration import Config
-from .policy import Weights
 
 _ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 

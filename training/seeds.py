@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..dynamics.errors import InputError
-from .evaluate import FIRST_TEST_SEED
+from ..evaluation.episodes import FIRST_TEST_SEED
+from ..runtime.errors import InputError
 
 FIRST_VALIDATION_SEED = 900_000  # below it: training
 

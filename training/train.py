@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..dynamics.errors import InputError
-from ..dynamics.files import replaced
+from ..controllers.trained_policy import TrainedPolicy, save_policy
+from ..evaluation.episodes import fly_episode
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
 from .configuration import Config, features_of
-from .evaluate import fly_episode
-from .policy import TrainedPolicy, save_policy
 from .seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
-from .worlds import check_world, make_world, make_worlds
+from .training_envs import check_world, make_world, make_worlds
 
 _PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
 

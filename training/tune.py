@@ -8,11 +8,11 @@ import numpy as np
 import yaml
 
 from ..controllers import Admittance, Controller, Ratio
-from ..dynamics.errors import InputError, unknown_name
-from ..dynamics.files import replaced
-from .evaluate import fly_episode
+from ..evaluation.episodes import fly_episode
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.whole_files import replaced
 from .seeds import validation_seeds
-from .worlds import check_world, make_world
+from .training_envs import check_world, make_world
 
 # the ranges searched, each on a logarithmic scale: far beyond what was seen to work
 RANGES: dict[str, dict[str, tuple[float, float]]] = {

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from ..controllers.features import Features, History
 from ..envs.fan_tracking import LOST_OFFSET
-from .features import Features, History
 
 Array = NDArray[np.float32]
 

@@ -14,8 +14,8 @@ from types import ModuleType
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
-from ..python_file import import_file
+from ...runtime.errors import InputError, unknown_name
+from ...runtime.python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 

@@ -7,7 +7,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..compiled import Record, compiled
+from ...runtime.compiled import Record, compiled
 from .base import (
     DIRECTION,
     HAS_POSITION,

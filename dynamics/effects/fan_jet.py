@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import cfunc
 
-from ..jet import AIR_DENSITY, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
+from ..mean_jet import AIR_DENSITY, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
 from .base import LAW, POSITION, RATE, ROTATION, ROTOR_POSITION, VELOCITY, Coefficient, Effect
 from .parts import push
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ...runtime.errors import InputError
 from .base import Coefficient, Effect
 
 if TYPE_CHECKING:

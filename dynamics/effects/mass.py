@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ...runtime.errors import InputError
 from .base import Coefficient, Effect
 
 if TYPE_CHECKING:

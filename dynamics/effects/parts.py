@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from ..compiled import compiled
+from ...runtime.compiled import compiled
 from .base import COM, RATE, ROTATION, SAMPLE_QUATERNION, VELOCITY, WIND
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line

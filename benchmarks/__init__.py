@@ -1,1 +1,0 @@
-"""Speed and accuracy against peers, side by side."""

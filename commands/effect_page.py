@@ -1,0 +1,46 @@
+"""The effect library as a page of documentation, made from the library itself."""
+
+from ..dynamics.effects import get, law_in_words, names
+
+_HEAD = """# The effects
+
+One effect, three uses: the plant flies it, the estimator's model includes it once it is declared, and the residual wrench of
+a log is taken against it. Each is one file in `dynamics/effects/`, in which its law is written once. This page is made from
+those files:
+
+    windwrench effects --markdown docs/effects.md
+
+A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coefficients: {kdx: 1.2e-4, kdy: 1.2e-4}}]`;
+`windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4` flies one that nobody declared. Coefficients not given are
+zero. Kinds: *rotor input* changes what the rotors really deliver, *wrench* adds force and torque, *body* changes the rigid
+body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
+
+"""
+
+
+def effects_page() -> str:
+    """Return the page (Markdown) of all effects: law, coefficients, sizes, sources, and what tells them apart."""
+    parts = [_HEAD, "| effect | kind | coefficients | easily confused with |\n| --- | --- | --- | --- |\n"]
+    for name in names():
+        effect = get(name)
+        parts.append(f"| [{name}](#{name}) | {effect.kind} | {', '.join(c.name for c in effect.coefficients)} | "
+                     f"{', '.join(effect.confused_with)} |\n")
+    for name in names():
+        effect = get(name)
+        law = law_in_words(name).replace("``", "`")
+        parts.append(f"\n## {name}\n\n{law}\n\nKind: {effect.kind}.\n\n"
+                     "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
+                     "| --- | --- | --- | --- | --- | --- |\n")
+        for c in effect.coefficients:
+            parts.append(f"| {c.name} | {c.unit} | {c.typical[0]:g} | {c.typical[1]:g} | {_span(c.minimum, c.maximum)} | "
+                         f"{c.meaning} |\n")
+        parts.append(f"\nSource: {effect.source}.\n\nEasily confused with: {', '.join(effect.confused_with)}.\n\n"
+                     f"What tells it apart: {effect.excitation}.\n")
+    return "".join(parts)
+
+
+def _span(minimum: float, maximum: float) -> str:
+    low, high = abs(minimum) != float("inf"), abs(maximum) != float("inf")
+    if low and high:
+        return f"{minimum:g} to {maximum:g}"
+    return f"at least {minimum:g}" if low else f"at most {maximum:g}" if high else "any"

@@ -1,0 +1,118 @@
+"""What a learned policy sees: scaled quantities of an observation, over the last few decisions."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..runtime.errors import InputError, unknown_name
+from .observation import (
+    FORCE_X,
+    FORCE_Y,
+    FORCE_Z,
+    LAST_COMMAND,
+    TORQUE_X,
+    TORQUE_Y,
+    TORQUE_Z,
+    VELOCITY_Y,
+)
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Where a quantity stands, and the size that becomes 1."""
+
+    scale: float  # N, Nm or m/s
+    column: int
+    source: str = "observation"  # or the entry of the environment's ``info``
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "torque_x": Quantity(0.03, TORQUE_X),
+    "torque_y": Quantity(0.03, TORQUE_Y),
+    "torque_z": Quantity(0.03, TORQUE_Z),
+    "force_x": Quantity(0.5, FORCE_X),
+    "force_y": Quantity(0.5, FORCE_Y),
+    "force_z": Quantity(0.5, FORCE_Z),
+    "velocity_y": Quantity(0.5, VELOCITY_Y),
+    "command": Quantity(1.0, LAST_COMMAND),
+    # what only a simulator knows, or an estimator beside the filter: for ablations (see ``sensing``)
+    "true_torque_z": Quantity(0.03, 2, "torque"),
+    "true_force_x": Quantity(0.5, 0, "force"),
+    "true_force_y": Quantity(0.5, 1, "force"),
+    "std_torque_z": Quantity(0.005, 2, "std_torque"),
+    "std_force_x": Quantity(0.05, 0, "std_force"),
+    "observer_torque_z": Quantity(0.03, 2, "observer_torque"),
+    "observer_force_x": Quantity(0.5, 0, "observer_force"),
+    "observer_force_y": Quantity(0.5, 1, "observer_force"),
+}
+
+
+@dataclass(frozen=True)
+class Features:
+    """The quantities of one frame, each with its scale, and how many frames a policy sees.
+
+    Raises:
+        InputError: a quantity that does not exist or comes twice, no frame, a scale that is not positive.
+    """
+
+    frame: tuple[str, ...]
+    history: int
+    scale: tuple[float, ...] = ()  # default: that of ``QUANTITIES``
+
+    def __post_init__(self) -> None:
+        for name in self.frame:
+            if not isinstance(name, str) or name not in QUANTITIES:
+                raise unknown_name("quantity", str(name), QUANTITIES, "features: frame")
+        if not self.frame or len(set(self.frame)) != len(self.frame):
+            raise InputError(f"features: frame must name different quantities, got {list(self.frame)}")
+        if self.history < 1:
+            raise InputError(f"features: history must be at least 1, got {self.history}")
+        if not self.scale:
+            object.__setattr__(self, "scale", tuple(QUANTITIES[name].scale for name in self.frame))
+        if len(self.scale) != len(self.frame) or min(self.scale) <= 0:
+            raise InputError(f"features: scale must hold {len(self.frame)} positive numbers, got {list(self.scale)}")
+
+    @property
+    def size(self) -> int:
+        """How many numbers a policy sees."""
+        return self.history * len(self.frame)
+
+    @property
+    def sources(self) -> frozenset[str]:
+        """Entries of ``info`` that are needed beside the observation."""
+        return frozenset(QUANTITIES[name].source for name in self.frame) - {"observation"}
+
+    def frames(self, observations: ArrayLike, info: Mapping[str, Any]) -> Array:
+        """Return scaled frames (n, quantities) of n environments: observations (n, 8), ``info`` with (n, 3) entries."""
+        rows = np.asarray(observations, dtype=np.float64)
+        columns = [np.asarray(rows if QUANTITIES[name].source == "observation" else info[QUANTITIES[name].source])
+                   [:, QUANTITIES[name].column] for name in self.frame]
+        scaled = np.stack(columns, axis=1) / np.array(self.scale)
+        clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
+        return clipped
+
+
+class History:
+    """The last frames of n environments, oldest first; an episode begins with its first frame repeated."""
+
+    def __init__(self, features: Features, count: int) -> None:
+        self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
+
+    def restart(self, frames: Array, which: Sequence[int] | NDArray[np.bool_]) -> None:
+        """Begin an episode in the environments ``which`` with their rows of ``frames`` (n, quantities)."""
+        self._frames[which] = frames[which][:, None, :]
+
+    def push(self, frames: Array) -> None:
+        """Add one frame (n, quantities) each."""
+        self._frames[:, :-1] = self._frames[:, 1:]
+        self._frames[:, -1] = frames
+
+    def flat(self) -> Array:
+        """Return a copy (n, history * quantities)."""
+        flat: Array = self._frames.reshape(len(self._frames), -1).copy()
+        return flat

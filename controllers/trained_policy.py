@@ -1,0 +1,176 @@
+"""Trained policies as files: weights in ``NAME.npz``, and beside them the card ``NAME.json`` that says what they are.
+
+Neither can run code when it is read, and a policy is flown in plain NumPy: scoring needs no deep-learning library.
+"""
+
+import hashlib
+import io
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
+from .features import Features, History
+from .observation import MAX_COMMAND
+
+Array = NDArray[np.float32]
+Weights = dict[str, Array]
+FORMAT = 1
+_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {"relu": lambda x: np.maximum(x, np.float32(0.0)), "tanh": np.tanh}
+
+
+def layers_of(weights: Weights) -> int:
+    """Return how many dense layers there are."""
+    return sum(name.startswith("weight") for name in weights)
+
+
+def dense(weights: Weights, activation: str, x: Array) -> Array:
+    """Return the output (n,) of the dense layers ``weight0, bias0, weight1, ...`` for an input (m,)."""
+    act = _ACTIVATIONS[activation]
+    last = layers_of(weights) - 1
+    for i in range(last + 1):
+        x = weights[f"weight{i}"] @ x + weights[f"bias{i}"]
+        if i < last:
+            x = act(x)
+    return x
+
+
+def lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
+    """Return the next hidden state and cell (h,) of an LSTM with gates in the order input, forget, cell, output."""
+    gates = (weights["lstm_input"] @ x + weights["lstm_input_bias"]
+             + weights["lstm_hidden"] @ hidden + weights["lstm_hidden_bias"])
+    i, f, g, o = np.split(gates, 4)
+    cell = _sigmoid(f) * cell + _sigmoid(i) * np.tanh(g)
+    after: Array = _sigmoid(o) * np.tanh(cell)
+    return after, cell
+
+
+def _sigmoid(x: Array) -> Array:
+    between: Array = (0.5 * (1.0 + np.tanh(0.5 * x))).astype(np.float32)
+    return between
+
+
+class TrainedPolicy:
+    """A policy that was learned, as a controller.
+
+    Args:
+        card: what the policy is: ``features``, ``repeat`` (decisions that a command is held), ``activation``, ``squash``
+            (the output goes through a tanh), and where it comes from.
+        weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ...; before them, where there is one, the LSTM
+            ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h), ``lstm_input_bias``, ``lstm_hidden_bias`` (4h,).
+
+    Raises:
+        InputError: card and weights do not go together.
+    """
+
+    def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
+        self.card, self.weights = dict(card), weights
+        try:
+            seen = card["features"]
+            self.features = Features(tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"])))
+            self._repeat, self._activation, self._squash = int(card["repeat"]), card["activation"], bool(card["squash"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
+        if self._activation not in _ACTIVATIONS or self._repeat < 1:
+            raise InputError(f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at least 1")
+        self._recurrent = "lstm_input" in weights
+        entry = weights.get("lstm_input" if self._recurrent else "weight0")
+        if entry is None or entry.shape[1] != self.features.size:
+            raise InputError(f"{name}: the first layer must take {self.features.size} numbers")
+        for i in range(layers_of(weights)):
+            bias = weights.get(f"bias{i}")
+            below = weights["lstm_hidden"].shape[1] if self._recurrent else self.features.size
+            below = below if i == 0 else weights[f"weight{i - 1}"].shape[0]
+            if bias is None or weights[f"weight{i}"].shape != (len(bias), below):
+                raise InputError(f"{name}: layer {i} does not fit the one before it")
+        if weights[f"weight{layers_of(weights) - 1}"].shape[0] != 1:
+            raise InputError(f"{name}: the last layer must give one number")
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._history = History(self.features, 1)
+        self._count, self._held = 0, np.zeros(1, dtype=np.float32)
+        if self._recurrent:
+            size = self.weights["lstm_hidden"].shape[1]
+            self._hidden, self._cell = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
+
+    def __call__(self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None) -> Array:
+        """Return the command (1,) m/s for an observation (8,)."""
+        if self._count % self._repeat == 0:
+            batch = {source: np.asarray((info or {})[source])[None] for source in self.features.sources}
+            frames = self.features.frames(np.asarray(observation)[None], batch)
+            if self._count == 0:
+                self._history.restart(frames, [0])
+            else:
+                self._history.push(frames)
+            self._held = self.act(self._history.flat()[0])
+        self._count += 1
+        return self._held
+
+    def act(self, x: Array) -> Array:
+        """Return the command (1,) for features (size,); a recurrent policy remembers them."""
+        if self._recurrent:
+            self._hidden, self._cell = lstm(self.weights, x, self._hidden, self._cell)
+            x = self._hidden
+        out = dense(self.weights, self._activation, x)
+        return (np.tanh(out) * np.float32(MAX_COMMAND) if self._squash
+                else np.clip(out, -MAX_COMMAND, MAX_COMMAND)).astype(np.float32)
+
+
+def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
+    """Write ``path`` (.npz) and the card beside it; return the path. The same weights give the same bytes."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **{name: np.asarray(w, dtype=np.float32) for name, w in sorted(weights.items())})  # type: ignore[arg-type]
+    data = buffer.getvalue()
+    full = {"format": FORMAT, **card, "sha256": hashlib.sha256(data).hexdigest()}
+    with replaced(path) as partial:
+        partial.write_bytes(data)
+    with replaced(path.with_suffix(".json")) as partial:
+        partial.write_text(json.dumps(full, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def load_policy(path: str | Path) -> TrainedPolicy:
+    """Read a policy from its ``.npz`` or its card.
+
+    Raises:
+        InputError: a file is missing, not readable, of another format, or the two are not of one policy.
+    """
+    file = Path(path).with_suffix(".npz")
+    card_file = file.with_suffix(".json")
+    try:
+        card = json.loads(card_file.read_text(encoding="utf-8"))
+        data = file.read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{error.filename}: no such file; a trained policy is a .npz file with its .json card") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{card_file}: cannot be read as a policy's card: {error}") from error
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise InputError(f"{card_file}: format must be {FORMAT}, a trained policy's card")
+    if card.get("sha256") != hashlib.sha256(data).hexdigest():
+        raise InputError(f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)")
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
+    except Exception as error:  # whatever a parser makes of bytes that are no archive of arrays
+        raise InputError(f"{file}: cannot be read as weights: {error}") from error
+    bad = [name for name, array in weights.items() if not np.all(np.isfinite(array)) or array.ndim not in (1, 2)]
+    if bad:
+        raise InputError(f"{file}: {bad[0]} must be a vector or a matrix of finite numbers")
+    try:
+        return TrainedPolicy(card, weights, str(file))
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{file}: its weights lack or spoil an entry: {error}") from error
+
+
+def is_policy_path(name: str) -> bool:
+    """Whether a controller's name is the path of a trained policy."""
+    return name.endswith((".npz", ".json"))

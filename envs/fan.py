@@ -1,0 +1,147 @@
+"""The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean jet: ``dynamics.jet``."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.mean_jet import (
+    AIR_DENSITY,
+    COUNT_R,
+    COUNT_X,
+    FIRST_X,
+    HULL_RADIUS,
+    HULL_STATIONS,
+    STEP_R,
+    STEP_X,
+    jet_table,
+)
+from ..runtime.compiled import Record, compiled
+
+Array = NDArray[np.float64]
+
+STATIONS = 4 + HULL_STATIONS  # where the wind acts on the vehicle: four rotors and a ring on the hull
+
+
+@dataclass(frozen=True)
+class Fan:
+    """A drum fan at (0, y, height) that blows along +x, and the drag of the vehicle that it blows at."""
+
+    speed: float = 3.6  # m/s, U0 of the jet
+    radius: float = 0.45  # m
+    hub_radius: float = 0.10  # m
+    height: float = 1.2  # m
+    turbulence: float = 0.10  # standard deviation of the gusts, as a share of the local axial speed
+    gust_length: float = 0.25  # m, over which gusts at two stations are correlated
+    gust_time: float = 0.10  # s, over which they last
+    rotor_drag: float = 0.020  # N/(m/s), each rotor, in its plane
+    hull_area: float = 0.060  # m2, drag area of the whole hull
+
+
+FAN = np.dtype([
+    ("speed", "f8"), ("height", "f8"), ("turbulence", "f8"), ("rotor_drag", "f8"), ("hull_area", "f8"),
+    ("keep", "f8"),  # share of a gust that lasts over a tick
+    ("mixing", "f8", (STATIONS, STATIONS)),  # lower root of the correlation between stations
+    ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
+    ("gusts", "f8", (STATIONS, 3)),  # unit variance
+    ("y", "f8"),  # m, where the fan is
+])
+
+
+def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
+    """Return the fan as an array (1,) of ``FAN``; ``rotor_positions`` is (4, 3) m, ``period`` the tick in s."""
+    record = np.zeros(1, dtype=FAN)
+    f = record[0]
+    for name in ("speed", "height", "turbulence", "rotor_drag", "hull_area"):
+        f[name] = getattr(fan, name)
+    f["keep"] = math.exp(-period / fan.gust_time)
+    angle = np.arange(8) * math.pi / 4
+    stations = np.concatenate([rotor_positions, HULL_RADIUS * np.stack(
+        [np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)])
+    f["stations"] = stations
+    distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)
+    f["mixing"] = np.linalg.cholesky(np.exp(-distance / fan.gust_length) + 1e-9 * np.eye(STATIONS))
+    return record
+
+
+@compiled
+def jet_at(f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array) -> None:
+    """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
+    dy, dz = y - f.y, z - f.height
+    r = math.sqrt(dy * dy + dz * dz)
+    row, column = (x - FIRST_X) / STEP_X, r / STEP_R
+    if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
+        wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
+        return
+    i, j = int(row), int(column)
+    a, b = row - i, column - j
+    u = (1 - a) * ((1 - b) * axial[i, j] + b * axial[i, j + 1]) + a * ((1 - b) * axial[i + 1, j] + b * axial[i + 1, j + 1])
+    v = (1 - a) * ((1 - b) * radial[i, j] + b * radial[i, j + 1]) + a * (
+        (1 - b) * radial[i + 1, j] + b * radial[i + 1, j + 1])
+    wind[0] = f.speed * u
+    scale = f.speed * v / r if r > 1e-9 else 0.0
+    wind[1], wind[2] = scale * dy, scale * dz
+
+
+@compiled
+def gust(f: Record, noise: Array) -> None:
+    """Let the gusts at the stations age by one tick; ``noise`` holds 36 unit normals."""
+    fresh = math.sqrt(1.0 - f.keep * f.keep)
+    for i in range(STATIONS):
+        for a in range(3):
+            total = 0.0
+            for j in range(i + 1):
+                total += f.mixing[i, j] * noise[3 * j + a]
+            f.gusts[i, a] = f.keep * f.gusts[i, a] + fresh * total
+
+
+@compiled
+def jet_wrench(f: Record, axial: Array, radial: Array, position: Array, rotation: Array, velocity: Array,
+               omega: Array, com: Array, wind: Array, out: Array) -> None:
+    """Write force and torque about the centre of mass (6,), world frame, of the wind on the vehicle into ``out``.
+
+    Drag acts at the stations, each in its own wind: that is why a symmetric vehicle feels a torque where the jet falls
+    off across its span. ``velocity`` is that of the geometric centre in the world, ``omega`` in the body frame; ``wind``
+    (3,) is scratch.
+    """
+    R = rotation
+    for i in range(6):
+        out[i] = 0.0
+    ox = R[0, 0] * omega[0] + R[0, 1] * omega[1] + R[0, 2] * omega[2]
+    oy = R[1, 0] * omega[0] + R[1, 1] * omega[1] + R[1, 2] * omega[2]
+    oz = R[2, 0] * omega[0] + R[2, 1] * omega[1] + R[2, 2] * omega[2]
+    cx = R[0, 0] * com[0] + R[0, 1] * com[1] + R[0, 2] * com[2]
+    cy = R[1, 0] * com[0] + R[1, 1] * com[1] + R[1, 2] * com[2]
+    cz = R[2, 0] * com[0] + R[2, 1] * com[1] + R[2, 2] * com[2]
+    hull = 0.5 * AIR_DENSITY * f.hull_area / (STATIONS - 4)
+    for i in range(STATIONS):
+        s = f.stations[i]
+        x = R[0, 0] * s[0] + R[0, 1] * s[1] + R[0, 2] * s[2]
+        y = R[1, 0] * s[0] + R[1, 1] * s[1] + R[1, 2] * s[2]
+        z = R[2, 0] * s[0] + R[2, 1] * s[1] + R[2, 2] * s[2]
+        jet_at(f, axial, radial, position[0] + x, position[1] + y, position[2] + z, wind)
+        strength = f.turbulence * wind[0]
+        ux = wind[0] + strength * f.gusts[i, 0] - velocity[0] - (oy * z - oz * y)
+        uy = wind[1] + strength * f.gusts[i, 1] - velocity[1] - (oz * x - ox * z)
+        uz = wind[2] + strength * f.gusts[i, 2] - velocity[2] - (ox * y - oy * x)
+        if i < 4:
+            along = R[0, 2] * ux + R[1, 2] * uy + R[2, 2] * uz
+            fx = f.rotor_drag * (ux - along * R[0, 2])
+            fy = f.rotor_drag * (uy - along * R[1, 2])
+            fz = f.rotor_drag * (uz - along * R[2, 2])
+        else:
+            scale = hull * math.sqrt(ux * ux + uy * uy + uz * uz)
+            fx, fy, fz = scale * ux, scale * uy, scale * uz
+        x -= cx
+        y -= cy
+        z -= cz
+        out[0] += fx
+        out[1] += fy
+        out[2] += fz
+        out[3] += y * fz - z * fy
+        out[4] += z * fx - x * fz
+        out[5] += x * fy - y * fx
+
+
+__all__ = ["FAN", "HULL_RADIUS", "STATIONS", "Fan", "fan_record", "gust", "jet_at", "jet_table", "jet_wrench"]

@@ -1,0 +1,1 @@
+"""Episodes flown and compared: the benchmark, its statistics, pictures and the leaderboard."""

@@ -1,0 +1,170 @@
+"""The leaderboard: controllers on the same episodes, scored between hover (0) and oracle (1)."""
+
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..controllers import Controller, make_controller
+from ..controllers.own_file import is_file_name, load_controller
+from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
+from ..envs.scenarios import get_scenario
+from ..envs.watched_fan_tracking import scenario_env
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
+from ..runtime.workers import workers
+from .episodes import Episode, benchmark_seeds, fly_episode
+
+_CHUNK = 5  # episodes that a worker flies at a time
+_REFERENCES = ("hover", "admittance", "oracle")  # what scores and wins are relative to
+_RESAMPLES = 4_000
+
+Results = dict[tuple[str, str], list[Episode]]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the leaderboard."""
+
+    controller: str
+    scenario: str
+    episodes: int
+    seed: int
+    rmse_m: float  # mean over episodes
+    rmse_ci95_m: tuple[float, float]  # bootstrap over episodes
+    median_rmse_m: float
+    lost_fraction: float
+    score: float  # (hover - this) / (hover - oracle), of the means
+    wins_over_admittance: float  # share of the paired episodes with a smaller RMSE
+
+
+def make_pilot(name: str) -> Controller:
+    """Return a new controller by its name, by the path of a trained policy, or by FILE.py:CLASS of a file that is then run.
+
+    Raises:
+        InputError: no controller has this name, or the file holds none.
+    """
+    if is_file_name(name):
+        controller: Controller = load_controller(name)
+        return controller
+    return load_policy(name) if is_policy_path(name) else make_controller(name)
+
+
+def check_request(controllers: Sequence[str], scenarios: Sequence[str], episodes: int, seed: int) -> None:
+    """Check what ``fly_all`` is asked for, before anything is flown.
+
+    Raises:
+        InputError: an unknown name, no episodes, or a seed out of range.
+    """
+    if episodes < 1:
+        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
+    if not 0 <= seed < 100_000:
+        raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
+    for name in controllers:
+        make_pilot(name)
+    for name in scenarios:
+        get_scenario(name)
+
+
+def fly_all(
+    controllers: Sequence[str],
+    scenarios: Sequence[str],
+    episodes: int,
+    seed: int,
+    jobs: int | None = None,
+    advance: Callable[[int], None] = lambda count: None,
+    cluster: str | None = None,
+) -> Results:
+    """Fly every controller, and the references, through every scenario on the same seeds.
+
+    Args:
+        controllers: names, or paths of trained policies.
+        scenarios: names.
+        episodes: a scenario.
+        seed: of the benchmark.
+        jobs: processes; default: one a core. The results do not depend on it.
+        advance: called with the number of episodes flown since the last call.
+        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this machine; default: none.
+
+    Raises:
+        InputError: as ``check_request``.
+    """
+    check_request(controllers, scenarios, episodes, seed)
+    wanted = list(dict.fromkeys([*controllers, *_REFERENCES]))
+    seeds = benchmark_seeds(seed, episodes)
+    tasks = [(controller, scenario, seeds[i : i + _CHUNK])
+             for scenario in dict.fromkeys(scenarios) for controller in wanted for i in range(0, episodes, _CHUNK)]
+    results: Results = {(c, s): [] for s in scenarios for c in wanted}
+    jobs = min(jobs or os.cpu_count() or 1, len(tasks))
+
+    def take(task: tuple[str, str, list[int]], flown: list[Episode]) -> None:
+        results[task[0], task[1]].extend(flown)
+        advance(len(flown))
+
+    if cluster is not None:
+        from ..runtime.cluster import spread
+
+        for task, flown in zip(tasks, spread(_fly_chunk, tasks, cluster), strict=True):
+            take(task, flown)
+    elif jobs == 1:
+        for task in tasks:
+            take(task, _fly_chunk(task))
+    else:
+        with workers(jobs) as pool:
+            for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
+                take(task, flown)
+    return results
+
+
+def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes: int) -> int:
+    """Return how many episodes ``fly_all`` flies."""
+    return len({*controllers, *_REFERENCES}) * len(set(scenarios)) * episodes
+
+
+def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
+    name, scenario, seeds = task
+    controller = make_pilot(name)
+    env = scenario_env(scenario, controller.features.sources if isinstance(controller, TrainedPolicy) else frozenset())
+    return [fly_episode(env, controller, seed) for seed in seeds]
+
+
+def leaderboard(results: Results, controllers: Sequence[str], seed: int) -> list[Row]:
+    """Return the leaderboard's rows, scenario by scenario, best first."""
+    rows = []
+    for scenario in dict.fromkeys(s for _, s in results):
+        rmse = {c: np.array([e.rmse for e in flown]) for (c, s), flown in results.items() if s == scenario}
+        span = rmse["hover"].mean() - rmse["oracle"].mean()
+        some = []
+        for name in dict.fromkeys(controllers):
+            flown, values = results[name, scenario], rmse[name]
+            ahead = values - rmse["admittance"]
+            some.append(Row(
+                controller=name, scenario=scenario, episodes=len(flown), seed=seed, rmse_m=float(values.mean()),
+                rmse_ci95_m=_interval(values), median_rmse_m=float(np.median(values)),
+                lost_fraction=float(np.mean([e.lost for e in flown])),
+                score=float((rmse["hover"].mean() - values.mean()) / span) if span > 0 else math.nan,
+                wins_over_admittance=float(np.mean(ahead < 0) + 0.5 * np.mean(ahead == 0)),
+            ))
+        rows.extend(sorted(some, key=lambda row: row.rmse_m))
+    return rows
+
+
+def _interval(values: np.ndarray) -> tuple[float, float]:
+    """Return the 95 % percentile bootstrap interval of the mean."""
+    rng = np.random.default_rng(0)
+    means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
+    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing is null."""
+    path = folder / "leaderboard.json"
+    data = [{key: None if value != value else value for key, value in asdict(row).items()} for row in rows]
+    with replaced(path) as partial:
+        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path

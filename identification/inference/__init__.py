@@ -1,0 +1,1 @@
+"""Which effects explain a residual wrench, with which coefficients, and how surely."""

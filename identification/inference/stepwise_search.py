@@ -1,0 +1,243 @@
+"""The moves of the search for what a model lacks: whole effects are added, removed, and swapped for others.
+
+Each is judged on blocks of the fit that are left out in turn; nothing here looks at the held-out rows.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .commanded_rotors import takes_back
+from .gram_matrix import Gram
+from .innovations import Innovations, adds
+from .search import (
+    COMPLEXITY,
+    LEAST_GAIN,
+    LEAST_SIZE,
+    Fit,
+    Gain,
+    Regression,
+    Search,
+    freedom,
+    started,
+)
+from .starting_points import STARTS, barely_swings
+
+LEAST_SHARE = 0.01  # of what is left unexplained, that an effect must explain besides LEAST_GAIN
+PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
+LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
+SWAP_GAIN = 12.0
+MOST_EFFECTS = 4
+LEAST_OF_COMMANDS = 25.0, 0.018  # gain and share; effects that cannot be there explain up to 25, and 0.01, of real flights
+LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
+LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
+MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
+_ROUNDS = 2  # of adding and pruning: what wanders on stands for a law that the library lacks
+_MOVES = 3  # at a time, which takes seconds each where four effects stand for one
+_SHORTLIST = 2
+_TRIED = 8  # candidates for one place, the best first, that innovations may turn down
+_FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
+_HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
+
+
+def find(search: Search) -> tuple[Fit, list[Gain]]:
+    """Return the effects that are needed, and what each of the library explained at first, alone."""
+    needed = Fit(search.delay.setting if search.delay else {})
+    first: list[Gain] = []
+    asked: list[set[str]] = []
+    for _ in range(_ROUNDS):
+        fit, gains = _forward(search, needed)
+        first = first or gains
+        if asked and fit.effects == needed.effects:
+            break
+        search.report("asking whether every effect is needed")
+        # by the noise as it is known by now
+        needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
+        if search.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
+            break
+        # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
+        asked.append(set(needed.effects))
+    return _borne_out(search, needed), first
+
+
+def _borne_out(search: Search, fit: Fit) -> Fit:
+    """Return a fit less the effects that innovations do not confirm beside those that are left."""
+    if search.flights.commanded:
+        return fit
+    for effect in fit.effects:
+        if not _is_borne_out(search, fit, effect):
+            search.report(f"{effect} is an answer to gusts")
+            return _borne_out(search, search.refit(fit.without(effect)))
+    return fit
+
+
+def _is_borne_out(search: Search, fit: Fit, effect: str) -> bool:
+    return Innovations(search.flights, fit.without(effect).setting).confirm(fit.setting)
+
+
+def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
+    """Return ``fit`` with the effects that are worth adding one after the other, and what each explained at first."""
+    commanded, most = search.flights.commanded, MOST_OF_COMMANDS if search.flights.commanded else MOST_EFFECTS
+    first: list[Gain] = []
+    for count in range(len([e for e in fit.effects if not search.held(e)]), most + 1):
+        regression = search.linearise(fit)
+        search.set_noise(fit, regression)
+        if count == 0:
+            fit = search.refit(fit)
+        g = search.gram(fit, regression)
+        gains = search.gains(fit, regression, g)
+        first = first or gains
+        least = _least(search, g.error(g.index(search.base(fit.effects))))
+        better = [x for x in gains if _worth(x, least) and (not commanded or _plausible(search, x, count))]
+        if not better or count == most:
+            break
+        for gain in better[:_TRIED]:
+            search.report(f"trying {gain.effect}")
+            more = search.refit(gain.fit)
+            if commanded:
+                taken = not barely_swings(more.setting, search.flights.vehicle.gravity)
+            else:
+                taken = adds(search.flights, fit.setting, more.setting)
+            if taken:
+                break
+        else:
+            break
+        fit = more
+    return fit, first
+
+
+def _plausible(search: Search, gain: Gain, count: int) -> bool:
+    """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""
+    if takes_back(gain.fit.setting, search.flights.vehicle.weight):
+        return False
+    return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (gain.effect not in STARTS or gain.share > LEAST_OF_STARTS)
+
+
+def _prune(search: Search, fit: Fit) -> Fit:
+    """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced."""
+    error = search.error(fit)
+    failed: dict[frozenset[str], float] = {}
+    for _ in range(_MOVES):
+        better = _best_move(search, fit, error, failed)
+        if better is None:
+            break
+        fit, error = better
+    if search.flights.commanded:
+        fit = search.refit(fit)
+        search.weigh_to_measure()
+    return fit
+
+
+def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]) -> tuple[Fit, float] | None:
+    """Return a better fit and its error: with an effect less, one in place of two or one, or two in place of one or of many.
+
+    ``failed`` keeps which effects no other one could bring down to which error, so that it is tried no second time.
+    """
+    least = _least(search, error)
+    for effect in fit.effects:
+        if not search.held(effect) and search.error_without(fit, effect) < error + least:
+            search.report(f"{effect} is not needed")
+            less = search.refit(fit.without(effect))
+            return less, search.error(less)
+    if search.flights.commanded:  # whose effects are far apart: no two of those that are alike are ever named
+        return None
+    few = len(fit.effects) <= _FEW
+    if not few:  # what stands for two effects with three or four is left by no small step
+        less, spared = fit.without(*fit.effects), COMPLEXITY * sum(map(freedom, fit.effects))
+        regression = search.linearise(less)
+        g, bar = search.gram(less, regression), error - SWAP_GAIN + spared
+        couple = _couple(search, less, regression, g, search.library, bar)
+        if better := _swapped(search, couple, fit, fit.effects):
+            return better
+    for size, allowed in ((2, least), (1, -SWAP_GAIN)):
+        for group in itertools.combinations(fit.effects, size):
+            less, spared = fit.without(*group), COMPLEXITY * sum(map(freedom, group))
+            rest, bar = frozenset(less.effects), error + allowed + spared
+            if bar <= failed.get(rest, -np.inf):
+                continue
+            failed[rest] = bar
+            regression = search.linearise(less, None if few else fit)
+            g = search.gram(less, regression)
+            rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
+            if better := _swapped(search, _singles(rivals, error, allowed, bar), fit, group):
+                return better
+            if few and size == 1:
+                others = [e for e in search.library if e not in group]  # one that only joins has been asked already
+                couple = _couple(search, less, regression, g, others, error - least + spared)
+                if better := _swapped(search, couple, fit, group):
+                    return better
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class Swap:
+    """What may come in place of effects that are taken away."""
+
+    effects: tuple[str, ...]
+    fit: Fit  # with them, before it is refitted
+    limit: float  # whitened energy that it must come below
+
+
+def _swapped(search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]) -> tuple[Fit, float] | None:
+    """Return the first of the swaps for a group of a fit's effects that keeps what it promises, refitted, and its error.
+
+    What it gains by less noise of the sensors does not count.
+    """
+    quiet = search.noise_explained(old)
+    for swap in swaps:
+        fit = search.refit(swap.fit, swap.limit)
+        limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
+        better = search.energy(fit.setting) < limit and (error := search.error(fit)) < limit
+        if better and (len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)):
+            search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
+            return fit, error
+    return None
+
+
+def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -> Iterator[Swap]:
+    """Yield the rivals that may do better than ``bar``, less what their coefficients cost."""
+    for rival in rivals[:_SHORTLIST]:
+        # what is far from linear may do better than it looks here, but not by any amount
+        near = rival.left <= error + allowed + _HOPE * (rival.left + rival.energy - error)
+        if near and rival.size > _least_size(rival.effect):
+            yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
+
+
+def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float) -> Iterator[Swap]:
+    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than ``bar``, less what they cost.
+
+    What takes two to replace it is passed on the way to neither of them. Two together are nearly linear.
+    """
+    total, least, best = g.blocks.sum(axis=0), bar, None
+    for both in itertools.combinations([e for e in library if e not in search.begun and e not in fit.effects], 2):
+        wanted = search.base(fit.effects, both)
+        if not regression.columns.keys() >= set(wanted):
+            continue
+        cost = COMPLEXITY * sum(map(freedom, both))
+        if (left := g.error(g.index(wanted)) + cost) >= least:
+            continue
+        change = g.solve(total, g.index(wanted))
+        if not any(search.drowned(g, total, wanted, change, e) or search.size(wanted, change, e) <= _least_size(e)
+                   for e in both):
+            least, best = left, Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost)
+    if best:
+        yield best
+
+
+def _least(search: Search, error: float) -> float:
+    """Return the energy that an effect must explain of flights of which so much is left unexplained."""
+    gain, share = LEAST_OF_COMMANDS if search.flights.commanded else (LEAST_GAIN, LEAST_SHARE)
+    return max(gain, share * error)
+
+
+def _least_size(effect: str) -> float:
+    """Return the size, in typical ones, above which an effect is worth a name."""
+    return LEAST_SIZES.get(effect, LEAST_SIZE)
+
+
+def _worth(gain: Gain, least: float) -> bool:
+    """Return whether an effect explains enough, and is large enough, to be named."""
+    size = _least_size(gain.effect)
+    return gain.energy > least and gain.size > (size if gain.energy < PLAIN * least else 0.5 * size)

@@ -1,0 +1,1 @@
+"""Flight logs: tables, readers of other forms, conventions recognised, screening."""

@@ -1,0 +1,149 @@
+"""A flight log: what was measured on a flight, in SI units and this kit's conventions.
+
+One row a sample, time strictly increasing. Columns of the file:
+
+=============================  =======  ==========================================================================
+``t``                          s        time
+``px, py, pz``                 m        position of the geometric centre, world, z up
+``qw, qx, qy, qz``             1        attitude, body to world, scalar first; its sign means nothing
+``omega1 ... omega4``          rad/s    turn rates: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right
+``vbat`` (optional)            V        battery voltage
+``fx, fy, fz`` (optional)      N        true external force, world
+``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
+=============================  =======  ==========================================================================
+
+A row whose seven pose fields are all empty is one in which motion capture lost the vehicle. Other columns are ignored.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.errors import InputError
+from .tables import Table, file_kind, write_table
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
+ROTORS = ("omega1", "omega2", "omega3", "omega4")
+TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
+REQUIRED = ("t", *POSE, *ROTORS)
+
+_NORM_TOLERANCE = 0.02  # of a quaternion's length
+_GAP = 3.0  # median time steps
+
+
+@dataclass(frozen=True, eq=False)
+class FlightLog:
+    """One flight, checked: times increase, numbers are finite, quaternions have length 1."""
+
+    t: Array  # (N,) s
+    position: Array  # (N, 3) m, world; NaN where the pose is missing
+    quaternion: Array  # (N, 4) body to world, scalar first; NaN where the pose is missing
+    rotor_speeds: Array  # (N, 4) rad/s
+    voltage: Array | None = None  # (N,) V
+    force: Array | None = None  # (N, 3) N, world, truth
+    torque: Array | None = None  # (N, 3) Nm, world, truth
+    name: str = ""
+    source: str = ""  # the file and the reader
+    notes: tuple[str, ...] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
+    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # (N,) the pose is there
+    extra: Mapping[str, Array] = field(default_factory=dict)  # (N,) or (N, ...) SI; what a reader found besides
+    commanded: bool = False  # turn rates are worked out from commands: scale of thrust unknown, moments not to be trusted
+
+    def __post_init__(self) -> None:
+        if len(self.valid) != len(self.t):
+            object.__setattr__(self, "valid", np.isfinite(self.position).all(axis=1))
+
+    @property
+    def period(self) -> float:
+        """Median time step, s."""
+        return float(np.median(np.diff(self.t)))
+
+
+def log_name(path: Path) -> str:
+    """Return the file's name without its ending."""
+    return path.name[: -len(file_kind(path))]
+
+
+def check_finite(table: Table, name: str, column: Array, where: Mask | None = None) -> None:
+    """Raise InputError at the first number of a column (N,) that is not finite; ``where`` limits the rows."""
+    bad = ~np.isfinite(column) if where is None else ~np.isfinite(column) & where
+    if bad.any():
+        i = int(np.flatnonzero(bad)[0])
+        found = "empty or NaN" if np.isnan(column[i]) else "infinite"
+        more = "; only all seven pose columns together may be empty (pose lost)" if name in POSE else ""
+        raise InputError(f"{table.path}: column {name}, {table.row(i)} is {found}; expected a finite number{more}")
+
+
+def check_times(table: Table, t: Array) -> None:
+    """Raise InputError where times (N,) in s do not strictly increase, or are fewer than two."""
+    if len(t) < 2:
+        raise InputError(f"{table.path}: only one row; expected at least two")
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if back.size:
+        i = int(back[0]) + 1
+        what = "repeats the time" if t[i] == t[i - 1] else "goes back from"
+        raise InputError(f"{table.path}: column t, {table.row(i)}: {t[i]:.9g} s {what} {t[i - 1]:.9g} s of the row "
+                         "before; expected strictly increasing times")
+
+
+def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str) -> Array:
+    """Return quaternions (N, 4) at length 1, after checking that they nearly were in the rows ``where`` (N,).
+
+    Raises:
+        InputError: a length differs from 1 by more than 0.02.
+    """
+    length = np.linalg.norm(quaternions, axis=1)
+    bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= _NORM_TOLERANCE))
+    if bad.size:
+        raise InputError(f"{table.path}: columns {columns}, {table.row(bad[0])}: a quaternion of length "
+                         f"{length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}")
+    unit: Array = quaternions / length[:, None]
+    return unit
+
+
+def time_notes(t: Array) -> tuple[str, ...]:
+    """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
+    step = np.diff(t)
+    gaps = np.flatnonzero(step > _GAP * np.median(step))
+    if not gaps.size:
+        return ()
+    longest = gaps[np.argmax(step[gaps])]
+    return (f"{gaps.size} gap(s) in time; the longest is {step[longest]:.3g} s, at t = {t[longest]:.6g} s "
+            f"(median step {np.median(step):.4g} s)",)
+
+
+def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
+    """Return a log with the rows (N,) that are to be kept alone; the log itself where that is all of them."""
+    if keep.all():
+        return log
+
+    def cut(x: Array | None) -> Array | None:
+        return None if x is None else x[keep]
+
+    return replace(log, t=log.t[keep], position=log.position[keep], quaternion=log.quaternion[keep],
+                   rotor_speeds=log.rotor_speeds[keep], voltage=cut(log.voltage), force=cut(log.force), torque=cut(log.torque),
+                   valid=log.valid[keep], extra={name: x[keep] for name, x in log.extra.items()})
+
+
+def write_log(log: FlightLog, path: str | Path) -> None:
+    """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or not at all.
+
+    Raises:
+        InputError: the name's ending is unknown or the file cannot be written.
+    """
+    columns = {"t": log.t}
+    pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
+    columns |= {name: pose[:, i] for i, name in enumerate(POSE)}
+    columns |= {name: log.rotor_speeds[:, i] for i, name in enumerate(ROTORS)}
+    if log.voltage is not None:
+        columns["vbat"] = log.voltage
+    if log.force is not None and log.torque is not None:
+        truth = np.column_stack([log.force, log.torque])
+        columns |= {name: truth[:, i] for i, name in enumerate(TRUTH)}
+    write_table(columns, Path(path))

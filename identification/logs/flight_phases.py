@@ -1,0 +1,83 @@
+"""The phases of a flight, told from its rotors and height: on the ground, take-off, flight and landing."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+GROUND, TAKE_OFF, FLIGHT, LANDING = "ground", "take-off", "flight", "landing"
+
+_TURNING = 0.1  # of the weight: less thrust is a rotor at rest
+_CLEARANCE = 0.05  # m above the place of rest: the vehicle is off the ground
+_WELL_ABOVE = 0.2  # of the typical height
+_CLIMB = 0.1  # m/s: slower is not climbing or sinking
+_CLIMB_WINDOW = 0.25  # s, either side, over which the climb rate is taken
+
+
+class Phase(NamedTuple):
+    """One stretch of a flight, from ``start`` to ``end`` in s."""
+
+    name: str
+    start: float
+    end: float
+
+
+def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle) -> list[Phase]:
+    """Return the phases of a flight in order of time; together they cover it.
+
+    A log that begins (or ends) with its rotors turning begins (or ends) in flight. Take-off lasts from leaving the
+    ground until the first climb ends, landing from the start of the last descent until touching the ground.
+
+    Args:
+        t: (N,) s.
+        height: (N,) m.
+        rotor_speeds: (N, 4) rad/s.
+        vehicle: the vehicle that flew.
+    """
+    at_rest = np.square(rotor_speeds) @ vehicle.k < _TURNING * vehicle.weight
+    if at_rest.all():
+        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+    turning = np.flatnonzero(~at_rest)
+    on, off, last = int(turning[0]), int(turning[-1]), len(t) - 1
+    starts, lands = on > 0, off < last  # whether the log shows it
+    before = float(np.median(height[:on])) if starts else -np.inf
+    after = float(np.median(height[off + 1 :])) if lands else -np.inf
+    clear = height > max(before, after) + _CLEARANCE
+    clear[:on] = clear[off + 1 :] = False
+    if not clear.any():  # the rotors turned, but the vehicle never left the ground
+        return [Phase(GROUND, float(t[0]), float(t[-1]))]
+
+    # well above the ground, so that a bounce on landing is no flight
+    typical = float(np.median(height[clear]))
+    climb = _climb_rate(t, height)
+    lift_off, cruise, descent, touch_down = 0, 0, last, last
+    if starts:
+        up = int(np.argmax(clear & (height >= before + _WELL_ABOVE * (typical - before))))
+        lift_off = up - _run(clear[up::-1]) + 1
+        cruise = up + _run(climb[up:] > _CLIMB)
+    if lands:
+        down = last - int(np.argmax((clear & (height >= after + _WELL_ABOVE * (typical - after)))[::-1]))
+        touch_down = down + _run(clear[down:]) - 1
+        descent = down - _run(climb[down::-1] < -_CLIMB)
+    cruise, descent = min(cruise, touch_down), max(descent, lift_off)
+    if cruise > descent:  # a hop: up and down again at once
+        cruise = descent = (cruise + descent) // 2
+    edges = [0, lift_off, cruise, descent, touch_down, last]
+    names = [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
+    return [Phase(name, float(t[a]), float(t[b])) for name, a, b in zip(names, edges, edges[1:], strict=False) if b > a]
+
+
+def _climb_rate(t: Array, height: Array) -> Array:
+    """Return the mean climb rate (N,) in m/s around each time."""
+    later, sooner = np.interp(t + _CLIMB_WINDOW, t, height), np.interp(t - _CLIMB_WINDOW, t, height)
+    rate: Array = (later - sooner) / (2 * _CLIMB_WINDOW)
+    return rate
+
+
+def _run(true: NDArray[np.bool_]) -> int:
+    """Return how many elements from the first on are True."""
+    return len(true) if true.all() else int(np.argmin(true))

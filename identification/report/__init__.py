@@ -1,0 +1,1 @@
+"""A diagnosis as a person and a machine read it: page, pictures, sentences, `report.json`."""

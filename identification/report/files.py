@@ -1,0 +1,124 @@
+"""The report of a diagnosis: its numbers (JSON), the amended vehicle (YAML) and a page for people (HTML)."""
+
+import json
+import math
+import shlex
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.whole_files import replaced
+from ..findings import Diagnosis, Errors
+from .page import report_page
+
+
+def write_report(diagnosis: Diagnosis, folder: str | Path, command: str | None = None) -> list[Path]:
+    """Write ``report.json``, ``report.html`` and ``vehicle.yaml`` into a folder, each whole or not at all.
+
+    Args:
+        diagnosis: what was found.
+        folder: it is made if need be.
+        command: the command line that made the diagnosis, for the page; default: put together from the names of the logs
+            and the vehicle, which lack their folders and the reader.
+
+    Returns:
+        the three paths.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    folder = Path(folder)
+    command = _printable(command or _command(diagnosis, folder))
+    data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    page = report_page(_printable_names(diagnosis), command)
+    numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
+    save_vehicle(diagnosis.amended, vehicle)
+    for path, text in ((html, page), (numbers, data)):
+        with replaced(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    return [numbers, html, vehicle]
+
+
+def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return what ``report.json`` holds: plain Python values, six significant digits, None for what is not finite."""
+    segments = [[start, end] for _, start, end in diagnosis.held_out_segments]
+    error: dict[str, Any] = {
+        "held_out_segments": segments,
+        "before": _errors(diagnosis.before),
+        "after": _errors(diagnosis.after),
+        "floor": {"force_rms_N": diagnosis.floor_force_rms, "torque_rms_Nm": diagnosis.floor_torque_rms},
+    }
+    if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
+        by_log: dict[str, list[list[float]]] = {}
+        for log, start, end in diagnosis.held_out_segments:
+            by_log.setdefault(log, []).append([start, end])
+        error["held_out_by_log"] = by_log
+    data: dict[str, Any] = {
+        "verdict": diagnosis.verdict,
+        "remainder": diagnosis.remainder,
+        "effects": [asdict(effect) for effect in diagnosis.effects],
+        "error": error,
+        "advice": diagnosis.advice,
+        "notes": diagnosis.notes,
+        "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
+        "structure": [asdict(structure) for structure in diagnosis.structure],
+        "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
+        "pushes": [{"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak} for p in diagnosis.pushes],
+        "logs": diagnosis.logs,
+        "test_logs": diagnosis.test_logs,
+        "seconds": diagnosis.seconds,
+        "cutoff_hz": diagnosis.cutoff_hz,
+        "vehicle": diagnosis.declared.name,
+        "version": __version__,
+    }
+    plain: dict[str, Any] = _plain(data)
+    return plain
+
+
+def _errors(errors: Errors) -> dict[str, float]:
+    return {"force_rms_N": errors.force_rms, "torque_rms_Nm": errors.torque_rms,
+            "nis_without_wrench_state": errors.nis_without_wrench_state,
+            "rollout_1s_position_rms_m": errors.rollout_1s_position_rms}
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as strict JSON can hold it."""
+    if isinstance(value, Mapping):
+        return {_printable(str(key)): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if math.isfinite(value) else None
+    return _printable(value) if isinstance(value, str) else value
+
+
+def _printable(text: str) -> str:
+    """Return a text with a question mark for each byte of a file's name that is no text."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def _printable_names(diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis whose names of files can all be written."""
+    return replace(
+        diagnosis,
+        declared=replace(diagnosis.declared, name=_printable(diagnosis.declared.name)),
+        logs=tuple(map(_printable, diagnosis.logs)),
+        test_logs=tuple(map(_printable, diagnosis.test_logs)),
+        notes=tuple(map(_printable, diagnosis.notes)),
+        traces=tuple(replace(trace, log=_printable(trace.log)) for trace in diagnosis.traces),
+        pushes=tuple(replace(push, log=_printable(push.log)) for push in diagnosis.pushes),
+        held_out_segments=tuple((_printable(log), start, end) for log, start, end in diagnosis.held_out_segments),
+    )
+
+
+def _command(diagnosis: Diagnosis, folder: Path) -> str:
+    tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
+    return shlex.join(["windwrench", "diagnose", *diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name,
+                       "--out", str(folder)])

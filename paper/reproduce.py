@@ -1,0 +1,178 @@
+"""Running experiments side by side, keeping what is done, and the page that compares them with the paper."""
+
+import csv
+import io
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..runtime.errors import InputError, unknown_name
+from ..runtime.whole_files import replaced
+from ..runtime.workers import shared_dict, workers
+from . import NAMES
+from .result import Result
+
+
+def chosen(name: str) -> list[str]:
+    """Return the experiments that a name stands for: itself, or all.
+
+    Raises:
+        InputError: no experiment has this name.
+    """
+    if name != "all" and name not in NAMES:
+        raise unknown_name("experiment", name, [*NAMES, "all"])
+    return list(NAMES) if name == "all" else [name]
+
+
+def reproduce(
+    names: Sequence[str],
+    folder: Path,
+    seeds: int | None = None,
+    jobs: int | None = None,
+    report: Callable[[Mapping[str, float]], None] = lambda shares: None,
+) -> dict[str, bool]:
+    """Run experiments, each in a process of its own, and write their files as each ends.
+
+    An experiment whose JSON of the same version and seeds lies in the folder already is not run again, so that an
+    interrupted run goes on where it stopped.
+
+    Args:
+        names: of the experiments.
+        folder: for NAME.json, NAME.csv, NAME.png and NAME.svg.
+        seeds: for every experiment; default: each one's own number.
+        jobs: processes; default: one a core.
+        report: called a few times a second with the share that is done of each experiment.
+
+    Returns:
+        For each name, whether it was run now (or kept from before).
+
+    Raises:
+        InputError: ``seeds`` is not positive, or an experiment needs a package that is not there.
+    """
+    wanted = numbers_of_seeds(names, seeds)
+    done = {name: is_done(folder, name, count) for name, count in wanted.items()}
+    pending = [name for name in names if not done[name]]
+    count = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
+    with shared_dict({name: float(done[name]) for name in names}) as shares, workers(count) as pool:
+        waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending}
+        while waiting:
+            finished, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
+            report(dict(shares))
+            for future in finished:
+                future.result()
+        report(dict(shares))
+    return {name: name in pending for name in names}
+
+
+def _module(name: str) -> Any:
+    return import_module(f".{name}", __package__)
+
+
+def numbers_of_seeds(names: Sequence[str], seeds: int | None = None) -> dict[str, int]:
+    """Return with how many seeds each experiment runs: ``seeds``, or its own number.
+
+    Raises:
+        InputError: ``seeds`` is not positive.
+    """
+    if seeds is not None and seeds < 1:
+        raise InputError(f"reproduce: --seeds must be at least 1, got {seeds}")
+    return {name: seeds or int(_module(name).SEEDS) for name in names}
+
+
+def is_done(folder: Path, name: str, seeds: int) -> bool:
+    """Return whether an experiment's files of this version and number of seeds lie in a folder."""
+    try:
+        kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    files = all((folder / f"{name}.{kind}").is_file() for kind in ("csv", "png", "svg"))
+    return bool(files and isinstance(kept, dict) and (kept.get("seeds"), kept.get("version")) == (seeds, __version__))
+
+
+def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
+    """Run one experiment and write its files; the JSON comes last and says that the others are whole."""
+    module = _module(name)
+    result: Result = module.run(seeds, lambda share: shares.__setitem__(name, min(float(share), 0.99)))
+    write_result(name, module.TITLE, seeds, result, folder)
+    shares[name] = 1.0
+
+
+def write_result(name: str, title: str, seeds: int, result: Result, folder: Path) -> None:
+    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json, the same bytes for the same result; times go beside them."""
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.json").unlink(missing_ok=True)
+    with matplotlib.rc_context({"svg.hashsalt": "windwrench"}):
+        for kind, stamp in (("png", "Software"), ("svg", "Date")):
+            with replaced(folder / f"{name}.{kind}") as partial:
+                result.picture.savefig(partial, format=kind, dpi=110, metadata={stamp: None})
+    with replaced(folder / f"{name}.csv") as partial:
+        partial.write_text(_csv(result.data), encoding="utf-8")
+    summary = {
+        "experiment": name, "title": title, "version": __version__, "seeds": seeds, "figures": _plain(result.figures),
+        "comparison": [asdict(row) for row in result.comparison], "remarks": result.remarks,
+    }
+    if result.timing:
+        with replaced(folder / f"{name}.timing.json") as partial:
+            partial.write_text(json.dumps([asdict(row) for row in result.timing], indent=1) + "\n", encoding="utf-8")
+    with replaced(folder / f"{name}.json") as partial:
+        partial.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+
+
+def _csv(columns: Mapping[str, NDArray[np.generic]]) -> str:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*([_cell(v) for v in column] for column in columns.values()), strict=True))
+    return buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """Return a number with the six digits that a picture's data need, and anything else as it is."""
+    plain = _plain(value)
+    return float(f"{plain:.6g}") if isinstance(plain, float) else plain
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with NumPy's numbers as Python's, and what is not finite as None."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
+    """Write the page "the paper / this kit" from the experiments' JSON files in a folder."""
+    parts = ["# The paper, reproduced figure by figure", "",
+             "C. D. McKinnon and A. P. Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016.",
+             "Every number and picture on this page was written by the command beside it.", ""]
+    where = Path(os.path.relpath(folder, page.parent)).as_posix()
+    for name in names:
+        try:
+            kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        parts += [f"## {kept['title']}", "", f"`windwrench reproduce {name} --seeds {kept['seeds']}`", "",
+                  f"![{kept['title']}]({where}/{name}.png)", "", "| quantity | the paper | this kit |", "| --- | --- | --- |"]
+        timing = folder / f"{name}.timing.json"
+        rows = kept["comparison"] + (json.loads(timing.read_text(encoding="utf-8")) if timing.is_file() else [])
+        parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in rows]
+        for remark in kept["remarks"]:
+            parts += ["", remark]
+        parts += ["", f"Data: [{name}.csv]({where}/{name}.csv), figures of merit: [{name}.json]({where}/{name}.json), "
+                  f"[picture as SVG]({where}/{name}.svg).", ""]
+    with replaced(page) as partial:
+        partial.write_text("\n".join(parts), encoding="utf-8")

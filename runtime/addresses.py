@@ -1,0 +1,74 @@
+"""Functions and memory by their addresses: a compiled loop calls the filter it was given and holds the code of no other.
+
+So one compiled call works for environments that each have their own arrays, and code is compiled once, not once for each of
+its callers.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import carray, cfunc, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from .compiled import compiled
+
+Array = NDArray[np.float64]
+STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
+
+
+@cache
+def _machine_code(function: Callable[..., Any], signature: Any) -> Any:
+    return cfunc(signature, cache=True)(function)
+
+
+def address_of(function: Callable[..., Any], signature: Any = STEP) -> int:
+    """Return the address of a plain function, a filter's step if nothing else is said, compiled now if it was not."""
+    return int(_machine_code(function, signature).address)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_step(_typing_context: Any, address: Any, record: Any, parts: Any, dt: Any, voltage: Any) -> Any:
+    """Call the step at ``address`` for the filter in ``record``; what it returns are the parts of ``record.z`` it used."""
+    signature = types.int64(types.int64, record, types.int64, types.float64, types.float64)
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        pointer, whole, real = ir.IntType(8).as_pointer(), ir.IntType(64), ir.DoubleType()
+        kind = ir.FunctionType(whole, [pointer, whole, real, real])
+        target = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(target, [builder.bitcast(arguments[1], pointer), *arguments[2:]])
+
+    return signature, generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
+    """Call the C function at ``address``, which returns nothing, with whole numbers of 64 bits; addresses are such."""
+    signature = types.void(types.int64, types.StarArgTuple.from_types((types.int64,) * len(arguments)))
+
+    def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        values = cgutils.unpack_tuple(builder, given[1])
+        kind = ir.FunctionType(ir.VoidType(), [value.type for value in values])
+        builder.call(builder.inttoptr(given[0], kind.as_pointer()), values)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pointer_to(_typing_context: Any, address: Any) -> Any:
+    """Return an address as a pointer, for ``carray``."""
+    def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        return builder.inttoptr(given[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.int64), generate
+
+
+@compiled
+def numbers_at(address: int, shape: Any) -> Array:
+    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns it keeps it alive."""
+    return carray(pointer_to(address), shape, np.float64)  # type: ignore[no-any-return]

@@ -1,0 +1,1 @@
+"""How fast the kit is, measured beside its peers; run by ``windwrench speed``."""

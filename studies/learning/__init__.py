@@ -1,0 +1,1 @@
+"""The learning study: policies trained and compared, and the leaderboard page."""

@@ -1,0 +1,222 @@
+"""The study behind the leaderboard: policies trained, everything scored on the same test episodes, step by step.
+
+Each step leaves a file, and a step whose file is there is not done again: a study that was stopped goes on where it was.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import FIRST_EXCEPTION, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, save_policy
+from windwrench.dynamics.effects import parse_setting
+from windwrench.envs.fan_tracking import FanTrackingEnv
+from windwrench.envs.watched_fan_tracking import scenario_env
+from windwrench.evaluation.benchmark import make_pilot
+from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
+from windwrench.runtime.errors import InputError, unknown_name
+from windwrench.runtime.workers import shared_dict, workers
+from windwrench.training.configuration import load_config
+from windwrench.training.train import Progress, read_progress, write_json
+
+Advance = Callable[[str, float], None]  # what is being done, and the share of it that is
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the study: a policy of one seed, or a hand-designed controller (``seed`` None)."""
+
+    name: str
+    group: str  # designed, learned or ablation
+    worlds: tuple[str, ...]
+    seed: int | None = None
+    algorithm: str = ""
+    scenario: str = ""
+    overrides: tuple[str, ...] = ()
+    ship: bool = False
+
+    @property
+    def file(self) -> str:
+        """Name of its files."""
+        words = "".join(c if c.isalnum() or c in "._-" else "-" for c in self.name)
+        return words if self.seed is None else f"{words}-{self.seed}"
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where a study keeps what."""
+
+    runs: Path  # training runs, with checkpoints; large, and of no use once a policy is scored
+    results: Path  # a small JSON file for each entry
+    policies: Path  # the policies that are shipped
+
+
+def load_plan(file: Path | None = None) -> dict[str, Any]:
+    """Return the plan of the study: ``study.yaml``, or a file like it.
+
+    Raises:
+        InputError: the file is missing or not of this form.
+    """
+    source = Path(__file__).with_name("study.yaml") if file is None else file
+    try:
+        plan = yaml.safe_load(source.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{source}: cannot be read as a study's plan: {error}") from error
+    missing = {"worlds", "episodes", "designed", "learned", "ablation"} - set(plan if isinstance(plan, dict) else ())
+    if missing:
+        raise InputError(f"{source}: a study's plan needs {', '.join(sorted(missing))} as well")
+    return dict(plan)
+
+
+def entries_of(plan: Mapping[str, Any], only: Sequence[str] = ()) -> list[Entry]:
+    """Return the lines of a study, in the order in which they are done: seed by seed.
+
+    Args:
+        plan: of ``load_plan``.
+        only: names of lines, groups, or single seeds such as sac-0; default: all.
+
+    Raises:
+        InputError: ``only`` names something that is not in the plan.
+    """
+    worlds = tuple(plan["worlds"])
+    entries = [Entry(name, "designed", worlds) for name in plan["designed"]]
+    for name, one in plan["learned"].items():
+        entries += [Entry(name, "learned", worlds, seed, one["algorithm"], one["scenario"], tuple(one.get("set", ())),
+                          bool(one.get("ship"))) for seed in range(one["seeds"])]
+    ablation = plan["ablation"]
+    changes = {ablation["reference"]: [], **ablation["changes"]} if ablation else {}
+    for name, extra in changes.items():
+        entries += [Entry(name, "ablation", tuple(ablation["worlds"]), seed, ablation["algorithm"], ablation["scenario"],
+                          (*ablation["set"], *extra)) for seed in range(ablation["seeds"])]
+    known = {e.name for e in entries} | {e.file for e in entries} | {"designed", "learned", "ablation"}
+    for name in only:
+        if name not in known:
+            raise unknown_name("part of the study", name, known, "--only")
+    return [e for e in entries if not only or e.name in only or e.group in only or e.file in only]
+
+
+def result_path(entry: Entry, places: Places) -> Path:
+    """Return where an entry's result is kept."""
+    return places.results / f"{entry.file}.json"
+
+
+def is_done(entry: Entry, plan: Mapping[str, Any], places: Places) -> bool:
+    """Whether an entry is trained and scored in all its worlds."""
+    path = result_path(entry, places)
+    if not path.exists():
+        return False
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    return all(len(kept["scores"].get(world, {}).get("rmse_m", ())) >= plan["episodes"] for world in entry.worlds)
+
+
+def train_entry(entry: Entry, places: Places, advance: Advance = lambda text, share: None) -> tuple[Path, Progress]:
+    """Train an entry's policy, or take up its training where it was left; return the best policy and how it went."""
+    assert entry.seed is not None
+    folder = places.runs / entry.file
+    config = load_config(entry.algorithm, entry.overrides)
+    done = read_progress(folder)
+    if done is None or not done.steps or done.steps[-1] < config["steps"]:
+        from windwrench.training.imitate import imitate
+        from windwrench.training.train import train
+
+        work = imitate if entry.algorithm == "imitation" else train
+        work(config, entry.scenario, entry.seed, folder,
+             advance=lambda steps: advance(f"{entry.file}: training", min(steps / config["steps"], 1.0)))
+        done = read_progress(folder)
+    assert done is not None
+    return folder / "best.npz", done
+
+
+def fly_world(pilot: Any, world: Mapping[str, Any], seeds: Sequence[int]) -> Iterator[tuple[float, bool]]:
+    """Yield RMSE (m) of the offset and whether the vehicle was lost, for each seed in a world of the plan."""
+    effects = [parse_setting(text) for text in world.get("effects", ())]
+    if effects or "estimator" in world:
+        env = FanTrackingEnv(world["scenario"], effects=effects, estimator=world.get("estimator", "ukf"))
+    else:
+        env = scenario_env(world["scenario"], pilot.features.sources if isinstance(pilot, TrainedPolicy) else frozenset())
+    for seed in seeds:
+        episode = fly_episode(env, pilot, seed)
+        yield episode.rmse, episode.lost
+
+
+def do_entry(entry: Entry, plan: Mapping[str, Any], places: Places, advance: Advance = lambda text, share: None) -> None:
+    """Train and score one entry, as far as that is not done; its result grows world by world."""
+    path = result_path(entry, places)
+    result: dict[str, Any] = {"name": entry.name, "group": entry.group, "seed": entry.seed, "scores": {}}
+    if entry.seed is None:
+        pilot = make_pilot(entry.name)
+    else:
+        shipped = places.policies / f"{entry.file}.npz"
+        if entry.ship and shipped.exists() and path.exists():
+            pilot = load_policy(shipped)
+        else:
+            best, progress = train_entry(entry, places, advance)
+            pilot = load_policy(best)
+            if entry.ship:
+                save_policy({k: v for k, v in pilot.card.items() if k != "sha256"}, pilot.weights, shipped)
+            result["training"] = {"steps": progress.steps, "rmse_m": progress.rmse_m, "lost": progress.lost,
+                                  "best": progress.best, "seconds": round(progress.seconds, 1)}
+        result |= {"algorithm": entry.algorithm, "scenario": entry.scenario, "overrides": list(entry.overrides),
+                   "sha256": pilot.card["sha256"]}
+    if path.exists():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept.get("sha256") == result.get("sha256"):  # else the scores are those of another policy
+            result = {**kept, **result, "scores": kept["scores"]}
+    for done, name in enumerate(entry.worlds):
+        if len(result["scores"].get(name, {}).get("rmse_m", ())) >= plan["episodes"]:
+            continue
+        rmse, lost = [], []
+        for value, gone in fly_world(pilot, plan["worlds"][name], benchmark_seeds(0, plan["episodes"])):
+            rmse.append(round(value, 6))
+            lost.append(int(gone))
+            advance(f"{entry.file}: {name}", (done + len(rmse) / plan["episodes"]) / len(entry.worlds))
+        result["scores"][name] = {"rmse_m": rmse, "lost": lost}
+        write_json(result, path)
+
+
+def read_results(places: Places) -> list[dict[str, Any]]:
+    """Return all results that there are."""
+    found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(places.results.glob("*.json"))]
+    return [r for r in found if isinstance(r, dict) and "scores" in r]
+
+
+def run_study(entries: Sequence[Entry], plan: Mapping[str, Any], places: Places, jobs: int,
+              report: Callable[[dict[str, tuple[str, float]], int], None] = lambda shares, done: None) -> int:
+    """Train and score what is not done yet, in ``jobs`` processes; return how many entries that were.
+
+    Args:
+        entries: of ``entries_of``.
+        plan: of ``load_plan``.
+        places: where everything is kept.
+        jobs: processes.
+        report: called now and then with what each entry in work is at, and how many are done.
+
+    Raises:
+        InputError: what training or scoring refuses.
+    """
+    waiting = [e for e in entries if not is_done(e, plan, places)]
+    with shared_dict({}) as shares, workers(min(jobs, max(len(waiting), 1))) as pool:
+        futures = {pool.submit(_work, e, plan, places, shares) for e in waiting}
+        open_ones = set(futures)
+        while open_ones:
+            finished, open_ones = wait(open_ones, timeout=0.5, return_when=FIRST_EXCEPTION)
+            for future in finished:
+                future.result()
+            report(dict(shares), len(futures) - len(open_ones))
+    return len(waiting)
+
+
+def _work(entry: Entry, plan: Mapping[str, Any], places: Places, shares: MutableMapping[str, Any]) -> None:
+    last = ("", -1.0)
+
+    def advance(text: str, share: float) -> None:
+        nonlocal last
+        if (now := (text, round(share, 2))) != last:  # the dictionary lies in another process
+            shares[entry.file] = last = now
+
+    do_entry(entry, plan, places, advance)
+    shares.pop(entry.file, None)

@@ -1,0 +1,1 @@
+"""Measured flights of public data sets, diagnosed."""

@@ -1,0 +1,1 @@
+"""Trials of the diagnosis: flights with a known cause, diagnosed and scored."""

@@ -1,0 +1,283 @@
+"""Disturbances outside the effect library: what a diagnosis must not blame on a named effect.
+
+Each is a small law of time, state and rotors that gives a force and a torque. Sizes are in proportion to the vehicle: a
+force in its weight, a torque in its weight times the arm. Where a law has a place (a wall, a column of rising air), the
+place is chosen from the set points of the flight, so that the vehicle comes there.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from windwrench.dynamics.rotation import matrix_of
+from windwrench.dynamics.vehicle import Vehicle
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.plant import TICK
+from windwrench.runtime.errors import unknown_name
+
+Array = NDArray[np.float64]
+
+
+class Moment(NamedTuple):
+    """The true state at which a law is asked."""
+
+    t: float  # s
+    position: Array  # (3,) m, world, of the geometric centre
+    velocity: Array  # (3,) m/s, world
+    rotation: Array  # (3, 3) body to world
+    rate: Array  # (3,) rad/s, body
+    speeds: Array  # (4,) rad/s, of the rotors
+
+
+# a wrench (6,): force in N and torque in Nm about the centre of mass, world frame
+Law = Callable[[Moment], Array]
+Maker = Callable[[Vehicle, np.random.Generator, Array], Law]
+
+
+def _at(force: Array, arm: Array) -> Array:
+    """Return the wrench (6,) of a force (3,) at ``arm`` (3,) m from the centre of mass, both in the world frame."""
+    (fx, fy, fz), (x, y, z) = force.tolist(), arm.tolist()
+    return np.array([fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
+
+
+def _force(force: Array) -> Array:
+    """Return the wrench (6,) of a force (3,) N at the centre of mass."""
+    wrench = np.zeros(6)
+    wrench[:3] = force
+    return wrench
+
+
+def _thrust_change(vehicle: Vehicle, m: Moment, change: Array) -> Array:
+    """Return the wrench (6,) of rotors whose thrust changes by ``change`` (4,) N, and their drag torque in proportion."""
+    arms = vehicle.positions - vehicle.com
+    torque = np.array([arms[:, 1] @ change, -arms[:, 0] @ change, -(vehicle.spin * vehicle.p / vehicle.k) @ change])
+    return np.concatenate([m.rotation[:, 2] * change.sum(), m.rotation @ torque])
+
+
+def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """Irregular pushes of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in the mean, anywhere on the hull."""
+    start, end, force, point = 0.0, 0.0, np.zeros(3), np.zeros(3)
+
+    def law(m: Moment) -> Array:
+        nonlocal start, end, force, point
+        if m.t >= end:
+            start = m.t + rng.exponential(1.5)
+            end = start + rng.uniform(0.2, 1.0)
+            direction = rng.standard_normal(3)
+            force = rng.uniform(0.05, 0.13) * vehicle.weight * direction / np.linalg.norm(direction)
+            point = rng.uniform(-0.3, 0.3, 3) * vehicle.arm_l
+        return _at(force, m.rotation @ point) if m.t >= start else np.zeros(6)
+
+    return law
+
+
+def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """An elastic tether from a point on the floor to a leg: slack up to a length, then 0.25 weights a metre, 0.25 at most."""
+    anchor = np.array([*path[:, :2].mean(axis=0), 0.0])
+    slack = float(np.quantile(np.linalg.norm(path - anchor, axis=1), 0.3))
+    leg = np.array([-0.3, 0.3, 0.0]) * vehicle.arm_l
+
+    def law(m: Moment) -> Array:
+        reach = anchor - m.position
+        length = math.sqrt(reach @ reach)
+        pull = vehicle.weight * min(max(0.25 * (length - slack), 0.0), 0.25)
+        return _at(pull / max(length, 1e-6) * reach, m.rotation @ leg)
+
+    return law
+
+
+def wall_attraction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A wall across x just beyond the flight draws the vehicle on with 0.02 weights m2 / d^2, as from d = 0.4 m within it."""
+    wall = float(path[:, 0].max()) + 0.4
+
+    def law(m: Moment) -> Array:
+        away = wall - m.position[0]
+        return _force(np.array([math.copysign(0.02 * vehicle.weight / max(abs(away), 0.4) ** 2, away), 0.0, 0.0]))
+
+    return law
+
+
+def dry_friction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A force of 0.04 weights against the direction of travel, whatever the speed; it fades in up to 5 cm/s."""
+    def law(m: Moment) -> Array:
+        return _force(-0.04 * vehicle.weight / math.sqrt(m.velocity @ m.velocity + 0.05**2) * m.velocity)
+
+    return law
+
+
+def cubic_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A drag that grows with the cube of the speed: 0.006 weights at 1 m/s, a quarter of the weight at most."""
+    def law(m: Moment) -> Array:
+        square = float(m.velocity @ m.velocity)
+        scale = min(0.006 * square, 0.25 / max(math.sqrt(square), 1e-6))
+        return _force(-scale * vehicle.weight * m.velocity)
+
+    return law
+
+
+def magnus_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A side force on a body that turns in yaw as it moves: 0.02 weights at 1 rad/s and 1 m/s, along yaw rate x velocity."""
+    def law(m: Moment) -> Array:
+        turn = 0.02 * vehicle.weight * float(m.rotation[2] @ m.rate)
+        return _force(np.array([-turn * m.velocity[1], turn * m.velocity[0], 0.0]))
+
+    return law
+
+
+def patchy_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A linear drag in one half of the room only, and most with the nose along one wall: 0.08 weights at 1 m/s at most."""
+    middle, heading = float(np.median(path[:, 0])), rng.uniform(-math.pi, math.pi)
+
+    def law(m: Moment) -> Array:
+        yaw = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
+        share = 0.25 * (1.0 + math.cos(yaw - heading)) * (1.0 + math.tanh((m.position[0] - middle) / 0.2))
+        return _force(-0.08 * vehicle.weight * share * m.velocity)
+
+    return law
+
+
+def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A column of rising air, 0.35 m in radius (one sigma), lifts with up to 0.12 weights, each rotor in its own draught."""
+    centre, rotors = path[rng.integers(len(path)), :2], vehicle.positions - vehicle.com
+
+    def law(m: Moment) -> Array:
+        arms = rotors @ m.rotation.T
+        away = m.position[:2] + arms[:, :2] - centre
+        lift = 0.03 * vehicle.weight * np.exp(-0.5 / 0.35**2 * (away * away).sum(axis=1))
+        return np.array([0.0, 0.0, lift.sum(), arms[:, 1] @ lift, -(arms[:, 0] @ lift), 0.0])
+
+    return law
+
+
+def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A flywheel about body z: the torque -omega x h of its precession, 0.015 weights times the arm at 1 rad/s of roll."""
+    spin = 0.015 * vehicle.weight * vehicle.arm_l * rng.choice([-1.0, 1.0])
+
+    def law(m: Moment) -> Array:
+        torque = np.array([-m.rate[1] * spin, m.rate[0] * spin, 0.0])
+        return np.concatenate([np.zeros(3), m.rotation @ torque])
+
+    return law
+
+
+def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A long level tank along the nose holds a tenth of the mass in liquid, already weighed, that sloshes at 1.2 Hz.
+
+    With s where the liquid is in the tank and a the vehicle's acceleration along it, s'' = -a - w^2 s - 2 zeta w s' and the
+    tank feels m (w^2 s + 2 zeta w s') along itself, a third of an arm below the centre; zeta is 0.05.
+    """
+    mass, w, zeta = 0.1 * vehicle.mass, 2.0 * math.pi * 1.2, 0.05
+    place, speed, last = 0.0, 0.0, np.zeros(3)
+
+    def law(m: Moment) -> Array:
+        nonlocal place, speed, last
+        ahead = np.array([m.rotation[0, 0], m.rotation[1, 0], 0.0])
+        ahead /= max(math.hypot(ahead[0], ahead[1]), 1e-6)
+        spring = w * w * place + 2.0 * zeta * w * speed
+        speed -= TICK * (spring + float((m.velocity - last) @ ahead) / TICK)
+        place += TICK * speed
+        last = m.velocity
+        return _at(mass * spring * ahead, m.rotation @ np.array([0.0, 0.0, -0.3 * vehicle.arm_l]))
+
+    return law
+
+
+def rotor_dropouts(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """Rotor 2 now and then loses a tenth of its thrust for 0.3 s, 0.8 s apart in the mean."""
+    start = rng.exponential(0.8)
+
+    def law(m: Moment) -> Array:
+        nonlocal start
+        if m.t >= start + 0.3:
+            start = m.t + rng.exponential(0.8)
+        if m.t < start:
+            return np.zeros(6)
+        return _thrust_change(vehicle, m, np.array([0.0, -0.1 * vehicle.k[1] * m.speeds[1] ** 2, 0.0, 0.0]))
+
+    return law
+
+
+def vortex_ring(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A descent faster than 0.3 m/s into the own wash costs thrust, 15 % for each m/s beyond, up to 10 %, and buffets."""
+    buffet = np.zeros(4)
+    keep = math.exp(-TICK / 0.1)
+
+    def law(m: Moment) -> Array:
+        nonlocal buffet
+        buffet = keep * buffet + math.sqrt(1.0 - keep * keep) * 0.4 * rng.standard_normal(4)
+        loss = min(max(0.15 * (-m.velocity[2] - 0.3), 0.0), 0.1)
+        return _thrust_change(vehicle, m, -loss * (1.0 + buffet) * vehicle.k * m.speeds**2)
+
+    return law
+
+
+def periodic_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """A sine of 0.5 Hz and 0.05 weights along one direction of the world."""
+    direction, phase = rng.standard_normal(3), rng.uniform(0.0, 2.0 * math.pi)
+    force = 0.05 * vehicle.weight * direction / np.linalg.norm(direction)
+
+    def law(m: Moment) -> Array:
+        return _force(math.sin(math.pi * m.t + phase) * force)
+
+    return law
+
+
+def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its turn rate promises."""
+    knee = 1.1 * vehicle.weight / 4.0
+
+    def law(m: Moment) -> Array:
+        return _thrust_change(vehicle, m, -0.3 * np.maximum(vehicle.k * m.speeds**2 - knee, 0.0))
+
+    return law
+
+
+def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+    """The trim walks at random as things warm up: in 20 s by 0.02 weights times the arm in roll and pitch, a third in yaw."""
+    step = 0.02 * vehicle.weight * vehicle.arm_l * math.sqrt(TICK / 20.0) * np.array([1.0, 1.0, 0.3])
+    torque = np.zeros(3)
+
+    def law(m: Moment) -> Array:
+        nonlocal torque
+        torque = torque + step * rng.standard_normal(3)
+        return np.concatenate([np.zeros(3), m.rotation @ torque])
+
+    return law
+
+
+OUTSIDERS: dict[str, Maker] = {
+    law.__name__: law for law in (
+        contact_pushes, tether, wall_attraction, dry_friction, cubic_drag, magnus_force, patchy_drag, thermal_column,
+        flywheel, sloshing, rotor_dropouts, vortex_ring, periodic_force, thrust_saturation, torque_drift)
+}
+
+
+def outside_push(name: str, vehicle: Vehicle, rng: np.random.Generator, path: Array,
+                 size: float = 1.0) -> Callable[[ClosedLoop], Array]:
+    """Return what gives a loop its wrench (6,) of a disturbance at each tick.
+
+    Args:
+        name: one of ``OUTSIDERS``.
+        vehicle: that flies.
+        rng: of what the disturbance draws at random.
+        path: set points (n, 3) m of the flight, near which it has its place.
+        size: factor on the wrench.
+
+    Raises:
+        InputError: no disturbance has this name.
+    """
+    if name not in OUTSIDERS:
+        raise unknown_name("disturbance", name, OUTSIDERS)
+    return pushing(OUTSIDERS[name](vehicle, rng, path), size)
+
+
+def pushing(law: Law, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
+    """Return what gives a loop its wrench (6,) of a law at each tick, times ``size``."""
+    def push(loop: ClosedLoop) -> Array:
+        return size * law(Moment(loop.time, loop.position, loop.velocity.copy(), matrix_of(loop.quaternion),
+                                 loop.data.qvel[3:6], loop.record[0]["plant"]["speeds"]))
+
+    return push

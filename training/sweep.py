@@ -1,0 +1,103 @@
+"""A sweep: many training runs, on one machine or spread over several with Ray.
+
+Every run is the same run wherever it is done: its seed fixes it, and it goes on from its own checkpoint when the machine or
+process that did it is lost. On a cluster of several machines the results' folder must lie where all of them see it.
+"""
+
+import itertools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..runtime.cluster import RETRIES, connected
+from ..runtime.errors import InputError
+from .configuration import Config, load_config
+
+
+@dataclass(frozen=True)
+class Job:
+    """One training run of a sweep."""
+
+    name: str  # of its folder
+    config: Config
+    scenario: str
+    seed: int
+
+
+def jobs_of(algorithm: str, scenario: str, seeds: Sequence[int], overrides: Sequence[str], search: Sequence[str],
+            file: Path | None = None) -> list[Job]:
+    """Return the runs of a sweep: every combination of the values searched, with every seed.
+
+    Args:
+        algorithm: of the runs.
+        scenario: scenario or tier.
+        seeds: of the runs.
+        overrides: ``KEY=VALUE``, the same for all.
+        search: ``KEY=VALUE|VALUE|...``.
+        file: a configuration file.
+
+    Raises:
+        InputError: a key or value that does not exist, or nothing to choose from.
+    """
+    axes = []
+    for text in search:
+        key, equals, values = text.partition("=")
+        choices = [v for v in values.split("|") if v.strip()]
+        if not equals or len(choices) < 2:
+            raise InputError(f"--search {text}: expected KEY=VALUE|VALUE|..., such as learner.gamma=0.9|0.95|0.98")
+        axes.append([f"{key}={value.strip()}" for value in choices])
+    jobs = []
+    for chosen in itertools.product(*axes):
+        config = load_config(algorithm, [*overrides, *chosen], file)
+        label = "".join(f"{_words(setting)}-" for setting in chosen)
+        jobs += [Job(f"{label}seed-{seed}", config, scenario, seed) for seed in seeds]
+    return jobs
+
+
+def _words(setting: str) -> str:
+    """Return a setting as part of a folder's name."""
+    key, _, value = setting.partition("=")
+    return f"{key.rpartition('.')[2]}-{'-'.join(re.findall(r'[A-Za-z0-9_.]+', value))}"
+
+
+def run_job(job: Job, folder: Path) -> dict[str, Any]:
+    """Do one run in its folder, or go on with it; return what it was worth."""
+    from .train import read_progress, train
+
+    path = train(job.config, job.scenario, job.seed, folder / job.name)
+    done = read_progress(folder / job.name)
+    assert done is not None
+    return {"run": job.name, "policy": str(path), "validation_rmse_m": done.best_rmse, "seconds": done.seconds}
+
+
+def run_jobs(jobs: Sequence[Job], folder: Path, address: str) -> list[dict[str, Any]]:
+    """Do the runs of a sweep with Ray Tune; return what each was worth, in their order.
+
+    A run whose process or machine is lost is taken up again elsewhere, from its last checkpoint.
+
+    Raises:
+        InputError: as ``connected``, or a run failed for good.
+    """
+    with connected(address):
+        from ray import tune
+
+        by_name = {job.name: job for job in jobs}
+        root = folder.resolve()
+
+        def trial(space: dict[str, Any]) -> None:
+            tune.report(run_job(by_name[space["run"]], root))
+
+        tuner = tune.Tuner(
+            tune.with_resources(trial, {"cpu": 1}),
+            param_space={"run": tune.grid_search(list(by_name))},
+            run_config=tune.RunConfig(name="ray", storage_path=str(root), verbose=0,
+                                      failure_config=tune.FailureConfig(max_failures=RETRIES)),
+        )
+        grid = tuner.fit()
+    if grid.errors:
+        raise InputError(f"--cluster {address}: {len(grid.errors)} of {len(jobs)} runs failed: {grid.errors[0]}")
+    found = {result.metrics["run"]: {k: result.metrics[k] for k in ("run", "policy", "validation_rmse_m", "seconds")}
+             for result in grid}
+    return [found[job.name] for job in jobs]
