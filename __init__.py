@@ -9,7 +9,9 @@ from .runtime.moved_modules import keep_old_paths
 
 __version__ = "0.1.0"
 
-if "windwrench/FanTracking-v0" not in gymnasium.registry:  # pytest imports this file a second time, as a folder's
+if (
+    "windwrench/FanTracking-v0" not in gymnasium.registry
+):  # pytest imports this file a second time, as a folder's
     gymnasium.register(
         id="windwrench/FanTracking-v0",
         entry_point="windwrench.envs.fan_tracking:FanTrackingEnv",

@@ -31,10 +31,15 @@ class _Commands(TyperGroup):
 
 
 app = typer.Typer(
-    name="windwrench", cls=_Commands, no_args_is_help=True, add_completion=True, rich_markup_mode=None,
+    name="windwrench",
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=True,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    epilog="Exit codes: 0 done; 1 a fault of windwrench itself, with its traceback; 2 a mistake in what was asked or in a "
-           "file, with one line that names it; 130 interrupted. NO_COLOR=1 switches colours off.",
+    epilog="Exit codes: 0 done; 1 a fault of windwrench itself, with its traceback; 2 a mistake in "
+    "what was asked or in a "
+    "file, with one line that names it; 130 interrupted. NO_COLOR=1 switches colours off.",
 )
 _INTERRUPTED = 130
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
@@ -48,15 +53,31 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def windwrench(
-    version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Print the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_version, help="Print the version.")
+    ] = False,
 ) -> None:
-    """A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the wrench on a flight log.
+    """A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the
+    wrench on a flight log.
 
     Example: windwrench fly --scenario base --seed 4
     """
 
 
-for command in (fly, benchmark, estimate, diagnose, record, replay, reproduce, speed, effects, train, imitate, tune):
+for command in (
+    fly,
+    benchmark,
+    estimate,
+    diagnose,
+    record,
+    replay,
+    reproduce,
+    speed,
+    effects,
+    train,
+    imitate,
+    tune,
+):
     app.command(command_name(command))(as_command(command))
 for command in (trials, real_flights, close_loop, leaderboard):
     app.command(command_name(command), hidden=not has_studies())(as_command(command))
@@ -69,7 +90,13 @@ def main() -> None:
     except (InputError, _UsageError) as error:
         text = str(error) if isinstance(error, InputError) else error.format_message()
         # what a parser says may take several lines
-        errors.print(f"error: {' '.join(text.split())}", style="red", highlight=False, soft_wrap=True, markup=False)
+        errors.print(
+            f"error: {' '.join(text.split())}",
+            style="red",
+            highlight=False,
+            soft_wrap=True,
+            markup=False,
+        )
         sys.exit(2)
     except (KeyboardInterrupt, typer.Abort):
         code = _INTERRUPTED

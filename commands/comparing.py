@@ -23,20 +23,28 @@ from .terminal import (
 
 @expensive
 def benchmark(
-    controllers: Annotated[str, typer.Option(
-        help="Names, paths of trained policies, or FILE.py:CLASS, with commas.",
-        autocompletion=offering(controller_names))] = "hover,admittance,ratio,oracle",
-    scenarios: Annotated[str, typer.Option(
-        help="Names, with commas.", autocompletion=offering(scenario_names))] = "static,base",
+    controllers: Annotated[
+        str,
+        typer.Option(
+            help="Names, paths of trained policies, or FILE.py:CLASS, with commas.",
+            autocompletion=offering(controller_names),
+        ),
+    ] = "hover,admittance,ratio,oracle",
+    scenarios: Annotated[
+        str, typer.Option(help="Names, with commas.", autocompletion=offering(scenario_names))
+    ] = "static,base",
     episodes: Annotated[int, typer.Option(min=1, help="Paired episodes a scenario.")] = 40,
     seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    cluster: Annotated[str | None, typer.Option(help="Fly on a Ray cluster: its address, or local.")] = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="Fly on a Ray cluster: its address, or local.")
+    ] = None,
     out: Out = Path("results/benchmark"),
 ) -> dict[str, Any]:
     """Fly controllers through the same episodes; write the leaderboard.
 
-    Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast --episodes 40
+    Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast
+    --episodes 40
     """
     from ..evaluation.benchmark import (
         check_request,
@@ -49,33 +57,69 @@ def benchmark(
 
     names, worlds = names_in(controllers, "--controllers"), names_in(scenarios, "--scenarios")
     check_request(names, worlds, episodes, seed)
-    folder = results_folder(out, controllers=names, scenarios=worlds, flights=count_flights(names, worlds, episodes), jobs=jobs)
+    folder = results_folder(
+        out,
+        controllers=names,
+        scenarios=worlds,
+        flights=count_flights(names, worlds, episodes),
+        jobs=jobs,
+    )
     with progress_bar() as progress:
         task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
-        results = fly_all(names, worlds, episodes, seed, jobs, lambda count: progress.advance(task, count), cluster)
+        results = fly_all(
+            names,
+            worlds,
+            episodes,
+            seed,
+            jobs,
+            lambda count: progress.advance(task, count),
+            cluster,
+        )
     rows = leaderboard(results, names, seed)
     path = write_leaderboard(rows, folder)
     draw_leaderboard(rows, results, folder / "leaderboard.png")
-    table = Table("scenario", "controller", "RMSE (m), 95 %", "median", "lost", "score", "wins*", box=box.SIMPLE_HEAD)
+    table = Table(
+        "scenario",
+        "controller",
+        "RMSE (m), 95 %",
+        "median",
+        "lost",
+        "score",
+        "wins*",
+        box=box.SIMPLE_HEAD,
+    )
     for i, row in enumerate(rows):
         low, high = row.rmse_ci95_m
         last = i + 1 == len(rows) or rows[i + 1].scenario != row.scenario
-        table.add_row(row.scenario, row.controller, f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
-                      f"{row.median_rmse_m:.3f}", f"{row.lost_fraction:.1%}", f"{row.score:.2f}",
-                      f"{row.wins_over_admittance:.1%}", end_section=last)
+        table.add_row(
+            row.scenario,
+            row.controller,
+            f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
+            f"{row.median_rmse_m:.3f}",
+            f"{row.lost_fraction:.1%}",
+            f"{row.score:.2f}",
+            f"{row.wins_over_admittance:.1%}",
+            end_section=last,
+        )
     console.print(table)
-    console.print(f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over admittance",
-                  highlight=False)
+    console.print(
+        f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over "
+        f"admittance",
+        highlight=False,
+    )
     say(path, folder / "leaderboard.png")
     return {"leaderboard": rows}
 
 
 def speed(
     rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
-    hour: Annotated[bool, typer.Option("--hour", help="Also diagnose a log of an hour (some minutes).")] = False,
+    hour: Annotated[
+        bool, typer.Option("--hour", help="Also diagnose a log of an hour (some minutes).")
+    ] = False,
     markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
 ) -> dict[str, Any]:
-    """Measure a filter step, flights against real time, growth and start-up, beside peers that are installed.
+    """Measure a filter step, flights against real time, growth and start-up, beside peers that are
+    installed.
 
     Example: windwrench speed --rounds 7
     """
@@ -98,8 +142,15 @@ def speed(
         progress.update(task, total=rounds * len(contenders))
         figures = measure(contenders, rounds, lambda: progress.advance(task))
         progress.update(task, description="growth and profile", total=None)
-        sections = [*profiles(rounds), over_threads(rounds), over_vehicles(rounds), over_steps(), over_formats(rounds),
-                    over_logs((60.0, 600.0, 3600.0) if hour else (60.0, 600.0)), cold_start()]
+        sections = [
+            *profiles(rounds),
+            over_threads(rounds),
+            over_vehicles(rounds),
+            over_steps(),
+            over_formats(rounds),
+            over_logs((60.0, 600.0, 3600.0) if hour else (60.0, 600.0)),
+            cold_start(),
+        ]
     if markdown is not None:
         write_markdown(figures, rounds, markdown, sections, " --hour" if hour else "")
     table = Table(*HEADER[:-1], box=box.SIMPLE_HEAD)
@@ -114,6 +165,10 @@ def speed(
         console.print(section.words, highlight=False)
     if markdown is not None:
         say(markdown)
-    return {"figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
-            "sections": {section.title: [dict(zip(section.header, row, strict=True)) for row in section.rows]
-                         for section in sections}}
+    return {
+        "figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
+        "sections": {
+            section.title: [dict(zip(section.header, row, strict=True)) for row in section.rows]
+            for section in sections
+        },
+    }

@@ -19,23 +19,39 @@ body, *sensing* changes what the log holds. World z is up; body x points forward
 
 
 def effects_page() -> str:
-    """Return the page (Markdown) of all effects: law, coefficients, sizes, sources, and what tells them apart."""
-    parts = [_HEAD, "| effect | kind | coefficients | easily confused with |\n| --- | --- | --- | --- |\n"]
+    """Return the page (Markdown) of all effects: law, coefficients, sizes, sources, and what tells
+    them apart.
+    """
+    parts = [
+        _HEAD,
+        "| effect | kind | coefficients | easily confused with |\n| --- | --- | --- | --- |\n",
+    ]
     for name in names():
         effect = get(name)
-        parts.append(f"| [{name}](#{name}) | {effect.kind} | {', '.join(c.name for c in effect.coefficients)} | "
-                     f"{', '.join(effect.confused_with)} |\n")
+        parts.append(
+            f"| [{name}](#{name}) | {effect.kind} | "
+            f"{', '.join(c.name for c in effect.coefficients)} | "
+            f"{', '.join(effect.confused_with)} |\n"
+        )
     for name in names():
         effect = get(name)
         law = law_in_words(name).replace("``", "`")
-        parts.append(f"\n## {name}\n\n{law}\n\nKind: {effect.kind}.\n\n"
-                     "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
-                     "| --- | --- | --- | --- | --- | --- |\n")
+        parts.append(
+            f"\n## {name}\n\n{law}\n\nKind: {effect.kind}.\n\n"
+            "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
+            "| --- | --- | --- | --- | --- | --- |\n"
+        )
         for c in effect.coefficients:
-            parts.append(f"| {c.name} | {c.unit} | {c.typical[0]:g} | {c.typical[1]:g} | {_span(c.minimum, c.maximum)} | "
-                         f"{c.meaning} |\n")
-        parts.append(f"\nSource: {effect.source}.\n\nEasily confused with: {', '.join(effect.confused_with)}.\n\n"
-                     f"What tells it apart: {effect.excitation}.\n")
+            parts.append(
+                f"| {c.name} | {c.unit} | {c.typical[0]:g} | {c.typical[1]:g} | "
+                f"{_span(c.minimum, c.maximum)} | "
+                f"{c.meaning} |\n"
+            )
+        parts.append(
+            f"\nSource: {effect.source}.\n\nEasily confused with: "
+            f"{', '.join(effect.confused_with)}.\n\n"
+            f"What tells it apart: {effect.excitation}.\n"
+        )
     return "".join(parts)
 
 

@@ -26,19 +26,43 @@ from .terminal import (
 
 
 def fly(
-    scenario: Annotated[str, typer.Option(help="static, base, fast, slow-filter, noisy, gusty, far or varied.",
-                                         autocompletion=offering(scenario_names))] = "base",
-    controller: Annotated[str, typer.Option(help="hover, admittance, ratio, oracle ..., a policy's path, or FILE.py:CLASS.",
-                                           autocompletion=offering(controller_names))] = "admittance",
+    scenario: Annotated[
+        str,
+        typer.Option(
+            help="static, base, fast, slow-filter, noisy, gusty, far or varied.",
+            autocompletion=offering(scenario_names),
+        ),
+    ] = "base",
+    controller: Annotated[
+        str,
+        typer.Option(
+            help="hover, admittance, ratio, oracle ..., a policy's path, or FILE.py:CLASS.",
+            autocompletion=offering(controller_names),
+        ),
+    ] = "admittance",
     seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
     vehicle: VehicleOption = "ardrone2",
-    effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect NAME:coef=value of the true vehicle.",
-                                                       autocompletion=offering(effect_names))] = None,
-    video: Annotated[bool, typer.Option("--video", help="Also write fly.mp4 (video extra), and the last picture.")] = False,
-    gif: Annotated[bool, typer.Option("--gif", help="Also write fly.gif, and the last picture.")] = False,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Undeclared effect NAME:coef=value of the true vehicle.",
+            autocompletion=offering(effect_names),
+        ),
+    ] = None,
+    video: Annotated[
+        bool,
+        typer.Option("--video", help="Also write fly.mp4 (video extra), and the last picture."),
+    ] = False,
+    gif: Annotated[
+        bool, typer.Option("--gif", help="Also write fly.gif, and the last picture.")
+    ] = False,
     film_seconds: Annotated[float, typer.Option(min=0.1, help="Longest film.")] = 20.0,
-    rrd: Annotated[bool, typer.Option("--rrd", help="Also write fly.rrd for the Rerun viewer (rerun extra).")] = False,
-    view: Annotated[bool, typer.Option("--view", help="Show it in a window while it flies.")] = False,
+    rrd: Annotated[
+        bool, typer.Option("--rrd", help="Also write fly.rrd for the Rerun viewer (rerun extra).")
+    ] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show it in a window while it flies.")
+    ] = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
     """Fly one episode in the jet; write a picture of it.
@@ -56,16 +80,24 @@ def fly(
 
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     if view and kinds:
-        raise InputError("--view shows the flight in a window; expected it without --video and --gif")
+        raise InputError(
+            "--view shows the flight in a window; expected it without --video and --gif"
+        )
     pilot = make_pilot(controller)
     mode = "rgb_array" if kinds else "human" if view else None
-    env = FanTrackingEnv(scenario, mode, vehicle, [parse_setting(e) for e in effect or []], width=960, height=640)
+    env = FanTrackingEnv(
+        scenario, mode, vehicle, [parse_setting(e) for e in effect or []], width=960, height=640
+    )
     folder = results_folder(out)
     poses: list[Any] = []
     with progress_bar() as progress, ExitStack() as films:
         task = progress.add_task("flying", total=DECISIONS)
-        open_films = [films.enter_context(Film(folder / f"fly.{kind}", env.width, env.height, longest=film_seconds))
-                      for kind in kinds]
+        open_films = [
+            films.enter_context(
+                Film(folder / f"fly.{kind}", env.width, env.height, longest=film_seconds)
+            )
+            for kind in kinds
+        ]
 
         def each() -> None:
             progress.advance(task)
@@ -88,34 +120,68 @@ def fly(
         from ..envs.rerun_export import write_rrd
 
         pose, seen = np.array(poses), episode.observation
-        flight = Flight(episode.time, pose[:, :3], pose[:, 3:], seen[:, 0:3], seen[:, 3:6], episode.force, episode.torque,
-                        episode.fan_y)
+        flight = Flight(
+            episode.time,
+            pose[:, :3],
+            pose[:, 3:],
+            seen[:, 0:3],
+            seen[:, 3:6],
+            episode.force,
+            episode.torque,
+            episode.fan_y,
+        )
         write_rrd(flight, env.truth, folder / "fly.rrd")
         written.append(folder / "fly.rrd")
     draw_episode(episode, f"{controller}, {scenario}", folder / "fly.png")
-    table = Table("controller", "scenario", "fan", "RMSE (m)", "lost", "reward", box=box.SIMPLE_HEAD)
-    table.add_row(controller, scenario, episode.motion, f"{episode.rmse:.3f}", "yes" if episode.lost else "no",
-                  f"{episode.total_reward:.1f}")
+    table = Table(
+        "controller", "scenario", "fan", "RMSE (m)", "lost", "reward", box=box.SIMPLE_HEAD
+    )
+    table.add_row(
+        controller,
+        scenario,
+        episode.motion,
+        f"{episode.rmse:.3f}",
+        "yes" if episode.lost else "no",
+        f"{episode.total_reward:.1f}",
+    )
     console.print(table)
     say(*written)
-    return {"controller": controller, "scenario": scenario, "fan": episode.motion, "rmse_m": episode.rmse,
-            "lost": episode.lost, "reward": episode.total_reward}
+    return {
+        "controller": controller,
+        "scenario": scenario,
+        "fan": episode.motion,
+        "rmse_m": episode.rmse,
+        "lost": episode.lost,
+        "reward": episode.total_reward,
+    }
 
 
 def record(
-    out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path("results/flight.csv"),
+    out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path(
+        "results/flight.csv"
+    ),
     vehicle: VehicleOption = "ardrone2",
-    effect: Annotated[list[str] | None, typer.Option(help="Undeclared effect, NAME or NAME:coef=value,...",
-                                                       autocompletion=offering(effect_names))] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Undeclared effect, NAME or NAME:coef=value,...",
+            autocompletion=offering(effect_names),
+        ),
+    ] = None,
     trajectory: Annotated[
-        str, typer.Option(help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, shake or jet.")
+        str,
+        typer.Option(
+            help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, shake or "
+            "jet."
+        ),
     ] = "excite",
     seconds: Annotated[float, typer.Option(help="Length of the flight.")] = 60.0,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random on the flight.")] = 0,
 ) -> dict[str, Any]:
     """Fly a vehicle with effects that it does not declare; write a flight log.
 
-    Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out drag.csv
+    Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out
+    drag.csv
     """
     from ..dynamics.effects import parse_setting
     from ..dynamics.vehicle_file import load_vehicle
@@ -128,12 +194,27 @@ def record(
     file_kind(out)
     with working(f"flying {seconds:g} s") as progress:
         columns = record_flight(model, effects, trajectory, seconds, seed, report=progress)
-    log = FlightLog(columns["t"], columns["position"], columns["quaternion"], columns["rotor_speeds"],
-                    columns.get("voltage"), columns["force"], columns["torque"], name=out.stem)
+    log = FlightLog(
+        columns["t"],
+        columns["position"],
+        columns["quaternion"],
+        columns["rotor_speeds"],
+        columns.get("voltage"),
+        columns["force"],
+        columns["torque"],
+        name=out.stem,
+    )
     write_log(log, out)
     run.record = out.with_name(f"{log_name(out)}.run.json")
-    console.print(f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
-                  f"{', '.join(e.name for e in effects) or 'no undeclared effect'}", highlight=False)
+    console.print(
+        f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
+        f"{', '.join(e.name for e in effects) or 'no undeclared effect'}",
+        highlight=False,
+    )
     say(out)
-    return {"samples": len(log.t), "vehicle": model.name, "trajectory": trajectory,
-            "effects": {e.name: dict(e.coefficients) for e in effects}}
+    return {
+        "samples": len(log.t),
+        "vehicle": model.name,
+        "trajectory": trajectory,
+        "effects": {e.name: dict(e.coefficients) for e in effects},
+    }

@@ -27,28 +27,56 @@ def world_names() -> list[str]:
     return [*SCENARIOS, *TIERS]
 
 
-Scenario = Annotated[str, typer.Option("--scenario", help="A scenario, or the tier wide, which mixes them all.",
-                                       autocompletion=offering(world_names))]
+Scenario = Annotated[
+    str,
+    typer.Option(
+        "--scenario",
+        help="A scenario, or the tier wide, which mixes them all.",
+        autocompletion=offering(world_names),
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the training run.")]
-Steps = Annotated[int | None, typer.Option("--steps", min=1, help="Decisions to fly; default: the configuration's.")]
-Settings = Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE of the configuration, such as "
-                                                                  "learner.gamma=0.98; may be repeated.")]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML file of keys in place of the configuration's own.")]
+Steps = Annotated[
+    int | None,
+    typer.Option("--steps", min=1, help="Decisions to fly; default: the configuration's."),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", help="KEY=VALUE of the configuration, such as learner.gamma=0.98; may be repeated."
+    ),
+]
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option("--config", help="YAML file of keys in place of the configuration's own."),
+]
 
 
 @expensive
 def train(
-    algorithm: Annotated[str, typer.Argument(help="sac, ppo, recurrent-ppo or td3.",
-                                             autocompletion=offering(algorithm_names))],
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            help="sac, ppo, recurrent-ppo or td3.", autocompletion=offering(algorithm_names)
+        ),
+    ],
     scenario: Scenario = "base",
     seed: Seed = 0,
     steps: Steps = None,
     setting: Settings = None,
     config: ConfigFile = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs, with this many seeds from --seed on, each in a folder of its own.")
-                     ] = 1,
-    search: Annotated[list[str] | None, typer.Option(help="KEY=VALUE|VALUE|...: a run for each; may be repeated.")] = None,
-    cluster: Annotated[str | None, typer.Option(help="Spread the runs over a Ray cluster: its address, or local.")] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Runs, with this many seeds from --seed on, each in a folder of its own."
+        ),
+    ] = 1,
+    search: Annotated[
+        list[str] | None, typer.Option(help="KEY=VALUE|VALUE|...: a run for each; may be repeated.")
+    ] = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="Spread the runs over a Ray cluster: its address, or local.")
+    ] = None,
     out: Out = Path("results/train"),
 ) -> dict[str, Any]:
     """Train a policy; a run that was killed goes on where its last checkpoint is.
@@ -64,14 +92,33 @@ def train(
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
     if seeds > 1 or search or cluster:
-        return _sweep(algorithm, scenario, range(seed, seed + seeds), steps, setting, search or [], config, cluster, out)
+        return _sweep(
+            algorithm,
+            scenario,
+            range(seed, seed + seeds),
+            steps,
+            setting,
+            search or [],
+            config,
+            cluster,
+            out,
+        )
     from ..training.train import train as work
 
     return _learn(work, algorithm, scenario, seed, steps, setting, config, out)
 
 
-def _sweep(algorithm: str, scenario: str, seeds: range, steps: int | None, setting: list[str] | None, search: list[str],
-           config: Path | None, cluster: str | None, out: Path) -> dict[str, Any]:
+def _sweep(
+    algorithm: str,
+    scenario: str,
+    seeds: range,
+    steps: int | None,
+    setting: list[str] | None,
+    search: list[str],
+    config: Path | None,
+    cluster: str | None,
+    out: Path,
+) -> dict[str, Any]:
     from ..runtime.extras import need
     from ..training.sweep import jobs_of, run_job, run_jobs
     from ..training.training_envs import check_world
@@ -108,7 +155,8 @@ def imitate(
     config: ConfigFile = None,
     out: Out = Path("results/imitate"),
 ) -> dict[str, Any]:
-    """Learn what the oracle commands from what a policy may see (DAgger): the bound on this observation.
+    """Learn what the oracle commands from what a policy may see (DAgger): the bound on this
+    observation.
 
     Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
     """
@@ -120,29 +168,59 @@ def imitate(
     return _learn(work, "imitation", scenario, seed, steps, setting, config, out)
 
 
-def _learn(work: Callable[..., Path], algorithm: str, scenario: str, seed: int, steps: int | None,
-           setting: list[str] | None, config: Path | None, out: Path) -> dict[str, Any]:
+def _learn(
+    work: Callable[..., Path],
+    algorithm: str,
+    scenario: str,
+    seed: int,
+    steps: int | None,
+    setting: list[str] | None,
+    config: Path | None,
+    out: Path,
+) -> dict[str, Any]:
     from ..training.configuration import load_config
     from ..training.train import Progress, read_progress
     from ..training.training_envs import check_world
 
     check_world(scenario)
-    given = load_config(algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config)
+    given = load_config(
+        algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config
+    )
     folder = results_folder(out, algorithm=algorithm, scenario=scenario, seed=seed, config=given)
     with progress_bar() as progress:
         task = progress.add_task(f"{algorithm}, {scenario}", total=given["steps"])
 
         def report(now: Progress) -> None:
-            progress.update(task, description=f"{algorithm}, {scenario}: validation RMSE {now.rmse_m[-1]:.3f} m")
-            console.print(f"{now.steps[-1]:8d} decisions: validation RMSE {now.rmse_m[-1]:.3f} m, {now.lost[-1]} lost",
-                          highlight=False)
+            progress.update(
+                task, description=f"{algorithm}, {scenario}: validation RMSE {now.rmse_m[-1]:.3f} m"
+            )
+            console.print(
+                f"{now.steps[-1]:8d} decisions: validation RMSE {now.rmse_m[-1]:.3f} m, "
+                f"{now.lost[-1]} lost",
+                highlight=False,
+            )
 
-        path = work(given, scenario, seed, folder, lambda done: progress.update(task, completed=done), report)
+        path = work(
+            given,
+            scenario,
+            seed,
+            folder,
+            lambda done: progress.update(task, completed=done),
+            report,
+        )
     done = read_progress(folder)
     assert done is not None
-    console.print(f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s", highlight=False)
+    console.print(
+        f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
+        highlight=False,
+    )
     say(path, path.with_suffix(".json"), folder / "last.npz", folder / "progress.json")
-    return {"policy": str(path), "validation_rmse_m": done.best_rmse, "seconds": done.seconds, "progress": done}
+    return {
+        "policy": str(path),
+        "validation_rmse_m": done.best_rmse,
+        "seconds": done.seconds,
+        "progress": done,
+    }
 
 
 def law_names() -> list[str]:
@@ -152,14 +230,17 @@ def law_names() -> list[str]:
 
 @expensive
 def tune(
-    law: Annotated[str, typer.Argument(help="admittance or ratio.", autocompletion=offering(law_names))],
+    law: Annotated[
+        str, typer.Argument(help="admittance or ratio.", autocompletion=offering(law_names))
+    ],
     scenario: Scenario = "base",
     trials: Annotated[int, typer.Option(min=1, help="Gains to try.")] = 30,
     episodes: Annotated[int, typer.Option(min=1, help="Validation episodes of each.")] = 60,
     seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
     out: Out = Path("results/tune"),
 ) -> dict[str, Any]:
-    """Search the gains of a hand-designed law on validation episodes; add them to tuned.yaml in the folder.
+    """Search the gains of a hand-designed law on validation episodes; add them to tuned.yaml in the
+    folder.
 
     Example: windwrench tune admittance --scenario fast --trials 30 --episodes 60
     """
@@ -177,10 +258,21 @@ def tune(
     folder = results_folder(out, law=law, scenario=scenario, trials=trials, episodes=episodes)
     with progress_bar() as progress:
         task = progress.add_task(f"{law}, {scenario}", total=trials)
-        found = search(law, scenario, trials, episodes, seed, lambda done: progress.update(task, completed=done))
+        found = search(
+            law,
+            scenario,
+            trials,
+            episodes,
+            seed,
+            lambda done: progress.update(task, completed=done),
+        )
     keep_gains(found, folder / "tuned.yaml", shlex.join(["windwrench", *sys.argv[1:]]))
     gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
-    console.print(f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation episodes "
-                  f"(as it comes: {found['default_rmse_m']:.3f} m)", highlight=False)
+    console.print(
+        f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
+        f"episodes "
+        f"(as it comes: {found['default_rmse_m']:.3f} m)",
+        highlight=False,
+    )
     say(folder / "tuned.yaml")
     return found

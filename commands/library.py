@@ -11,7 +11,9 @@ from .terminal import console, say
 
 
 def effects(
-    markdown: Annotated[Path | None, typer.Option(help="Write the page of all effects to this file instead.")] = None,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Write the page of all effects to this file instead.")
+    ] = None,
 ) -> dict[str, Any]:
     """List the physical effects that plant and estimator know.
 
@@ -27,14 +29,47 @@ def effects(
             partial.write_text(effects_page(), encoding="utf-8")
         say(markdown)
         return {"effects": names()}
-    name_column, coefficient_column = Column("effect", no_wrap=True), Column("coefficient", no_wrap=True)
-    table = Table(name_column, "kind", coefficient_column, "unit", "typical, 0.45 / 0.03 kg", "meaning", box=box.SIMPLE_HEAD)
+    name_column, coefficient_column = (
+        Column("effect", no_wrap=True),
+        Column("coefficient", no_wrap=True),
+    )
+    table = Table(
+        name_column,
+        "kind",
+        coefficient_column,
+        "unit",
+        "typical, 0.45 / 0.03 kg",
+        "meaning",
+        box=box.SIMPLE_HEAD,
+    )
     for name in names():
         one = get(name)
         for i, c in enumerate(one.coefficients):
-            table.add_row(name if i == 0 else "", one.kind if i == 0 else "", c.name, c.unit,
-                          f"{c.typical[0]:g} / {c.typical[1]:g}", c.meaning, end_section=i + 1 == len(one.coefficients))
+            table.add_row(
+                name if i == 0 else "",
+                one.kind if i == 0 else "",
+                c.name,
+                c.unit,
+                f"{c.typical[0]:g} / {c.typical[1]:g}",
+                c.meaning,
+                end_section=i + 1 == len(one.coefficients),
+            )
     console.print(table)
-    return {"effects": {name: {"kind": get(name).kind, "coefficients": {c.name: {
-        "unit": c.unit, "meaning": c.meaning, "typical": c.typical, "minimum": c.minimum, "maximum": c.maximum}
-        for c in get(name).coefficients}} for name in names()}}
+    return {
+        "effects": {
+            name: {
+                "kind": get(name).kind,
+                "coefficients": {
+                    c.name: {
+                        "unit": c.unit,
+                        "meaning": c.meaning,
+                        "typical": c.typical,
+                        "minimum": c.minimum,
+                        "maximum": c.maximum,
+                    }
+                    for c in get(name).coefficients
+                },
+            }
+            for name in names()
+        }
+    }

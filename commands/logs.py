@@ -13,11 +13,27 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError
-from .terminal import Out, ReaderOption, VehicleOption, console, effect_names, note, offering, results_folder, say, working
+from .terminal import (
+    Out,
+    ReaderOption,
+    VehicleOption,
+    console,
+    effect_names,
+    note,
+    offering,
+    results_folder,
+    say,
+    working,
+)
 
 # of a diagnosis' time, where its stages begin
-_STAGES = {"looking at the logs": 0.0, "asking whether every effect is needed": 0.45, "asking what else it could be": 0.75,
-           "looking for what is left": 0.9, "predicting the flights": 0.96}
+_STAGES = {
+    "looking at the logs": 0.0,
+    "asking whether every effect is needed": 0.45,
+    "asking what else it could be": 0.75,
+    "looking for what is left": 0.9,
+    "predicting the flights": 0.96,
+}
 
 
 def estimate(
@@ -46,11 +62,21 @@ def estimate(
     picture = plot_wrench(series, flight, folder / "wrench.png")
     for text in dict.fromkeys((*flight.notes, *series.notes)):
         note(text)
-    console.print(f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s", highlight=False)
+    console.print(
+        f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s",
+        highlight=False,
+    )
     table = Table("", "x", "y", "z", box=box.SIMPLE_HEAD)
-    result: dict[str, Any] = {"log": flight.name, "samples": len(flight.t), "seconds": flight.t[-1] - flight.t[0]}
+    result: dict[str, Any] = {
+        "log": flight.name,
+        "samples": len(flight.t),
+        "seconds": flight.t[-1] - flight.t[0],
+    }
     for name, values, unit in (("force", series.force, "N"), ("torque", series.torque, "Nm")):
-        result |= {f"{name}_mean_{unit}": values.mean(axis=0), f"{name}_std_{unit}": values.std(axis=0)}
+        result |= {
+            f"{name}_mean_{unit}": values.mean(axis=0),
+            f"{name}_std_{unit}": values.std(axis=0),
+        }
         table.add_row(f"{name}, mean ({unit})", *(f"{v:+.4g}" for v in values.mean(axis=0)))
         table.add_row(f"{name}, std ({unit})", *(f"{v:.4g}" for v in values.std(axis=0)))
     truth = truth_rmse(series, flight)
@@ -64,15 +90,26 @@ def estimate(
 
 
 def diagnose(
-    logs: Annotated[list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")],
-    test: Annotated[list[Path] | None, typer.Option(help="Log on which alone the error is reported; may be repeated.")] = None,
+    logs: Annotated[
+        list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")
+    ],
+    test: Annotated[
+        list[Path] | None,
+        typer.Option(help="Log on which alone the error is reported; may be repeated."),
+    ] = None,
     reader: ReaderOption = None,
-    without: Annotated[list[str] | None, typer.Option(help="Effect to take out of the library; may be repeated.",
-                                                        autocompletion=offering(effect_names))] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Effect to take out of the library; may be repeated.",
+            autocompletion=offering(effect_names),
+        ),
+    ] = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/diagnose"),
 ) -> dict[str, Any]:
-    """Find the physical effects that a vehicle's model lacks; write report.json, report.html and vehicle.yaml.
+    """Find the physical effects that a vehicle's model lacks; write report.json, report.html and
+    vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
@@ -89,7 +126,9 @@ def diagnose(
         unseen = [read_log(path, reader, model) for path in test or []]
     folder = results_folder(out)
     with working("looking at the logs") as progress:
-        found = run(flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text))
+        found = run(
+            flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
+        )
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
     for text in found.notes:
@@ -101,13 +140,30 @@ def diagnose(
         for effect in found.effects:
             for i, (name, value) in enumerate(effect.coefficients.items()):
                 title = effect.name + (" (tentative)" if effect.tentative else "") if i == 0 else ""
-                table.add_row(title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name])
+                table.add_row(
+                    title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
+                )
         console.print(table)
     table = Table("held-out", "before", "after", "floor", box=box.SIMPLE_HEAD)
     before, after = found.before, found.after
-    table.add_row("force (N)", f"{before.force_rms:.3g}", f"{after.force_rms:.3g}", f"{found.floor_force_rms:.3g}")
-    table.add_row("torque (Nm)", f"{before.torque_rms:.3g}", f"{after.torque_rms:.3g}", f"{found.floor_torque_rms:.3g}")
-    table.add_row("1 s prediction (m)", f"{before.rollout_1s_position_rms:.3g}", f"{after.rollout_1s_position_rms:.3g}", "")
+    table.add_row(
+        "force (N)",
+        f"{before.force_rms:.3g}",
+        f"{after.force_rms:.3g}",
+        f"{found.floor_force_rms:.3g}",
+    )
+    table.add_row(
+        "torque (Nm)",
+        f"{before.torque_rms:.3g}",
+        f"{after.torque_rms:.3g}",
+        f"{found.floor_torque_rms:.3g}",
+    )
+    table.add_row(
+        "1 s prediction (m)",
+        f"{before.rollout_1s_position_rms:.3g}",
+        f"{after.rollout_1s_position_rms:.3g}",
+        "",
+    )
     console.print(table)
     for line in found.advice:
         console.print(line, highlight=False, markup=False)
@@ -121,13 +177,19 @@ def replay(
     vehicle: VehicleOption = "ardrone2",
     video: Annotated[bool, typer.Option("--video", help="Write replay.mp4 (video extra).")] = False,
     gif: Annotated[bool, typer.Option("--gif", help="Write replay.gif.")] = False,
-    rrd: Annotated[bool, typer.Option("--rrd", help="Write replay.rrd for the Rerun viewer (rerun extra).")] = False,
+    rrd: Annotated[
+        bool, typer.Option("--rrd", help="Write replay.rrd for the Rerun viewer (rerun extra).")
+    ] = False,
     view: Annotated[bool, typer.Option("--view", help="Show it in a window.")] = False,
-    begin: Annotated[float, typer.Option("--from", min=0.0, help="Time in the log at which the film begins, in s.")] = 0.0,
+    begin: Annotated[
+        float,
+        typer.Option("--from", min=0.0, help="Time in the log at which the film begins, in s."),
+    ] = 0.0,
     film_seconds: Annotated[float, typer.Option(min=0.1, help="Longest film.")] = 30.0,
     out: Out = Path("results/replay"),
 ) -> dict[str, Any]:
-    """Draw a logged flight again, with its residual wrench as arrows; write its last picture, and films if asked for.
+    """Draw a logged flight again, with its residual wrench as arrows; write its last picture, and
+    films if asked for.
 
     Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
     """
@@ -146,15 +208,30 @@ def replay(
         flight = read_log(log, reader, model)
     length = float(flight.t[-1] - flight.t[0])
     if begin >= length:
-        raise InputError(f"--from {begin:g}: {log} ends after {length:.6g} s; expected a time before that")
+        raise InputError(
+            f"--from {begin:g}: {log} ends after {length:.6g} s; expected a time before that"
+        )
     folder = results_folder(out)
     with working("estimating") as progress:
         series = estimate_log(flight, model, report=progress)
-    shown = np.flatnonzero((flight.t - flight.t[0] >= begin) & (flight.t - flight.t[0] <= begin + film_seconds))
+    shown = np.flatnonzero(
+        (flight.t - flight.t[0] >= begin) & (flight.t - flight.t[0] <= begin + film_seconds)
+    )
     if len(shown) < 2:
-        raise InputError(f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected more time")
+        raise InputError(
+            f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected "
+            f"more time"
+        )
     # where motion capture lost the vehicle, the filter's own pose goes on
-    whole = Flight(series.t, series.position, series.quaternion, series.force, series.torque, flight.force, flight.torque)
+    whole = Flight(
+        series.t,
+        series.position,
+        series.quaternion,
+        series.force,
+        series.torque,
+        flight.force,
+        flight.torque,
+    )
     part = whole.part(shown)
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     written, last = [], None
@@ -162,7 +239,9 @@ def replay(
     total = max(1, int((part.t[-1] - part.t[0]) * FPS))
     try:
         with working("drawing") as progress, ExitStack() as films:
-            open_films = [films.enter_context(Film(folder / f"replay.{kind}", 960, 640)) for kind in kinds]
+            open_films = [
+                films.enter_context(Film(folder / f"replay.{kind}", 960, 640)) for kind in kinds
+            ]
             for count, picture in enumerate(pictures(part, model, viewer, FPS)):
                 if view:
                     time.sleep(1.0 / FPS)
@@ -184,6 +263,10 @@ def replay(
     for text in dict.fromkeys((*flight.notes, *series.notes)):
         note(text)
     say(*written)
-    return {"log": flight.name, "samples": len(flight.t), "seconds": length,
-            "largest_force_N": np.linalg.norm(part.force, axis=1).max(),
-            "largest_torque_Nm": np.linalg.norm(part.torque, axis=1).max()}
+    return {
+        "log": flight.name,
+        "samples": len(flight.t),
+        "seconds": length,
+        "largest_force_N": np.linalg.norm(part.force, axis=1).max(),
+        "largest_torque_Nm": np.linalg.norm(part.torque, axis=1).max(),
+    }

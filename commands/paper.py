@@ -12,11 +12,18 @@ from .terminal import Out, console, results_folder, say, share_bars
 
 @expensive
 def reproduce(
-    figure: Annotated[str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")] = "all",
+    figure: Annotated[
+        str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")
+    ] = "all",
     out: Out = Path("results/reproduction"),
-    seeds: Annotated[int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")] = None,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    page: Annotated[Path | None, typer.Option(help="Where to write the page; default: reproduction.md in the folder.")] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option(help="Where to write the page; default: reproduction.md in the folder."),
+    ] = None,
 ) -> dict[str, Any]:
     """Reproduce the paper's figures; what a run has finished, the next does not repeat.
 
@@ -30,8 +37,12 @@ def reproduce(
 
     names = chosen(figure)
     numbers = numbers_of_seeds(names, seeds)
-    folder = results_folder(out, seeds={name: n for name, n in numbers.items() if not is_done(out, name, n)},
-                            kept=[name for name, n in numbers.items() if is_done(out, name, n)], jobs=jobs)
+    folder = results_folder(
+        out,
+        seeds={name: n for name, n in numbers.items() if not is_done(out, name, n)},
+        kept=[name for name, n in numbers.items() if is_done(out, name, n)],
+        jobs=jobs,
+    )
     with share_bars() as progress:
         tasks = {name: progress.add_task(name, total=1.0) for name in names}
 
@@ -45,11 +56,21 @@ def reproduce(
     result: dict[str, Any] = {}
     for name in names:
         kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        result[name] = {"title": kept["title"], "figures": kept["figures"], "comparison": kept["comparison"],
-                        "kept": not fresh[name]}
-        console.print(f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"), style="bold", highlight=False)
+        result[name] = {
+            "title": kept["title"],
+            "figures": kept["figures"],
+            "comparison": kept["comparison"],
+            "kept": not fresh[name],
+        }
+        console.print(
+            f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"),
+            style="bold",
+            highlight=False,
+        )
         for row in kept["comparison"]:
             paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
-            console.print(f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False)
+            console.print(
+                f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False
+            )
     say(*(folder / f"{name}.png" for name in names), target)
     return result

@@ -1,4 +1,6 @@
-"""How every command runs: ``--json``, ``--quiet`` and ``--dry-run`` mean the same everywhere; ``run.json`` says what ran."""
+"""How every command runs: ``--json``, ``--quiet`` and ``--dry-run`` mean the same everywhere;
+``run.json`` says what ran.
+"""
 
 import functools
 import inspect
@@ -21,16 +23,33 @@ from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
 
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else, on standard output.")]
+JsonOption = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object, and nothing else, on standard output."),
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Check the request and say what would be done; do nothing.")]
+DryRunOption = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Check the request and say what would be done; do nothing."),
+]
 
 # what a result depends on
-_PACKAGES = ("numpy", "scipy", "numba", "mujoco", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
+_PACKAGES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "mujoco",
+    "gymnasium",
+    "torch",
+    "stable-baselines3",
+    "sb3-contrib",
+)
 
 
 def expensive(work: Work) -> Work:
-    """Mark a command as one that runs for minutes: it gets ``--dry-run``, which stops it at ``results_folder``."""
+    """Mark a command as one that runs for minutes: it gets ``--dry-run``, which stops it at
+    ``results_folder``.
+    """
     work.expensive = True  # type: ignore[attr-defined]
     return work
 
@@ -38,7 +57,8 @@ def expensive(work: Work) -> Work:
 def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     """Return a function for typer: ``work`` with the options that every command has.
 
-    ``work`` returns what ``--json`` prints as the result, tells ``say`` what it wrote, and ``results_folder`` where.
+    ``work`` returns what ``--json`` prints as the result, tells ``say`` what it wrote, and
+    ``results_folder`` where.
     """
     name = command_name(work)
     can_stop = getattr(work, "expensive", False)
@@ -53,9 +73,17 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
                 write_run(run.record, name, options)
         except DryRun as stopped:
             outcome = {"dry_run": True, "would": stopped.plan, "out": stopped.out}
-            lines = [f"  {key}: {_words(value)}" for key, value in stopped.plan.items() if value is not None]
-            console.print("\n".join([f"{name} would do", *lines, f"  and write to {stopped.out}"]), highlight=False,
-                          markup=False, soft_wrap=True)
+            lines = [
+                f"  {key}: {_words(value)}"
+                for key, value in stopped.plan.items()
+                if value is not None
+            ]
+            console.print(
+                "\n".join([f"{name} would do", *lines, f"  and write to {stopped.out}"]),
+                highlight=False,
+                markup=False,
+                soft_wrap=True,
+            )
         except BaseException:
             run.undo()
             raise
@@ -63,14 +91,23 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
             console.quiet = errors.quiet = False
         if as_json:
             written = [*run.written, *([run.record] if run.record is not None else [])]
-            print(json.dumps(plain({"command": name, **outcome, "written": written}), allow_nan=False))
+            print(
+                json.dumps(plain({"command": name, **outcome, "written": written}), allow_nan=False)
+            )
 
-    shared = {"as_json": JsonOption, "quiet": QuietOption, **({"dry_run": DryRunOption} if can_stop else {})}
+    shared = {
+        "as_json": JsonOption,
+        "quiet": QuietOption,
+        **({"dry_run": DryRunOption} if can_stop else {}),
+    }
     signature = inspect.signature(work, eval_str=True)
-    extra = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
-             for key, kind in shared.items()]
+    extra = [
+        inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for key, kind in shared.items()
+    ]
     command.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[*signature.parameters.values(), *extra], return_annotation=None)
+        parameters=[*signature.parameters.values(), *extra], return_annotation=None
+    )
     command.__annotations__ = {**work.__annotations__, **shared}
     return command
 
@@ -90,7 +127,8 @@ def command_name(work: Callable[..., Any]) -> str:
 
 
 def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
-    """Write how the results beside a file came about, under the command's name: other commands' runs in it stay.
+    """Write how the results beside a file came about, under the command's name: other commands'
+    runs in it stay.
 
     It holds no date and no duration: the same command gives the same bytes.
 
@@ -107,16 +145,26 @@ def write_run(path: Path, name: str, options: Mapping[str, Any]) -> None:
             packages[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             continue
-    entry = {"command": shlex.join(["windwrench", *sys.argv[1:]]), "seed": options.get("seed"), "options": options,
-             "windwrench": __version__, "python": platform.python_version(), "platform": platform.platform(),
-             "packages": packages}
+    entry = {
+        "command": shlex.join(["windwrench", *sys.argv[1:]]),
+        "seed": options.get("seed"),
+        "options": options,
+        "windwrench": __version__,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "packages": packages,
+    }
     runs = {**(kept if isinstance(kept, dict) else {}), name: plain(entry)}
     with replaced(path) as partial:
-        partial.write_text(json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", encoding="utf-8")
+        partial.write_text(
+            json.dumps(runs, indent=1, sort_keys=True, allow_nan=False) + "\n", encoding="utf-8"
+        )
 
 
 def plain(value: Any) -> Any:
-    """Return a value as strict JSON holds it: arrays as lists, paths as texts, what is not finite as None."""
+    """Return a value as strict JSON holds it: arrays as lists, paths as texts, what is not finite
+    as None.
+    """
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, Mapping):

@@ -1,4 +1,6 @@
-"""Studies: runs of many flights that write a page of this repository. They run from a checkout alone."""
+"""Studies: runs of many flights that write a page of this repository. They run from a checkout
+alone.
+"""
 
 import functools
 import os
@@ -36,13 +38,16 @@ def has_studies() -> bool:
 
 
 def from_a_checkout(work: Work) -> Work:
-    """Mark a command that needs the studies: elsewhere it ends in one line that says where to find them."""
+    """Mark a command that needs the studies: elsewhere it ends in one line that says where to find
+    them.
+    """
 
     @functools.wraps(work)
     def checked(**options: Any) -> Any:
         if not has_studies():
             raise InputError(
-                f"{work.__name__.replace('_', '-')}: expected a checkout of windwrench's repository, whose pages this "
+                f"{work.__name__.replace('_', '-')}: expected a checkout of windwrench's "
+                f"repository, whose pages this "
                 "command writes; an installed package has no studies"
             )
         return work(**options)
@@ -53,15 +58,24 @@ def from_a_checkout(work: Work) -> Work:
 @expensive
 @from_a_checkout
 def trials(
-    seeds: Annotated[int, typer.Option(min=1, help="How often everything is flown, each time anew.")] = 1,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="How often everything is flown, each time anew.")
+    ] = 1,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
-    quick: Annotated[bool, typer.Option("--quick", help="A part of it only, some minutes long.")] = False,
-    group: Annotated[list[str] | None, typer.Option(help="Fly this group alone, such as pair; again for more.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A part of it only, some minutes long.")
+    ] = False,
+    group: Annotated[
+        list[str] | None, typer.Option(help="Fly this group alone, such as pair; again for more.")
+    ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    markdown: Annotated[Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")] = None,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")
+    ] = None,
     out: Out = Path("results/trials"),
 ) -> dict[str, Any]:
-    """Diagnose flights whose cause is known, and score it; what a run has finished, the next does not repeat.
+    """Diagnose flights whose cause is known, and score it; what a run has finished, the next does
+    not repeat.
 
     Example: windwrench trials --quick --out results/trials
     """
@@ -70,17 +84,32 @@ def trials(
     from ..studies.trials.trials import plan, run_trials
 
     wanted = plan(seeds, quick, seed, group or ())
-    folder = results_folder(out, flights=len(wanted), diagnoses=sum(len(trial.libraries) for trial in wanted), jobs=jobs)
+    folder = results_folder(
+        out, flights=len(wanted), diagnoses=sum(len(trial.libraries) for trial in wanted), jobs=jobs
+    )
     with progress_bar() as progress:
         task = progress.add_task("diagnosing flights", total=len(wanted))
-        outcomes = run_trials(wanted, folder, jobs, lambda done: progress.update(task, completed=done))
-    paths = write_results(outcomes, folder, folder / "trials.md" if markdown is None else markdown, seeds, quick, seed,
-                          group or ())
+        outcomes = run_trials(
+            wanted, folder, jobs, lambda done: progress.update(task, completed=done)
+        )
+    paths = write_results(
+        outcomes,
+        folder,
+        folder / "trials.md" if markdown is None else markdown,
+        seeds,
+        quick,
+        seed,
+        group or (),
+    )
     measured = rules(j for outcome in outcomes for j in judge(outcome))
     for rule in measured:
         met = {True: "met", False: "not met", None: "-"}[rule.met]
-        console.print(f"{met:8}{rule.subject}: {rule.measured}; target: {rule.target}", highlight=False, markup=False,
-                      soft_wrap=True)
+        console.print(
+            f"{met:8}{rule.subject}: {rule.measured}; target: {rule.target}",
+            highlight=False,
+            markup=False,
+            soft_wrap=True,
+        )
     say(*paths)
     return {"rules": measured}
 
@@ -88,9 +117,13 @@ def trials(
 @expensive
 @from_a_checkout
 def real_flights(
-    data: Annotated[Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")],
-    markdown: Annotated[Path, typer.Option(help="The page; pictures and numbers go to a folder of its name beside it.")] = Path(
-        "results/real-flights.md"),
+    data: Annotated[
+        Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")
+    ],
+    markdown: Annotated[
+        Path,
+        typer.Option(help="The page; pictures and numbers go to a folder of its name beside it."),
+    ] = Path("results/real-flights.md"),
 ) -> dict[str, Any]:
     """Diagnose measured flights, each judged on flights that the fit never saw, and write the page.
 
@@ -112,9 +145,14 @@ def real_flights(
 @expensive
 @from_a_checkout
 def close_loop(
-    effect: Annotated[list[str] | None, typer.Option(
-        help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten of typical size.",
-        autocompletion=offering(effect_names))] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten of typical "
+            "size.",
+            autocompletion=offering(effect_names),
+        ),
+    ] = None,
     vehicle: VehicleOption = "ardrone2",
     episodes: Annotated[int, typer.Option(min=1, help="Paired episodes an effect and model.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of flights and episodes.")] = 0,
@@ -122,7 +160,8 @@ def close_loop(
     markdown: Annotated[Path | None, typer.Option(help="Also write the results as a page.")] = None,
     out: Out = Path("results/close-loop"),
 ) -> dict[str, Any]:
-    """Fly an undeclared effect, name it from the log, declare it, and follow the fan before and after.
+    """Fly an undeclared effect, name it from the log, declare it, and follow the fan before and
+    after.
 
     What a run has finished, the next does not repeat.
 
@@ -141,9 +180,13 @@ def close_loop(
     from ..studies.closed_loop.picture import write_picture
 
     model = load_vehicle(vehicle)
-    requests = [Request(parse_setting(e, model), model, episodes, seed) for e in effect or DEFAULT_EFFECTS]
+    requests = [
+        Request(parse_setting(e, model), model, episodes, seed) for e in effect or DEFAULT_EFFECTS
+    ]
     check_requests(requests)
-    folder = results_folder(out, effects=[r.name for r in requests], episodes=2 * episodes * len(requests), jobs=jobs)
+    folder = results_folder(
+        out, effects=[r.name for r in requests], episodes=2 * episodes * len(requests), jobs=jobs
+    )
     with share_bars() as progress:
         tasks = {r.name: progress.add_task(r.name, total=1.0) for r in requests}
 
@@ -155,39 +198,69 @@ def close_loop(
     picture = write_picture(results, folder)
     if markdown is not None:
         write_page(results, folder, markdown)
-    table = Table(Column("added", no_wrap=True), "named", *(m.title for m in MEASURES), box=box.SIMPLE_HEAD)
+    table = Table(
+        Column("added", no_wrap=True), "named", *(m.title for m in MEASURES), box=box.SIMPLE_HEAD
+    )
     for r in results:
         ratios = [r["summary"][m.key] for m in MEASURES]
         found = [e["name"] for e in r["diagnosis"]["effects"]]
-        table.add_row(r["name"], "the same" if found == [r["request"]["effect"]] else ", ".join(found) or "nothing",
-                      *(f"x{s['ratio']:.2f}\n{s['ratio_ci95'][0]:.2f}-{s['ratio_ci95'][1]:.2f}" for s in ratios))
+        table.add_row(
+            r["name"],
+            "the same" if found == [r["request"]["effect"]] else ", ".join(found) or "nothing",
+            *(
+                f"x{s['ratio']:.2f}\n{s['ratio_ci95'][0]:.2f}-{s['ratio_ci95'][1]:.2f}"
+                for s in ratios
+            ),
+        )
     console.print(table)
-    console.print(f"after by before (95 %), {episodes} paired episodes an effect, seed {seed}", highlight=False)
+    console.print(
+        f"after by before (95 %), {episodes} paired episodes an effect, seed {seed}",
+        highlight=False,
+    )
     for sentence in conclusions(results):
         console.print(sentence.replace("**", ""), highlight=False, markup=False)
-    say(picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else []))
+    say(
+        picture, *(folder / f"{r['name']}.json" for r in results), *([markdown] if markdown else [])
+    )
     return {r["name"]: {"summary": r["summary"], "diagnosis": r["diagnosis"]} for r in results}
 
 
 @expensive
 @from_a_checkout
 def leaderboard(
-    train: Annotated[bool, typer.Option("--train", help="Train and score what is missing, not only write the page.")] = False,
-    only: Annotated[str, typer.Option(help="Parts of the study, with commas: designed, learned, ablation, or names of lines.")
-                    ] = "",
-    plan: Annotated[Path | None, typer.Option(help="A plan like studies/learning/study.yaml, in its place.")] = None,
-    results: Annotated[Path, typer.Option(help="Folder of the result files, one for each line and seed.")] = Path(
-        "docs/results/learning"),
-    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path("training/policies"),
-    markdown: Annotated[Path | None, typer.Option(help="The page; its pictures go to a folder of its name beside it.")] = Path(
-        "docs/leaderboard.md"),
+    train: Annotated[
+        bool,
+        typer.Option("--train", help="Train and score what is missing, not only write the page."),
+    ] = False,
+    only: Annotated[
+        str,
+        typer.Option(
+            help="Parts of the study, with commas: designed, learned, ablation, or names of lines."
+        ),
+    ] = "",
+    plan: Annotated[
+        Path | None, typer.Option(help="A plan like studies/learning/study.yaml, in its place.")
+    ] = None,
+    results: Annotated[
+        Path, typer.Option(help="Folder of the result files, one for each line and seed.")
+    ] = Path("docs/results/learning"),
+    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path(
+        "training/policies"
+    ),
+    markdown: Annotated[
+        Path | None,
+        typer.Option(help="The page; its pictures go to a folder of its name beside it."),
+    ] = Path("docs/leaderboard.md"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    out: Annotated[Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")] = Path(
-        "results/leaderboard"),
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")
+    ] = Path("results/leaderboard"),
 ) -> dict[str, Any]:
-    """Write the page of the leaderboard from its result files; with --train, first do what is missing of the study.
+    """Write the page of the leaderboard from its result files; with --train, first do what is
+    missing of the study.
 
-    What a run has finished, the next does not repeat; a training run that was stopped goes on where it was.
+    What a run has finished, the next does not repeat; a training run that was stopped goes on where
+    it was.
 
     Example: windwrench leaderboard --train --only sac,sac-wide
     """
@@ -204,7 +277,9 @@ def leaderboard(
     wanted = entries_of(study, names_in(only, "--only") if only else ())
     places = Places(out, results, policies)
     missing = [e.file for e in wanted if not is_done(e, study, places)]
-    folder = results_folder(out, lines=len(wanted), missing=missing if train else "left alone (no --train)")
+    folder = results_folder(
+        out, lines=len(wanted), missing=missing if train else "left alone (no --train)"
+    )
     for one in (places.results, places.policies):
         results_folder(one)
     results_folder(folder)
@@ -233,11 +308,28 @@ def leaderboard(
     from ..studies.learning.leaderboard_page import rows_of, write_page
 
     written = write_page(found, study, places, markdown)
-    table = Table("world", "controller", "RMSE (m)", "95 %", "lost", "against the best admittance", box=box.SIMPLE_HEAD)
+    table = Table(
+        "world",
+        "controller",
+        "RMSE (m)",
+        "95 %",
+        "lost",
+        "against the best admittance",
+        box=box.SIMPLE_HEAD,
+    )
     for row in rows_of(found, study):
         if row.world in ("base", "fast"):
-            table.add_row(row.world, row.name, f"{row.rmse_m:.3f}", f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
-                          f"{row.lost_fraction:.1%}", f"{row.change:+.0%}")
+            table.add_row(
+                row.world,
+                row.name,
+                f"{row.rmse_m:.3f}",
+                f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
+                f"{row.lost_fraction:.1%}",
+                f"{row.change:+.0%}",
+            )
     console.print(table)
     say(*written)
-    return {"lines": len(found), "missing": [e.file for e in wanted if not is_done(e, study, places)]}
+    return {
+        "lines": len(found),
+        "missing": [e.file for e in wanted if not is_done(e, study, places)],
+    }

@@ -1,4 +1,6 @@
-"""What the commands share: the terminal, the results' folder, options that mean the same everywhere."""
+"""What the commands share: the terminal, the results' folder, options that mean the same
+everywhere.
+"""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -9,7 +11,14 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from ..runtime.errors import InputError
 
@@ -49,7 +58,9 @@ class DryRun(Exception):  # noqa: N818 - the way out of a command whose request 
 
 
 def offering(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Return what completes a name, or the last of several with commas, in a shell; ``names`` is only called there."""
+    """Return what completes a name, or the last of several with commas, in a shell; ``names`` is
+    only called there.
+    """
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")
@@ -94,17 +105,30 @@ def reader_names() -> Iterable[str]:
 
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; it is made if need be.")]
-VehicleOption = Annotated[str, typer.Option("--vehicle", help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
-                                            autocompletion=offering(vehicle_names))]
-ReaderOption = Annotated[str | None, typer.Option(
-    "--reader", help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag or rosbag:TOPICS.yaml.",
-    autocompletion=offering(reader_names))]
+VehicleOption = Annotated[
+    str,
+    typer.Option(
+        "--vehicle",
+        help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
+        autocompletion=offering(vehicle_names),
+    ),
+]
+ReaderOption = Annotated[
+    str | None,
+    typer.Option(
+        "--reader",
+        help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag or "
+        "rosbag:TOPICS.yaml.",
+        autocompletion=offering(reader_names),
+    ),
+]
 
 
 def results_folder(out: Path, **plan: object) -> Path:
     """Make the results' folder, before the work starts, so that no result is lost for want of it.
 
-    Every command calls this once its request is checked and before its work begins: here a dry run ends.
+    Every command calls this once its request is checked and before its work begins: here a dry run
+    ends.
 
     Args:
         out: the folder.
@@ -120,7 +144,9 @@ def results_folder(out: Path, **plan: object) -> Path:
         run.made = [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"--out {out}: cannot be made a folder: {error.strerror or error}") from error
+        raise InputError(
+            f"--out {out}: cannot be made a folder: {error.strerror or error}"
+        ) from error
     if not os.access(out, os.W_OK):
         raise InputError(f"--out {out}: is not writable")
     run.record = out / "run.json"
@@ -128,21 +154,47 @@ def results_folder(out: Path, **plan: object) -> Path:
 
 
 def progress_bar() -> Progress:
-    """Return a bar that counts what is done and says how long the rest will take; it goes when the work is over."""
-    return Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-                    console=errors, transient=True, disable=errors.quiet)
+    """Return a bar that counts what is done and says how long the rest will take; it goes when the
+    work is over.
+    """
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=errors,
+        transient=True,
+        disable=errors.quiet,
+    )
 
 
 def share_bars() -> Progress:
-    """Return bars for shares of work between 0 and 1, with the time that is left; they go when the work is over."""
-    return Progress(TextColumn("{task.description:18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
-                    TimeRemainingColumn(), console=errors, transient=True, disable=errors.quiet)
+    """Return bars for shares of work between 0 and 1, with the time that is left; they go when the
+    work is over.
+    """
+    return Progress(
+        TextColumn("{task.description:18}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+        console=errors,
+        transient=True,
+        disable=errors.quiet,
+    )
 
 
 @contextmanager
 def working(text: str) -> Iterator[Callable[..., None]]:
-    """Show what is being done; give a function that takes the share done so far, another text, or both."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
+    """Show what is being done; give a function that takes the share done so far, another text, or
+    both.
+    """
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=errors, transient=True, disable=errors.quiet) as progress:
         task = progress.add_task(text, total=None)
 
@@ -168,7 +220,9 @@ def names_in(text: str, option: str) -> list[str]:
 
 def note(text: str) -> None:
     """Say on standard error what is worth knowing about the input; a warning stands out."""
-    errors.print(text, style="yellow" if text.startswith("warning") else "dim", highlight=False, markup=False)
+    errors.print(
+        text, style="yellow" if text.startswith("warning") else "dim", highlight=False, markup=False
+    )
 
 
 def say(*paths: Path) -> None:

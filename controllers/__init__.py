@@ -15,7 +15,9 @@ __all__ = ["CONTROLLERS", "Admittance", "Controller", "Hover", "Oracle", "Ratio"
 
 
 class Controller(Protocol):
-    """From an observation to a command; ``info`` is the environment's, for those that may see the truth."""
+    """From an observation to a command; ``info`` is the environment's, for those that may see the
+    truth.
+    """
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -29,7 +31,10 @@ class Controller(Protocol):
 
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
-    "hover": Hover, "admittance": Admittance, "ratio": Ratio, "oracle": Oracle,
+    "hover": Hover,
+    "admittance": Admittance,
+    "ratio": Ratio,
+    "oracle": Oracle,
     **tuned_controllers({"admittance": Admittance, "ratio": Ratio}),
 }
 

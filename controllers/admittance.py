@@ -1,7 +1,8 @@
 """Hand-designed laws that turn the estimated wrench into a velocity along y.
 
-With the fan at the origin and the jet along +x, the world's ``tau_z`` is positive at positive y: a vehicle that moves by
-``-gain tau_z`` moves towards the axis. (In the body frame of a vehicle that faces the fan, y and the sign turn round.)
+With the fan at the origin and the jet along +x, the world's ``tau_z`` is positive at positive y: a
+vehicle that moves by ``-gain tau_z`` moves towards the axis. (In the body frame of a vehicle that
+faces the fan, y and the sign turn round.)
 """
 
 from collections.abc import Mapping
@@ -16,10 +17,12 @@ Array = NDArray[np.floating[Any]]
 
 
 class Admittance:
-    """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw torque.
+    """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
+    torque.
 
     Args:
-        gain: m/s per Nm; ``gain`` times the jet's largest torque bounds the speed of a fan that it can follow.
+        gain: m/s per Nm; ``gain`` times the jet's largest torque bounds the speed of a fan that it
+            can follow.
     """
 
     def __init__(self, gain: float = 18.0) -> None:
@@ -30,11 +33,15 @@ class Admittance:
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
-        return np.array([np.clip(-self.gain * observation[TORQUE_Z], -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)
+        return np.array(
+            [np.clip(-self.gain * observation[TORQUE_Z], -MAX_COMMAND, MAX_COMMAND)],
+            dtype=np.float32,
+        )
 
 
 class Ratio:
-    """Velocity in proportion to ``tau_z / f_x``, which grows with the offset where ``tau_z`` alone falls off again.
+    """Velocity in proportion to ``tau_z / f_x``, which grows with the offset where ``tau_z`` alone
+    falls off again.
 
     Args:
         gain: 1/s per metre-like ratio, m/s per m.
@@ -49,5 +56,7 @@ class Ratio:
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
-        command = -self.gain * observation[TORQUE_Z] / max(float(observation[FORCE_X]), self.least_force)
+        command = (
+            -self.gain * observation[TORQUE_Z] / max(float(observation[FORCE_X]), self.least_force)
+        )
         return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)

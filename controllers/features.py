@@ -40,7 +40,8 @@ QUANTITIES: dict[str, Quantity] = {
     "force_z": Quantity(0.5, FORCE_Z),
     "velocity_y": Quantity(0.5, VELOCITY_Y),
     "command": Quantity(1.0, LAST_COMMAND),
-    # what only a simulator knows, or an estimator beside the filter: for ablations (see ``sensing``)
+    # what only a simulator knows, or an estimator beside the filter: for ablations (see
+    # ``sensing``)
     "true_torque_z": Quantity(0.03, 2, "torque"),
     "true_force_x": Quantity(0.5, 0, "force"),
     "true_force_y": Quantity(0.5, 1, "force"),
@@ -57,7 +58,8 @@ class Features:
     """The quantities of one frame, each with its scale, and how many frames a policy sees.
 
     Raises:
-        InputError: a quantity that does not exist or comes twice, no frame, a scale that is not positive.
+        InputError: a quantity that does not exist or comes twice, no frame, a scale that is not
+            positive.
     """
 
     frame: tuple[str, ...]
@@ -69,13 +71,18 @@ class Features:
             if not isinstance(name, str) or name not in QUANTITIES:
                 raise unknown_name("quantity", str(name), QUANTITIES, "features: frame")
         if not self.frame or len(set(self.frame)) != len(self.frame):
-            raise InputError(f"features: frame must name different quantities, got {list(self.frame)}")
+            raise InputError(
+                f"features: frame must name different quantities, got {list(self.frame)}"
+            )
         if self.history < 1:
             raise InputError(f"features: history must be at least 1, got {self.history}")
         if not self.scale:
             object.__setattr__(self, "scale", tuple(QUANTITIES[name].scale for name in self.frame))
         if len(self.scale) != len(self.frame) or min(self.scale) <= 0:
-            raise InputError(f"features: scale must hold {len(self.frame)} positive numbers, got {list(self.scale)}")
+            raise InputError(
+                f"features: scale must hold {len(self.frame)} positive numbers, got "
+                f"{list(self.scale)}"
+            )
 
     @property
     def size(self) -> int:
@@ -88,23 +95,33 @@ class Features:
         return frozenset(QUANTITIES[name].source for name in self.frame) - {"observation"}
 
     def frames(self, observations: ArrayLike, info: Mapping[str, Any]) -> Array:
-        """Return scaled frames (n, quantities) of n environments: observations (n, 8), ``info`` with (n, 3) entries."""
+        """Return scaled frames (n, quantities) of n environments: observations (n, 8), ``info``
+        with (n, 3) entries.
+        """
         rows = np.asarray(observations, dtype=np.float64)
-        columns = [np.asarray(rows if QUANTITIES[name].source == "observation" else info[QUANTITIES[name].source])
-                   [:, QUANTITIES[name].column] for name in self.frame]
+        columns = [
+            np.asarray(
+                rows if QUANTITIES[name].source == "observation" else info[QUANTITIES[name].source]
+            )[:, QUANTITIES[name].column]
+            for name in self.frame
+        ]
         scaled = np.stack(columns, axis=1) / np.array(self.scale)
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
 
 
 class History:
-    """The last frames of n environments, oldest first; an episode begins with its first frame repeated."""
+    """The last frames of n environments, oldest first; an episode begins with its first frame
+    repeated.
+    """
 
     def __init__(self, features: Features, count: int) -> None:
         self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
 
     def restart(self, frames: Array, which: Sequence[int] | NDArray[np.bool_]) -> None:
-        """Begin an episode in the environments ``which`` with their rows of ``frames`` (n, quantities)."""
+        """Begin an episode in the environments ``which`` with their rows of ``frames`` (n,
+        quantities).
+        """
         self._frames[which] = frames[which][:, None, :]
 
     def push(self, frames: Array) -> None:

@@ -1,8 +1,8 @@
 """The inner flight loop: from a position, velocity and yaw set point to rotor turn rates.
 
-A cascade on the estimated state: position, velocity and integral to a thrust vector; its direction to body rates and
-torques; torques and thrust through the inverse of the rotor mixing. The defaults halved the fan-tracking error of
-softer gains on the AR.Drone model.
+A cascade on the estimated state: position, velocity and integral to a thrust vector; its direction
+to body rates and torques; torques and thrust through the inverse of the rotor mixing. The defaults
+halved the fan-tracking error of softer gains on the AR.Drone model.
 """
 
 import math
@@ -21,7 +21,9 @@ SETPOINT_SIZE = 11
 
 @dataclass(frozen=True)
 class FlightGains:
-    """Gains of the flight loop; each acts on an acceleration, so they do not depend on the vehicle's size."""
+    """Gains of the flight loop; each acts on an acceleration, so they do not depend on the
+    vehicle's size.
+    """
 
     position: float = 4.0  # 1/s2
     velocity: float = 6.0  # 1/s
@@ -35,17 +37,19 @@ class FlightGains:
     leash: float = 0.5  # m, how far a moving set point runs ahead of the vehicle before it waits
 
 
-FLIGHT = np.dtype([
-    ("body", BODY),
-    ("unmixing", "f8", (4, 4)),
-    ("omega_max", "f8"),
-    *[(name, "f8") for name in FlightGains.__dataclass_fields__],
-    ("setpoint", "f8", (SETPOINT_SIZE,)),
-    ("sum", "f8", (3,)),
-    ("yaw_sum", "f8"),
-    ("rotation", "f8", (3, 3)),
-    ("command", "f8", (4,)),  # turn rates, rad/s
-])
+FLIGHT = np.dtype(
+    [
+        ("body", BODY),
+        ("unmixing", "f8", (4, 4)),
+        ("omega_max", "f8"),
+        *[(name, "f8") for name in FlightGains.__dataclass_fields__],
+        ("setpoint", "f8", (SETPOINT_SIZE,)),
+        ("sum", "f8", (3,)),
+        ("yaw_sum", "f8"),
+        ("rotation", "f8", (3, 3)),
+        ("command", "f8", (4,)),  # turn rates, rad/s
+    ]
+)
 
 
 def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndarray:
@@ -56,7 +60,9 @@ def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndar
     c["body"] = body_record(vehicle)[0]
     c["unmixing"] = np.linalg.inv(vehicle.mixing)
     # a rotor that makes four times its hover thrust where nothing else is stated
-    c["omega_max"] = vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    c["omega_max"] = (
+        vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    )
     for name in FlightGains.__dataclass_fields__:
         c[name] = getattr(gains, name)
     c["command"] = vehicle.hover_rate
@@ -65,7 +71,9 @@ def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndar
 
 @compiled
 def move_setpoint(c: Record, position: Array, dt: float) -> None:
-    """Move the set point with its own velocity for ``dt`` s; on an axis where it runs too far ahead it waits."""
+    """Move the set point with its own velocity for ``dt`` s; on an axis where it runs too far ahead
+    it waits.
+    """
     for i in range(3):
         step = dt * c.setpoint[3 + i]
         ahead = c.setpoint[i] + step - position[i]
@@ -76,9 +84,11 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
 
 @compiled
 def fly(c: Record, x: Array, dt: float) -> None:
-    """Write the turn rates (4,) rad/s that steer the estimated state ``x`` to the set point into ``c.command``.
+    """Write the turn rates (4,) rad/s that steer the estimated state ``x`` to the set point into
+    ``c.command``.
 
-    ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body rate 10-12.
+    ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body
+    rate 10-12.
     """
     R, s = c.rotation, c.setpoint
     quaternion_to_matrix(x[3:7], R)
@@ -86,7 +96,12 @@ def fly(c: Record, x: Array, dt: float) -> None:
     for i in range(3):
         error = s[i] - x[i]
         c.sum[i] = min(max(c.sum[i] + dt * error, -2.0), 2.0)
-        a = s[6 + i] + c.position * error + c.velocity * (s[3 + i] - x[7 + i]) + c.integral * c.sum[i]
+        a = (
+            s[6 + i]
+            + c.position * error
+            + c.velocity * (s[3 + i] - x[7 + i])
+            + c.integral * c.sum[i]
+        )
         if i == 0:
             a0 = a
         elif i == 1:
@@ -126,5 +141,10 @@ def fly(c: Record, x: Array, dt: float) -> None:
     tx += c.body.com[1] * thrust
     ty -= c.body.com[0] * thrust
     for i in range(4):
-        square = (c.unmixing[i, 0] * thrust + c.unmixing[i, 1] * tx + c.unmixing[i, 2] * ty + c.unmixing[i, 3] * tz)
+        square = (
+            c.unmixing[i, 0] * thrust
+            + c.unmixing[i, 1] * tx
+            + c.unmixing[i, 2] * ty
+            + c.unmixing[i, 3] * tz
+        )
         c.command[i] = min(math.sqrt(max(square, 0.0)), c.omega_max)

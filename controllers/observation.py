@@ -1,7 +1,8 @@
 """The observation that controllers act on, and the action that they return.
 
-One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm) in the world frame, own estimated
-velocity along y (m/s), and the last command (m/s). The action is (1,): the commanded velocity along the world's y.
+One frame is (8,): estimated external force x, y, z (N) and torque x, y, z (Nm) in the world frame,
+own estimated velocity along y (m/s), and the last command (m/s). The action is (1,): the commanded
+velocity along the world's y.
 """
 
 FORCE_X, FORCE_Y, FORCE_Z, TORQUE_X, TORQUE_Y, TORQUE_Z, VELOCITY_Y, LAST_COMMAND = range(8)

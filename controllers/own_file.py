@@ -15,7 +15,8 @@ def is_file_name(name: str) -> bool:
 
 
 def load_controller(name: str) -> Any:
-    """Return a new controller from ``FILE.py:CLASS``; the class may be left out where the file has only one.
+    """Return a new controller from ``FILE.py:CLASS``; the class may be left out where the file has
+    only one.
 
     Raises:
         InputError: no such file or class, one that fails, or that is no controller.
@@ -23,16 +24,26 @@ def load_controller(name: str) -> Any:
     stem, _, wanted = name.partition(".py:")
     path = f"{stem}.py" if wanted else name.removesuffix(":")
     module = import_file(path, _WHAT)
-    known = {key: value for key, value in vars(module).items()
-             if inspect.isclass(value) and value.__module__ == module.__name__ and callable(getattr(value, "reset", None))
-             and any("__call__" in vars(base) for base in value.__mro__)}
+    known = {
+        key: value
+        for key, value in vars(module).items()
+        if inspect.isclass(value)
+        and value.__module__ == module.__name__
+        and callable(getattr(value, "reset", None))
+        and any("__call__" in vars(base) for base in value.__mro__)
+    }
     if not known:
         raise InputError(f"{path}: holds no controller; expected {_WHAT}")
     if not wanted and len(known) > 1:
-        raise InputError(f"{path}: holds {', '.join(known)}; expected one of them behind the name, {path}:{next(iter(known))}")
+        raise InputError(
+            f"{path}: holds {', '.join(known)}; expected one of them behind the name, "
+            f"{path}:{next(iter(known))}"
+        )
     if wanted and wanted not in known:
         raise unknown_name("controller", wanted, known, path)
     try:
         return known[wanted or next(iter(known))]()
     except TypeError as error:
-        raise InputError(f"{name}: cannot be made without arguments: {error}; expected defaults for all of them") from error
+        raise InputError(
+            f"{name}: cannot be made without arguments: {error}; expected defaults for all of them"
+        ) from error

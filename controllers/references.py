@@ -43,6 +43,9 @@ class Oracle:
             InputError: no ``info``.
         """
         if info is None:
-            raise InputError("oracle: needs the environment's info (fan_y, fan_velocity, y), which only a simulator has")
+            raise InputError(
+                "oracle: needs the environment's info (fan_y, fan_velocity, y), which only a "
+                "simulator has"
+            )
         command = info["fan_velocity"] + self.gain * (info["fan_y"] - info["y"])
         return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)

@@ -1,6 +1,8 @@
-"""Trained policies as files: weights in ``NAME.npz``, and beside them the card ``NAME.json`` that says what they are.
+"""Trained policies as files: weights in ``NAME.npz``, and beside them the card ``NAME.json`` that
+says what they are.
 
-Neither can run code when it is read, and a policy is flown in plain NumPy: scoring needs no deep-learning library.
+Neither can run code when it is read, and a policy is flown in plain NumPy: scoring needs no
+deep-learning library.
 """
 
 import hashlib
@@ -21,7 +23,10 @@ from .observation import MAX_COMMAND
 Array = NDArray[np.float32]
 Weights = dict[str, Array]
 FORMAT = 1
-_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {"relu": lambda x: np.maximum(x, np.float32(0.0)), "tanh": np.tanh}
+_ACTIVATIONS: dict[str, Callable[[Array], Array]] = {
+    "relu": lambda x: np.maximum(x, np.float32(0.0)),
+    "tanh": np.tanh,
+}
 
 
 def layers_of(weights: Weights) -> int:
@@ -30,7 +35,9 @@ def layers_of(weights: Weights) -> int:
 
 
 def dense(weights: Weights, activation: str, x: Array) -> Array:
-    """Return the output (n,) of the dense layers ``weight0, bias0, weight1, ...`` for an input (m,)."""
+    """Return the output (n,) of the dense layers ``weight0, bias0, weight1, ...`` for an input
+    (m,).
+    """
     act = _ACTIVATIONS[activation]
     last = layers_of(weights) - 1
     for i in range(last + 1):
@@ -41,9 +48,15 @@ def dense(weights: Weights, activation: str, x: Array) -> Array:
 
 
 def lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array, Array]:
-    """Return the next hidden state and cell (h,) of an LSTM with gates in the order input, forget, cell, output."""
-    gates = (weights["lstm_input"] @ x + weights["lstm_input_bias"]
-             + weights["lstm_hidden"] @ hidden + weights["lstm_hidden_bias"])
+    """Return the next hidden state and cell (h,) of an LSTM with gates in the order input, forget,
+    cell, output.
+    """
+    gates = (
+        weights["lstm_input"] @ x
+        + weights["lstm_input_bias"]
+        + weights["lstm_hidden"] @ hidden
+        + weights["lstm_hidden_bias"]
+    )
     i, f, g, o = np.split(gates, 4)
     cell = _sigmoid(f) * cell + _sigmoid(i) * np.tanh(g)
     after: Array = _sigmoid(o) * np.tanh(cell)
@@ -59,10 +72,11 @@ class TrainedPolicy:
     """A policy that was learned, as a controller.
 
     Args:
-        card: what the policy is: ``features``, ``repeat`` (decisions that a command is held), ``activation``, ``squash``
-            (the output goes through a tanh), and where it comes from.
-        weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ...; before them, where there is one, the LSTM
-            ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h), ``lstm_input_bias``, ``lstm_hidden_bias`` (4h,).
+        card: what the policy is: ``features``, ``repeat`` (decisions that a command is held),
+            ``activation``, ``squash`` (the output goes through a tanh), and where it comes from.
+        weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ...; before them, where there
+            is one, the LSTM ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h), ``lstm_input_bias``,
+            ``lstm_hidden_bias`` (4h,).
 
     Raises:
         InputError: card and weights do not go together.
@@ -72,12 +86,20 @@ class TrainedPolicy:
         self.card, self.weights = dict(card), weights
         try:
             seen = card["features"]
-            self.features = Features(tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"])))
-            self._repeat, self._activation, self._squash = int(card["repeat"]), card["activation"], bool(card["squash"])
+            self.features = Features(
+                tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"]))
+            )
+            self._repeat, self._activation, self._squash = (
+                int(card["repeat"]),
+                card["activation"],
+                bool(card["squash"]),
+            )
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
         if self._activation not in _ACTIVATIONS or self._repeat < 1:
-            raise InputError(f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at least 1")
+            raise InputError(
+                f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at least 1"
+            )
         self._recurrent = "lstm_input" in weights
         entry = weights.get("lstm_input" if self._recurrent else "weight0")
         if entry is None or entry.shape[1] != self.features.size:
@@ -98,12 +120,19 @@ class TrainedPolicy:
         self._count, self._held = 0, np.zeros(1, dtype=np.float32)
         if self._recurrent:
             size = self.weights["lstm_hidden"].shape[1]
-            self._hidden, self._cell = np.zeros(size, dtype=np.float32), np.zeros(size, dtype=np.float32)
+            self._hidden, self._cell = (
+                np.zeros(size, dtype=np.float32),
+                np.zeros(size, dtype=np.float32),
+            )
 
-    def __call__(self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None) -> Array:
+    def __call__(
+        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
+    ) -> Array:
         """Return the command (1,) m/s for an observation (8,)."""
         if self._count % self._repeat == 0:
-            batch = {source: np.asarray((info or {})[source])[None] for source in self.features.sources}
+            batch = {
+                source: np.asarray((info or {})[source])[None] for source in self.features.sources
+            }
             frames = self.features.frames(np.asarray(observation)[None], batch)
             if self._count == 0:
                 self._history.restart(frames, [0])
@@ -119,14 +148,21 @@ class TrainedPolicy:
             self._hidden, self._cell = lstm(self.weights, x, self._hidden, self._cell)
             x = self._hidden
         out = dense(self.weights, self._activation, x)
-        return (np.tanh(out) * np.float32(MAX_COMMAND) if self._squash
-                else np.clip(out, -MAX_COMMAND, MAX_COMMAND)).astype(np.float32)
+        return (
+            np.tanh(out) * np.float32(MAX_COMMAND)
+            if self._squash
+            else np.clip(out, -MAX_COMMAND, MAX_COMMAND)
+        ).astype(np.float32)
 
 
 def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
-    """Write ``path`` (.npz) and the card beside it; return the path. The same weights give the same bytes."""
+    """Write ``path`` (.npz) and the card beside it; return the path. The same weights give the same
+    bytes.
+    """
     buffer = io.BytesIO()
-    np.savez(buffer, **{name: np.asarray(w, dtype=np.float32) for name, w in sorted(weights.items())})  # type: ignore[arg-type]
+    np.savez(
+        buffer, **{name: np.asarray(w, dtype=np.float32) for name, w in sorted(weights.items())}
+    )  # type: ignore[arg-type]
     data = buffer.getvalue()
     full = {"format": FORMAT, **card, "sha256": hashlib.sha256(data).hexdigest()}
     with replaced(path) as partial:
@@ -140,7 +176,8 @@ def load_policy(path: str | Path) -> TrainedPolicy:
     """Read a policy from its ``.npz`` or its card.
 
     Raises:
-        InputError: a file is missing, not readable, of another format, or the two are not of one policy.
+        InputError: a file is missing, not readable, of another format, or the two are not of one
+            policy.
     """
     file = Path(path).with_suffix(".npz")
     card_file = file.with_suffix(".json")
@@ -148,19 +185,27 @@ def load_policy(path: str | Path) -> TrainedPolicy:
         card = json.loads(card_file.read_text(encoding="utf-8"))
         data = file.read_bytes()
     except FileNotFoundError as error:
-        raise InputError(f"{error.filename}: no such file; a trained policy is a .npz file with its .json card") from error
+        raise InputError(
+            f"{error.filename}: no such file; a trained policy is a .npz file with its .json card"
+        ) from error
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{card_file}: cannot be read as a policy's card: {error}") from error
     if not isinstance(card, dict) or card.get("format") != FORMAT:
         raise InputError(f"{card_file}: format must be {FORMAT}, a trained policy's card")
     if card.get("sha256") != hashlib.sha256(data).hexdigest():
-        raise InputError(f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)")
+        raise InputError(
+            f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)"
+        )
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}
     except Exception as error:  # whatever a parser makes of bytes that are no archive of arrays
         raise InputError(f"{file}: cannot be read as weights: {error}") from error
-    bad = [name for name, array in weights.items() if not np.all(np.isfinite(array)) or array.ndim not in (1, 2)]
+    bad = [
+        name
+        for name, array in weights.items()
+        if not np.all(np.isfinite(array)) or array.ndim not in (1, 2)
+    ]
     if bad:
         raise InputError(f"{file}: {bad[0]} must be a vector or a matrix of finite numbers")
     try:

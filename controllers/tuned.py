@@ -1,4 +1,6 @@
-"""The hand-designed laws with gains found by search, ``tuned.yaml``; the file says for which scenario and how."""
+"""The hand-designed laws with gains found by search, ``tuned.yaml``; the file says for which
+scenario and how.
+"""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,12 +14,21 @@ STANDARD = "base"
 
 
 def tuned_gains() -> dict[str, dict[str, dict[str, Any]]]:
-    """Return what is known of tuned gains: law, scenario, and then ``gains`` and how they were found."""
+    """Return what is known of tuned gains: law, scenario, and then ``gains`` and how they were
+    found.
+    """
     text = (resources.files(__package__) / "tuned.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text) or {}
 
 
 def tuned_controllers(laws: Mapping[str, Callable[..., Any]]) -> dict[str, Callable[[], Any]]:
-    """Return ``LAW-tuned`` (for the base scenario) and ``LAW-tuned-SCENARIO`` for all gains that are known."""
-    return {f"{law}-tuned" + ("" if scenario == STANDARD else f"-{scenario}"): partial(laws[law], **found["gains"])
-            for law, scenarios in tuned_gains().items() for scenario, found in scenarios.items()}
+    """Return ``LAW-tuned`` (for the base scenario) and ``LAW-tuned-SCENARIO`` for all gains that
+    are known.
+    """
+    return {
+        f"{law}-tuned" + ("" if scenario == STANDARD else f"-{scenario}"): partial(
+            laws[law], **found["gains"]
+        )
+        for law, scenarios in tuned_gains().items()
+        for scenario, found in scenarios.items()
+    }

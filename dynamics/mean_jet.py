@@ -1,9 +1,10 @@
 """The mean wind of a drum fan's jet, as a table over distance and radius.
 
-Axial speed: the momentum of an annular disc spread by a Gaussian that widens with the distance x, a jet still in its
-shear layer: ``u^2 = U0^2 (disc of radius 0.45 less hub of radius 0.10) * Gaussian of width 0.12 x / sqrt 2``. The momentum
-flux is the same at every x, and the radial inflow (entrainment) follows from continuity. The convolution of a disc with
-a Gaussian is a non-central chi-square distribution.
+Axial speed: the momentum of an annular disc spread by a Gaussian that widens with the distance x, a
+jet still in its shear layer:
+``u^2 = U0^2 (disc of radius 0.45 less hub of radius 0.10) * Gaussian of width 0.12 x / sqrt 2``.
+The momentum flux is the same at every x, and the radial inflow (entrainment) follows from
+continuity. The convolution of a disc with a Gaussian is a non-central chi-square distribution.
 """
 
 import math
@@ -25,7 +26,9 @@ _SPREAD = 0.12
 
 @cache
 def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
-    """Return axial and radial speed for U0 = 1 over the grid of distances and radii, each (137, 151)."""
+    """Return axial and radial speed for U0 = 1 over the grid of distances and radii, each (137,
+    151).
+    """
     from scipy.special import chndtr
 
     x = FIRST_X + STEP_X * np.arange(COUNT_X)
@@ -33,11 +36,18 @@ def jet_table(radius: float, hub_radius: float) -> tuple[Array, Array]:
     # one more distance on either side, so that the derivative along x is central everywhere
     fine = np.concatenate([[x[0] - STEP_X], x, [x[-1] + STEP_X]])
     sigma = (_SPREAD * fine / math.sqrt(2.0))[:, None]
-    momentum = chndtr((radius / sigma) ** 2, 2, (r / sigma) ** 2) - chndtr((hub_radius / sigma) ** 2, 2, (r / sigma) ** 2)
+    momentum = chndtr((radius / sigma) ** 2, 2, (r / sigma) ** 2) - chndtr(
+        (hub_radius / sigma) ** 2, 2, (r / sigma) ** 2
+    )
     axial = np.sqrt(np.maximum(momentum, 0.0))
     slope = (axial[2:] - axial[:-2]) / (2.0 * STEP_X)
-    flux = np.concatenate([np.zeros((len(x), 1)), np.cumsum(
-        0.5 * (slope[:, 1:] * r[1:] + slope[:, :-1] * r[:-1]) * STEP_R, axis=1)], axis=1)
+    flux = np.concatenate(
+        [
+            np.zeros((len(x), 1)),
+            np.cumsum(0.5 * (slope[:, 1:] * r[1:] + slope[:, :-1] * r[:-1]) * STEP_R, axis=1),
+        ],
+        axis=1,
+    )
     radial = np.zeros_like(flux)
     radial[:, 1:] = -flux[:, 1:] / r[1:]
     return np.ascontiguousarray(axial[1:-1]), radial

@@ -1,6 +1,7 @@
 """A vehicle with its effects, as fields of a record that compiled code works on.
 
-Filter and plant each hold one: the filter's has the declared effects, the plant's also those that nobody declared.
+Filter and plant each hold one: the filter's has the declared effects, the plant's also those that
+nobody declared.
 """
 
 import numpy as np
@@ -29,7 +30,9 @@ MAX_EFFECTS = 16  # of a kind
 MAX_SENSING = 4
 MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
 _SENSE_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
-_OWN_ROW = MAX_EFFECTS + MAX_SENSING  # the model's: whether it has delivered turn rates yet, and those
+_OWN_ROW = (
+    MAX_EFFECTS + MAX_SENSING
+)  # the model's: whether it has delivered turn rates yet, and those
 
 MODEL_FIELDS: list[tuple[object, ...]] = [
     ("body", BODY),
@@ -65,15 +68,23 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
         InputError: more effects than a model holds.
     """
     bundle = compile_effects(vehicle)
-    if max(len(bundle.wrench_laws), len(bundle.rotor_laws)) > MAX_EFFECTS or len(bundle.sense_laws) > MAX_SENSING:
-        raise InputError(f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and {MAX_SENSING} of "
-                         "sensing")
+    if (
+        max(len(bundle.wrench_laws), len(bundle.rotor_laws)) > MAX_EFFECTS
+        or len(bundle.sense_laws) > MAX_SENSING
+    ):
+        raise InputError(
+            f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and "
+            f"{MAX_SENSING} of "
+            "sensing"
+        )
     assert max(bundle.rotor_memory, bundle.sense_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
     record["constants"] = bundle.constants
-    for kind, laws, coefficients in (("wrench", bundle.wrench_laws, bundle.wrench_coefficients),
-                                     ("rotor", bundle.rotor_laws, bundle.rotor_coefficients),
-                                     ("sense", bundle.sense_laws, bundle.sense_coefficients)):
+    for kind, laws, coefficients in (
+        ("wrench", bundle.wrench_laws, bundle.wrench_coefficients),
+        ("rotor", bundle.rotor_laws, bundle.rotor_coefficients),
+        ("sense", bundle.sense_laws, bundle.sense_coefficients),
+    ):
         record[f"{kind}_count"] = len(laws)
         record[f"{kind}_laws"][: len(laws)] = laws
         record[f"{kind}_coefficients"][: len(laws)] = coefficients
@@ -90,13 +101,23 @@ def reset_model(record: np.void) -> None:
 
 @compiled
 def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Work out what the rotors deliver over a step of ``dt`` s at the logged turn rates (4,) rad/s."""
+    """Work out what the rotors deliver over a step of ``dt`` s at the logged turn
+    rates (4,) rad/s.
+    """
     f.voltage = voltage
     for i in range(4):
         f.rotors[i] = rotor_speeds[i]
     f.rotors[STEP], f.rotors[ROTOR_TIME] = dt, f.time
     if f.rotor_count > 0:
-        deliver(f.rotor_laws[: f.rotor_count], f.rotor_coefficients, f.constants, f.memory, dt, voltage, f.rotors)
+        deliver(
+            f.rotor_laws[: f.rotor_count],
+            f.rotor_coefficients,
+            f.constants,
+            f.memory,
+            dt,
+            voltage,
+            f.rotors,
+        )
     if f.wrench_count > 0:
         last = f.memory[_OWN_ROW]
         share = last[0] / dt if dt > 0.0 else 0.0
@@ -109,27 +130,70 @@ def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 
 
 @compiled
-def apply_effects(f: Record, position: Array, rotation: Array, velocity: Array, omega: Array) -> None:
+def apply_effects(
+    f: Record, position: Array, rotation: Array, velocity: Array, omega: Array
+) -> None:
     """Write what the wrench effects say at a state into ``f.effect_wrench``.
 
-    The first call after ``drive`` also carries the effects' own states over the step: it must be at the state itself,
-    not at a sigma point.
+    The first call after ``drive`` also carries the effects' own states over the step: it must be at
+    the state itself, not at a sigma point.
     """
     if f.wrench_count > 0:
         if f.waiting > 0:
             f.waiting = 0
-            fill_state(f.body, position, rotation, velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state)
-            advance(f.wrench_hooks[: f.wrench_count], f.wrench_coefficients, f.constants, f.effect_state, f.rotors)
-        effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
-                      velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, f.effect_wrench)
+            fill_state(
+                f.body,
+                position,
+                rotation,
+                velocity,
+                omega,
+                f.rotors,
+                f.wind,
+                f.voltage,
+                f.time,
+                f.effect_state,
+            )
+            advance(
+                f.wrench_hooks[: f.wrench_count],
+                f.wrench_coefficients,
+                f.constants,
+                f.effect_state,
+                f.rotors,
+            )
+        effect_wrench(
+            f.wrench_laws[: f.wrench_count],
+            f.wrench_coefficients,
+            f.constants,
+            f.body,
+            position,
+            rotation,
+            velocity,
+            omega,
+            f.rotors,
+            f.wind,
+            f.voltage,
+            f.time,
+            f.effect_state,
+            f.effect_wrench,
+        )
 
 
 @compiled
 def rewrite_sample(f: Record, dt: float, parts: int, direction: float) -> None:
-    """Change turn rates and pose, the first 11 of ``f.sample``, from truth to report (``direction`` +1) or back (-1).
+    """Change turn rates and pose, the first 11 of ``f.sample``, from truth to report (``direction``
+    +1) or back (-1).
 
-    ``parts``: 1 position, 2 attitude, 4 turn rates. Where the attitude is no part of it, it must still be readable.
+    ``parts``: 1 position, 2 attitude, 4 turn rates. Where the attitude is no part of it, it must
+    still be readable.
     """
     if f.sense_count > 0:
-        report(f.sense_laws[: f.sense_count], f.sense_coefficients, f.constants, f.memory[_SENSE_ROW:], dt, parts,
-               direction, f.sample)
+        report(
+            f.sense_laws[: f.sense_count],
+            f.sense_coefficients,
+            f.constants,
+            f.memory[_SENSE_ROW:],
+            dt,
+            parts,
+            direction,
+            f.sample,
+        )

@@ -24,15 +24,17 @@ from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-BODY = np.dtype([
-    ("mass", "f8"),
-    ("gravity", "f8"),
-    ("com", "f8", (3,)),
-    ("inertia", "f8", (3, 3)),
-    ("inverse_inertia", "f8", (3, 3)),
-    ("k", "f8", (4,)),
-    ("mixing", "f8", (4, 4)),
-])
+BODY = np.dtype(
+    [
+        ("mass", "f8"),
+        ("gravity", "f8"),
+        ("com", "f8", (3,)),
+        ("inertia", "f8", (3, 3)),
+        ("inverse_inertia", "f8", (3, 3)),
+        ("k", "f8", (4,)),
+        ("mixing", "f8", (4, 4)),
+    ]
+)
 
 
 def body_record(vehicle: Vehicle) -> np.ndarray:
@@ -47,7 +49,9 @@ def body_record(vehicle: Vehicle) -> np.ndarray:
 
 @compiled
 def rotor_wrench(body: Record, rotor_speeds: Array, out: Array) -> None:
-    """Write total thrust (N) and body torques about the centre of mass (Nm) into ``out`` (4,): (1), (8)-(10)."""
+    """Write total thrust (N) and body torques about the centre of mass (Nm) into ``out`` (4,): (1),
+    (8)-(10).
+    """
     for i in range(4):
         total = 0.0
         for j in range(4):
@@ -58,12 +62,22 @@ def rotor_wrench(body: Record, rotor_speeds: Array, out: Array) -> None:
 
 
 @compiled
-def accelerations(body: Record, rotation: Array, omega: Array, rotors: Array, torque: Array, force: Array,
-                  effects: Array, out: Array) -> None:
-    """Write the accelerations of the geometric centre (world) and of the attitude (body) into ``out`` (6,): (4), (12).
+def accelerations(
+    body: Record,
+    rotation: Array,
+    omega: Array,
+    rotors: Array,
+    torque: Array,
+    force: Array,
+    effects: Array,
+    out: Array,
+) -> None:
+    """Write the accelerations of the geometric centre (world) and of the attitude (body) into
+    ``out`` (6,): (4), (12).
 
-    ``rotors`` is (4,) thrust and torques, ``torque`` and ``force`` (3,) the external wrench in the world frame,
-    ``effects`` (6,) the wrench of the declared effects: force in the world, torque in the body frame.
+    ``rotors`` is (4,) thrust and torques, ``torque`` and ``force`` (3,) the external wrench in the
+    world frame, ``effects`` (6,) the wrench of the declared effects: force in the world, torque in
+    the body frame.
     """
     J = body.inertia
     wx, wy, wz = omega[0], omega[1], omega[2]
@@ -71,9 +85,27 @@ def accelerations(body: Record, rotation: Array, omega: Array, rotors: Array, to
     hy = J[1, 0] * wx + J[1, 1] * wy + J[1, 2] * wz
     hz = J[2, 0] * wx + J[2, 1] * wy + J[2, 2] * wz
     # the world torque enters as R' tau
-    tx = rotors[1] + effects[3] + rotation[0, 0] * torque[0] + rotation[1, 0] * torque[1] + rotation[2, 0] * torque[2]
-    ty = rotors[2] + effects[4] + rotation[0, 1] * torque[0] + rotation[1, 1] * torque[1] + rotation[2, 1] * torque[2]
-    tz = rotors[3] + effects[5] + rotation[0, 2] * torque[0] + rotation[1, 2] * torque[1] + rotation[2, 2] * torque[2]
+    tx = (
+        rotors[1]
+        + effects[3]
+        + rotation[0, 0] * torque[0]
+        + rotation[1, 0] * torque[1]
+        + rotation[2, 0] * torque[2]
+    )
+    ty = (
+        rotors[2]
+        + effects[4]
+        + rotation[0, 1] * torque[0]
+        + rotation[1, 1] * torque[1]
+        + rotation[2, 1] * torque[2]
+    )
+    tz = (
+        rotors[3]
+        + effects[5]
+        + rotation[0, 2] * torque[0]
+        + rotation[1, 2] * torque[1]
+        + rotation[2, 2] * torque[2]
+    )
     tx -= wy * hz - wz * hy
     ty -= wz * hx - wx * hz
     tz -= wx * hy - wy * hx
@@ -96,10 +128,24 @@ def accelerations(body: Record, rotation: Array, omega: Array, rotors: Array, to
 
 
 @compiled
-def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body: Record, position: Array,
-                  rotation: Array, velocity: Array, omega: Array, rotor_speeds: Array, wind: Array, voltage: float,
-                  time: float, state: Array, out: Array) -> None:
-    """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the body frame.
+def effect_wrench(
+    laws: np.ndarray,
+    coefficients: Array,
+    constants: Array,
+    body: Record,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    omega: Array,
+    rotor_speeds: Array,
+    wind: Array,
+    voltage: float,
+    time: float,
+    state: Array,
+    out: Array,
+) -> None:
+    """Write the summed wrench (6,) of the effects into ``out``: force in the world, torque in the
+    body frame.
 
     ``state`` (STATE_SIZE,) is scratch but for the rotors' acceleration, which must be there.
     """
@@ -110,9 +156,21 @@ def effect_wrench(laws: np.ndarray, coefficients: Array, constants: Array, body:
 
 
 @compiled
-def fill_state(body: Record, position: Array, rotation: Array, velocity: Array, omega: Array, rotor_speeds: Array,
-               wind: Array, voltage: float, time: float, state: Array) -> None:
-    """Lay a state of the flight out for the laws in ``state`` (STATE_SIZE,), all but the rotors' acceleration."""
+def fill_state(
+    body: Record,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    omega: Array,
+    rotor_speeds: Array,
+    wind: Array,
+    voltage: float,
+    time: float,
+    state: Array,
+) -> None:
+    """Lay a state of the flight out for the laws in ``state`` (STATE_SIZE,), all but the rotors'
+    acceleration.
+    """
     for i in range(3):
         state[POSITION + i] = position[i]
         state[VELOCITY + i] = velocity[i]
@@ -127,4 +185,12 @@ def fill_state(body: Record, position: Array, rotation: Array, velocity: Array, 
     state[TIME] = time
 
 
-__all__ = ["BODY", "STATE_SIZE", "accelerations", "body_record", "effect_wrench", "fill_state", "rotor_wrench"]
+__all__ = [
+    "BODY",
+    "STATE_SIZE",
+    "accelerations",
+    "body_record",
+    "effect_wrench",
+    "fill_state",
+    "rotor_wrench",
+]

@@ -1,9 +1,11 @@
-"""Rotations: unit quaternions (scalar first, Hamilton, body to world) and modified Rodrigues parameters.
+"""Rotations: unit quaternions (scalar first, Hamilton, body to world) and modified Rodrigues
+parameters.
 
-Equation numbers are those of McKinnon and Schoellig, *Unscented External Force and Torque Estimation for
-Quadrotors*, IROS 2016, with the sign conventions of body-to-world quaternions (see docs/estimator.md).
-The functions are compiled and write into their last argument, so that the filter allocates nothing in a step;
-arrays of rotations in Python code are better served by ``scipy.spatial.transform.Rotation``.
+Equation numbers are those of McKinnon and Schoellig, *Unscented External Force and Torque
+Estimation for Quadrotors*, IROS 2016, with the sign conventions of body-to-world quaternions (see
+docs/estimator.md). The functions are compiled and write into their last argument, so that the
+filter allocates nothing in a step; arrays of rotations in Python code are better served by
+``scipy.spatial.transform.Rotation``.
 """
 
 import math
@@ -19,7 +21,9 @@ Array = NDArray[np.float64]
 
 @compiled
 def quaternion_multiply(a: Array, b: Array, out: Array) -> None:
-    """Write the Hamilton product ``a * b`` of two quaternions (4,) into ``out``, which must be neither of them."""
+    """Write the Hamilton product ``a * b`` of two quaternions (4,) into ``out``, which must be
+    neither of them.
+    """
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
     out[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
@@ -28,7 +32,9 @@ def quaternion_multiply(a: Array, b: Array, out: Array) -> None:
 
 @compiled
 def quaternion_to_matrix(q: Array, out: Array) -> None:
-    """Write the matrix (3, 3) that takes body to world coordinates into ``out``: (7) with ``+2 q0 [qv]x``."""
+    """Write the matrix (3, 3) that takes body to world coordinates into ``out``: (7) with
+    ``+2 q0 [qv]x``.
+    """
     w, x, y, z = q[0], q[1], q[2], q[3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
@@ -66,8 +72,8 @@ def quaternion_from_mrp(rho: Array, out: Array) -> None:
 def mrp_from_quaternion(q: Array, out: Array) -> None:
     """Write the modified Rodrigues parameters (3,) of a unit quaternion (4,) into ``out``, (17).
 
-    A quaternion and its negative are one attitude: the one with a non-negative scalar part is taken, so that the
-    result never exceeds 1 in length (half a turn).
+    A quaternion and its negative are one attitude: the one with a non-negative scalar part is
+    taken, so that the result never exceeds 1 in length (half a turn).
     """
     sign = 1.0 if q[0] >= 0.0 else -1.0
     scale = sign / (1.0 + sign * q[0])
@@ -77,7 +83,9 @@ def mrp_from_quaternion(q: Array, out: Array) -> None:
 
 @compiled
 def attitude_error(q: Array, reference: Array, out: Array) -> None:
-    """Write the world-frame MRP (3,) that takes ``reference`` to ``q`` into ``out``: ``q * conj(reference)``, (24)."""
+    """Write the world-frame MRP (3,) that takes ``reference`` to ``q`` into ``out``:
+    ``q * conj(reference)``, (24).
+    """
     w = q[0] * reference[0] + q[1] * reference[1] + q[2] * reference[2] + q[3] * reference[3]
     x = -q[0] * reference[1] + q[1] * reference[0] - q[2] * reference[3] + q[3] * reference[2]
     y = -q[0] * reference[2] + q[1] * reference[3] + q[2] * reference[0] - q[3] * reference[1]
@@ -91,12 +99,19 @@ def attitude_error(q: Array, reference: Array, out: Array) -> None:
 
 @compiled
 def turn_body(q: Array, wx: float, wy: float, wz: float, dt: float, out: Array) -> None:
-    """Write ``q`` turned at the body rate (wx, wy, wz) rad/s for ``dt`` s into ``out``: (13), (14), ``-[psi]x``."""
+    """Write ``q`` turned at the body rate (wx, wy, wz) rad/s for ``dt`` s into ``out``: (13), (14),
+    ``-[psi]x``.
+    """
     half = 0.5 * dt
     square = half * half * (wx * wx + wy * wy + wz * wz)
-    # the series to the last digit of a double: three times as fast as the functions, and safe at zero
-    cosine = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
-    scale = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))))
+    # the series to the last digit of a double: three times as fast as the functions, and safe at
+    # zero
+    cosine = 1.0 - square / 2.0 * (
+        1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))
+    )
+    scale = half * (
+        1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
+    )
     large = square >= 0.01
     if any_of(large):
         angle = math.sqrt(square)

@@ -1,7 +1,9 @@
-"""What is declared of a quadrotor: rigid body, rotors, sensing and the effects that its model includes.
+"""What is declared of a quadrotor: rigid body, rotors, sensing and the effects that its model
+includes.
 
 Vehicles are data: ``vehicle_file`` reads them.
-Rotor geometry, mixing and its inverse are equations (1) and (8)-(10) of McKinnon and Schoellig, IROS 2016.
+Rotor geometry, mixing and its inverse are equations (1) and (8)-(10) of McKinnon and Schoellig,
+IROS 2016.
 """
 
 import math
@@ -13,9 +15,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Rotors as in the paper: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right, with x forward and y left.
+# Rotors as in the paper: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right, with x forward and
+# y left.
 _QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
-# Turning sense about body +z; the reaction on the body is opposite, which gives tau_z = M1 - M2 + M3 - M4.
+# Turning sense about body +z; the reaction on the body is opposite, which gives tau_z = M1 - M2 +
+# M3 - M4.
 _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 
 
@@ -30,7 +34,9 @@ class Mocap:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """One effect of a vehicle's model: its name and the coefficients given; those not given are zero."""
+    """One effect of a vehicle's model: its name and the coefficients given; those not given are
+    zero.
+    """
 
     name: str
     coefficients: Mapping[str, float]
@@ -54,7 +60,9 @@ class Vehicle:
     gravity: float = 9.81  # m/s2
     spin: Array = field(default_factory=_SPIN.copy)  # (4,) turning sense about body +z
     rotor_positions: Array | None = None  # (4, 3) m from the geometric centre; default from arm_l
-    com: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m, centre of mass from the geometric centre
+    com: Array = field(
+        default_factory=lambda: np.zeros(3)
+    )  # (3,) m, centre of mass from the geometric centre
     mocap: Mocap = Mocap()
     effects: tuple[EffectSetting, ...] = ()
     floor_z: float = -math.inf  # m
@@ -67,7 +75,9 @@ class Vehicle:
 
     @property
     def mixing(self) -> Array:
-        """Matrix (4, 4) from the squared turn rates to total thrust and body torques about the centre, (1), (8)-(10)."""
+        """Matrix (4, 4) from the squared turn rates to total thrust and body torques about the
+        centre, (1), (8)-(10).
+        """
         x, y = self.positions[:, 0], self.positions[:, 1]
         return np.array([self.k, y * self.k, -x * self.k, -self.spin * self.p])
 
@@ -82,11 +92,14 @@ class Vehicle:
         return math.sqrt(self.weight / float(np.sum(self.k)))
 
     def rotor_wrench(self, rotor_speeds: Array) -> Array:
-        """Return total thrust (N) and body torques (Nm), shape (..., 4), of turn rates (..., 4) in rad/s, (1)."""
+        """Return total thrust (N) and body torques (Nm), shape (..., 4), of turn rates (..., 4) in
+        rad/s, (1).
+        """
         return np.square(rotor_speeds) @ self.mixing.T
 
     def rotor_speeds(self, thrust: float, torque: Array) -> Array:
-        """Return the turn rates (4,) in rad/s that give a thrust (N) and body torques (3,) in Nm, the inverse of (1).
+        """Return the turn rates (4,) in rad/s that give a thrust (N) and body torques (3,) in Nm,
+        the inverse of (1).
 
         What no non-negative turn rate can give is clipped at zero and at ``omega_max``.
         """

@@ -21,22 +21,28 @@ _LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow
 
 def preset_names() -> list[str]:
     """Return the names of the vehicles that come with the kit."""
-    return sorted(file.name[:-5] for file in resources.files(__package__).joinpath("vehicles").iterdir()
-                  if file.name.endswith(".yaml"))
+    return sorted(
+        file.name[:-5]
+        for file in resources.files(__package__).joinpath("vehicles").iterdir()
+        if file.name.endswith(".yaml")
+    )
 
 
 def load_vehicle(name_or_path: str | Path) -> Vehicle:
     """Return a preset by its name, or the vehicle of a YAML file.
 
     Raises:
-        InputError: no such preset or file, or a field that is missing, unknown, malformed or out of range.
+        InputError: no such preset or file, or a field that is missing, unknown, malformed or out of
+            range.
     """
     path = Path(name_or_path)
     if path.suffix in {".yaml", ".yml"}:
         return _vehicle(read_yaml(path, "a vehicle file"), str(path))
     presets = preset_names()
     if str(name_or_path) not in presets:
-        raise unknown_name("vehicle", str(name_or_path), presets, "vehicle (a preset's name or a .yaml file)")
+        raise unknown_name(
+            "vehicle", str(name_or_path), presets, "vehicle (a preset's name or a .yaml file)"
+        )
     source = resources.files(__package__).joinpath("vehicles", f"{name_or_path}.yaml")
     return parse_vehicle(source.read_text(encoding="utf-8"), f"{name_or_path}.yaml")
 
@@ -48,7 +54,10 @@ def parse_vehicle(text: str, where: str = "vehicle") -> Vehicle:
 
 def _vehicle(data: object, where: str) -> Vehicle:
     if not isinstance(data, dict):
-        raise InputError(f"{where}: expected a mapping of fields such as mass and inertia, got {type(data).__name__}")
+        raise InputError(
+            f"{where}: expected a mapping of fields such as mass and inertia, got "
+            f"{type(data).__name__}"
+        )
     known = {f.name for f in fields(Vehicle)}
     for key in data:
         if key not in known:
@@ -78,23 +87,35 @@ def _vehicle(data: object, where: str) -> Vehicle:
     if "spin" in data:
         given["spin"] = _numbers(data["spin"], where, "spin", (4,))
         if not np.all(np.isin(given["spin"], (-1.0, 1.0))):
-            raise InputError(f"{where}: spin must be four times 1 or -1 (turning sense about body +z), got {data['spin']}")
+            raise InputError(
+                f"{where}: spin must be four times 1 or -1 (turning sense about body +z), got "
+                f"{data['spin']}"
+            )
     if data.get("rotor_positions") is not None:
-        given["rotor_positions"] = _numbers(data["rotor_positions"], where, "rotor_positions", (4, 3))
+        given["rotor_positions"] = _numbers(
+            data["rotor_positions"], where, "rotor_positions", (4, 3)
+        )
     if "com" in data:
         given["com"] = _numbers(data["com"], where, "com", (3,))
     if "omega_source" in data:
         if data["omega_source"] not in ("measured", "commanded"):
-            raise InputError(f"{where}: omega_source must be measured or commanded, got {data['omega_source']!r}")
+            raise InputError(
+                f"{where}: omega_source must be measured or commanded, got {data['omega_source']!r}"
+            )
         given["omega_source"] = data["omega_source"]
     if "mocap" in data:
         given["mocap"] = _mocap(data["mocap"], where)
     given["effects"] = _effects(data.get("effects") or [], where)
     vehicle = Vehicle(**given)
-    length = np.linalg.norm(vehicle.mixing, axis=1, keepdims=True)  # zero where all rotors stand in one line
+    length = np.linalg.norm(
+        vehicle.mixing, axis=1, keepdims=True
+    )  # zero where all rotors stand in one line
     if np.any(length == 0.0) or np.linalg.cond(vehicle.mixing / length) > 1e6:
-        raise InputError(f"{where}: rotor_positions and spin: the four rotors cannot make thrust and three torques "
-                         "independently of one another")
+        raise InputError(
+            f"{where}: rotor_positions and spin: the four rotors cannot make thrust and three "
+            f"torques "
+            "independently of one another"
+        )
     return vehicle
 
 
@@ -108,7 +129,10 @@ def dump_vehicle(vehicle: Vehicle) -> str:
         if f.name == "mocap":
             value = {m.name: getattr(value, m.name) for m in fields(Mocap)}
         elif f.name == "effects":
-            value = [{"name": e.name, "coefficients": {c: float(v) for c, v in e.coefficients.items()}} for e in value]
+            value = [
+                {"name": e.name, "coefficients": {c: float(v) for c, v in e.coefficients.items()}}
+                for e in value
+            ]
         elif isinstance(value, np.ndarray):
             value = value.tolist()
         elif isinstance(value, np.generic):
@@ -118,7 +142,8 @@ def dump_vehicle(vehicle: Vehicle) -> str:
 
 
 def save_vehicle(vehicle: Vehicle, path: str | Path) -> None:
-    """Write a vehicle to a YAML file, whole or not at all: ``load_vehicle`` of it gives the vehicle again.
+    """Write a vehicle to a YAML file, whole or not at all: ``load_vehicle`` of it gives the vehicle
+    again.
 
     Raises:
         InputError: the file cannot be written.
@@ -155,9 +180,14 @@ def _inertia(value: object, where: str) -> Array:
         matrix = np.diag(_numbers(value, where, "inertia", (3,)))
     else:
         matrix = _numbers(value, where, "inertia", (3, 3))
-    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0) or np.any(np.linalg.eigvalsh(matrix) <= 0):
-        raise InputError(f"{where}: inertia must be symmetric and positive definite (3 principal values or 3 x 3), "
-                         f"got {value!r}")
+    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0) or np.any(
+        np.linalg.eigvalsh(matrix) <= 0
+    ):
+        raise InputError(
+            f"{where}: inertia must be symmetric and positive definite (3 principal values or 3 x "
+            f"3), "
+            f"got {value!r}"
+        )
     return matrix
 
 
@@ -168,19 +198,29 @@ def _mocap(value: object, where: str) -> Mocap:
     for key in value:
         if key not in known:
             raise unknown_name("key", str(key), known, f"{where}: mocap")
-    return Mocap(**{key: _number(v, where, f"mocap.{key}", positive=True) for key, v in value.items()})
+    return Mocap(
+        **{key: _number(v, where, f"mocap.{key}", positive=True) for key, v in value.items()}
+    )
 
 
 def _effects(value: object, where: str) -> tuple[EffectSetting, ...]:
     if not isinstance(value, list):
-        raise InputError(f"{where}: effects must be a list of {{name, coefficients}}, got {value!r}")
+        raise InputError(
+            f"{where}: effects must be a list of {{name, coefficients}}, got {value!r}"
+        )
     settings = []
     for item in value:
         if not isinstance(item, dict) or set(item) - {"name", "coefficients"} or "name" not in item:
-            raise InputError(f"{where}: effects: each must be a mapping of name and coefficients, got {item!r}")
+            raise InputError(
+                f"{where}: effects: each must be a mapping of name and coefficients, got {item!r}"
+            )
         given = item.get("coefficients") or {}
         if not isinstance(given, dict):
-            raise InputError(f"{where}: effects: {item['name']}: coefficients must be a mapping, got {given!r}")
-        numbers = {str(c): _number(v, where, f"effects: {item['name']}.{c}") for c, v in given.items()}
+            raise InputError(
+                f"{where}: effects: {item['name']}: coefficients must be a mapping, got {given!r}"
+            )
+        numbers = {
+            str(c): _number(v, where, f"effects: {item['name']}.{c}") for c, v in given.items()
+        }
         settings.append(check_setting(EffectSetting(str(item["name"]), numbers), where))
     return tuple(settings)

@@ -1,4 +1,6 @@
-"""Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the wind."""
+"""Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the
+wind.
+"""
 
 import math
 from contextlib import nullcontext
@@ -25,28 +27,63 @@ from ..runtime.direct_call import direct, released
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, Fan, fan_record, jet_table
 from .native_functions import clock_address, mj_step_address
-from .plant import NOISE, PLANT, SUBSTEPS, TICK, PlantSettings, actuate, load_world, plant_record, reset_plant, sense
+from .plant import (
+    NOISE,
+    PLANT,
+    SUBSTEPS,
+    TICK,
+    PlantSettings,
+    actuate,
+    load_world,
+    plant_record,
+    reset_plant,
+    sense,
+)
 from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
 _AT_REST = np.zeros(1)
 _STILL_AIR = (np.zeros((COUNT_X, COUNT_R)),) * 2
-LOOP = np.dtype([
-    ("plant", PLANT), ("filter", FILTER), ("step", "i8"), ("flight", FLIGHT), ("fan", FAN),
-    ("ticks", "i8"),  # since the reset
-    # addresses: of the jet's tables, of MuJoCo's step and its arguments, and of arrays in its data
-    *[(name, "i8") for name in ("axial", "radial", "mj_step", "model", "data", "qpos", "qvel", "xfrc", "clock")],
-])
+LOOP = np.dtype(
+    [
+        ("plant", PLANT),
+        ("filter", FILTER),
+        ("step", "i8"),
+        ("flight", FLIGHT),
+        ("fan", FAN),
+        ("ticks", "i8"),  # since the reset
+        # addresses: of the jet's tables, of MuJoCo's step and its arguments, and of arrays in its
+        # data
+        *[
+            (name, "i8")
+            for name in (
+                "axial",
+                "radial",
+                "mj_step",
+                "model",
+                "data",
+                "qpos",
+                "qvel",
+                "xfrc",
+                "clock",
+            )
+        ],
+    ]
+)
 
 # what estimates the wrench in flight
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
 
 
 @compiled
-def tick(loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array, noise: Array) -> None:
-    """Sense, estimate, steer and actuate once; MuJoCo's ``xfrc`` (6,) then holds the wrench of this tick.
+def tick(
+    loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array, noise: Array
+) -> None:
+    """Sense, estimate, steer and actuate once; MuJoCo's ``xfrc`` (6,) then holds the wrench of this
+    tick.
 
-    ``noise`` (NOISE,) are unit normals. Everything that changes lies in ``loop`` and the arrays given.
+    ``noise`` (NOISE,) are unit normals. Everything that changes lies in ``loop`` and the arrays
+    given.
     """
     plant, ukf, flight = loop.plant, loop.filter, loop.flight
     plant.seen = sense(plant, qpos, noise)
@@ -61,14 +98,23 @@ def tick(loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xf
 def _run(address: int, noise: int, count: int, fan_y: int, fan_count: int, first: int) -> None:
     """Run ``count`` ticks of the loop whose record lies at ``address``.
 
-    ``noise`` and ``fan_y`` are the addresses of normals (count, NOISE) and of the fan's path (fan_count,) in m, of which
-    ``first`` is this first tick's place; after its end the fan stands still.
+    ``noise`` and ``fan_y`` are the addresses of normals (count, NOISE) and of the fan's path
+    (fan_count,) in m, of which ``first`` is this first tick's place; after its end the fan stands
+    still.
     """
     loop = carray(pointer_to(address), 1, LOOP)[0]
-    # first of all: a run that does not come to its end lags behind it, as one that MuJoCo reset does
+    # first of all: a run that does not come to its end lags behind it, as one that MuJoCo reset
+    # does
     loop.ticks += count
-    axial, radial = numbers_at(loop.axial, (COUNT_X, COUNT_R)), numbers_at(loop.radial, (COUNT_X, COUNT_R))
-    qpos, qvel, xfrc = numbers_at(loop.qpos, (7,)), numbers_at(loop.qvel, (6,)), numbers_at(loop.xfrc, (6,))
+    axial, radial = (
+        numbers_at(loop.axial, (COUNT_X, COUNT_R)),
+        numbers_at(loop.radial, (COUNT_X, COUNT_R)),
+    )
+    qpos, qvel, xfrc = (
+        numbers_at(loop.qpos, (7,)),
+        numbers_at(loop.qvel, (6,)),
+        numbers_at(loop.xfrc, (6,)),
+    )
     normals, path = numbers_at(noise, (count, NOISE)), numbers_at(fan_y, (fan_count,))
     for k in range(count):
         loop.fan.y = path[min(first + k, fan_count - 1)]
@@ -82,7 +128,9 @@ _RUN = types.void(*[types.int64] * 6)
 
 @cache
 def run_address() -> int:
-    """Return the address of ``_run``, compiled now if it was not: one machine code for all that run loops."""
+    """Return the address of ``_run``, compiled now if it was not: one machine code for all that run
+    loops.
+    """
     return address_of(_run, _RUN)
 
 
@@ -93,14 +141,18 @@ def _run_rows(run: int, loop: int, noise: Array, fan_y: Array, first: int) -> No
 
 
 def compile_run() -> None:
-    """Compile the correction, which the filter's step compiles last, and the loop: half of what a first flight needs."""
+    """Compile the correction, which the filter's step compiles last, and the loop: half of what a
+    first flight needs.
+    """
     direct(correct_parts, np.zeros(1, dtype=FILTER)[0], np.zeros(1), 3)
     run_address()
 
 
 @compiled
 def has_been_reset(loop: Record) -> bool:
-    """Return whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state is not finite."""
+    """Return whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a
+    state is not finite.
+    """
     late: bool = numbers_at(loop.clock, (1,))[0] < (loop.ticks - 0.5) * TICK
     return late
 
@@ -137,11 +189,15 @@ class ClosedLoop:
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
-        plant, self._body = plant_record(declared if true is None else true, settings or PlantSettings())
+        plant, self._body = plant_record(
+            declared if true is None else true, settings or PlantSettings()
+        )
         self.model, self.data = load_world(self._body, load, drawn)
         self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else _STILL_AIR
         self.record = np.zeros(1, dtype=LOOP)
-        self.address = int(self.record.ctypes.data)  # of the record, for compiled code; good for as long as this loop lives
+        self.address = int(
+            self.record.ctypes.data
+        )  # of the record, for compiled code; good for as long as this loop lives
         loop = self.record[0]
         loop["plant"] = plant[0]
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
@@ -165,19 +221,36 @@ class ClosedLoop:
         self._qvel: Array = self.data.qvel
         self._xfrc: Array = self.data.xfrc_applied[self._body_id]
         loop = self.record[0]
-        self.state: Array = loop["filter"]["x"]  # (20,) estimated state, laid out as in estimator.estimate
+        self.state: Array = loop["filter"][
+            "x"
+        ]  # (20,) estimated state, laid out as in estimator.estimate
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
         self.external: Array = loop["plant"]["external"]  # (6,) true external wrench, world
         self.jet: Array = loop["plant"]["jet"]  # (6,) parts of it: of the jet,
-        self.disturbance: Array = loop["plant"]["disturbance"]  # (6,) of the actuators' unmodelled disturbance,
-        self.applied: Array = loop["plant"]["applied"]  # (6,) and that a user applies; zero after a reset
+        self.disturbance: Array = loop["plant"][
+            "disturbance"
+        ]  # (6,) of the actuators' unmodelled disturbance,
+        self.applied: Array = loop["plant"][
+            "applied"
+        ]  # (6,) and that a user applies; zero after a reset
         self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
-        self.unrounded: Array = loop["plant"]["sample"][:4]  # (4,) these turn rates before they are rounded
-        loop["mj_step"], loop["model"], loop["data"] = mj_step_address(), self.model._address, self.data._address
+        self.unrounded: Array = loop["plant"]["sample"][
+            :4
+        ]  # (4,) these turn rates before they are rounded
+        loop["mj_step"], loop["model"], loop["data"] = (
+            mj_step_address(),
+            self.model._address,
+            self.data._address,
+        )
         loop["clock"] = clock_address(self.data)
-        for name, array in (("qpos", self._qpos), ("qvel", self._qvel), ("xfrc", self._xfrc),
-                            ("axial", self.jet_table[0]), ("radial", self.jet_table[1])):
+        for name, array in (
+            ("qpos", self._qpos),
+            ("qvel", self._qvel),
+            ("xfrc", self._xfrc),
+            ("axial", self.jet_table[0]),
+            ("radial", self.jet_table[1]),
+        ):
             loop[name] = array.ctypes.data
 
     @property
@@ -216,7 +289,9 @@ class ClosedLoop:
         return int(self.record["ticks"][0]) * TICK
 
     def reset(self, rng: np.random.Generator, position: Array, yaw: float = 0.0) -> None:
-        """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured pose."""
+        """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured
+        pose.
+        """
         mujoco.mj_resetData(self.model, self.data)
         self._views()
         loop = self.record[0]
@@ -226,7 +301,9 @@ class ClosedLoop:
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
         loop["flight"]["sum"], loop["flight"]["yaw_sum"] = 0.0, 0.0
-        loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((len(loop["fan"]["gusts"]), 3))
+        loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal(
+            (len(loop["fan"]["gusts"]), 3)
+        )
         noise = rng.standard_normal(NOISE)
         sense(self.record[0:1]["plant"][0], self._qpos, noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
@@ -242,19 +319,25 @@ class ClosedLoop:
             InputError: this loop was made without a load.
         """
         if self._load is None:
-            raise InputError("ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)")
+            raise InputError(
+                "ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)"
+            )
         hang(self.model, self.data, self._load)
 
     def load_pull(self) -> Array:
-        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load on the vehicle."""
+        """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load
+        on the vehicle.
+        """
         return pull(self.data, self._body.com)
 
     def run(self, noise: Array, fan_y: Array | None = None, first: int = 0) -> None:
-        """Run one tick for each row of ``noise`` (n, NOISE), all of them in one compiled call that lets other threads run.
+        """Run one tick for each row of ``noise`` (n, NOISE), all of them in one compiled call that
+        lets other threads run.
 
         Args:
             noise: unit normals.
-            fan_y: (m,) m, where the fan is tick by tick; after the last it stands still. Default: at 0.
+            fan_y: (m,) m, where the fan is tick by tick; after the last it stands still. Default:
+                at 0.
             first: the first tick's place in ``fan_y``.
 
         Raises:
@@ -262,26 +345,46 @@ class ClosedLoop:
         """
         noise = np.ascontiguousarray(noise, dtype=np.float64)
         fan_y = _AT_REST if fan_y is None else np.ascontiguousarray(fan_y, dtype=np.float64)
-        if noise.ndim != 2 or noise.shape[1] != NOISE or fan_y.ndim != 1 or len(fan_y) == 0 or first < 0:
-            raise InputError(f"ClosedLoop: expected noise (n, {NOISE}), fan_y (m,) and first from 0 on; got shapes "
-                             f"{noise.shape}, {fan_y.shape} and first = {first}")
+        if (
+            noise.ndim != 2
+            or noise.shape[1] != NOISE
+            or fan_y.ndim != 1
+            or len(fan_y) == 0
+            or first < 0
+        ):
+            raise InputError(
+                f"ClosedLoop: expected noise (n, {NOISE}), fan_y (m,) and first from 0 on; got "
+                f"shapes "
+                f"{noise.shape}, {fan_y.shape} and first = {first}"
+            )
         self._call(self._run, self.address, noise, fan_y, first)
 
     @property
     def was_reset(self) -> bool:
-        """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state is not finite."""
+        """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state
+        is not finite.
+        """
         return bool(has_been_reset(self.record[0]))
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: compiled code knows its arrays by address, and the copy would fly this one's.
+        """Refuse to be copied or pickled: compiled code knows its arrays by address, and the copy
+        would fly this one's.
 
         Raises:
             InputError: always.
         """
-        raise InputError("a flight cannot be copied or pickled; make another environment, reset it with the same seed and fly "
-                         "the same actions: it arrives at the same state")
+        raise InputError(
+            "a flight cannot be copied or pickled; make another environment, reset it with the "
+            "same seed and fly "
+            "the same actions: it arrives at the same state"
+        )
 
     def healthy(self) -> bool:
-        """Whether it still flies: every number of plant and filter finite, and nothing faster than a vehicle can be."""
-        return (math.isfinite(sum(self.state.tolist()[:19])) and all(abs(v) < FASTEST for v in self._qvel.tolist())
-                and not self.was_reset)
+        """Whether it still flies: every number of plant and filter finite, and nothing faster than
+        a vehicle can be.
+        """
+        return (
+            math.isfinite(sum(self.state.tolist()[:19]))
+            and all(abs(v) < FASTEST for v in self._qvel.tolist())
+            and not self.was_reset
+        )

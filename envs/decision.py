@@ -1,4 +1,6 @@
-"""A decision of the fan-tracking task, all of it compiled: its flight, the observation, the reward and the truth behind it."""
+"""A decision of the fan-tracking task, all of it compiled: its flight, the observation, the reward
+and the truth behind it.
+"""
 
 import math
 
@@ -25,43 +27,52 @@ _UPRIGHT = 0.34  # cosine of 70 degrees
 LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)
 
 # one environment's decision; the names are those of ``info``
-OUTCOME = np.dtype([
-    ("observation", "f4", (OBSERVATION_SIZE,)),
-    ("reward_tracking", "f8"),
-    ("reward_change", "f8"),
-    ("fan_y", "f8"),
-    ("fan_velocity", "f8"),
-    ("y", "f8"),
-    ("offset", "f8"),
-    ("force", "f8", (3,)),
-    ("torque", "f8", (3,)),
-    ("time", "f8"),
-    ("lost", "?"),
-])
+OUTCOME = np.dtype(
+    [
+        ("observation", "f4", (OBSERVATION_SIZE,)),
+        ("reward_tracking", "f8"),
+        ("reward_change", "f8"),
+        ("fan_y", "f8"),
+        ("fan_velocity", "f8"),
+        ("y", "f8"),
+        ("offset", "f8"),
+        ("force", "f8", (3,)),
+        ("torque", "f8", (3,)),
+        ("time", "f8"),
+        ("lost", "?"),
+    ]
+)
 INFO = OUTCOME.names[1:]  # type: ignore[index]
 
 
 # an episode in progress
-EPISODE = np.dtype([
-    # addresses: of the closed loop's record and of what runs it, of NumPy's normals and their bits, of the fan's path
-    *[(name, "i8") for name in ("loop", "run", "normals", "bits", "path")],
-    ("path_count", "i8"),  # of that path's places (m), one a tick
-    ("ticks", "i8"),  # since its start
-    ("distance", "f8"),  # m, where the vehicle started
-    ("height", "f8"),
-    ("command", "f8"),  # m/s, the last
-    # 2, of the offset in the reward; the compiler would make a product of a constant one, which rounds otherwise than C's
-    # ``pow`` once in a thousand times, and rewards keep their bits
-    ("power", "f8"),
-    ("outcome", OUTCOME),
-])
+EPISODE = np.dtype(
+    [
+        # addresses: of the closed loop's record and of what runs it, of NumPy's normals and their
+        # bits, of the fan's path
+        *[(name, "i8") for name in ("loop", "run", "normals", "bits", "path")],
+        ("path_count", "i8"),  # of that path's places (m), one a tick
+        ("ticks", "i8"),  # since its start
+        ("distance", "f8"),  # m, where the vehicle started
+        ("height", "f8"),
+        ("command", "f8"),  # m/s, the last
+        # 2, of the offset in the reward; the compiler would make a product of a constant one, which
+        # rounds otherwise than C's ``pow`` once in a thousand times, and rewards keep their bits
+        ("power", "f8"),
+        ("outcome", OUTCOME),
+    ]
+)
 
 
 @compiled
 def look(loop: Record, episode: Record) -> None:
     """Write what there is to see now into ``episode.outcome``, all but the reward."""
     e, out, x, external = episode, episode.outcome, loop.filter.x, loop.plant.external
-    qpos, qvel, path = numbers_at(loop.qpos, (7,)), numbers_at(loop.qvel, (6,)), numbers_at(e.path, (e.path_count,))
+    qpos, qvel, path = (
+        numbers_at(loop.qpos, (7,)),
+        numbers_at(loop.qvel, (6,)),
+        numbers_at(e.path, (e.path_count,)),
+    )
     for i in range(OBSERVATION_SIZE):
         value = x[16 + i] if i < 3 else x[10 + i] if i < 6 else x[8] if i == 6 else e.command
         out.observation[i] = min(max(value, -LIMITS[i]), LIMITS[i]) if math.isfinite(value) else 0.0
@@ -74,12 +85,19 @@ def look(loop: Record, episode: Record) -> None:
         out.force[i] = external[i]
         out.torque[i] = external[3 + i]
     out.time = e.ticks * TICK
-    flying = math.isfinite(x[:19].sum()) and 1.0 - 2.0 * (qpos[4] * qpos[4] + qpos[5] * qpos[5]) >= _UPRIGHT
+    flying = (
+        math.isfinite(x[:19].sum())
+        and 1.0 - 2.0 * (qpos[4] * qpos[4] + qpos[5] * qpos[5]) >= _UPRIGHT
+    )
     for i in range(6):
         flying = flying and abs(qvel[i]) < FASTEST
     # all of them such that a number that is none counts as lost
-    out.lost = has_been_reset(loop) or not (flying and abs(out.offset) <= LOST_OFFSET
-                                            and abs(qpos[0] - e.distance) <= _AWAY and abs(qpos[2] - e.height) <= _AWAY)
+    out.lost = has_been_reset(loop) or not (
+        flying
+        and abs(out.offset) <= LOST_OFFSET
+        and abs(qpos[0] - e.distance) <= _AWAY
+        and abs(qpos[2] - e.height) <= _AWAY
+    )
 
 
 @compiled
@@ -99,11 +117,19 @@ def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
 
 
 @released
-def decide(episodes: np.ndarray, commands: Array, resting: np.ndarray, ticks: int, turns: np.ndarray, patience: int) -> None:
-    """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its outcome.
+def decide(
+    episodes: np.ndarray,
+    commands: Array,
+    resting: np.ndarray,
+    ticks: int,
+    turns: np.ndarray,
+    patience: int,
+) -> None:
+    """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its
+    outcome.
 
-    Other threads run meanwhile; several may call this with the same arguments and share the episodes out. All that an
-    episode's record has the addresses of must live.
+    Other threads run meanwhile; several may call this with the same arguments and share the
+    episodes out. All that an episode's record has the addresses of must live.
 
     Args:
         episodes: (n,) of ``EPISODE``.

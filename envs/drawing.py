@@ -1,4 +1,6 @@
-"""Drawing the world: the jet as drifting tracers, the wrench as arrows, the path flown, in a window or as a picture."""
+"""Drawing the world: the jet as drifting tracers, the wrench as arrows, the path flown, in a window
+or as a picture.
+"""
 
 import math
 import time
@@ -44,8 +46,13 @@ class Viewer:
         self._tracers[:, 0] = self._rng.uniform(0.2, 3.6, _TRACERS)
 
     def _new_tracers(self, count: int) -> NDArray[np.float64]:
-        radius, angle = 0.45 * np.sqrt(self._rng.random(count)), self._rng.uniform(0, 2 * math.pi, count)
-        return np.stack([np.full(count, 0.2), radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+        radius, angle = (
+            0.45 * np.sqrt(self._rng.random(count)),
+            self._rng.uniform(0, 2 * math.pi, count),
+        )
+        return np.stack(
+            [np.full(count, 0.2), radius * np.cos(angle), radius * np.sin(angle)], axis=1
+        )
 
     def open_world(self, model: Any, data: Any) -> None:
         """Make ready to draw a model, unless it is the one that was drawn last.
@@ -61,19 +68,30 @@ class Viewer:
             if self.mode == "human":
                 from mujoco import viewer
 
-                self._window = viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+                self._window = viewer.launch_passive(
+                    model, data, show_left_ui=False, show_right_ui=False
+                )
                 self._window.cam.lookat[:] = (1.3, 0.0, 1.1)
-                self._window.cam.distance, self._window.cam.azimuth, self._window.cam.elevation = 4.5, 140, -22
+                self._window.cam.distance, self._window.cam.azimuth, self._window.cam.elevation = (
+                    4.5,
+                    140,
+                    -22,
+                )
             else:
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
-        except Exception as error:  # what a missing OpenGL raises differs from one backend to the next
+        except (
+            Exception
+        ) as error:  # what a missing OpenGL raises differs from one backend to the next
             raise InputError(
-                f"render: this machine cannot draw ({error}). Without a screen, set MUJOCO_GL=egl or MUJOCO_GL=osmesa and "
+                f"render: this machine cannot draw ({error}). Without a screen, set MUJOCO_GL=egl "
+                f"or MUJOCO_GL=osmesa and "
                 "install Debian's libegl1 or libosmesa6"
             ) from error
 
     def draw(self, loop: ClosedLoop, fan_y: float) -> NDArray[np.uint8] | None:
-        """Draw the loop as it is now; return the picture (height, width, 3) unless it went to a window."""
+        """Draw the loop as it is now; return the picture (height, width, 3) unless it went to a
+        window.
+        """
         self.open_world(loop.model, loop.data)
         if loop.time < self._last:  # another episode
             self._path.clear()
@@ -89,7 +107,8 @@ class Viewer:
         return self.show(loop.data, lambda scene: self._mark(scene, loop, fan_y), "chase")
 
     def show(self, data: Any, mark: Callable[[Any], None], camera: Any) -> NDArray[np.uint8] | None:
-        """Draw a world with the marks that ``mark`` adds; return the picture unless it went to a window.
+        """Draw a world with the marks that ``mark`` adds; return the picture unless it went to a
+        window.
 
         Args:
             data: MuJoCo's, of the world of ``open_world``.
@@ -110,7 +129,11 @@ class Viewer:
     @property
     def is_open(self) -> bool:
         """Whether there is a window that nobody has closed, or a renderer."""
-        return bool(self._window.is_running()) if self._window is not None else self._renderer is not None
+        return (
+            bool(self._window.is_running())
+            if self._window is not None
+            else self._renderer is not None
+        )
 
     def _drift(self, loop: ClosedLoop, fan_y: float) -> None:
         """Carry the tracers with the mean wind for one frame."""
@@ -131,8 +154,13 @@ class Viewer:
         if float(loop.record[0]["fan"]["speed"]) > 0:
             for tracer in self._tracers:
                 fade = 0.55 * (1.0 - tracer[0] / 3.8)
-                add_shape(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.014), tracer + np.array([0.0, fan_y, height]),
-                          np.array([0.25, 0.55, 0.95, fade]))
+                add_shape(
+                    scene,
+                    mujoco.mjtGeom.mjGEOM_SPHERE,
+                    np.full(3, 0.014),
+                    tracer + np.array([0.0, fan_y, height]),
+                    np.array([0.25, 0.55, 0.95, fade]),
+                )
         at = loop.position
         add_shadow(scene, at, 0.22)
         add_path(scene, self._path)
@@ -145,4 +173,3 @@ class Viewer:
             if thing is not None:
                 thing.close()
         self._window = self._renderer = self._model = None
-

@@ -1,4 +1,6 @@
-"""The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean jet: ``dynamics.jet``."""
+"""The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean
+jet: ``dynamics.jet``.
+"""
 
 import math
 from dataclasses import dataclass
@@ -21,12 +23,16 @@ from ..runtime.compiled import Record, compiled
 
 Array = NDArray[np.float64]
 
-STATIONS = 4 + HULL_STATIONS  # where the wind acts on the vehicle: four rotors and a ring on the hull
+STATIONS = (
+    4 + HULL_STATIONS
+)  # where the wind acts on the vehicle: four rotors and a ring on the hull
 
 
 @dataclass(frozen=True)
 class Fan:
-    """A drum fan at (0, y, height) that blows along +x, and the drag of the vehicle that it blows at."""
+    """A drum fan at (0, y, height) that blows along +x, and the drag of the vehicle that it blows
+    at.
+    """
 
     speed: float = 3.6  # m/s, U0 of the jet
     radius: float = 0.45  # m
@@ -39,26 +45,38 @@ class Fan:
     hull_area: float = 0.060  # m2, drag area of the whole hull
 
 
-FAN = np.dtype([
-    ("speed", "f8"), ("height", "f8"), ("turbulence", "f8"), ("rotor_drag", "f8"), ("hull_area", "f8"),
-    ("keep", "f8"),  # share of a gust that lasts over a tick
-    ("mixing", "f8", (STATIONS, STATIONS)),  # lower root of the correlation between stations
-    ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
-    ("gusts", "f8", (STATIONS, 3)),  # unit variance
-    ("y", "f8"),  # m, where the fan is
-])
+FAN = np.dtype(
+    [
+        ("speed", "f8"),
+        ("height", "f8"),
+        ("turbulence", "f8"),
+        ("rotor_drag", "f8"),
+        ("hull_area", "f8"),
+        ("keep", "f8"),  # share of a gust that lasts over a tick
+        ("mixing", "f8", (STATIONS, STATIONS)),  # lower root of the correlation between stations
+        ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
+        ("gusts", "f8", (STATIONS, 3)),  # unit variance
+        ("y", "f8"),  # m, where the fan is
+    ]
+)
 
 
 def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
-    """Return the fan as an array (1,) of ``FAN``; ``rotor_positions`` is (4, 3) m, ``period`` the tick in s."""
+    """Return the fan as an array (1,) of ``FAN``; ``rotor_positions`` is (4, 3) m, ``period`` the
+    tick in s.
+    """
     record = np.zeros(1, dtype=FAN)
     f = record[0]
     for name in ("speed", "height", "turbulence", "rotor_drag", "hull_area"):
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    stations = np.concatenate([rotor_positions, HULL_RADIUS * np.stack(
-        [np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)])
+    stations = np.concatenate(
+        [
+            rotor_positions,
+            HULL_RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1),
+        ]
+    )
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)
     f["mixing"] = np.linalg.cholesky(np.exp(-distance / fan.gust_length) + 1e-9 * np.eye(STATIONS))
@@ -66,7 +84,9 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 
 @compiled
-def jet_at(f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array) -> None:
+def jet_at(
+    f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array
+) -> None:
     """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
     dy, dz = y - f.y, z - f.height
     r = math.sqrt(dy * dy + dz * dz)
@@ -76,9 +96,12 @@ def jet_at(f: Record, axial: Array, radial: Array, x: float, y: float, z: float,
         return
     i, j = int(row), int(column)
     a, b = row - i, column - j
-    u = (1 - a) * ((1 - b) * axial[i, j] + b * axial[i, j + 1]) + a * ((1 - b) * axial[i + 1, j] + b * axial[i + 1, j + 1])
+    u = (1 - a) * ((1 - b) * axial[i, j] + b * axial[i, j + 1]) + a * (
+        (1 - b) * axial[i + 1, j] + b * axial[i + 1, j + 1]
+    )
     v = (1 - a) * ((1 - b) * radial[i, j] + b * radial[i, j + 1]) + a * (
-        (1 - b) * radial[i + 1, j] + b * radial[i + 1, j + 1])
+        (1 - b) * radial[i + 1, j] + b * radial[i + 1, j + 1]
+    )
     wind[0] = f.speed * u
     scale = f.speed * v / r if r > 1e-9 else 0.0
     wind[1], wind[2] = scale * dy, scale * dz
@@ -97,13 +120,24 @@ def gust(f: Record, noise: Array) -> None:
 
 
 @compiled
-def jet_wrench(f: Record, axial: Array, radial: Array, position: Array, rotation: Array, velocity: Array,
-               omega: Array, com: Array, wind: Array, out: Array) -> None:
-    """Write force and torque about the centre of mass (6,), world frame, of the wind on the vehicle into ``out``.
+def jet_wrench(
+    f: Record,
+    axial: Array,
+    radial: Array,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    omega: Array,
+    com: Array,
+    wind: Array,
+    out: Array,
+) -> None:
+    """Write force and torque about the centre of mass (6,), world frame, of the wind on the vehicle
+    into ``out``.
 
-    Drag acts at the stations, each in its own wind: that is why a symmetric vehicle feels a torque where the jet falls
-    off across its span. ``velocity`` is that of the geometric centre in the world, ``omega`` in the body frame; ``wind``
-    (3,) is scratch.
+    Drag acts at the stations, each in its own wind: that is why a symmetric vehicle feels a torque
+    where the jet falls off across its span. ``velocity`` is that of the geometric centre in the
+    world, ``omega`` in the body frame; ``wind`` (3,) is scratch.
     """
     R = rotation
     for i in range(6):
@@ -144,4 +178,14 @@ def jet_wrench(f: Record, axial: Array, radial: Array, position: Array, rotation
         out[5] += x * fy - y * fx
 
 
-__all__ = ["FAN", "HULL_RADIUS", "STATIONS", "Fan", "fan_record", "gust", "jet_at", "jet_table", "jet_wrench"]
+__all__ = [
+    "FAN",
+    "HULL_RADIUS",
+    "STATIONS",
+    "Fan",
+    "fan_record",
+    "gust",
+    "jet_at",
+    "jet_table",
+    "jet_wrench",
+]

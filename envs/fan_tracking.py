@@ -101,7 +101,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Version history
 
     * v0: initial version.
-    """
+    """  # noqa: E501
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}  # noqa: RUF012
 
@@ -120,11 +120,20 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         estimator: str = "ukf",
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}")
+            raise InputError(
+                f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}"
+            )
         self.scenario = scenario if isinstance(scenario, Scenario) else get_scenario(scenario)
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
-        # a declared vehicle whose model was amended must not bring its effects into the world a second time
-        self.truth = self.vehicle if truth is None else truth if isinstance(truth, Vehicle) else load_vehicle(truth)
+        # a declared vehicle whose model was amended must not bring its effects into the world a
+        # second time
+        self.truth = (
+            self.vehicle
+            if truth is None
+            else truth
+            if isinstance(truth, Vehicle)
+            else load_vehicle(truth)
+        )
         self.effects = tuple(check_setting(e, "FanTracking: effects") for e in effects)
         self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
         self.settings = settings
@@ -141,19 +150,30 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.fan_motion = ""
         self.episode = np.zeros(1, dtype=EPISODE)
         self._command = np.zeros(1)
-        self._addressed: tuple[object, ...] = ()  # what the episode has the addresses of, beside its generator
+        self._addressed: tuple[
+            object, ...
+        ] = ()  # what the episode has the addresses of, beside its generator
         self._turns = np.zeros(3, dtype=np.int64)
         self._call: Callable[..., None] | None = None
 
     def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
-        """Return the closed loop for a true vehicle (before the undeclared effects); the filter knows the declared one."""
+        """Return the closed loop for a true vehicle (before the undeclared effects); the filter
+        knows the declared one.
+        """
         scenario = self.scenario
         mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
         declared = replace(self.vehicle, mocap=mocap)
         true = replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects))
         tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
-        return ClosedLoop(declared, true, tuning, fan, self.settings or PlantSettings.for_vehicle(self.truth),
-                          drawn=self.render_mode is not None, estimator=self.estimator)
+        return ClosedLoop(
+            declared,
+            true,
+            tuning,
+            fan,
+            self.settings or PlantSettings.for_vehicle(self.truth),
+            drawn=self.render_mode is not None,
+            estimator=self.estimator,
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -164,11 +184,17 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         scenario, distance = self.scenario, DISTANCE
         if scenario.varied:
             distance = float(rng.uniform(2.0, 2.7))
-            fan = replace(self.fan, speed=self.fan.speed * float(rng.uniform(0.85, 1.25)),
-                          rotor_drag=self.fan.rotor_drag * float(rng.uniform(0.8, 1.2)),
-                          hull_area=self.fan.hull_area * float(rng.uniform(0.8, 1.2)))
-            vehicle = replace(self.truth, mass=self.truth.mass * float(rng.uniform(0.93, 1.07)),
-                              inertia=self.truth.inertia * float(rng.uniform(0.9, 1.1)))
+            fan = replace(
+                self.fan,
+                speed=self.fan.speed * float(rng.uniform(0.85, 1.25)),
+                rotor_drag=self.fan.rotor_drag * float(rng.uniform(0.8, 1.2)),
+                hull_area=self.fan.hull_area * float(rng.uniform(0.8, 1.2)),
+            )
+            vehicle = replace(
+                self.truth,
+                mass=self.truth.mass * float(rng.uniform(0.93, 1.07)),
+                inertia=self.truth.inertia * float(rng.uniform(0.9, 1.1)),
+            )
             self.loop = self._make_loop(vehicle, fan)
         elif self.loop is None:
             self.loop = self._make_loop(self.truth, self.fan)
@@ -177,9 +203,14 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         t = TICK * np.arange(ticks + 2, dtype=np.float64)
         self.fan_motion, self._fan_speed, self._fan_y = draw_fan_path(scenario, rng, t)
         if self.fan_path is not None:
-            self.fan_motion, self._fan_y = "given", np.ascontiguousarray(self.fan_path(t), dtype=np.float64)
+            self.fan_motion, self._fan_y = (
+                "given",
+                np.ascontiguousarray(self.fan_path(t), dtype=np.float64),
+            )
             if self._fan_y.shape != t.shape or not np.all(np.isfinite(self._fan_y)):
-                raise InputError(f"FanTracking: fan_path must return {t.size} finite numbers for {t.size} times")
+                raise InputError(
+                    f"FanTracking: fan_path must return {t.size} finite numbers for {t.size} times"
+                )
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         loop.reset(rng, np.array([distance, self._fan_y[0] + offset, self.fan.height]), math.pi)
         loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y[:1])
@@ -194,26 +225,43 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Fly 80 ms with a commanded velocity (1,) m/s along y."""
         command = np.asarray(action, dtype=np.float64)
         if command.shape != (1,) or not math.isfinite(command[0]):
-            raise InputError(f"FanTracking: action must be one finite number in m/s, shape (1,), got {action!r}")
+            raise InputError(
+                f"FanTracking: action must be one finite number in m/s, shape (1,), got {action!r}"
+            )
         self.fly(command.item())
         if self.render_mode == "human":
             self.render()
         info = self._info()
-        return self._observation(), info["reward_tracking"] + info["reward_change"], info["lost"], False, info
+        return (
+            self._observation(),
+            info["reward_tracking"] + info["reward_change"],
+            info["lost"],
+            False,
+            info,
+        )
 
     def fly(self, command: float) -> None:
-        """Do what ``step`` does at a finite ``command``, and leave what came of it in ``episode``."""
+        """Do what ``step`` does at a finite ``command``, and leave what came of it
+        in ``episode``.
+        """
         if not self._addressed:
             raise InputError("FanTracking: call reset before step")
         self._command[0] = command
         self._decide(DECISION_TICKS)
 
     def _begin(self, distance: float) -> None:
-        """Tell the compiled decision where everything of this episode lies, and look at its start."""
+        """Tell the compiled decision where everything of this episode lies, and
+        look at its start.
+        """
         loop = self.loop
         assert loop is not None
         e = self.episode[0]
-        e["loop"], e["run"], e["path"], e["path_count"] = loop.address, run_address(), self._fan_y.ctypes.data, len(self._fan_y)
+        e["loop"], e["run"], e["path"], e["path_count"] = (
+            loop.address,
+            run_address(),
+            self._fan_y.ctypes.data,
+            len(self._fan_y),
+        )
         self._addressed = loop, self._fan_y
         self._draw_from(self.np_random)
         e["ticks"], e["distance"], e["height"], e["command"] = 0, distance, self.fan.height, 0.0
@@ -226,7 +274,11 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _draw_from(self, generator: np.random.Generator) -> None:
         e = self.episode[0]
-        e["normals"], e["bits"], self._generator = normals_address(), bits_address(generator), generator
+        e["normals"], e["bits"], self._generator = (
+            normals_address(),
+            bits_address(generator),
+            generator,
+        )
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -253,22 +305,32 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _info(self) -> dict[str, Any]:
         """Return the reward's terms and the truth that the agent does not see."""
         info = dict(zip(INFO, self.episode["outcome"][0].item()[1:], strict=True))
-        info["force"], info["torque"], info["fan_motion"] = info["force"].copy(), info["torque"].copy(), self.fan_motion
+        info["force"], info["torque"], info["fan_motion"] = (
+            info["force"].copy(),
+            info["torque"].copy(),
+            self.fan_motion,
+        )
         return info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a window.
+        """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a
+        window.
 
         Raises:
             InputError: not reset yet, or this machine cannot draw.
         """
         if self.render_mode is None or self.loop is None:
-            raise InputError("FanTracking: render needs a render_mode ('human' or 'rgb_array') and a reset before it")
+            raise InputError(
+                "FanTracking: render needs a render_mode ('human' or 'rgb_array') and a reset "
+                "before it"
+            )
         if self._viewer is None:
             from .drawing import Viewer
 
             self._viewer = Viewer(self.render_mode, self.width, self.height)
-        picture: NDArray[np.uint8] | None = self._viewer.draw(self.loop, float(self.episode["outcome"]["fan_y"][0]))
+        picture: NDArray[np.uint8] | None = self._viewer.draw(
+            self.loop, float(self.episode["outcome"]["fan_y"][0])
+        )
         return picture
 
     def close(self) -> None:

@@ -1,4 +1,6 @@
-"""Choosing how MuJoCo draws on a machine without a screen; imported before MuJoCo, which decides at its own import."""
+"""Choosing how MuJoCo draws on a machine without a screen; imported before MuJoCo, which decides at
+its own import.
+"""
 
 import ctypes
 import os
@@ -6,7 +8,9 @@ import sys
 
 
 def _choose() -> None:
-    if not sys.platform.startswith("linux") or any(os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")):
+    if not sys.platform.startswith("linux") or any(
+        os.environ.get(n) for n in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    ):
         return
     for backend, library in (("egl", "libEGL.so.1"), ("osmesa", "libOSMesa.so.8")):
         try:

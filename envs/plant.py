@@ -1,7 +1,8 @@
 """The plant: a quadrotor in MuJoCo with real motors, real sensing and effects that nobody declared.
 
-One tick is one sample of the motion capture (5 ms). In it the motors follow their commands, rotors, effects, jet and
-unmodelled disturbance make a wrench that holds over the tick, and MuJoCo integrates the rigid body in two steps.
+One tick is one sample of the motion capture (5 ms). In it the motors follow their commands, rotors,
+effects, jet and unmodelled disturbance make a wrench that holds over the tick, and MuJoCo
+integrates the rigid body in two steps.
 """
 
 import math
@@ -11,9 +12,21 @@ from importlib import resources
 import mujoco
 import numpy as np
 
-from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model, reset_model, rewrite_sample
+from ..dynamics.model import (
+    MODEL_FIELDS,
+    apply_effects,
+    drive,
+    load_model,
+    reset_model,
+    rewrite_sample,
+)
 from ..dynamics.motion import Array
-from ..dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply, quaternion_to_matrix
+from ..dynamics.rotation import (
+    normalise,
+    quaternion_from_mrp,
+    quaternion_multiply,
+    quaternion_to_matrix,
+)
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
@@ -32,7 +45,9 @@ class PlantSettings:
     """What the plant does that its vehicle file does not say."""
 
     motor_lag: float = 0.04  # s, of a first-order motor whose true turn rate is logged
-    disturbance_force: float = 0.03  # N, standard deviation of the unmodelled part of the actuation, each axis
+    disturbance_force: float = (
+        0.03  # N, standard deviation of the unmodelled part of the actuation, each axis
+    )
     disturbance_torque: float = 0.01  # Nm
     disturbance_time: float = 0.3  # s, over which it lasts
     dropout: float = 0.0  # probability that a pose is lost
@@ -41,41 +56,49 @@ class PlantSettings:
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "PlantSettings":
-        """Return the settings with the disturbance, which is stated for the AR.Drone, scaled to a vehicle."""
+        """Return the settings with the disturbance, which is stated for the AR.Drone, scaled to a
+        vehicle.
+        """
         force = vehicle.weight / 4.56
-        return cls(disturbance_force=0.03 * force, disturbance_torque=0.01 * force * vehicle.arm_l / 0.1262)
+        return cls(
+            disturbance_force=0.03 * force, disturbance_torque=0.01 * force * vehicle.arm_l / 0.1262
+        )
 
 
-PLANT = np.dtype([
-    *MODEL_FIELDS,
-    ("motor_keep", "f8"),
-    ("omega_max", "f8"),
-    ("omega_lsb", "f8"),
-    ("sigma_position", "f8"),
-    ("sigma_attitude", "f8"),
-    ("disturbance_force", "f8"),
-    ("disturbance_torque", "f8"),
-    ("disturbance_keep", "f8"),
-    ("dropout", "f8"),  # a unit normal below it loses the pose
-    ("voltage_ref", "f8"),
-    ("battery_life", "f8"),
-    ("battery", "f8"),  # V now; 0: not modelled
-    ("speeds", "f8", (4,)),  # of the motors, rad/s
-    ("z", "f8", (11,)),  # the sample: logged turn rates of the last tick, position, quaternion
-    ("seen", "i8"),
-    ("disturbance", "f8", (6,)),
-    ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
-    ("jet", "f8", (6,)),  # the jet's part of it
-    ("applied", "f8", (6,)),  # and the part that a user applies, held until it is changed
-    ("rotation", "f8", (3, 3)),
-    ("q", "f8", (4,)),
-    ("rho", "f8", (3,)),
-    ("scratch", "f8", (3,)),
-])
+PLANT = np.dtype(
+    [
+        *MODEL_FIELDS,
+        ("motor_keep", "f8"),
+        ("omega_max", "f8"),
+        ("omega_lsb", "f8"),
+        ("sigma_position", "f8"),
+        ("sigma_attitude", "f8"),
+        ("disturbance_force", "f8"),
+        ("disturbance_torque", "f8"),
+        ("disturbance_keep", "f8"),
+        ("dropout", "f8"),  # a unit normal below it loses the pose
+        ("voltage_ref", "f8"),
+        ("battery_life", "f8"),
+        ("battery", "f8"),  # V now; 0: not modelled
+        ("speeds", "f8", (4,)),  # of the motors, rad/s
+        ("z", "f8", (11,)),  # the sample: logged turn rates of the last tick, position, quaternion
+        ("seen", "i8"),
+        ("disturbance", "f8", (6,)),
+        ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world
+        ("jet", "f8", (6,)),  # the jet's part of it
+        ("applied", "f8", (6,)),  # and the part that a user applies, held until it is changed
+        ("rotation", "f8", (3, 3)),
+        ("q", "f8", (4,)),
+        ("rho", "f8", (3,)),
+        ("scratch", "f8", (3,)),
+    ]
+)
 
 
 def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray, Vehicle]:
-    """Return the plant's memory (1,) for the true vehicle, and that vehicle with its body effects applied."""
+    """Return the plant's memory (1,) for the true vehicle, and that vehicle with its body effects
+    applied.
+    """
     record = np.zeros(1, dtype=PLANT)
     p = record[0]
     # the effect library's ground is the plant's floor
@@ -84,11 +107,16 @@ def plant_record(vehicle: Vehicle, settings: PlantSettings) -> tuple[np.ndarray,
     # with an undeclared lag the log holds commands: the motor's own lag then is the effect's
     lag = 0.0 if any(e.name == "motor_lag" for e in vehicle.effects) else settings.motor_lag
     p["motor_keep"] = math.exp(-TICK / lag) if lag > 0 else 0.0
-    p["omega_max"] = vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    p["omega_max"] = (
+        vehicle.omega_max if math.isfinite(vehicle.omega_max) else 2.0 * vehicle.hover_rate
+    )
     p["omega_lsb"] = vehicle.omega_lsb
     p["sigma_position"] = vehicle.mocap.sigma_pos_m if settings.sensor_noise else 0.0
     p["sigma_attitude"] = vehicle.mocap.sigma_att_rad if settings.sensor_noise else 0.0
-    p["disturbance_force"], p["disturbance_torque"] = settings.disturbance_force, settings.disturbance_torque
+    p["disturbance_force"], p["disturbance_torque"] = (
+        settings.disturbance_force,
+        settings.disturbance_torque,
+    )
     p["disturbance_keep"] = math.exp(-TICK / settings.disturbance_time)
     p["dropout"] = _normal_quantile(settings.dropout)
     p["voltage_ref"], p["battery_life"] = vehicle.voltage_ref, settings.battery_life
@@ -102,7 +130,9 @@ def _normal_quantile(probability: float) -> float:
 
 
 def reset_plant(p: np.void, vehicle: Vehicle) -> None:
-    """Put the plant's memory at hover; ``vehicle`` is the true one with its body effects applied."""
+    """Put the plant's memory at hover; ``vehicle`` is the true one with its body
+    effects applied.
+    """
     reset_model(p)
     for name in ("disturbance", "external", "jet", "applied"):
         p[name] = 0.0
@@ -112,7 +142,9 @@ def reset_plant(p: np.void, vehicle: Vehicle) -> None:
 
 
 def is_a_body(inertia: Array) -> bool:
-    """Return whether any body has an inertia (3, 3): none has a principal moment that exceeds the sum of the others."""
+    """Return whether any body has an inertia (3, 3): none has a principal moment that exceeds the
+    sum of the others.
+    """
     moments = np.linalg.eigvalsh(inertia)
     return bool(moments[0] + moments[1] >= moments[2])
 
@@ -120,10 +152,11 @@ def is_a_body(inertia: Array) -> bool:
 def load_world(
     vehicle: Vehicle, load: SuspendedLoad | None = None, drawn: bool = True
 ) -> tuple["mujoco.MjModel", "mujoco.MjData"]:
-    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied, and a load for it.
+    """Return MuJoCo's model and data of the world with a vehicle whose body effects are applied,
+    and a load for it.
 
-    One that is not ``drawn`` has nothing that is there for the eye alone: it moves as the other does, bit for bit, and a
-    fifth faster.
+    One that is not ``drawn`` has nothing that is there for the eye alone: it moves as the other
+    does, bit for bit, and a fifth faster.
 
     Raises:
         InputError: no body has the vehicle's inertia.
@@ -132,13 +165,17 @@ def load_world(
     spec = mujoco.MjSpec.from_string(xml)
     moments, axes = np.linalg.eigh(vehicle.inertia)
     if not is_a_body(vehicle.inertia):
-        raise InputError(f"{vehicle.name}: no body has the principal moments of inertia {moments[0]:.4g}, {moments[1]:.4g} and "
-                         f"{moments[2]:.4g} kg m2: the largest exceeds the sum of the others")
+        raise InputError(
+            f"{vehicle.name}: no body has the principal moments of inertia {moments[0]:.4g}, "
+            f"{moments[1]:.4g} and "
+            f"{moments[2]:.4g} kg m2: the largest exceeds the sum of the others"
+        )
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
-    # before it is compiled: the compiler takes short cuts for a centre of mass that lies in the body's origin
+    # before it is compiled: the compiler takes short cuts for a centre of mass that lies in the
+    # body's origin
     body = spec.body("vehicle")
     body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
     if load is not None:
@@ -148,9 +185,15 @@ def load_world(
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):
             spec.delete(part)
     model = spec.compile()
-    if load is None:  # whose thread is the world's one constraint, and the one that could have a spring or a damper
+    if (
+        load is None
+        # whose thread is the world's one constraint, and the one that could have a spring or a
+        # damper
+    ):
         flags = mujoco.mjtDisableBit
-        model.opt.disableflags |= int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
+        model.opt.disableflags |= (
+            int(flags.mjDSBL_CONSTRAINT) | int(flags.mjDSBL_SPRING) | int(flags.mjDSBL_DAMPER)
+        )
     model.opt.gravity[2] = -vehicle.gravity
     model.opt.timestep = TICK / SUBSTEPS
     # the drawing follows the vehicle's size
@@ -164,12 +207,13 @@ def load_world(
 
 @compiled
 def sense(p: Record, qpos: Array, noise: Array) -> int:
-    """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where it is lost).
+    """Write the sample that motion capture takes now into ``p.z``; return its parts (3, or 0 where
+    it is lost).
 
     Sensing effects change the true pose before its noise comes on.
 
-    The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle that faces -x sees the
-    sign of its quaternion flip several times a second.
+    The attitude comes with a non-negative scalar part, as from a real system, so that a vehicle
+    that faces -x sees the sign of its quaternion flip several times a second.
     """
     for i in range(7):
         p.sample[4 + i] = qpos[i]
@@ -187,9 +231,20 @@ def sense(p: Record, qpos: Array, noise: Array) -> int:
 
 
 @compiled
-def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array, qpos: Array, qvel: Array,
-            noise: Array, xfrc: Array) -> None:
-    """Let the motors follow their commands for one tick and write the wrench that acts in it into ``xfrc`` (6,)."""
+def actuate(
+    p: Record,
+    command: Array,
+    fan: Record,
+    axial: Array,
+    radial: Array,
+    qpos: Array,
+    qvel: Array,
+    noise: Array,
+    xfrc: Array,
+) -> None:
+    """Let the motors follow their commands for one tick and write the wrench that acts in it into
+    ``xfrc`` (6,).
+    """
     load = 0.0
     for i in range(4):
         p.speeds[i] = command[i] + p.motor_keep * (p.speeds[i] - command[i])
@@ -198,10 +253,18 @@ def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array,
         p.sample[i] = p.speeds[i]
     rewrite_sample(p, TICK, 4, 1.0)
     for i in range(4):
-        p.z[i] = p.sample[i] if p.omega_lsb == 0.0 else p.omega_lsb * math.floor(p.sample[i] / p.omega_lsb + 0.5)
+        p.z[i] = (
+            p.sample[i]
+            if p.omega_lsb == 0.0
+            else p.omega_lsb * math.floor(p.sample[i] / p.omega_lsb + 0.5)
+        )
     if p.voltage_ref > 0.0:
         # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
-        full = 1.05 - 0.1 * p.time / p.battery_life - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
+        full = (
+            1.05
+            - 0.1 * p.time / p.battery_life
+            - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
+        )
         p.battery += 0.05 * (full * p.voltage_ref - p.battery)
     drive(p, p.speeds, TICK, p.battery)
     R = p.rotation
@@ -209,17 +272,34 @@ def actuate(p: Record, command: Array, fan: Record, axial: Array, radial: Array,
     apply_effects(p, qpos[0:3], R, qvel[0:3], qvel[3:6])
     if fan.speed > 0.0:
         gust(fan, noise[_GUSTS:_DROPOUT])
-        jet_wrench(fan, axial, radial, qpos[0:3], R, qvel[0:3], qvel[3:6], p.body.com, p.scratch, p.jet)
+        jet_wrench(
+            fan, axial, radial, qpos[0:3], R, qvel[0:3], qvel[3:6], p.body.com, p.scratch, p.jet
+        )
     fresh = math.sqrt(1.0 - p.disturbance_keep * p.disturbance_keep)
     for i in range(3):
-        p.disturbance[i] = p.disturbance_keep * p.disturbance[i] + fresh * p.disturbance_force * noise[_DISTURBANCE + i]
-        p.disturbance[3 + i] = (p.disturbance_keep * p.disturbance[3 + i]
-                                + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i])
+        p.disturbance[i] = (
+            p.disturbance_keep * p.disturbance[i]
+            + fresh * p.disturbance_force * noise[_DISTURBANCE + i]
+        )
+        p.disturbance[3 + i] = (
+            p.disturbance_keep * p.disturbance[3 + i]
+            + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i]
+        )
     for i in range(3):
         p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i] + p.applied[i]
-        p.external[3 + i] = (R[i, 0] * p.effect_wrench[3] + R[i, 1] * p.effect_wrench[4] + R[i, 2] * p.effect_wrench[5]
-                             + p.jet[3 + i] + p.disturbance[3 + i] + p.applied[3 + i])
+        p.external[3 + i] = (
+            R[i, 0] * p.effect_wrench[3]
+            + R[i, 1] * p.effect_wrench[4]
+            + R[i, 2] * p.effect_wrench[5]
+            + p.jet[3 + i]
+            + p.disturbance[3 + i]
+            + p.applied[3 + i]
+        )
         xfrc[i] = p.external[i] + R[i, 2] * p.rotor_wrench[0]
-        xfrc[3 + i] = (p.external[3 + i] + R[i, 0] * p.rotor_wrench[1] + R[i, 1] * p.rotor_wrench[2]
-                       + R[i, 2] * p.rotor_wrench[3])
+        xfrc[3 + i] = (
+            p.external[3 + i]
+            + R[i, 0] * p.rotor_wrench[1]
+            + R[i, 1] * p.rotor_wrench[2]
+            + R[i, 2] * p.rotor_wrench[3]
+        )
     p.time += TICK

@@ -18,14 +18,24 @@ _REPORTED = 4_000  # ticks between two reports of progress
 _CEILING = 2.6  # m, of a room that does not say
 
 # Weak background turbulence: 15 mN and 0.3 mNm over 0.25 s for a 0.46 kg vehicle
-BACKGROUND = PlantSettings(disturbance_force=0.015, disturbance_torque=0.0003, disturbance_time=0.25)
+BACKGROUND = PlantSettings(
+    disturbance_force=0.015, disturbance_torque=0.0003, disturbance_time=0.25
+)
 
 
-def _waves(rng: np.random.Generator, t: Array, size: float, slowest: float, fastest: float, count: int = 4) -> Array:
-    """Return a sum (n,) of sines with random phases and frequencies (Hz), ``size`` in standard deviation."""
+def _waves(
+    rng: np.random.Generator, t: Array, size: float, slowest: float, fastest: float, count: int = 4
+) -> Array:
+    """Return a sum (n,) of sines with random phases and frequencies (Hz), ``size`` in standard
+    deviation.
+    """
     frequency = rng.uniform(slowest, fastest, count)
     phase = rng.uniform(0, 2 * math.pi, count)
-    waves: Array = size * math.sqrt(2.0 / count) * np.sin(2 * math.pi * frequency * t[:, None] + phase).sum(axis=1)
+    waves: Array = (
+        size
+        * math.sqrt(2.0 / count)
+        * np.sin(2 * math.pi * frequency * t[:, None] + phase).sum(axis=1)
+    )
     return waves
 
 
@@ -34,68 +44,142 @@ def _hover(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
 
 
 def _gentle(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 0.4, 0.05, 0.15), _waves(rng, t, 0.4, 0.05, 0.15),
-                     1.2 + _waves(rng, t, 0.12, 0.05, 0.15), _waves(rng, t, 0.4, 0.03, 0.1)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.4, 0.05, 0.15),
+            _waves(rng, t, 0.4, 0.05, 0.15),
+            1.2 + _waves(rng, t, 0.12, 0.05, 0.15),
+            _waves(rng, t, 0.4, 0.03, 0.1),
+        ],
+        axis=1,
+    )
 
 
 def _excite(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 0.7, 0.1, 0.5), _waves(rng, t, 0.7, 0.1, 0.5),
-                     1.4 + _waves(rng, t, 0.18, 0.15, 0.7), _waves(rng, t, 0.8, 0.05, 0.4)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.7, 0.1, 0.5),
+            _waves(rng, t, 0.7, 0.1, 0.5),
+            1.4 + _waves(rng, t, 0.18, 0.15, 0.7),
+            _waves(rng, t, 0.8, 0.05, 0.4),
+        ],
+        axis=1,
+    )
 
 
 def _ground(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     height = 0.13 + 0.5 * np.square(np.sin(math.pi * t / rng.uniform(5.0, 7.0)))
-    return np.stack([_waves(rng, t, 0.3, 0.05, 0.2), _waves(rng, t, 0.3, 0.05, 0.2), height,
-                     _waves(rng, t, 0.3, 0.05, 0.2)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.3, 0.05, 0.2),
+            _waves(rng, t, 0.3, 0.05, 0.2),
+            height,
+            _waves(rng, t, 0.3, 0.05, 0.2),
+        ],
+        axis=1,
+    )
 
 
 def _yaw(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     rate = rng.uniform(1.0, 2.0) * rng.choice([-1.0, 1.0])
-    return np.stack([0.8 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t), 1.2 + 0.15 * np.sin(0.7 * t), rate * t], axis=1)
+    return np.stack(
+        [0.8 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t), 1.2 + 0.15 * np.sin(0.7 * t), rate * t],
+        axis=1,
+    )
 
 
 def _circle(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     rate = rng.uniform(1.2, 1.8)
-    return np.stack([np.cos(rate * t), np.sin(rate * t), np.full_like(t, 1.2), np.zeros_like(t)], axis=1)
+    return np.stack(
+        [np.cos(rate * t), np.sin(rate * t), np.full_like(t, 1.2), np.zeros_like(t)], axis=1
+    )
 
 
 def _ceiling(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     gap = 0.3 + 0.5 * np.square(np.cos(math.pi * t / rng.uniform(5.0, 7.0)))
-    return np.stack([_waves(rng, t, 0.3, 0.05, 0.2), _waves(rng, t, 0.3, 0.05, 0.2), ceiling - gap,
-                     _waves(rng, t, 0.3, 0.05, 0.2)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.3, 0.05, 0.2),
+            _waves(rng, t, 0.3, 0.05, 0.2),
+            ceiling - gap,
+            _waves(rng, t, 0.3, 0.05, 0.2),
+        ],
+        axis=1,
+    )
 
 
 def _vertical(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 0.2, 0.05, 0.2), _waves(rng, t, 0.2, 0.05, 0.2),
-                     1.45 + _waves(rng, t, 0.3, 0.2, 0.6), _waves(rng, t, 0.5, 0.05, 0.2)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.2, 0.05, 0.2),
+            _waves(rng, t, 0.2, 0.05, 0.2),
+            1.45 + _waves(rng, t, 0.3, 0.2, 0.6),
+            _waves(rng, t, 0.5, 0.05, 0.2),
+        ],
+        axis=1,
+    )
 
 
 def _fast(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 1.3, 0.08, 0.25), _waves(rng, t, 1.3, 0.08, 0.25),
-                     1.5 + _waves(rng, t, 0.25, 0.1, 0.5), _waves(rng, t, 0.6, 0.05, 0.2)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 1.3, 0.08, 0.25),
+            _waves(rng, t, 1.3, 0.08, 0.25),
+            1.5 + _waves(rng, t, 0.25, 0.1, 0.5),
+            _waves(rng, t, 0.6, 0.05, 0.2),
+        ],
+        axis=1,
+    )
 
 
 def _shake(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 0.03, 1.2, 2.2), _waves(rng, t, 0.03, 1.2, 2.2),
-                     1.3 + _waves(rng, t, 0.1, 0.2, 0.7), _waves(rng, t, 0.4, 0.1, 0.6)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.03, 1.2, 2.2),
+            _waves(rng, t, 0.03, 1.2, 2.2),
+            1.3 + _waves(rng, t, 0.1, 0.2, 0.7),
+            _waves(rng, t, 0.4, 0.1, 0.6),
+        ],
+        axis=1,
+    )
 
 
 def _jet(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack([_waves(rng, t, 0.25, 0.03, 0.1), _waves(rng, t, 0.7, 0.05, 0.2),
-                     1.2 + _waves(rng, t, 0.12, 0.05, 0.2), math.pi + _waves(rng, t, 0.3, 0.05, 0.2)], axis=1)
+    return np.stack(
+        [
+            _waves(rng, t, 0.25, 0.03, 0.1),
+            _waves(rng, t, 0.7, 0.05, 0.2),
+            1.2 + _waves(rng, t, 0.12, 0.05, 0.2),
+            math.pi + _waves(rng, t, 0.3, 0.05, 0.2),
+        ],
+        axis=1,
+    )
 
 
-# in this order: hover at 1.2 m; slow waves; waves up to 3 m/s and 0.7 Hz; near the floor; steady yaw; a circle of 1 m at 1.2 to
-# 1.8 m/s; near the ceiling; climbs and descents up to 1.5 m/s; waves up to 4 m/s; small waves of 1.2 to 2.2 Hz, for
-# angular acceleration; across the jet of a fan that stands at x = -2.3 m
+# in this order: hover at 1.2 m; slow waves; waves up to 3 m/s and 0.7 Hz; near the floor; steady
+# yaw; a circle of 1 m at 1.2 to 1.8 m/s; near the ceiling; climbs and descents up to 1.5 m/s; waves
+# up to 4 m/s; small waves of 1.2 to 2.2 Hz, for angular acceleration; across the jet of a fan that
+# stands at x = -2.3 m
 TRAJECTORIES: dict[str, Callable[[np.random.Generator, Array, float], Array]] = {
-    "hover": _hover, "gentle": _gentle, "excite": _excite, "ground": _ground, "yaw": _yaw, "circle": _circle,
-    "ceiling": _ceiling, "vertical": _vertical, "fast": _fast, "shake": _shake, "jet": _jet,
+    "hover": _hover,
+    "gentle": _gentle,
+    "excite": _excite,
+    "ground": _ground,
+    "yaw": _yaw,
+    "circle": _circle,
+    "ceiling": _ceiling,
+    "vertical": _vertical,
+    "fast": _fast,
+    "shake": _shake,
+    "jet": _jet,
 }
 
 
-def draw_trajectory(name: str, rng: np.random.Generator, t: Array, ceiling: float = math.inf) -> Array:
-    """Return the set points (n, 11) of a trajectory at times ``t`` (n,) s; it fades in from its first point.
+def draw_trajectory(
+    name: str, rng: np.random.Generator, t: Array, ceiling: float = math.inf
+) -> Array:
+    """Return the set points (n, 11) of a trajectory at times ``t`` (n,) s; it fades in from its
+    first point.
 
     ``ceiling`` is its height in m; where there is none, trajectories take it to be at 2.6 m.
 
@@ -109,14 +193,19 @@ def draw_trajectory(name: str, rng: np.random.Generator, t: Array, ceiling: floa
     path = path[:1] + (path - path[:1]) * fade * fade * (3.0 - 2.0 * fade)
     speed = np.gradient(path, t, axis=0)
     acceleration = np.gradient(speed[:, :3], t, axis=0)
-    return np.concatenate([path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1)
+    return np.concatenate(
+        [path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1
+    )
 
 
 def background(vehicle: Vehicle, strength: float = 1.0) -> PlantSettings:
     """Return weak turbulence in proportion to the vehicle, and times ``strength``."""
     force = strength * vehicle.weight / 4.5126
-    return replace(BACKGROUND, disturbance_force=BACKGROUND.disturbance_force * force,
-                   disturbance_torque=BACKGROUND.disturbance_torque * force * vehicle.arm_l / 0.127)
+    return replace(
+        BACKGROUND,
+        disturbance_force=BACKGROUND.disturbance_force * force,
+        disturbance_torque=BACKGROUND.disturbance_torque * force * vehicle.arm_l / 0.127,
+    )
 
 
 def record_flight(
@@ -138,27 +227,34 @@ def record_flight(
         seconds: length of the log.
         seed: of everything random.
         settings: of the plant; default: weak background turbulence in proportion to the vehicle.
-        push: asked before each tick for a wrench (6,) that acts over it: force in N and torque in Nm about the centre of
-            mass, world frame; None leaves the last one on. Default: nothing pushes.
+        push: asked before each tick for a wrench (6,) that acts over it: force in N and torque in
+            Nm about the centre of mass, world frame; None leaves the last one on. Default: nothing
+            pushes.
         report: called now and then with the share that is done.
 
     Returns:
-        ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at the instant
-        of the sample, ``voltage`` (n,) V, and the true external ``force`` (n, 3) N and ``torque`` (n, 3) Nm (world frame, about
+        ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at
+            the instant
+        of the sample, ``voltage`` (n,) V, and the true external ``force`` (n, 3) N and ``torque``
+            (n, 3) Nm (world frame, about
         the centre of mass) over the interval that ends there.
 
     Raises:
         InputError: an unknown trajectory, or a length out of range.
     """
     if not TICK * 20 <= seconds <= 7200:
-        raise InputError(f"record: --seconds must lie between {TICK * 20:g} and 7200, got {seconds:g}")
+        raise InputError(
+            f"record: --seconds must lie between {TICK * 20:g} and 7200, got {seconds:g}"
+        )
     if settings is None:
         settings = background(vehicle)
     rng = np.random.default_rng(seed)
     count = round(seconds / TICK) + 1
     t = TICK * np.arange(count, dtype=np.float64)
     setpoints = draw_trajectory(trajectory, rng, t, vehicle.ceiling_z)
-    loop = ClosedLoop(vehicle, replace(vehicle, effects=(*vehicle.effects, *effects)), settings=settings)
+    loop = ClosedLoop(
+        vehicle, replace(vehicle, effects=(*vehicle.effects, *effects)), settings=settings
+    )
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     samples, external, voltage = np.empty((count, 11)), np.zeros((count, 6)), np.empty(count)
     for k in range(count):
@@ -173,16 +269,26 @@ def record_flight(
         loop.run(rng.standard_normal((1, NOISE)))
         samples[k, 4:] = loop.sample[4:]
         if not loop.healthy() or loop.position[2] < -0.5:
-            raise InputError(f"record: {vehicle.name} crashed after {loop.time:.1f} s: the effects are too large for its "
-                             "flight loop")
-    # A turn rate is logged as it is at the instant of the pose, between the ticks before and after. That is no even mean:
-    # with semi-implicit steps of half a tick the pose is a quarter of a tick ahead of the clock. It is rounded once: rounding
-    # what lies between two rounded rates would bring the later one back.
+            raise InputError(
+                f"record: {vehicle.name} crashed after {loop.time:.1f} s: the effects are too "
+                f"large for its "
+                "flight loop"
+            )
+    # A turn rate is logged as it is at the instant of the pose, between the ticks before and after.
+    # That is no even mean: with semi-implicit steps of half a tick the pose is a quarter of a tick
+    # ahead of the clock. It is rounded once: rounding what lies between two rounded rates would
+    # bring the later one back.
     samples[:-1, :4] = 0.25 * samples[:-1, :4] + 0.75 * samples[1:, :4]
     if vehicle.omega_lsb > 0:
         samples[:, :4] = vehicle.omega_lsb * np.round(samples[:, :4] / vehicle.omega_lsb)
-    columns = {"t": t, "position": samples[:, 4:7], "quaternion": samples[:, 7:11], "rotor_speeds": samples[:, :4],
-               "force": external[:, :3], "torque": external[:, 3:]}
+    columns = {
+        "t": t,
+        "position": samples[:, 4:7],
+        "quaternion": samples[:, 7:11],
+        "rotor_speeds": samples[:, :4],
+        "force": external[:, :3],
+        "torque": external[:, 3:],
+    }
     if vehicle.voltage_ref > 0:
         columns["voltage"] = voltage
     return columns

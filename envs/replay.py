@@ -1,4 +1,6 @@
-"""A flight that is over, drawn again: the vehicle along its path, with the wrench that was estimated on it."""
+"""A flight that is over, drawn again: the vehicle along its path, with the wrench that was
+estimated on it.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -16,7 +18,9 @@ from .scene_shapes import add_path, add_shadow, add_wrench
 Array = NDArray[np.float64]
 
 _DRAWN_ARM = 0.1262  # m, arm_l of the vehicle that the model shows
-_LONGEST_ARROW = 0.6  # m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
+_LONGEST_ARROW = (
+    0.6  # m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
+)
 _TRAIL = 2.0  # s of path behind the vehicle that are drawn closely
 _PATH_POINTS = 300
 _AWAY = (0.0, 0.0, -50.0)  # where the fan stands that a log knows nothing of
@@ -38,19 +42,27 @@ class Flight:
     def part(self, rows: NDArray[np.integer[Any]]) -> "Flight":
         """Return some rows of it."""
         every = {f.name: getattr(self, f.name) for f in fields(self)}
-        columns: dict[str, Any] = {name: None if column is None else column[rows] for name, column in every.items()}
+        columns: dict[str, Any] = {
+            name: None if column is None else column[rows] for name, column in every.items()
+        }
         return Flight(**columns)
 
 
 def arrow_scales(flight: Flight, arm: float) -> tuple[float, float]:
     """Return how long 1 N and 1 Nm are drawn, in m, for a vehicle of arm length ``arm`` m."""
     longest = _LONGEST_ARROW * arm / _DRAWN_ARM
-    force, torque = (float(np.quantile(np.linalg.norm(x, axis=1), 0.99)) for x in (flight.force, flight.torque[:, 2:]))
+    force, torque = (
+        float(np.quantile(np.linalg.norm(x, axis=1), 0.99))
+        for x in (flight.force, flight.torque[:, 2:])
+    )
     return longest / max(force, 1e-9), longest / max(torque, 1e-12)
 
 
-def pictures(flight: Flight, vehicle: Vehicle, viewer: Viewer, fps: float) -> Iterator[NDArray[np.uint8] | None]:
-    """Yield a picture of each 1 / ``fps`` s of a flight, or show it in the viewer's window until that is closed.
+def pictures(
+    flight: Flight, vehicle: Vehicle, viewer: Viewer, fps: float
+) -> Iterator[NDArray[np.uint8] | None]:
+    """Yield a picture of each 1 / ``fps`` s of a flight, or show it in the viewer's window until
+    that is closed.
 
     Raises:
         InputError: this machine cannot draw.
@@ -88,7 +100,18 @@ def pictures(flight: Flight, vehicle: Vehicle, viewer: Viewer, fps: float) -> It
             add_shadow(scene, at, 0.22 * size)
             add_path(scene, trail, size)
             if flight.true_force is not None and flight.true_torque is not None:
-                add_wrench(scene, at, flight.true_force[k], flight.true_torque[k, 2], scales, 0.22 * size, True, size)
-            add_wrench(scene, at, flight.force[k], flight.torque[k, 2], scales, 0.22 * size, size=size)
+                add_wrench(
+                    scene,
+                    at,
+                    flight.true_force[k],
+                    flight.true_torque[k, 2],
+                    scales,
+                    0.22 * size,
+                    True,
+                    size,
+                )
+            add_wrench(
+                scene, at, flight.force[k], flight.torque[k, 2], scales, 0.22 * size, size=size
+            )
 
         yield viewer.show(data, mark, camera)

@@ -1,4 +1,6 @@
-"""A flight as a recording for the Rerun viewer: pose, path, the wrench as arrows, and every number over time."""
+"""A flight as a recording for the Rerun viewer: pose, path, the wrench as arrows, and every number
+over time.
+"""
 
 from pathlib import Path
 
@@ -21,34 +23,61 @@ def write_rrd(flight: Flight, vehicle: Vehicle, path: Path) -> None:
     try:
         import rerun as rr
     except ImportError as error:
-        raise InputError(f"{path}: a Rerun recording needs the rerun extra: pip install 'windwrench[rerun]'") from error
+        raise InputError(
+            f"{path}: a Rerun recording needs the rerun extra: pip install 'windwrench[rerun]'"
+        ) from error
 
     recording = rr.RecordingStream("windwrench")
     with replaced(path) as partial:
         recording.save(partial)
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        discs = rr.Ellipsoids3D(centers=vehicle.positions, half_sizes=[[0.8 * vehicle.arm_l] * 2 + [0.05 * vehicle.arm_l]] * 4,
-                                colors=[_ROTOR], fill_mode="solid")
+        discs = rr.Ellipsoids3D(
+            centers=vehicle.positions,
+            half_sizes=[[0.8 * vehicle.arm_l] * 2 + [0.05 * vehicle.arm_l]] * 4,
+            colors=[_ROTOR],
+            fill_mode="solid",
+        )
         recording.log("world/vehicle/rotors", discs, static=True)
-        recording.log("world/path", rr.LineStrips3D([flight.position], colors=[(242, 115, 26)]), static=True)
+        recording.log(
+            "world/path", rr.LineStrips3D([flight.position], colors=[(242, 115, 26)]), static=True
+        )
         time = rr.TimeColumn("time", duration=flight.t - flight.t[0])
         turned = flight.quaternion[:, [1, 2, 3, 0]]
-        recording.send_columns("world/vehicle", [time], rr.Transform3D.columns(translation=flight.position, quaternion=turned))
+        recording.send_columns(
+            "world/vehicle",
+            [time],
+            rr.Transform3D.columns(translation=flight.position, quaternion=turned),
+        )
         scale, _ = arrow_scales(flight, vehicle.arm_l)
-        for name, force, torque, colour in (("estimated", flight.force, flight.torque, _ESTIMATED),
-                                            ("true", flight.true_force, flight.true_torque, _TRUE)):
+        for name, force, torque, colour in (
+            ("estimated", flight.force, flight.torque, _ESTIMATED),
+            ("true", flight.true_force, flight.true_torque, _TRUE),
+        ):
             if force is None or torque is None:
                 continue
-            recording.log(f"world/force/{name}", rr.Arrows3D.from_fields(colors=[colour]), static=True)
-            recording.send_columns(f"world/force/{name}", [time],
-                                   rr.Arrows3D.columns(origins=flight.position, vectors=scale * force))
+            recording.log(
+                f"world/force/{name}", rr.Arrows3D.from_fields(colors=[colour]), static=True
+            )
+            recording.send_columns(
+                f"world/force/{name}",
+                [time],
+                rr.Arrows3D.columns(origins=flight.position, vectors=scale * force),
+            )
             for quantity, values in (("force", force), ("torque", torque)):
                 for i, axis in enumerate("xyz"):
-                    recording.send_columns(f"{quantity}_{axis}/{name}", [time], rr.Scalars.columns(scalars=values[:, i]))
+                    recording.send_columns(
+                        f"{quantity}_{axis}/{name}",
+                        [time],
+                        rr.Scalars.columns(scalars=values[:, i]),
+                    )
         if flight.fan_y is not None:
             height = float(np.median(flight.position[:, 2]))
-            mouth = np.column_stack([0.0 * flight.fan_y, flight.fan_y, np.full(len(flight.t), height)])
-            ring = rr.Ellipsoids3D(centers=[[0, 0, 0]], half_sizes=[[0.05, 0.5, 0.5]], colors=[_FAN], fill_mode="solid")
+            mouth = np.column_stack(
+                [0.0 * flight.fan_y, flight.fan_y, np.full(len(flight.t), height)]
+            )
+            ring = rr.Ellipsoids3D(
+                centers=[[0, 0, 0]], half_sizes=[[0.05, 0.5, 0.5]], colors=[_FAN], fill_mode="solid"
+            )
             recording.log("world/fan", ring, static=True)
             recording.send_columns("world/fan", [time], rr.Transform3D.columns(translation=mouth))
         recording.flush()

@@ -18,7 +18,10 @@ class Scenario:
     summary: str
     motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
     speed: tuple[float, float] = (0.05, 0.35)  # m/s, largest speed of the fan
-    offset: tuple[float, float] = (0.0, 0.1)  # m, of the vehicle from the fan's axis at the start, on either side
+    offset: tuple[float, float] = (
+        0.0,
+        0.1,
+    )  # m, of the vehicle from the fan's axis at the start, on either side
     rise_time: float = 0.45  # s, of the filter
     sigma_position: float = 0.001  # m
     sigma_attitude: float = 0.005  # rad
@@ -27,11 +30,19 @@ class Scenario:
 
 
 SCENARIOS: dict[str, Scenario] = {
-    "static": Scenario("the fan stands still; start 0.8 m off its axis", motions=("still",), offset=(0.8, 0.8)),
-    "base": Scenario("the fan moves at up to 0.05-0.35 m/s: a sine, a triangle, a ramp, or not at all"),
-    "fast": Scenario("the fan moves at up to 0.2-0.6 m/s", motions=("sine", "triangle", "ramp"), speed=(0.2, 0.6)),
+    "static": Scenario(
+        "the fan stands still; start 0.8 m off its axis", motions=("still",), offset=(0.8, 0.8)
+    ),
+    "base": Scenario(
+        "the fan moves at up to 0.05-0.35 m/s: a sine, a triangle, a ramp, or not at all"
+    ),
+    "fast": Scenario(
+        "the fan moves at up to 0.2-0.6 m/s", motions=("sine", "triangle", "ramp"), speed=(0.2, 0.6)
+    ),
     "slow-filter": Scenario("base, with a filter of 1 s rise time", rise_time=1.0),
-    "noisy": Scenario("base, with a pose noise of 0.01 m and 0.05 rad", sigma_position=0.01, sigma_attitude=0.05),
+    "noisy": Scenario(
+        "base, with a pose noise of 0.01 m and 0.05 rad", sigma_position=0.01, sigma_attitude=0.05
+    ),
     "gusty": Scenario("base, with 35 % turbulence", turbulence=0.35),
     "far": Scenario("base, from 1.0-1.4 m off the axis", offset=(1.0, 1.4)),
     "varied": Scenario("base, with fan strength, distance and vehicle drawn anew", varied=True),
@@ -49,10 +60,14 @@ def get_scenario(name: str) -> Scenario:
     return SCENARIOS[name]
 
 
-def draw_fan_path(scenario: Scenario, rng: np.random.Generator, t: Array) -> tuple[str, float, Array]:
-    """Draw how the fan moves: name of the motion, its largest speed (m/s), and y (n,) m at times ``t`` (n,) s.
+def draw_fan_path(
+    scenario: Scenario, rng: np.random.Generator, t: Array
+) -> tuple[str, float, Array]:
+    """Draw how the fan moves: name of the motion, its largest speed (m/s), and y (n,) m at times
+    ``t`` (n,) s.
 
-    The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after 0.8-1.6 m.
+    The path starts at 0. Sine and triangle swing 0.5-1.2 m to either side; a ramp stops after
+    0.8-1.6 m.
     """
     motion = scenario.motions[rng.integers(len(scenario.motions))]
     speed = float(rng.uniform(*scenario.speed))

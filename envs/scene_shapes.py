@@ -34,7 +34,9 @@ def add_arrow(scene: Any, start: Array, end: Array, width: float, colour: Array)
 
 
 def add_path(scene: Any, path: Sequence[Array], size: float = 1.0) -> None:
-    """Append the path (n, 3) m flown so far, ``size`` times as thick; it fades towards its beginning."""
+    """Append the path (n, 3) m flown so far, ``size`` times as thick; it fades towards its
+    beginning.
+    """
     for i, (start, end) in enumerate(pairwise(path)):
         colour = _PATH.copy()
         colour[3] = 0.15 + 0.6 * (i + 1) / len(path)
@@ -43,24 +45,48 @@ def add_path(scene: Any, path: Sequence[Array], size: float = 1.0) -> None:
 
 def add_shadow(scene: Any, position: Array, radius: float) -> None:
     """Append a disc on the floor below a vehicle."""
-    add_shape(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, np.array([radius, 0.001, 0.0]), np.array([*position[:2], 0.002]), _SHADOW)
+    add_shape(
+        scene,
+        mujoco.mjtGeom.mjGEOM_CYLINDER,
+        np.array([radius, 0.001, 0.0]),
+        np.array([*position[:2], 0.002]),
+        _SHADOW,
+    )
 
 
-def add_wrench(scene: Any, position: Array, force: Array, torque_z: float, scales: tuple[float, float], above: float,
-               true: bool = False, size: float = 1.0) -> None:
-    """Append a force (3,) N and a yaw torque in Nm at a vehicle, ``scales`` in m per N and Nm, ``size`` times as thick.
+def add_wrench(
+    scene: Any,
+    position: Array,
+    force: Array,
+    torque_z: float,
+    scales: tuple[float, float],
+    above: float,
+    true: bool = False,
+    size: float = 1.0,
+) -> None:
+    """Append a force (3,) N and a yaw torque in Nm at a vehicle, ``scales`` in m per N and Nm,
+    ``size`` times as thick.
 
-    The torque stands ``above`` m over the vehicle as an arrow along y, the way in which it says that the jet's axis lies.
+    The torque stands ``above`` m over the vehicle as an arrow along y, the way in which it says
+    that the jet's axis lies.
     """
     # the estimate stands a little higher: neither hides the other
     at = position + np.array([0.0, 0.0, 0.0 if true else 0.05 * size])
     width = 0.022 * size
     add_arrow(scene, at, at + scales[0] * force, width, TRUE if true else ESTIMATED)
     top = at + np.array([0.0, 0.0, above])
-    add_arrow(scene, top, top - np.array([0.0, scales[1] * torque_z, 0.0]), width, TURNING_TRUE if true else TURNING)
+    add_arrow(
+        scene,
+        top,
+        top - np.array([0.0, scales[1] * torque_z, 0.0]),
+        width,
+        TURNING_TRUE if true else TURNING,
+    )
 
 
-def _add_between(scene: Any, kind: Any, start: Array, end: Array, width: float, colour: Array) -> None:
+def _add_between(
+    scene: Any, kind: Any, start: Array, end: Array, width: float, colour: Array
+) -> None:
     shape = add_shape(scene, kind, np.ones(3), start, colour)
     if shape is not None:
         mujoco.mjv_connector(shape, kind, width, start, end)

@@ -24,9 +24,10 @@ Infos = dict[str, Any]
 class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
-    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose episode has ended
-    starts its next one at the following step, whose action it ignores (``AutoresetMode.NEXT_STEP``). Each entry of
-    ``infos`` is an array with a row for each environment; all environments have all of them.
+    ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
+    episode has ended starts its next one at the following step, whose action it ignores
+    (``AutoresetMode.NEXT_STEP``). Each entry of ``infos`` is an array with a row for each
+    environment; all environments have all of them.
 
     Args:
         num_envs: how many.
@@ -38,16 +39,29 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         InputError: ``num_envs`` or ``threads`` is not positive, or what ``FanTrackingEnv`` refuses.
     """
 
-    def __init__(self, num_envs: int = 1, max_episode_steps: int = 250, threads: int = 1, **kwargs: Any) -> None:
-        for name, value in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps), ("threads", threads)):
+    def __init__(
+        self, num_envs: int = 1, max_episode_steps: int = 250, threads: int = 1, **kwargs: Any
+    ) -> None:
+        for name, value in (
+            ("num_envs", num_envs),
+            ("max_episode_steps", max_episode_steps),
+            ("threads", threads),
+        ):
             if value < 1:
                 raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
         self.envs = [FanTrackingEnv(**kwargs) for _ in range(num_envs)]
-        self.num_envs, self.max_episode_steps, self.threads = num_envs, max_episode_steps, min(threads, num_envs)
+        self.num_envs, self.max_episode_steps, self.threads = (
+            num_envs,
+            max_episode_steps,
+            min(threads, num_envs),
+        )
         first = self.envs[0]
         self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
         self.render_mode = first.render_mode
-        self.single_action_space, self.single_observation_space = first.action_space, first.observation_space
+        self.single_action_space, self.single_observation_space = (
+            first.action_space,
+            first.observation_space,
+        )
         self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
@@ -67,19 +81,28 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Frames, Infos]:
-        """Start an episode in every environment, or in those of ``options["reset_mask"]`` (num_envs,), booleans.
+        """Start an episode in every environment, or in those of ``options["reset_mask"]``
+        (num_envs,), booleans.
 
         Raises:
             InputError: a list of seeds, or a mask, of another length.
         """
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if seed is None or isinstance(
-            seed, int | np.integer) else list(seed)
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)]
+            if seed is None or isinstance(seed, int | np.integer)
+            else list(seed)
+        )
         mask = np.asarray((options or {}).get("reset_mask", self._all))
         if len(seeds) != self.num_envs or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise InputError(f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
-                             f"got {len(seeds)} and {mask!r}")
+            raise InputError(
+                f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
+                f"got {len(seeds)} and {mask!r}"
+            )
 
         self._spread(lambda first, last: self._start(first, last, mask, seeds))
         self._decisions[mask], self._over[mask] = 0, False
@@ -93,7 +116,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         """
         actions = np.asarray(actions, dtype=np.float64)
         if actions.shape != (self.num_envs, 1) or not np.all(np.isfinite(actions)):
-            raise InputError(f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), got {actions!r}")
+            raise InputError(
+                f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), "
+                f"got {actions!r}"
+            )
         if not self._episodes["loop"].all():
             raise InputError("FanTracking: call reset before step")
         self._commands[:], self._resting[:] = actions[:, 0], self._over
@@ -104,7 +130,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
         lost = out["lost"].copy()
         self._over = lost | truncated
-        return self._frames(), out["reward_tracking"] + out["reward_change"], lost, truncated, self._infos()
+        return (
+            self._frames(),
+            out["reward_tracking"] + out["reward_change"],
+            lost,
+            truncated,
+            self._infos(),
+        )
 
     def _fly(self) -> None:
         """Fly a decision of all environments that do not rest."""
@@ -114,7 +146,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._call, self._help = partial(entry, *given, 0), partial(entry, *given, PATIENCE)
         left = open_turns(self._turns) - 1  # without this thread
         if left:
-            self._helpers = [*(h for h in self._helpers if not h.done()), *self._call_others(self._help, left)]
+            self._helpers = [
+                *(h for h in self._helpers if not h.done()),
+                *self._call_others(self._help, left),
+            ]
         try:
             self._call()
             while not watch(self._turns, self.num_envs):
@@ -132,16 +167,22 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._pool = ThreadPoolExecutor(self.threads - 1)
         return [self._pool.submit(work) for _ in range(count)] if self._pool else []
 
-    def _start(self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
-        """Start an episode in those environments from ``first`` to before ``last`` that ``which`` (num_envs,) names."""
+    def _start(
+        self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None
+    ) -> None:
+        """Start an episode in those environments from ``first`` to before ``last`` that ``which``
+        (num_envs,) names.
+        """
         for i in (first + np.flatnonzero(which[first:last])).tolist():
             self.envs[i].reset(seed=None if seeds is None else seeds[i])
             self._motions[i] = self.envs[i].fan_motion
 
     def _spread(self, work: Callable[[int, int], None]) -> None:
-        """Call ``work`` with the bounds of some environments, until all had their turn; this thread works, too.
+        """Call ``work`` with the bounds of some environments, until all had their turn; this thread
+        works, too.
 
-        Whoever is done takes the next few, so that nobody waits for a thread that the machine held up.
+        Whoever is done takes the next few, so that nobody waits for a thread that the machine held
+        up.
         """
         turns = iter(range(self.num_envs))
 
@@ -153,7 +194,9 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         try:
             take_turns()
         finally:
-            others = [other for other in others if not other.cancel()]  # the rest came too late to find any
+            others = [
+                other for other in others if not other.cancel()
+            ]  # the rest came too late to find any
             wait(others)
         for other in others:
             other.result()
@@ -163,7 +206,9 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         return frames
 
     def _infos(self) -> Infos:
-        """Return what the environments say as Gymnasium's vector environments do: an array and a mask for each entry."""
+        """Return what the environments say as Gymnasium's vector environments do: an array and a
+        mask for each entry.
+        """
         infos: Infos = {name: self._outcomes[name].copy() for name in INFO}
         infos["fan_motion"] = self._motions.copy()
         return infos | {f"_{name}": self._all.copy() for name in infos}

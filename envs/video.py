@@ -19,7 +19,10 @@ FPS = 12.5  # of an episode: a picture a decision
 _GIF_WIDTH = 480  # pixels
 _GIF_COLOURS = 192
 _GIF_SAMPLES = 6  # pictures from which colours are chosen
-_SWATCH, _SHADES = 8, 3  # pixels, and shades, of a mark's colour on the sheet that colours are chosen from
+_SWATCH, _SHADES = (
+    8,
+    3,
+)  # pixels, and shades, of a mark's colour on the sheet that colours are chosen from
 
 
 class Film:
@@ -36,7 +39,9 @@ class Film:
         InputError: an mp4 without the video extra.
     """
 
-    def __init__(self, path: Path, width: int, height: int, fps: float = FPS, longest: float | None = None) -> None:
+    def __init__(
+        self, path: Path, width: int, height: int, fps: float = FPS, longest: float | None = None
+    ) -> None:
         self.path, self.width, self.height, self.fps = path, width, height, fps
         self._left = None if longest is None else max(1, round(longest * fps))
         self._partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -46,9 +51,17 @@ class Film:
             try:
                 import imageio_ffmpeg
             except ImportError as error:
-                raise InputError(f"{path}: an mp4 needs the video extra: pip install 'windwrench[video]'") from error
-            self._stream = imageio_ffmpeg.write_frames(str(self._partial), (width, height), fps=fps, quality=7,
-                                                       macro_block_size=16, output_params=["-f", "mp4"])
+                raise InputError(
+                    f"{path}: an mp4 needs the video extra: pip install 'windwrench[video]'"
+                ) from error
+            self._stream = imageio_ffmpeg.write_frames(
+                str(self._partial),
+                (width, height),
+                fps=fps,
+                quality=7,
+                macro_block_size=16,
+                output_params=["-f", "mp4"],
+            )
             self._stream.send(None)
 
     def add(self, picture: Picture | None) -> None:
@@ -74,7 +87,12 @@ class Film:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if self._stream is not None:
             self._stream.close()
             if kind is None:
@@ -84,12 +102,21 @@ class Film:
         elif kind is None and self._pictures:
             first, *others = _reduced(self._pictures)
             with replaced(self.path) as partial:
-                first.save(partial, format="GIF", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0,
-                           optimize=False)
+                first.save(
+                    partial,
+                    format="GIF",
+                    save_all=True,
+                    append_images=others,
+                    duration=round(1000 / self.fps),
+                    loop=0,
+                    optimize=False,
+                )
 
 
 def _reduced(images: list[Any]) -> list[Any]:
-    """Return images in the same few colours, which neither flicker nor cost space in every picture."""
+    """Return images in the same few colours, which neither flicker nor cost space
+    in every picture.
+    """
     from PIL import Image
 
     width, height = images[0].size
@@ -102,8 +129,15 @@ def _reduced(images: list[Any]) -> list[Any]:
         for j in range(_SHADES):
             shade = tuple(int(255 * c * (0.45 + 0.55 * (j + 1) / _SHADES)) for c in colour[:3])
             left = j * width // _SHADES
-            sheet.paste(shade, (left, len(some) * height + i * _SWATCH, left + width // _SHADES, len(some) * height
-                                + (i + 1) * _SWATCH))
+            sheet.paste(
+                shade,
+                (
+                    left,
+                    len(some) * height + i * _SWATCH,
+                    left + width // _SHADES,
+                    len(some) * height + (i + 1) * _SWATCH,
+                ),
+            )
     palette = sheet.quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
     return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
 

@@ -18,7 +18,9 @@ TRUTH = frozenset({"force", "torque"})  # what every environment's ``info`` hold
 
 
 class _Watched(ClosedLoop):
-    """A closed loop beside which a nonlinear observer watches the same samples; the flight loop keeps to the filter."""
+    """A closed loop beside which a nonlinear observer watches the same samples; the flight loop
+    keeps to the filter.
+    """
 
     observer: NonlinearObserver | None = None
     _speeds: Array = np.zeros(4)  # turn rates of the tick before
@@ -29,7 +31,9 @@ class _Watched(ClosedLoop):
             super().run(noise, fan_y, first)
             return
         for k in range(len(noise)):
-            super().run(noise[k : k + 1], fan_y, 0 if fan_y is None else min(first + k, len(fan_y) - 1))
+            super().run(
+                noise[k : k + 1], fan_y, 0 if fan_y is None else min(first + k, len(fan_y) - 1)
+            )
             seen = (self.sample[4:7], self.sample[7:11]) if self.seen else (None, None)
             self.observer.step(self._speeds, *seen)
             self._speeds = self.sample[:4].copy()
@@ -45,8 +49,9 @@ class _Watched(ClosedLoop):
 class SensingFanTracking(FanTrackingEnv):
     """``FanTrackingEnv`` with more in ``info``.
 
-    ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm. With ``observer``, also
-    ``observer_force``, ``observer_torque``: what a nonlinear observer of the same rise time makes of the same samples.
+    ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm. With
+    ``observer``, also ``observer_force``, ``observer_torque``: what a nonlinear observer of the
+    same rise time makes of the same samples.
     """
 
     def __init__(self, *args: Any, observer: bool = False, **kwargs: Any) -> None:
@@ -65,7 +70,8 @@ class SensingFanTracking(FanTrackingEnv):
     def _decide(self, ticks: int) -> None:
         loop = self.loop
         if isinstance(loop, _Watched) and ticks > 0:
-            # the observer must see every tick's sample: they are flown one by one, before the look at what came of them
+            # the observer must see every tick's sample: they are flown one by one, before the look
+            # at what came of them
             e = self.episode[0]
             loop.setpoint[4] = min(max(self._command[0], -MAX_COMMAND), MAX_COMMAND)
             loop.run(self.np_random.standard_normal((ticks, NOISE)), self._fan_y, int(e["ticks"]))
@@ -80,11 +86,16 @@ class SensingFanTracking(FanTrackingEnv):
         info["std_torque"], info["std_force"] = std[:3].copy(), std[3:].copy()
         if isinstance(loop, _Watched) and loop.observer is not None:
             estimate = loop.observer.estimate
-            info["observer_force"], info["observer_torque"] = estimate.force.copy(), estimate.torque.copy()
+            info["observer_force"], info["observer_torque"] = (
+                estimate.force.copy(),
+                estimate.torque.copy(),
+            )
         return info
 
 
-def scenario_env(scenario: str, sources: frozenset[str] = frozenset(), estimator: str = "ukf") -> FanTrackingEnv:
+def scenario_env(
+    scenario: str, sources: frozenset[str] = frozenset(), estimator: str = "ukf"
+) -> FanTrackingEnv:
     """Return a scenario's environment, with what a policy must find in its ``info``.
 
     Args:

@@ -1,4 +1,6 @@
-"""Sensing: estimators of the external force and torque on a quadrotor, and how to check that they are consistent."""
+"""Sensing: estimators of the external force and torque on a quadrotor, and how to check that they
+are consistent.
+"""
 
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
@@ -10,6 +12,15 @@ from .ukf import WrenchUKF
 from .ukf_batch import WrenchEstimates, WrenchUKFBatch
 
 __all__ = [
-    "ConstantGainFilter", "NonlinearObserver", "ObserverTuning", "UKFTuning", "WrenchEKF", "WrenchEstimate",
-    "WrenchEstimates", "WrenchEstimator", "WrenchMassUKF", "WrenchUKF", "WrenchUKFBatch",
+    "ConstantGainFilter",
+    "NonlinearObserver",
+    "ObserverTuning",
+    "UKFTuning",
+    "WrenchEKF",
+    "WrenchEstimate",
+    "WrenchEstimates",
+    "WrenchEstimator",
+    "WrenchMassUKF",
+    "WrenchUKF",
+    "WrenchUKFBatch",
 ]

@@ -1,8 +1,10 @@
-"""Is a filter as good as it says? Its errors against its own covariance, on truth drawn from its own model.
+"""Is a filter as good as it says? Its errors against its own covariance, on truth drawn from its
+own model.
 
-Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 5.4: the
-normalised estimation error squared (NEES) of a consistent filter is chi-squared with as many degrees of freedom as
-the state has (18), the normalised innovation squared (NIS) with as many as the measurement has (6).
+Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+section 5.4: the normalised estimation error squared (NEES) of a consistent filter is chi-squared
+with as many degrees of freedom as the state has (18), the normalised innovation squared (NIS) with
+as many as the measurement has (6).
 """
 
 import math
@@ -36,10 +38,11 @@ def state_error(
     true_torque: ArrayLike,
     true_force: ArrayLike,
 ) -> Array:
-    """Return truth minus estimate (18,), in the order of the covariance: (rho, omega, x, v, torque, force).
+    """Return truth minus estimate (18,), in the order of the covariance: (rho, omega, x, v, torque,
+    force).
 
-    rho is the world-frame MRP that turns the estimated attitude into the true one; positions are in m, velocities in
-    m/s (world), body rates in rad/s, torque in Nm and force in N (world).
+    rho is the world-frame MRP that turns the estimated attitude into the true one; positions are in
+    m, velocities in m/s (world), body rates in rad/s, torque in Nm and force in N (world).
     """
     error = np.empty(N)
     attitude_error(np.asarray(true_quaternion, dtype=np.float64), estimate.quaternion, error[0:3])
@@ -60,28 +63,42 @@ def nees(
     true_torque: ArrayLike,
     true_force: ArrayLike,
 ) -> float:
-    """Return the normalised estimation error squared of one estimate; see ``state_error`` for the arguments."""
-    error = state_error(estimate, true_position, true_quaternion, true_velocity, true_angular_velocity, true_torque,
-                        true_force)
+    """Return the normalised estimation error squared of one estimate; see ``state_error`` for the
+    arguments.
+    """
+    error = state_error(
+        estimate,
+        true_position,
+        true_quaternion,
+        true_velocity,
+        true_angular_velocity,
+        true_torque,
+        true_force,
+    )
     return float(error @ np.linalg.solve(estimate.covariance, error))
 
 
 def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, float]:
-    """Return the band in which the mean of ``runs`` independent chi-squared numbers lies with ``probability``.
+    """Return the band in which the mean of ``runs`` independent chi-squared numbers lies with
+    ``probability``.
 
     Raises:
         InputError: an argument out of range.
     """
     if dof < 1 or runs < 1 or not 0.0 < probability < 1.0:
-        raise InputError("chi2_band: expected dof and runs of at least 1 and a probability between 0 and 1, got "
-                         f"{dof}, {runs}, {probability}")
+        raise InputError(
+            "chi2_band: expected dof and runs of at least 1 and a probability between 0 and 1, got "
+            f"{dof}, {runs}, {probability}"
+        )
     tail = 0.5 * (1.0 - probability)
     return float(chi2.ppf(tail, dof * runs)) / runs, float(chi2.ppf(1.0 - tail, dof * runs)) / runs
 
 
 @dataclass(frozen=True, eq=False)
 class ConsistencyReport:
-    """What ``check_consistency`` found; every band holds a mean over the runs with ``probability``."""
+    """What ``check_consistency`` found; every band holds a mean over the runs with
+    ``probability``.
+    """
 
     probability: float
     runs: int
@@ -93,18 +110,23 @@ class ConsistencyReport:
     nis_fraction: float
     mean_nees: float  # over runs and steps
     mean_nis: float
-    mean_nis_band: tuple[float, float]  # for ``mean_nis``: a consistent filter's innovations are independent
+    mean_nis_band: tuple[
+        float, float
+    ]  # for ``mean_nis``: a consistent filter's innovations are independent
 
     @property
     def consistent(self) -> bool:
-        """Whether the mean NIS lies in the band of one step's mean, and the NEES does at 90 % of the steps or more."""
+        """Whether the mean NIS lies in the band of one step's mean, and the NEES does at 90 % of
+        the steps or more.
+        """
         return self.nis_band[0] <= self.mean_nis <= self.nis_band[1] and self.nees_fraction >= 0.9
 
     def __str__(self) -> str:
         percent = 100.0 * self.probability
         return (
             f"{self.runs} runs x {len(self.nees)} steps, {percent:g} % bands: "
-            f"mean NIS {self.mean_nis:.3f} (one step {self.nis_band[0]:.2f}-{self.nis_band[1]:.2f}, all steps "
+            f"mean NIS {self.mean_nis:.3f} (one step "
+            f"{self.nis_band[0]:.2f}-{self.nis_band[1]:.2f}, all steps "
             f"{self.mean_nis_band[0]:.3f}-{self.mean_nis_band[1]:.3f}), "
             f"{100.0 * self.nis_fraction:.1f} % of steps within; "
             f"mean NEES {self.mean_nees:.2f} ({self.nees_band[0]:.2f}-{self.nees_band[1]:.2f}), "
@@ -113,7 +135,10 @@ class ConsistencyReport:
 
 
 def check_consistency(
-    nees_runs: ArrayLike, nis_runs: ArrayLike, probability: float = 0.95, dof: tuple[int, int] = (N, MEASURED)
+    nees_runs: ArrayLike,
+    nis_runs: ArrayLike,
+    probability: float = 0.95,
+    dof: tuple[int, int] = (N, MEASURED),
 ) -> ConsistencyReport:
     """Return how the errors of R runs of K steps compare with what the filter says of them.
 
@@ -126,19 +151,35 @@ def check_consistency(
     Raises:
         InputError: the shapes differ or are not (R, K), or a number is not finite.
     """
-    estimation, innovation = np.asarray(nees_runs, dtype=np.float64), np.asarray(nis_runs, dtype=np.float64)
+    estimation, innovation = (
+        np.asarray(nees_runs, dtype=np.float64),
+        np.asarray(nis_runs, dtype=np.float64),
+    )
     if estimation.ndim != 2 or estimation.shape != innovation.shape or estimation.size == 0:
-        raise InputError("check_consistency: expected two arrays of one shape (runs, steps), got "
-                         f"{estimation.shape} and {innovation.shape}")
+        raise InputError(
+            "check_consistency: expected two arrays of one shape (runs, steps), got "
+            f"{estimation.shape} and {innovation.shape}"
+        )
     if not (np.all(np.isfinite(estimation)) and np.all(np.isfinite(innovation))):
-        raise InputError("check_consistency: NEES and NIS must be finite; leave out steps without a measurement")
+        raise InputError(
+            "check_consistency: NEES and NIS must be finite; leave out steps without a measurement"
+        )
     runs, steps = estimation.shape
     mean_nees, mean_nis = estimation.mean(axis=0), innovation.mean(axis=0)
     nees_band, nis_band = chi2_band(dof[0], runs, probability), chi2_band(dof[1], runs, probability)
     return ConsistencyReport(
-        probability, runs, mean_nees, mean_nis, nees_band, nis_band, _fraction_within(mean_nees, nees_band),
-        _fraction_within(mean_nis, nis_band), float(mean_nees.mean()), float(mean_nis.mean()),
-        chi2_band(dof[1], runs * steps, probability))
+        probability,
+        runs,
+        mean_nees,
+        mean_nis,
+        nees_band,
+        nis_band,
+        _fraction_within(mean_nees, nees_band),
+        _fraction_within(mean_nis, nis_band),
+        float(mean_nees.mean()),
+        float(mean_nis.mean()),
+        chi2_band(dof[1], runs * steps, probability),
+    )
 
 
 def _fraction_within(values: Array, band: tuple[float, float]) -> float:
@@ -146,15 +187,24 @@ def _fraction_within(values: Array, band: tuple[float, float]) -> float:
 
 
 def plot(report: ConsistencyReport, period: float, path: str | Path | None = None) -> Figure:
-    """Return a picture of NEES and NIS over time with their bands; ``period`` in s. Written to ``path`` if given."""
+    """Return a picture of NEES and NIS over time with their bands; ``period`` in s. Written to
+    ``path`` if given.
+    """
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     canvas = FigureCanvasAgg(figure)
     top, bottom = figure.subplots(2, 1, sharex=True)
     time = period * np.arange(1, len(report.nees) + 1)
-    for axes, values, band, fraction, name in ((top, report.nees, report.nees_band, report.nees_fraction, "NEES"),
-                                               (bottom, report.nis, report.nis_band, report.nis_fraction, "NIS")):
+    for axes, values, band, fraction, name in (
+        (top, report.nees, report.nees_band, report.nees_fraction, "NEES"),
+        (bottom, report.nis, report.nis_band, report.nis_fraction, "NIS"),
+    ):
         axes.axhspan(*band, color="0.85", label=f"{100.0 * report.probability:g} % band")
-        axes.plot(time, values, linewidth=0.8, label=f"mean of {report.runs} runs, {100.0 * fraction:.1f} % within")
+        axes.plot(
+            time,
+            values,
+            linewidth=0.8,
+            label=f"mean of {report.runs} runs, {100.0 * fraction:.1f} % within",
+        )
         axes.set_ylabel(name)
         axes.legend(loc="upper right", fontsize="small")
     bottom.set_xlabel("time (s)")
@@ -165,9 +215,13 @@ def plot(report: ConsistencyReport, period: float, path: str | Path | None = Non
 
 @dataclass(frozen=True, eq=False)
 class ModelRun:
-    """A flight drawn from the filter's own model: truth and measurement at the end of each of K steps."""
+    """A flight drawn from the filter's own model: truth and measurement at the end of each of K
+    steps.
+    """
 
-    initial_position: Array  # (3,) m, what the filter is to start with; the truth is drawn around it
+    initial_position: (
+        Array  # (3,) m, what the filter is to start with; the truth is drawn around it
+    )
     initial_quaternion: Array  # (4,)
     initial_velocity: Array  # (3,) m/s, world
     initial_angular_velocity: Array  # (3,) rad/s, body
@@ -184,8 +238,14 @@ class ModelRun:
 
     def truth(self, k: int) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return the true state after step ``k`` in the order in which ``nees`` takes it."""
-        return (self.position[k], self.quaternion[k], self.velocity[k], self.angular_velocity[k], self.torque[k],
-                self.force[k])
+        return (
+            self.position[k],
+            self.quaternion[k],
+            self.velocity[k],
+            self.angular_velocity[k],
+            self.torque[k],
+            self.force[k],
+        )
 
 
 def simulate_model(
@@ -203,9 +263,10 @@ def simulate_model(
 ) -> ModelRun:
     """Return a flight in which the filter's assumptions hold to the letter.
 
-    Every step draws a rotor torque error (body frame) and a rotor force error (body frame), moves the external torque
-    and force (world) by their walks, and measures the pose, all normal with the deviations of ``tuning``. The start is
-    drawn from ``covariance`` about the given pose and twist, with no external wrench in the mean.
+    Every step draws a rotor torque error (body frame) and a rotor force error (body frame), moves
+    the external torque and force (world) by their walks, and measures the pose, all normal with the
+    deviations of ``tuning``. The start is drawn from ``covariance`` about the given pose and twist,
+    with no external wrench in the mean.
 
     Args:
         vehicle: with its declared effects.
@@ -217,28 +278,46 @@ def simulate_model(
         quaternion: (4,) body to world, scalar first.
         velocity: (3,) m/s, world.
         angular_velocity: (3,) rad/s, body.
-        covariance: (18, 18) of (rho, omega, x, v, torque, force); default ``default_covariance(vehicle, tuning)``.
-        rate_gain: 1/s, of a loop on the true body rate about ``angular_velocity``, without which a walk of the torque
-            spins the vehicle up; the turn rates that it asks for are those of the result. Position and attitude drift.
+        covariance: (18, 18) of (rho, omega, x, v, torque, force); default
+            ``default_covariance(vehicle, tuning)``.
+        rate_gain: 1/s, of a loop on the true body rate about ``angular_velocity``, without which a
+            walk of the torque spins the vehicle up; the turn rates that it asks for are those of
+            the result. Position and attitude drift.
 
     Raises:
         InputError: a shape is wrong.
     """
     speeds = np.array(rotor_speeds, dtype=np.float64)
-    if speeds.ndim != 2 or speeds.shape[1] != 4 or len(speeds) == 0 or not np.all(np.isfinite(speeds)):
-        raise InputError(f"simulate_model: rotor_speeds must be finite and (K, 4), got shape {speeds.shape}")
-    P = default_covariance(vehicle, tuning) if covariance is None else np.asarray(covariance, dtype=np.float64)
+    if (
+        speeds.ndim != 2
+        or speeds.shape[1] != 4
+        or len(speeds) == 0
+        or not np.all(np.isfinite(speeds))
+    ):
+        raise InputError(
+            f"simulate_model: rotor_speeds must be finite and (K, 4), got shape {speeds.shape}"
+        )
+    P = (
+        default_covariance(vehicle, tuning)
+        if covariance is None
+        else np.asarray(covariance, dtype=np.float64)
+    )
     if P.shape != (N, N):
         raise InputError(f"simulate_model: covariance must be (18, 18), got shape {P.shape}")
     start = np.zeros(20)
-    for where, value in ((POSITION, position), (QUATERNION, quaternion), (VELOCITY, velocity),
-                         (RATE, angular_velocity)):
+    for where, value in (
+        (POSITION, position),
+        (QUATERNION, quaternion),
+        (VELOCITY, velocity),
+        (RATE, angular_velocity),
+    ):
         start[where] = value
     rng = np.random.default_rng(seed)
     steps = len(speeds)
     process = rng.standard_normal((steps, 12))
-    for n, deviation in enumerate((tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk,
-                                   tuning.force_walk)):
+    for n, deviation in enumerate(
+        (tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk)
+    ):
         process[:, 3 * n : 3 * n + 3] *= np.asarray(deviation, dtype=np.float64)
     measurement = rng.standard_normal((steps, MEASURED))
     measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
@@ -247,17 +326,53 @@ def simulate_model(
     record = filter_record(vehicle, tuning, period, 0.0, 1)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
     unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
-    _simulate(record, start, drawn, speeds, unmix, vehicle.omega_max, process, measurement, period, vehicle.voltage_ref,
-              states, measured)
+    _simulate(
+        record,
+        start,
+        drawn,
+        speeds,
+        unmix,
+        vehicle.omega_max,
+        process,
+        measurement,
+        period,
+        vehicle.voltage_ref,
+        states,
+        measured,
+    )
     return ModelRun(
-        start[POSITION], start[QUATERNION], start[VELOCITY], start[RATE], P, speeds, measured[:, :3], measured[:, 3:],
-        states[:, POSITION], states[:, QUATERNION], states[:, VELOCITY], states[:, RATE], states[:, TORQUE],
-        states[:, FORCE])
+        start[POSITION],
+        start[QUATERNION],
+        start[VELOCITY],
+        start[RATE],
+        P,
+        speeds,
+        measured[:, :3],
+        measured[:, 3:],
+        states[:, POSITION],
+        states[:, QUATERNION],
+        states[:, VELOCITY],
+        states[:, RATE],
+        states[:, TORQUE],
+        states[:, FORCE],
+    )
 
 
 @compiled
-def _simulate(record: Record, start: Array, error: Array, speeds: Array, rate_loop: Array, fastest: float, process: Array,
-              measurement: Array, dt: float, voltage: float, states: Array, measured: Array) -> None:
+def _simulate(
+    record: Record,
+    start: Array,
+    error: Array,
+    speeds: Array,
+    rate_loop: Array,
+    fastest: float,
+    process: Array,
+    measurement: Array,
+    dt: float,
+    voltage: float,
+    states: Array,
+    measured: Array,
+) -> None:
     f = record[0]
     x, after = f.x, f.next
     quaternion_from_mrp(error[0:3], f.q)
@@ -282,7 +397,11 @@ def _simulate(record: Record, start: Array, error: Array, speeds: Array, rate_lo
         propagate(f, x, dt, after)
         # the force error is in the body frame and acts through the mass alone
         for i in range(3):
-            push = f.rotation[i, 0] * noise[3] + f.rotation[i, 1] * noise[4] + f.rotation[i, 2] * noise[5]
+            push = (
+                f.rotation[i, 0] * noise[3]
+                + f.rotation[i, 1] * noise[4]
+                + f.rotation[i, 2] * noise[5]
+            )
             push *= dt / f.body.mass
             after[i] += 0.5 * dt * push
             after[7 + i] += push

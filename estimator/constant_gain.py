@@ -1,9 +1,11 @@
-"""The wrench filter with the gain that it converges to: less than a tenth of the work, for training and for many vehicles.
+"""The wrench filter with the gain that it converges to: less than a tenth of the work, for training
+and for many vehicles.
 
-A Kalman filter in steady flight soon always does the same with a measurement. Here that is worked out once, from
-``WrenchUKF`` at hover: the mean is carried by the same functions (2)-(5), (11)-(14), the covariance not at all. The gain
-knows world axes and body axes; a vehicle that is yawed sees the same problem turned about the vertical, so the innovation
-is turned into the vehicle's heading and the correction back out of it.
+A Kalman filter in steady flight soon always does the same with a measurement. Here that is worked
+out once, from ``WrenchUKF`` at hover: the mean is carried by the same functions (2)-(5), (11)-(14),
+the covariance not at all. The gain knows world axes and body axes; a vehicle that is yawed sees the
+same problem turned about the vertical, so the innovation is turned into the vehicle's heading and
+the correction back out of it.
 """
 
 import math
@@ -43,7 +45,9 @@ def _turn(values: Array, cosine: float, sine: float) -> None:
 
 @compiled
 def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of the covariance's."""
+    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of
+    the covariance's.
+    """
     usable: int = check_sample(f, z, parts)
     if usable < 0:
         return usable
@@ -63,7 +67,10 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         for i in range(3):
             y[3 + i] = sample[4 + i] - centre[i]
     # the heading as cosine and sine; straight up or down there is none, and none is needed
-    across, along = centre[3] * centre[6] + centre[4] * centre[5], 0.5 - centre[5] * centre[5] - centre[6] * centre[6]
+    across, along = (
+        centre[3] * centre[6] + centre[4] * centre[5],
+        0.5 - centre[5] * centre[5] - centre[6] * centre[6],
+    )
     length = math.sqrt(across * across + along * along)
     cosine, sine = (along / length, across / length) if length > 1e-6 else (1.0, 0.0)
     _turn(y, cosine, -sine)
@@ -99,10 +106,11 @@ def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
 class ConstantGainFilter(WrenchUKF):
     """The wrench filter with a constant gain; ``reset`` and ``step`` are those of ``WrenchUKF``.
 
-    It starts with the gain of a filter that has long converged: a first guess of pose or wrench that is far off takes the
-    rise time to correct. A measurement, or a part of it, that was not made is coasted over: the state moves on by the
-    model, and what is measured again is believed no more than before. The covariance is that of the converged ``WrenchUKF``
-    at hover, facing along x. Where noise differs between x and y, the gain is exact at that heading only.
+    It starts with the gain of a filter that has long converged: a first guess of pose or wrench
+    that is far off takes the rise time to correct. A measurement, or a part of it, that was not
+    made is coasted over: the state moves on by the model, and what is measured again is believed no
+    more than before. The covariance is that of the converged ``WrenchUKF`` at hover, facing along
+    x. Where noise differs between x and y, the gain is exact at that heading only.
 
     Args:
         vehicle: the declared vehicle, with its declared effects.
@@ -116,13 +124,16 @@ class ConstantGainFilter(WrenchUKF):
     _compiled_step = staticmethod(_step_record)
     _step_by_address = staticmethod(_step_at)
 
-    def __init__(self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005) -> None:
+    def __init__(
+        self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005
+    ) -> None:
         super().__init__(vehicle, tuning, period)
         super().reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
         self._converged = _converged_covariance(self.record.tobytes(), vehicle.voltage_ref)
         f = self.record[0]
         inverse = 1.0 / f["noise"]
-        # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R - H P H') within / R
+        # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R -
+        # H P H') within / R
         f["gain"] = self._converged[:, _MEASURED] * inverse
         left = np.diag(f["noise"]) - self._converged[np.ix_(_MEASURED, _MEASURED)]
         f["information"] = inverse[:, None] * left * inverse
@@ -136,11 +147,15 @@ class ConstantGainFilter(WrenchUKF):
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Start at a pose, without an external wrench; a ``covariance`` is checked and makes no difference."""
+        """Start at a pose, without an external wrench; a ``covariance`` is checked and makes no
+        difference.
+        """
         super().reset(position, quaternion, covariance, velocity, angular_velocity)
         self.record[0]["P"] = self._converged
 
-    def correct_imu(self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None) -> WrenchEstimate:
+    def correct_imu(
+        self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None
+    ) -> WrenchEstimate:
         """Refuse: there is a gain for pose alone.
 
         Raises:
@@ -158,7 +173,8 @@ def _hover(record: np.ndarray, z: Array, steps: int, voltage: float) -> None:
 
 @lru_cache(maxsize=32)
 def _converged_covariance(start: bytes, voltage: float) -> Array:
-    """Return the covariance (18, 18) after a correction that ``WrenchUKF``, its record given at hover, comes to.
+    """Return the covariance (18, 18) after a correction that ``WrenchUKF``, its record given at
+    hover, comes to.
 
     Raises:
         InputError: it comes to none.
@@ -173,4 +189,7 @@ def _converged_covariance(start: bytes, voltage: float) -> Array:
         scale = np.sqrt(np.diag(f["P"]))
         if np.all(np.abs(f["P"] - before) <= _CONVERGED * np.outer(scale, scale)):
             return np.array(f["P"])
-    raise InputError(f"ConstantGainFilter: the gain does not converge within {_LONGEST} s of hover; use WrenchUKF")
+    raise InputError(
+        f"ConstantGainFilter: the gain does not converge within {_LONGEST} s of hover; use "
+        f"WrenchUKF"
+    )

@@ -1,7 +1,8 @@
 """What the filter does to its covariance: root, linear part of the model, noise, sums of squares.
 
-The loops over 12 or 18 columns are written so that a compiler turns them into vector instructions: much work for each
-column, several rows at once, nothing that could be another array in memory. Sums keep their order.
+The loops over 12 or 18 columns are written so that a compiler turns them into vector instructions:
+much work for each column, several rows at once, nothing that could be another array in memory. Sums
+keep their order.
 """
 
 import math
@@ -14,7 +15,9 @@ from .filter_record import N
 
 @side_by_side
 def root_of_six(f: Record) -> None:
-    """Factor P: the first six columns of its lower root into ``S``, the Schur complement of the others into ``M``."""
+    """Factor P: the first six columns of its lower root into ``S``, the Schur complement of the
+    others into ``M``.
+    """
     P, S, M = f.P, f.S, f.M
     _six_columns(f, P[0:6], 0)
     for i in range(12):
@@ -25,14 +28,23 @@ def root_of_six(f: Record) -> None:
 
 @side_by_side
 def root_of_twelve(f: Record) -> None:
-    """Do the same with the first twelve columns, x and v among them: nothing is left of those in ``M``."""
+    """Do the same with the first twelve columns, x and v among them: nothing is left of those in
+    ``M``.
+    """
     P, S, M = f.P, f.S, f.M
     root_of_six(f)
     for r in range(6, 12):
         l0, l1, l2, l3, l4, l5 = S[0, r], S[1, r], S[2, r], S[3, r], S[4, r], S[5, r]
         for i in range(N):
-            S[r, i] = (P[r, i] - l0 * S[0, i] - l1 * S[1, i] - l2 * S[2, i] - l3 * S[3, i] - l4 * S[4, i]
-                       - l5 * S[5, i])
+            S[r, i] = (
+                P[r, i]
+                - l0 * S[0, i]
+                - l1 * S[1, i]
+                - l2 * S[2, i]
+                - l3 * S[3, i]
+                - l4 * S[4, i]
+                - l5 * S[5, i]
+            )
     _six_columns(f, S[6:12], 6)
     _take_off(S, 6, M)
     for i in range(6):
@@ -58,13 +70,16 @@ def _take_off(S: Array, first: int, M: Array) -> None:
 
 @inlined
 def _six_columns(f: Record, rows: Array, first: int) -> None:
-    """Write six columns of the root, from ``first`` on, into ``S``; from ``rows`` (6, 18) those before are taken off."""
+    """Write six columns of the root, from ``first`` on, into ``S``; from ``rows`` (6, 18) those
+    before are taken off.
+    """
     P, S, L, scales = f.P, f.S, f.L, f.scales
     for j in range(6):
         pivot = rows[j, first + j]
         for k in range(j):
             pivot -= L[j, k] * L[j, k]
-        # rounding may eat the smallest pivots; a tiny positive one keeps the filter alive and changes nothing
+        # rounding may eat the smallest pivots; a tiny positive one keeps the filter alive and
+        # changes nothing
         scale = 1.0 / math.sqrt(max(pivot, 1e-14 * P[first + j, first + j] + 1e-300))
         scales[j] = scale
         for r in range(j + 1, 6):
@@ -80,7 +95,9 @@ def _six_columns(f: Record, rows: Array, first: int) -> None:
 
 @inlined
 def _substitute(L: Array, scales: Array, rows: Array, out: Array) -> None:
-    """Solve ``L out = rows`` for six rows (18,); the diagonal of the lower triangular L is ``1 / scales``."""
+    """Solve ``L out = rows`` for six rows (18,); the diagonal of the lower triangular L is
+    ``1 / scales``.
+    """
     l10, l20, l21, l30, l31, l32 = L[1, 0], L[2, 0], L[2, 1], L[3, 0], L[3, 1], L[3, 2]
     l40, l41, l42, l43 = L[4, 0], L[4, 1], L[4, 2], L[4, 3]
     l50, l51, l52, l53, l54 = L[5, 0], L[5, 1], L[5, 2], L[5, 3], L[5, 4]
@@ -97,16 +114,32 @@ def _substitute(L: Array, scales: Array, rows: Array, out: Array) -> None:
 
 @inlined
 def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) -> None:
-    """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n): ``out`` (18, n)."""
+    """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n):
+    ``out`` (18, n).
+    """
     J, R, com = f.body.inverse_inertia, f.centre_rotation, f.body.com
     R00, R01, R02, R10, R11, R12, R20, R21, R22 = (
-        R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+        R[0, 0],
+        R[0, 1],
+        R[0, 2],
+        R[1, 0],
+        R[1, 1],
+        R[1, 2],
+        R[2, 0],
+        R[2, 1],
+        R[2, 2],
+    )
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = (
-        J[0, 0] * R00 + J[0, 1] * R01 + J[0, 2] * R02, J[0, 0] * R10 + J[0, 1] * R11 + J[0, 2] * R12,
-        J[0, 0] * R20 + J[0, 1] * R21 + J[0, 2] * R22, J[1, 0] * R00 + J[1, 1] * R01 + J[1, 2] * R02,
-        J[1, 0] * R10 + J[1, 1] * R11 + J[1, 2] * R12, J[1, 0] * R20 + J[1, 1] * R21 + J[1, 2] * R22,
-        J[2, 0] * R00 + J[2, 1] * R01 + J[2, 2] * R02, J[2, 0] * R10 + J[2, 1] * R11 + J[2, 2] * R12,
-        J[2, 0] * R20 + J[2, 1] * R21 + J[2, 2] * R22)
+        J[0, 0] * R00 + J[0, 1] * R01 + J[0, 2] * R02,
+        J[0, 0] * R10 + J[0, 1] * R11 + J[0, 2] * R12,
+        J[0, 0] * R20 + J[0, 1] * R21 + J[0, 2] * R22,
+        J[1, 0] * R00 + J[1, 1] * R01 + J[1, 2] * R02,
+        J[1, 0] * R10 + J[1, 1] * R11 + J[1, 2] * R12,
+        J[1, 0] * R20 + J[1, 1] * R21 + J[1, 2] * R22,
+        J[2, 0] * R00 + J[2, 1] * R01 + J[2, 2] * R02,
+        J[2, 0] * R10 + J[2, 1] * R11 + J[2, 2] * R12,
+        J[2, 0] * R20 + J[2, 1] * R21 + J[2, 2] * R22,
+    )
     cx, cy, cz, gain = com[0], com[1], com[2], dt / f.body.mass
     offset = cx != 0.0 or cy != 0.0 or cz != 0.0
     for j in range(columns):
@@ -126,7 +159,11 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
         x0, x1, x2 = source[0, j], source[1, j], source[2, j]
         out[0, j], out[1, j], out[2, j] = 0.0, 0.0, 0.0
         out[3, j], out[4, j], out[5, j] = wx, wy, wz
-        out[6, j], out[7, j], out[8, j] = x0 + dt * (v0 + 0.5 * vx), x1 + dt * (v1 + 0.5 * vy), x2 + dt * (v2 + 0.5 * vz)
+        out[6, j], out[7, j], out[8, j] = (
+            x0 + dt * (v0 + 0.5 * vx),
+            x1 + dt * (v1 + 0.5 * vy),
+            x2 + dt * (v2 + 0.5 * vz),
+        )
         out[9, j], out[10, j], out[11, j] = v0 + vx, v1 + vy, v2 + vz
         out[12, j], out[13, j], out[14, j] = t0, t1, t2
         out[15, j], out[16, j], out[17, j] = f0, f1, f2
@@ -137,7 +174,9 @@ def carry_linear_part(f: Record, dt: float) -> None:
     """Write ``A M A'`` into P, where A is the linear part of the model at ``f.centre_rotation``."""
     Y, Z = f.Y, f.Z
     _linear_rows(f, dt, f.M, f.Y, 12)
-    for i in range(0, N, 2):  # two rows at once: of one a compiler makes gather instructions, which are slow
+    for i in range(
+        0, N, 2
+    ):  # two rows at once: of one a compiler makes gather instructions, which are slow
         for j in range(12):
             Z[j, i] = Y[i, j]
             Z[j, i + 1] = Y[i + 1, j]
@@ -146,7 +185,9 @@ def carry_linear_part(f: Record, dt: float) -> None:
 
 @inlined
 def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
-    """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for speed."""
+    """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for
+    speed.
+    """
     r0, r1, r2, r3, r4, r5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
     for i in range(0, N, 2):
         a0, a1, a2 = sign * rows[r0, i], sign * rows[r1, i], sign * rows[r2, i]
@@ -154,7 +195,14 @@ def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
         b0, b1, b2 = sign * rows[r0, i + 1], sign * rows[r1, i + 1], sign * rows[r2, i + 1]
         b3, b4, b5 = sign * rows[r3, i + 1], sign * rows[r4, i + 1], sign * rows[r5, i + 1]
         for j in range(N):
-            s0, s1, s2, s3, s4, s5 = rows[r0, j], rows[r1, j], rows[r2, j], rows[r3, j], rows[r4, j], rows[r5, j]
+            s0, s1, s2, s3, s4, s5 = (
+                rows[r0, j],
+                rows[r1, j],
+                rows[r2, j],
+                rows[r3, j],
+                rows[r4, j],
+                rows[r5, j],
+            )
             P[i, j] += (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
             P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
 
@@ -176,11 +224,25 @@ def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
     add_squares(P, H, k, 1.0)
     # only the first 12 rows of the model are nonlinear
     for i in range(0, 12, 2):
-        a0, a1, a2, a3, a4, a5 = E[k, i], E[k + 1, i], E[k + 2, i], E[k + 3, i], E[k + 4, i], E[k + 5, i]
+        a0, a1, a2, a3, a4, a5 = (
+            E[k, i],
+            E[k + 1, i],
+            E[k + 2, i],
+            E[k + 3, i],
+            E[k + 4, i],
+            E[k + 5, i],
+        )
         b0, b1, b2 = E[k, i + 1], E[k + 1, i + 1], E[k + 2, i + 1]
         b3, b4, b5 = E[k + 3, i + 1], E[k + 4, i + 1], E[k + 5, i + 1]
         for j in range(12):
-            s0, s1, s2, s3, s4, s5 = E[k, j], E[k + 1, j], E[k + 2, j], E[k + 3, j], E[k + 4, j], E[k + 5, j]
+            s0, s1, s2, s3, s4, s5 = (
+                E[k, j],
+                E[k + 1, j],
+                E[k + 2, j],
+                E[k + 3, j],
+                E[k + 4, j],
+                E[k + 5, j],
+            )
             P[i, j] += (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
             P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
 
@@ -195,7 +257,10 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
     for n in range(3):
         P[12 + n, 12 + n] += walk * f.torque_walk[n]
         P[15 + n, 15 + n] += walk * f.force_walk[n]
-        torque, thrust = dt * math.sqrt(white * f.motor_torque[n]), dt * math.sqrt(white * f.thrust[n]) / f.body.mass
+        torque, thrust = (
+            dt * math.sqrt(white * f.motor_torque[n]),
+            dt * math.sqrt(white * f.thrust[n]) / f.body.mass,
+        )
         for i in range(3):
             B[n, 3 + i] = torque * J[i, n]
             B[3 + n, 9 + i] = thrust * rotation[i, n]
@@ -204,7 +269,9 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
             ax, ay, az = J[0, n], J[1, n], J[2, n]
             px, py, pz = c[1] * az - c[2] * ay, c[2] * ax - c[0] * az, c[0] * ay - c[1] * ax
             for i in range(3):
-                B[n, 9 + i] = torque * (rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz)
+                B[n, 9 + i] = torque * (
+                    rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz
+                )
                 B[n, 6 + i] = 0.5 * dt * B[n, 9 + i]
     if offset:
         add_squares(P, B, 0, 1.0)
@@ -220,10 +287,11 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
 
 @side_by_side
 def whiten(f: Record) -> None:
-    """Write the whitened cross covariance of the measurement (rho, x) into ``f.W`` and its part in the mean into ``f.mean``.
+    """Write the whitened cross covariance of the measurement (rho, x) into ``f.W`` and its part in
+    the mean into ``f.mean``.
 
-    Expects the root of the innovation's covariance in ``f.L`` with its inverse diagonal in ``f.scales``, and the whitened
-    innovation; all of these are zero for what was not measured.
+    Expects the root of the innovation's covariance in ``f.L`` with its inverse diagonal in
+    ``f.scales``, and the whitened innovation; all of these are zero for what was not measured.
     """
     P, W, L, scales, y, mean = f.P, f.W, f.L, f.scales, f.innovation, f.mean
     y0, y1, y2, y3, y4, y5 = y[0], y[1], y[2], y[3], y[4], y[5]
@@ -232,7 +300,9 @@ def whiten(f: Record) -> None:
             W[j, i], W[3 + j, i] = P[j, i], P[6 + j, i]
     _substitute(L, scales, W, W)
     for i in range(N):
-        mean[i] = (W[0, i] * y0 + W[1, i] * y1 + W[2, i] * y2 + W[3, i] * y3 + W[4, i] * y4 + W[5, i] * y5)
+        mean[i] = (
+            W[0, i] * y0 + W[1, i] * y1 + W[2, i] * y2 + W[3, i] * y3 + W[4, i] * y4 + W[5, i] * y5
+        )
 
 
 @side_by_side

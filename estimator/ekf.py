@@ -1,8 +1,9 @@
 """The wrench filter's plain relative: an error-state extended Kalman filter on the same model.
 
-State, noise, measurement and tuning are those of ``ukf.py``; only the prediction of the covariance differs: it is
-``F P F' + B Q B'`` with the Jacobian F of the model (2)-(5), (11)-(14) at the estimate. The attitude error is a
-world-frame MRP rho, on the left of the attitude: R_true = exp([4 rho]x) R for small errors.
+State, noise, measurement and tuning are those of ``ukf.py``; only the prediction of the covariance
+differs: it is ``F P F' + B Q B'`` with the Jacobian F of the model (2)-(5), (11)-(14) at the
+estimate. The attitude error is a world-frame MRP rho, on the left of the attitude: R_true = exp([4
+rho]x) R for small errors.
 """
 
 import math
@@ -21,7 +22,9 @@ _STEP = 1e-5  # m, m/s and rad/s
 
 
 @compiled
-def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float, scale: float) -> None:
+def _cross_into(
+    out: Array, row: int, column: int, x: float, y: float, z: float, scale: float
+) -> None:
     """Add ``scale * [(x, y, z)]x`` to the block of ``out`` that starts at ``row``, ``column``."""
     out[row, column + 1] -= scale * z
     out[row, column + 2] += scale * y
@@ -32,14 +35,31 @@ def _cross_into(out: Array, row: int, column: int, x: float, y: float, z: float,
 
 
 @compiled
-def _effects_at(f: Record, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array) -> None:
-    effect_wrench(f.wrench_laws[: f.wrench_count], f.wrench_coefficients, f.constants, f.body, position, rotation,
-                  velocity, omega, f.rotors, f.wind, f.voltage, f.time, f.effect_state, out)
+def _effects_at(
+    f: Record, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array
+) -> None:
+    effect_wrench(
+        f.wrench_laws[: f.wrench_count],
+        f.wrench_coefficients,
+        f.constants,
+        f.body,
+        position,
+        rotation,
+        velocity,
+        omega,
+        f.rotors,
+        f.wind,
+        f.voltage,
+        f.time,
+        f.effect_state,
+        out,
+    )
 
 
 @compiled
 def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
-    """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into ``out`` (12, 6).
+    """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into
+    ``out`` (12, 6).
 
     By central differences: a law is a black box behind an address.
     """
@@ -62,7 +82,14 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
             else:
                 where = axis + (10 if kind == 1 else 0 if kind == 2 else 7)
                 point[where] = x[where] + sign * size
-            _effects_at(f, point[0:3], turned, point[7:10], point[10:13], out[n] if sign > 0.0 else minus[0:6])
+            _effects_at(
+                f,
+                point[0:3],
+                turned,
+                point[7:10],
+                point[10:13],
+                out[n] if sign > 0.0 else minus[0:6],
+            )
             if kind > 0:
                 point[where] = x[where]
         for i in range(6):
@@ -71,10 +98,12 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
 
 @compiled
 def _acceleration_jacobian(f: Record, A: Array) -> None:
-    """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18), rows 3-5 and 9-11.
+    """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18),
+    rows 3-5 and 9-11.
 
-    Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world): (4), (12). Expects
-    ``f.rotation``, ``f.acceleration`` and ``f.effect_wrench`` of the estimate, as ``propagate`` leaves them.
+    Rows 3-5 are the angular acceleration (body), rows 9-11 that of the geometric centre (world):
+    (4), (12). Expects ``f.rotation``, ``f.acceleration`` and ``f.effect_wrench`` of the estimate,
+    as ``propagate`` leaves them.
     """
     body, R, x, B = f.body, f.centre_rotation, f.x, f.Z
     J, inverse = body.inertia, body.inverse_inertia
@@ -82,7 +111,8 @@ def _acceleration_jacobian(f: Record, A: Array) -> None:
     for i in range(3):
         for j in range(3):
             R[i, j] = f.rotation[i, j]
-    # B, rows 0-2: derivatives of the torque in the body frame; rows 3-5: of the force in the world frame
+    # B, rows 0-2: derivatives of the torque in the body frame; rows 3-5: of the force in the world
+    # frame
     for i in range(6):
         for j in range(N):
             B[i, j] = 0.0
@@ -116,12 +146,15 @@ def _acceleration_jacobian(f: Record, A: Array) -> None:
                 B[i, n] += scale * f.H[n, 3 + i]
     for i in range(3):
         for j in range(N):
-            A[3 + i, j] = inverse[i, 0] * B[0, j] + inverse[i, 1] * B[1, j] + inverse[i, 2] * B[2, j]
+            A[3 + i, j] = (
+                inverse[i, 0] * B[0, j] + inverse[i, 1] * B[1, j] + inverse[i, 2] * B[2, j]
+            )
             A[9 + i, j] = B[3 + i, j] / body.mass
     c0, c1, c2 = -body.com[0], -body.com[1], -body.com[2]
     if c0 == 0.0 and c1 == 0.0 and c2 == 0.0:
         return
-    # the geometric centre, at c from the centre of mass: R (alpha x c + omega x (omega x c)), here s in the body frame
+    # the geometric centre, at c from the centre of mass: R (alpha x c + omega x (omega x c)), here
+    # s in the body frame
     w0, w1, w2 = omega[0], omega[1], omega[2]
     n0, n1, n2 = w1 * c2 - w2 * c1, w2 * c0 - w0 * c2, w0 * c1 - w1 * c0
     a0, a1, a2 = f.acceleration[3], f.acceleration[4], f.acceleration[5]
@@ -151,17 +184,19 @@ def _acceleration_jacobian(f: Record, A: Array) -> None:
 
 @compiled
 def model_jacobian(f: Record, dt: float, A: Array) -> None:
-    """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); the rows of torque and force would be zero.
+    """Write the first 12 rows of ``F - 1`` into ``A`` (12, 18); the rows of torque and force would
+    be zero.
 
-    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``. Expects what
-    ``drive`` and ``propagate`` leave behind.
+    F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``.
+    Expects what ``drive`` and ``propagate`` leave behind.
     """
     for i in range(12):
         for j in range(N):
             A[i, j] = 0.0
     _acceleration_jacobian(f, A)
     R = f.centre_rotation
-    # the turn of this step is at the old rate: 4 d(rho) = R Jl(omega dt) dt d(omega), Jl the left Jacobian of SO(3)
+    # the turn of this step is at the old rate: 4 d(rho) = R Jl(omega dt) dt d(omega), Jl the left
+    # Jacobian of SO(3)
     px, py, pz = f.x[10] * dt, f.x[11] * dt, f.x[12] * dt
     square = px * px + py * py + pz * pz
     if square > 1e-8:
@@ -229,10 +264,12 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
 
 
 class WrenchEKF(WrenchUKF):
-    """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``, linearised.
+    """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``,
+    linearised.
 
-    It is made and used like ``WrenchUKF`` and shares all of it but the prediction of the covariance. Where the attitude
-    is well known the two agree closely; it serves as a check of the other, and where a step must cost less.
+    It is made and used like ``WrenchUKF`` and shares all of it but the prediction of the
+    covariance. Where the attitude is well known the two agree closely; it serves as a check of the
+    other, and where a step must cost less.
     """
 
     _compiled_step = staticmethod(_step_record)

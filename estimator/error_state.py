@@ -26,7 +26,9 @@ def displace(x: Array, column: Array, spread: float, rho: Array, q: Array, out: 
 
 @compiled
 def error_from(after: Array, centre: Array, error: Array) -> None:
-    """Write the error state (18,) of one sigma point, seen from the central one, into ``error``, (24)."""
+    """Write the error state (18,) of one sigma point, seen from the central one, into ``error``,
+    (24).
+    """
     attitude_error(after[3:7], centre[3:7], error[0:3])
     for i in range(3):
         error[3 + i] = after[10 + i] - centre[10 + i]
@@ -38,7 +40,9 @@ def error_from(after: Array, centre: Array, error: Array) -> None:
 
 @compiled
 def fold(f: Record, base: Array, error: Array) -> None:
-    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (25), (35), (37)."""
+    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (25), (35),
+    (37).
+    """
     x = f.x
     quaternion_from_mrp(error[0:3], f.q)
     quaternion_multiply(f.q, base[3:7], f.point[3:7])
@@ -55,7 +59,9 @@ def fold(f: Record, base: Array, error: Array) -> None:
 
 @compiled
 def symmetrise(P: Array) -> None:
-    """Make P (n, n) symmetric, and hold the attitude's variance, first in it, where an MRP still means something."""
+    """Make P (n, n) symmetric, and hold the attitude's variance, first in it, where an MRP still
+    means something.
+    """
     n = len(P)
     for i in range(n):
         for j in range(i):

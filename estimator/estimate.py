@@ -29,7 +29,9 @@ class WrenchEstimate:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a world-frame MRP."""
+        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
+        world-frame MRP.
+        """
         return self._numbers[STATE_SIZE:].reshape(18, 18)
 
     @property
@@ -89,5 +91,7 @@ class WrenchEstimator(Protocol):
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Predict over one period with the turn rates (4,) of that period, then take in the pose at its end."""
+        """Predict over one period with the turn rates (4,) of that period, then take in the pose at
+        its end.
+        """
         ...

@@ -12,61 +12,74 @@ from .tuning import UKFTuning
 
 N = 18  # error state (rho, omega, x, v, torque, force)
 
-FILTER = np.dtype([
-    *MODEL_FIELDS,
-    # the estimate, in one piece
-    ("x", "f8", (STATE_SIZE,)),
-    ("P", "f8", (N, N)),
-    # tuning, as variances
-    ("motor_torque", "f8", (3,)),
-    ("torque_walk", "f8", (3,)),
-    ("thrust", "f8", (3,)),
-    ("force_walk", "f8", (3,)),
-    ("noise", "f8", (6,)),  # of the measurement (rho, x)
-    ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
-    ("kappa", "f8"),
-    ("period", "f8"),
-    ("gate", "f8"),  # largest NIS of a measurement that is taken in; 0: any
-    ("patience", "i8"),  # measurements that may be refused in a row
-    ("refused", "i8"),
-    # the step in progress
-    ("z", "f8", (11,)),  # turn rates, position and quaternion, for a step that is called from elsewhere
-    ("acceleration", "f8", (6,)),
-    ("rotation", "f8", (3, 3)),  # of the sigma point in hand
-    ("centre_rotation", "f8", (3, 3)),
-    ("last_speeds", "f8", (4,)),
-    ("S", "f8", (12, N)),  # columns of the root of P, one a row
-    ("M", "f8", (12, 12)),
-    ("Y", "f8", (N, 12)),
-    ("Z", "f8", (12, N)),
-    ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
-    ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
-    ("error", "f8", (2, N)),
-    # twelve sigma points side by side, one a column
-    ("points", "f8", (19, 12)),
-    ("accelerations", "f8", (6, 12)),
-    ("turns", "f8", (3, 12)),  # in a step: square of half the angle, its cosine, rate to quaternion
-    ("errors", "f8", (N, 12)),
-    ("rows", "f8", (12, N)),  # the errors, one point a row
-    ("B", "f8", (6, N)),  # scaled noise inputs, one a row
-    ("mean", "f8", (N,)),
-    ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
-    ("next", "f8", (STATE_SIZE,)),  # where it is after the step
-    ("centre", "f8", (STATE_SIZE,)),  # the same of the central one
-    ("q", "f8", (4,)),
-    ("rho", "f8", (3,)),
-    ("L", "f8", (6, 6)),
-    ("scales", "f8", (6,)),  # inverse diagonal of a root
-    ("W", "f8", (6, N)),
-    ("innovation", "f8", (6,)),
-    # of the filter with a constant gain, facing along x: the gain, and the inverse covariance of the innovation
-    ("gain", "f8", (N, 6)),
-    ("information", "f8", (6, 6)),
-])
+FILTER = np.dtype(
+    [
+        *MODEL_FIELDS,
+        # the estimate, in one piece
+        ("x", "f8", (STATE_SIZE,)),
+        ("P", "f8", (N, N)),
+        # tuning, as variances
+        ("motor_torque", "f8", (3,)),
+        ("torque_walk", "f8", (3,)),
+        ("thrust", "f8", (3,)),
+        ("force_walk", "f8", (3,)),
+        ("noise", "f8", (6,)),  # of the measurement (rho, x)
+        ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
+        ("kappa", "f8"),
+        ("period", "f8"),
+        ("gate", "f8"),  # largest NIS of a measurement that is taken in; 0: any
+        ("patience", "i8"),  # measurements that may be refused in a row
+        ("refused", "i8"),
+        # the step in progress
+        (
+            "z",
+            "f8",
+            (11,),
+        ),  # turn rates, position and quaternion, for a step that is called from elsewhere
+        ("acceleration", "f8", (6,)),
+        ("rotation", "f8", (3, 3)),  # of the sigma point in hand
+        ("centre_rotation", "f8", (3, 3)),
+        ("last_speeds", "f8", (4,)),
+        ("S", "f8", (12, N)),  # columns of the root of P, one a row
+        ("M", "f8", (12, 12)),
+        ("Y", "f8", (N, 12)),
+        ("Z", "f8", (12, N)),
+        ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
+        ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
+        ("error", "f8", (2, N)),
+        # twelve sigma points side by side, one a column
+        ("points", "f8", (19, 12)),
+        ("accelerations", "f8", (6, 12)),
+        (
+            "turns",
+            "f8",
+            (3, 12),
+        ),  # in a step: square of half the angle, its cosine, rate to quaternion
+        ("errors", "f8", (N, 12)),
+        ("rows", "f8", (12, N)),  # the errors, one point a row
+        ("B", "f8", (6, N)),  # scaled noise inputs, one a row
+        ("mean", "f8", (N,)),
+        ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
+        ("next", "f8", (STATE_SIZE,)),  # where it is after the step
+        ("centre", "f8", (STATE_SIZE,)),  # the same of the central one
+        ("q", "f8", (4,)),
+        ("rho", "f8", (3,)),
+        ("L", "f8", (6, 6)),
+        ("scales", "f8", (6,)),  # inverse diagonal of a root
+        ("W", "f8", (6, N)),
+        ("innovation", "f8", (6,)),
+        # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
+        # of the innovation
+        ("gain", "f8", (N, 6)),
+        ("information", "f8", (6, 6)),
+    ]
+)
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P
 
 
-def filter_record(vehicle: Vehicle, tuning: UKFTuning, period: float, gate: float, patience: int) -> np.ndarray:
+def filter_record(
+    vehicle: Vehicle, tuning: UKFTuning, period: float, gate: float, patience: int
+) -> np.ndarray:
     """Return the memory (1,) of a filter for a vehicle with its declared effects; ``period`` in s.
 
     Raises:
@@ -75,12 +88,19 @@ def filter_record(vehicle: Vehicle, tuning: UKFTuning, period: float, gate: floa
     record = np.zeros(1, dtype=FILTER)
     f = record[0]
     f["last_speeds"] = load_model(f, vehicle).hover_rate
-    for name, deviation in (("motor_torque", tuning.motor_torque_noise), ("torque_walk", tuning.torque_walk),
-                            ("thrust", tuning.thrust_noise), ("force_walk", tuning.force_walk)):
+    for name, deviation in (
+        ("motor_torque", tuning.motor_torque_noise),
+        ("torque_walk", tuning.torque_walk),
+        ("thrust", tuning.thrust_noise),
+        ("force_walk", tuning.force_walk),
+    ):
         f[name] = np.square(deviation)
     f["noise"][:3] = np.square(np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0)  # (16)
     f["noise"][3:] = np.square(tuning.position_noise)
-    f["imu_noise"][:3], f["imu_noise"][3:] = np.square(tuning.gyro_noise), np.square(tuning.accelerometer_noise)
+    f["imu_noise"][:3], f["imu_noise"][3:] = (
+        np.square(tuning.gyro_noise),
+        np.square(tuning.accelerometer_noise),
+    )
     f["kappa"], f["period"], f["gate"], f["patience"] = tuning.kappa, period, gate, patience
     return record
 
@@ -96,7 +116,16 @@ def propagate(f: Record, x: Array, dt: float, out: Array) -> None:
 @compiled
 def move(f: Record, x: Array, dt: float, out: Array) -> None:
     """Do what ``propagate`` does once ``f.rotation`` and the effects' wrench at ``x`` are known."""
-    accelerations(f.body, f.rotation, x[10:13], f.rotor_wrench, x[13:16], x[16:19], f.effect_wrench, f.acceleration)
+    accelerations(
+        f.body,
+        f.rotation,
+        x[10:13],
+        f.rotor_wrench,
+        x[13:16],
+        x[16:19],
+        f.effect_wrench,
+        f.acceleration,
+    )
     for i in range(3):
         out[i] = x[i] + dt * (x[7 + i] + 0.5 * dt * f.acceleration[i])
         out[7 + i] = x[7 + i] + dt * f.acceleration[i]

@@ -1,10 +1,11 @@
 """Gyro and accelerometer as further measurements of the same filter.
 
-The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate. An accelerometer at the
-geometric centre measures the specific force ``R' (a + g)``, with the acceleration ``a`` of (4): it sees the external force
-at once, where a pose sees it only after two integrations. What the rotor model misses (``thrust_noise``) is in the
-measured acceleration too and cannot be told from the force in one sample, so it counts as noise of the measurement.
-Sensors with a bias must be corrected before.
+The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate. An
+accelerometer at the geometric centre measures the specific force ``R' (a + g)``, with the
+acceleration ``a`` of (4): it sees the external force at once, where a pose sees it only after two
+integrations. What the rotor model misses (``thrust_noise``) is in the measured acceleration too and
+cannot be told from the force in one sample, so it counts as noise of the measurement. Sensors with
+a bias must be corrected before.
 """
 
 import math
@@ -26,7 +27,9 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
     R = f.rotation
     quaternion_to_matrix(x[3:7], R)
     apply_effects(f, x[0:3], R, x[7:10], x[10:13])
-    accelerations(f.body, R, x[10:13], f.rotor_wrench, x[13:16], x[16:19], f.effect_wrench, f.acceleration)
+    accelerations(
+        f.body, R, x[10:13], f.rotor_wrench, x[13:16], x[16:19], f.effect_wrench, f.acceleration
+    )
     a = f.acceleration
     for i in range(3):
         out[i] = x[10 + i]
@@ -35,7 +38,9 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
 
 @compiled
 def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> None:
-    """Correct with what is measured of ``z`` (6,), gyro and accelerometer: (27)-(37) with its 37 sigma points."""
+    """Correct with what is measured of ``z`` (6,), gyro and accelerometer: (27)-(37) with its 37
+    sigma points.
+    """
     f = record[0]
     x, P = f.x, f.P
     first, last = 0 if gyro else 3, 6 if accelerometer else 3
@@ -59,8 +64,10 @@ def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> No
             differences[j, a] = 0.5 * (plus[a] - minus[a])
             sums[a] += weight * (plus[a] + minus[a] - 2.0 * centre[a])
             for b in range(a + 1):
-                S[a, b] += weight * ((plus[a] - centre[a]) * (plus[b] - centre[b])
-                                     + (minus[a] - centre[a]) * (minus[b] - centre[b]))
+                S[a, b] += weight * (
+                    (plus[a] - centre[a]) * (plus[b] - centre[b])
+                    + (minus[a] - centre[a]) * (minus[b] - centre[b])
+                )
     count = last - first
     covariance, cross, innovation = np.empty((count, count)), np.zeros((N, count)), np.empty(count)
     for a in range(count):

@@ -1,8 +1,9 @@
 """The wrench filter with the mass as a nineteenth state.
 
-The paper: "mass and inertia may be included in the state". A vehicle that picks up a load changes its weight and its
-response to thrust; the wrench filter calls the first an external force and knows nothing of the second. At hover a
-changed mass and a vertical force are the same thing: which of the two takes it is decided by how fast either may walk.
+The paper: "mass and inertia may be included in the state". A vehicle that picks up a load changes
+its weight and its response to thrust; the wrench filter calls the first an external force and knows
+nothing of the second. At hover a changed mass and a vertical force are the same thing: which of the
+two takes it is decided by how fast either may walk.
 """
 
 import math
@@ -25,9 +26,19 @@ from .ukf import NOISE, WrenchUKF
 
 
 @compiled
-def _step_with_mass(record: Record, z: Array, parts: int, dt: float, voltage: float, mass_walk: float, P: Array,
-                    out: Array) -> int:
-    """Predict over ``dt`` s and correct with what is usable of ``z`` (11,); ``P`` (19, 19) has the mass (kg) last."""
+def _step_with_mass(
+    record: Record,
+    z: Array,
+    parts: int,
+    dt: float,
+    voltage: float,
+    mass_walk: float,
+    P: Array,
+    out: Array,
+) -> int:
+    """Predict over ``dt`` s and correct with what is usable of ``z`` (11,); ``P`` (19, 19) has the
+    mass (kg) last.
+    """
     f = record[0]
     usable: int = check_sample(f, z, parts)
     if usable < 0:
@@ -45,7 +56,9 @@ def _step_with_mass(record: Record, z: Array, parts: int, dt: float, voltage: fl
 
 
 @compiled
-def _predict(f: Record, rotor_speeds: Array, dt: float, voltage: float, mass_walk: float, P: Array) -> None:
+def _predict(
+    f: Record, rotor_speeds: Array, dt: float, voltage: float, mass_walk: float, P: Array
+) -> None:
     """(18)-(26) with 39 sigma points, each with its own mass."""
     drive(f, rotor_speeds, dt, voltage)
     mass = f.body.mass
@@ -64,7 +77,8 @@ def _predict(f: Record, rotor_speeds: Array, dt: float, voltage: float, mass_wal
         for sign in range(2):
             signed = spread if sign == 0 else -spread
             displace(f.x, column, signed, f.rho, f.q, f.point)
-            # a mass of nothing has no acceleration: far out in the tail a point stays on this side of it
+            # a mass of nothing has no acceleration: far out in the tail a point stays on this side
+            # of it
             f.body.mass = max(mass + signed * root[N, j], 0.1 * mass)
             propagate(f, f.point, dt, f.next)
             error_from(f.next, f.centre, errors[2 * j + sign])
@@ -127,11 +141,13 @@ def _correct(f: Record, z: Array, first: int, last: int, P: Array) -> None:
 
 
 class WrenchMassUKF(WrenchUKF):
-    """``WrenchUKF`` that also estimates the vehicle's mass; made and used like it, at about four times its cost.
+    """``WrenchUKF`` that also estimates the vehicle's mass; made and used like it, at about four
+    times its cost.
 
     Args:
         vehicle: the declared vehicle; its mass is the first guess.
-        tuning: noise of model and measurement. A small ``force_walk`` along z lets the mass take what is vertical.
+        tuning: noise of model and measurement. A small ``force_walk`` along z lets the mass take
+            what is vertical.
         period: time between steps, s.
         gate: as for ``WrenchUKF``.
         mass_std: of the first guess, kg; default: a tenth of it.
@@ -159,9 +175,17 @@ class WrenchMassUKF(WrenchUKF):
         self._mass_walk = mass_walk
         self._P = np.zeros((N + 1, N + 1))
 
-    def reset(self, position: ArrayLike, quaternion: ArrayLike, covariance: ArrayLike | None = None,
-              velocity: ArrayLike = (0.0, 0.0, 0.0), angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Start at a pose, without an external wrench and with the declared mass; arguments as for ``WrenchUKF``."""
+    def reset(
+        self,
+        position: ArrayLike,
+        quaternion: ArrayLike,
+        covariance: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Start at a pose, without an external wrench and with the declared mass; arguments as for
+        ``WrenchUKF``.
+        """
         super().reset(position, quaternion, covariance, velocity, angular_velocity)
         self._P[:] = 0.0
         self._P[:N, :N] = self.record[0]["P"]
@@ -178,13 +202,22 @@ class WrenchMassUKF(WrenchUKF):
         """Standard deviation of the estimated mass, kg."""
         return float(math.sqrt(self._P[N, N]))
 
-    def correct_imu(self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None) -> Any:
+    def correct_imu(
+        self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None
+    ) -> Any:
         """Not offered together with the mass."""
-        raise InputError("WrenchMassUKF: correct_imu is not offered together with an estimated mass")
+        raise InputError(
+            "WrenchMassUKF: correct_imu is not offered together with an estimated mass"
+        )
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         out = np.empty(len(self.record[0]["x"]) + N * N)
         volts = self._voltage if voltage is None else voltage
-        if _step_with_mass(self.record, self._sample.z, parts, dt, volts, self._mass_walk, self._P, out) < 0:
+        if (
+            _step_with_mass(
+                self.record, self._sample.z, parts, dt, volts, self._mass_walk, self._P, out
+            )
+            < 0
+        ):
             raise self._sample.bad_quaternion()
         return WrenchEstimate(out)

@@ -1,22 +1,26 @@
-"""The classical alternative to the wrench filter: a nonlinear force and torque observer on a low-pass-filtered pose.
+"""The classical alternative to the wrench filter: a nonlinear force and torque observer on a
+low-pass-filtered pose.
 
-Yuksel, Secchi, Buelthoff and Franchi, *A nonlinear force observer for quadrotors and application to physical
-interactive tasks*, AIM 2014, with the pose filtered and differentiated as in Tomic and Haddadin, *A unified framework
-for external wrench estimation, interaction control and collision reflexes for flying robots*, IROS 2014.
+Yuksel, Secchi, Buelthoff and Franchi, *A nonlinear force observer for quadrotors and application to
+physical interactive tasks*, AIM 2014, with the pose filtered and differentiated as in Tomic and
+Haddadin, *A unified framework for external wrench estimation, interaction control and collision
+reflexes for flying robots*, IROS 2014.
 
 The wrench estimate w^ is driven through a gain L so that its error decays exponentially::
 
     w^' = L (w - w^),    w = p' - u
 
-where p is the momentum (linear of the centre of mass, angular in world axes, so that no gyroscopic term is left) and u
-what the model says that rotors, gravity and declared effects add to it. Only differences of p enter (the auxiliary
-variable of the paper), never an acceleration. Over a step at constant w the solution is exact::
+where p is the momentum (linear of the centre of mass, angular in world axes, so that no gyroscopic
+term is left) and u what the model says that rotors, gravity and declared effects add to it. Only
+differences of p enter (the auxiliary variable of the paper), never an acceleration. Over a step at
+constant w the solution is exact::
 
     w^[k] = exp(-L T) w^[k-1] + (1 - exp(-L T)) / T * (p[k] - p[k-1] - integral of u)
 
-p comes from the low-pass-filtered pose and is late by the filter's delay; u goes through the same filter, so that the
-vehicle's own manoeuvres cancel and do not show as a wrench. Both filters are discretised exactly (the pose as a
-straight line between samples, u as constant over a step), so that any cutoff at any period is stable.
+p comes from the low-pass-filtered pose and is late by the filter's delay; u goes through the same
+filter, so that the vehicle's own manoeuvres cancel and do not show as a wrench. Both filters are
+discretised exactly (the pose as a straight line between samples, u as constant over a step), so
+that any cutoff at any period is stable.
 """
 
 import math
@@ -39,45 +43,49 @@ from .ukf import WrenchUKF
 _DAMPING = math.sqrt(0.5)  # Butterworth
 _FORGOTTEN = 4.0  # delays of a filter after which exp(-4) of its past is left
 
-_LOW_PASS = np.dtype([
-    ("frequency", "f8"),  # rad/s
-    ("delay", "f8"),  # s, of a slow signal
-    ("transition", "f8", (2, 2)),  # of output and its rate over a step
-    ("old", "f8", (2,)),  # what the sample before adds, the input being a straight line
-    ("new", "f8", (2,)),  # and the present one
-])
+_LOW_PASS = np.dtype(
+    [
+        ("frequency", "f8"),  # rad/s
+        ("delay", "f8"),  # s, of a slow signal
+        ("transition", "f8", (2, 2)),  # of output and its rate over a step
+        ("old", "f8", (2,)),  # what the sample before adds, the input being a straight line
+        ("new", "f8", (2,)),  # and the present one
+    ]
+)
 
-OBSERVER = np.dtype([
-    ("translation", _LOW_PASS),
-    ("rotation", _LOW_PASS),
-    ("force_decay", "f8", (3,)),
-    ("torque_decay", "f8", (3,)),
-    # the filtered pose: centre of mass, quaternion, and their rates
-    ("p", "f8", (3,)),
-    ("v", "f8", (3,)),
-    ("q", "f8", (4,)),
-    ("dq", "f8", (4,)),
-    # what the model says of force (world) and torque (world), filtered, and their rates
-    ("u", "f8", (6,)),
-    ("du", "f8", (6,)),
-    ("impulse", "f8", (6,)),  # of the filtered u over the last step
-    ("angular_momentum", "f8", (3,)),  # of the filtered pose, world axes
-    ("sample_p", "f8", (3,)),  # the last sample, or what was expected of it
-    ("sample_q", "f8", (4,)),
-    ("position_gap", "f8"),  # s since the last sample
-    ("attitude_gap", "f8"),
-    # the step in progress
-    ("R_old", "f8", (3, 3)),
-    ("R_new", "f8", (3, 3)),
-    ("R", "f8", (3, 3)),  # of the filtered attitude
-    ("omega", "f8", (3,)),  # body rate of the filtered attitude
-    ("alpha", "f8", (3,)),  # its rate, by the model
-    ("old_p", "f8", (3,)),  # the sample before
-    ("old_q", "f8", (4,)),
-    ("momentum", "f8", (3,)),  # before the step
-    ("turn", "f8", (3,)),
-    ("scratch_q", "f8", (4,)),
-])
+OBSERVER = np.dtype(
+    [
+        ("translation", _LOW_PASS),
+        ("rotation", _LOW_PASS),
+        ("force_decay", "f8", (3,)),
+        ("torque_decay", "f8", (3,)),
+        # the filtered pose: centre of mass, quaternion, and their rates
+        ("p", "f8", (3,)),
+        ("v", "f8", (3,)),
+        ("q", "f8", (4,)),
+        ("dq", "f8", (4,)),
+        # what the model says of force (world) and torque (world), filtered, and their rates
+        ("u", "f8", (6,)),
+        ("du", "f8", (6,)),
+        ("impulse", "f8", (6,)),  # of the filtered u over the last step
+        ("angular_momentum", "f8", (3,)),  # of the filtered pose, world axes
+        ("sample_p", "f8", (3,)),  # the last sample, or what was expected of it
+        ("sample_q", "f8", (4,)),
+        ("position_gap", "f8"),  # s since the last sample
+        ("attitude_gap", "f8"),
+        # the step in progress
+        ("R_old", "f8", (3, 3)),
+        ("R_new", "f8", (3, 3)),
+        ("R", "f8", (3, 3)),  # of the filtered attitude
+        ("omega", "f8", (3,)),  # body rate of the filtered attitude
+        ("alpha", "f8", (3,)),  # its rate, by the model
+        ("old_p", "f8", (3,)),  # the sample before
+        ("old_q", "f8", (4,)),
+        ("momentum", "f8", (3,)),  # before the step
+        ("turn", "f8", (3,)),
+        ("scratch_q", "f8", (4,)),
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -96,20 +104,28 @@ class ObserverTuning:
         for f in fields(self):
             value = getattr(self, f.name)
             shapes: tuple[tuple[int, ...], ...] = ((), (3,)) if f.name.endswith("gain") else ((),)
-            expected = "positive and finite, a number or three" if len(shapes) > 1 else "positive and finite"
+            expected = (
+                "positive and finite, a number or three"
+                if len(shapes) > 1
+                else "positive and finite"
+            )
             try:
                 array = np.asarray(value, dtype=np.float64)
             except (TypeError, ValueError) as error:
-                raise InputError(f"ObserverTuning: {f.name} must be {expected}, got {value!r}") from error
+                raise InputError(
+                    f"ObserverTuning: {f.name} must be {expected}, got {value!r}"
+                ) from error
             if array.shape not in shapes or not np.all(np.isfinite(array)) or np.any(array <= 0):
                 raise InputError(f"ObserverTuning: {f.name} must be {expected}, got {value!r}")
 
 
 class NonlinearObserver:
-    """Force and torque observer with the interface of ``WrenchUKF``; it knows no covariance (NaN) and no NIS.
+    """Force and torque observer with the interface of ``WrenchUKF``; it knows no covariance (NaN)
+    and no NIS.
 
-    The pose and twist that it returns are those of the low-pass filters, moved ahead by the filters' delay with the
-    model. Through gaps in the measurements the model carries on with the last wrench.
+    The pose and twist that it returns are those of the low-pass filters, moved ahead by the
+    filters' delay with the model. Through gaps in the measurements the model carries on with the
+    last wrench.
 
     Args:
         vehicle: the declared vehicle with its declared effects.
@@ -120,7 +136,9 @@ class NonlinearObserver:
         InputError: period out of range.
     """
 
-    def __init__(self, vehicle: Vehicle, tuning: ObserverTuning | None = None, period: float = 0.005) -> None:
+    def __init__(
+        self, vehicle: Vehicle, tuning: ObserverTuning | None = None, period: float = 0.005
+    ) -> None:
         if not (math.isfinite(period) and period > 0):
             raise InputError(f"NonlinearObserver: period must be positive, in s, got {period!r}")
         self.vehicle = vehicle
@@ -156,7 +174,8 @@ class NonlinearObserver:
             angular_velocity: (3,) rad/s, body.
 
         Raises:
-            InputError: a shape is wrong, a number is not finite, or the quaternion is not one of a rotation.
+            InputError: a shape is wrong, a number is not finite, or the quaternion is not one of a
+                rotation.
         """
         self._filter.reset(position, quaternion, None, velocity, angular_velocity)
         self._filter.record[0]["P"] = math.nan
@@ -164,7 +183,9 @@ class NonlinearObserver:
 
     @property
     def records(self) -> tuple[np.ndarray, np.ndarray]:
-        """The memories, each (1,), of model and observer, for compiled code that calls ``step`` of this module."""
+        """The memories, each (1,), of model and observer, for compiled code that calls ``step`` of
+        this module.
+        """
         return self._filter.record, self._record
 
     @property
@@ -193,19 +214,27 @@ class NonlinearObserver:
             voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the quaternion's length is not 1; the observer stays as it was.
+            InputError: a shape is wrong or the quaternion's length is not 1; the observer stays as
+                it was.
         """
         sample = self._sample
         parts = sample.read(rotor_speeds, position, quaternion)
         out = empty_estimate()
         volts = self._voltage if voltage is None else voltage
-        if _step_and_copy(self._filter.record, self._record, sample.z, parts, self.period, volts, out) < 0:
+        if (
+            _step_and_copy(
+                self._filter.record, self._record, sample.z, parts, self.period, volts, out
+            )
+            < 0
+        ):
             raise sample.bad_quaternion()
         return WrenchEstimate(out)
 
 
 def _low_pass(record: Record, cutoff_hz: float, period: float) -> None:
-    """Fill in a second-order low-pass, y'' = w^2 (x - y) - 2 d w y', for an input that is straight between samples."""
+    """Fill in a second-order low-pass, y'' = w^2 (x - y) - 2 d w y', for an input that is straight
+    between samples.
+    """
     w = 2.0 * math.pi * cutoff_hz
     # states y and y'/w, then the input and its change over the step
     matrix = np.zeros((4, 4))
@@ -222,7 +251,9 @@ def _low_pass(record: Record, cutoff_hz: float, period: float) -> None:
 
 @compiled
 def _filter_sample(g: Record, y: Array, dy: Array, old: Array, new: Array) -> None:
-    """Move a filter's output ``y`` and its rate ``dy`` (n,) on by a step with the input from ``old`` to ``new``."""
+    """Move a filter's output ``y`` and its rate ``dy`` (n,) on by a step with the input from
+    ``old`` to ``new``.
+    """
     A, a, b = g.transition, g.old, g.new
     for i in range(len(y)):
         value, rate = y[i], dy[i]
@@ -232,7 +263,9 @@ def _filter_sample(g: Record, y: Array, dy: Array, old: Array, new: Array) -> No
 
 @compiled
 def _filter_input(o: Record, g: Record, i: int, u: float, dt: float) -> None:
-    """Filter row ``i`` of u, constant over the step, and write the integral of the filtered one over it."""
+    """Filter row ``i`` of u, constant over the step, and write the integral of the filtered one
+    over it.
+    """
     value, rate, A = o.u[i], o.du[i], g.transition
     o.u[i] = A[0, 0] * value + A[0, 1] * rate + (g.old[0] + g.new[0]) * u
     o.du[i] = A[1, 0] * value + A[1, 1] * rate + (g.old[1] + g.new[1]) * u
@@ -263,7 +296,9 @@ def _twist(f: Record, o: Record) -> None:
 
 @compiled
 def _seat_attitude(f: Record, o: Record, q: Array) -> None:
-    """Put the attitude filter where a vehicle that turns at ``omega`` and was just seen at ``q`` has it."""
+    """Put the attitude filter where a vehicle that turns at ``omega`` and was just seen at ``q``
+    has it.
+    """
     omega = o.omega
     turn_body(q, omega[0], omega[1], omega[2], -o.rotation.delay, o.q)
     _spin(o)
@@ -282,7 +317,9 @@ def _spin(o: Record) -> None:
 
 @compiled
 def _seat_position(o: Record, p: Array) -> None:
-    """Put the position filter where a vehicle that moves at ``v`` and was just seen at ``p`` has it."""
+    """Put the position filter where a vehicle that moves at ``v`` and was just seen at ``p`` has
+    it.
+    """
     for i in range(3):
         o.p[i] = p[i] - o.translation.delay * o.v[i]
 
@@ -352,7 +389,13 @@ def _observe_force(f: Record, o: Record, measured: bool, dt: float) -> None:
 
 @compiled
 def _observe_torque(f: Record, o: Record, measured: bool, dt: float) -> None:
-    torque, h, omega, R, inverse = f.x[13:16], o.angular_momentum, o.omega, o.R, f.body.inverse_inertia
+    torque, h, omega, R, inverse = (
+        f.x[13:16],
+        o.angular_momentum,
+        o.omega,
+        o.R,
+        f.body.inverse_inertia,
+    )
     if not measured:
         turn_body(o.q, omega[0], omega[1], omega[2], dt, o.scratch_q)
         o.q[:] = o.scratch_q
@@ -363,7 +406,9 @@ def _observe_torque(f: Record, o: Record, measured: bool, dt: float) -> None:
         for i in range(3):
             o.alpha[i] = R[0, i] * h[0] + R[1, i] * h[1] + R[2, i] * h[2]
         for i in range(3):
-            omega[i] = inverse[i, 0] * o.alpha[0] + inverse[i, 1] * o.alpha[1] + inverse[i, 2] * o.alpha[2]
+            omega[i] = (
+                inverse[i, 0] * o.alpha[0] + inverse[i, 1] * o.alpha[1] + inverse[i, 2] * o.alpha[2]
+            )
         _spin(o)
         return
     for i in range(3):
@@ -379,9 +424,17 @@ def _observe_torque(f: Record, o: Record, measured: bool, dt: float) -> None:
 def _look_ahead(f: Record, o: Record) -> None:
     """Write pose and twist as they are now: the filtered ones, ahead by the filters' delay.
 
-    The inverse of the filter, y + 2 d / w y' + y'' / w^2, with the derivatives of v and omega taken from the model.
+    The inverse of the filter, y + 2 d / w y' + y'' / w^2, with the derivatives of v and omega taken
+    from the model.
     """
-    x, R, J, inverse, omega, alpha = f.x, o.R, f.body.inertia, f.body.inverse_inertia, o.omega, o.alpha
+    x, R, J, inverse, omega, alpha = (
+        f.x,
+        o.R,
+        f.body.inertia,
+        f.body.inverse_inertia,
+        o.omega,
+        o.alpha,
+    )
     h0 = J[0, 0] * omega[0] + J[0, 1] * omega[1] + J[0, 2] * omega[2]
     h1 = J[1, 0] * omega[0] + J[1, 1] * omega[1] + J[1, 2] * omega[2]
     h2 = J[2, 0] * omega[0] + J[2, 1] * omega[1] + J[2, 2] * omega[2]
@@ -395,7 +448,13 @@ def _look_ahead(f: Record, o: Record) -> None:
     d2 = (R[0, 2] * o.du[3] + R[1, 2] * o.du[4] + R[2, 2] * o.du[5]) / square
     for i in range(3):
         alpha[i] = inverse[i, 0] * m0 + inverse[i, 1] * m1 + inverse[i, 2] * m2
-        x[10 + i] = omega[i] + delay * alpha[i] + inverse[i, 0] * d0 + inverse[i, 1] * d1 + inverse[i, 2] * d2
+        x[10 + i] = (
+            omega[i]
+            + delay * alpha[i]
+            + inverse[i, 0] * d0
+            + inverse[i, 1] * d1
+            + inverse[i, 2] * d2
+        )
         o.turn[i] = delay * omega[i] + alpha[i] / square
     turn_body(o.q, o.turn[0], o.turn[1], o.turn[2], 1.0, x[3:7])
     normalise(x[3:7])
@@ -417,7 +476,9 @@ def _look_ahead(f: Record, o: Record) -> None:
 
 @compiled
 def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) -> None:
-    """Go ``dt`` s on, the period for which ``o`` was made, with the ``parts`` of ``z`` (11,) that were measured."""
+    """Go ``dt`` s on, the period for which ``o`` was made, with the ``parts`` of ``z`` (11,) that
+    were measured.
+    """
     x = f.x
     drive(f, z[0:4], dt, voltage)
     position, attitude = parts & 1 != 0, parts & 2 != 0
@@ -441,7 +502,8 @@ def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) 
     _model(f, o, dt)
     if position:
         _centre_of_mass(f, z[4:7], o.R_new, o.sample_p)
-    # after a gap that the filter has forgotten, the error of the dead reckoning is no motion: start from the new sample
+    # after a gap that the filter has forgotten, the error of the dead reckoning is no motion: start
+    # from the new sample
     if attitude and o.attitude_gap > _FORGOTTEN * o.rotation.delay:
         turn_body(o.sample_q, o.omega[0], o.omega[1], o.omega[2], -dt, o.old_q)
         _seat_attitude(f, o, o.old_q)
@@ -462,7 +524,9 @@ def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) 
 
 
 @compiled
-def _step_and_copy(model: Record, record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array) -> int:
+def _step_and_copy(
+    model: Record, record: Record, z: Array, parts: int, dt: float, voltage: float, out: Array
+) -> int:
     f = model[0]
     usable: int = check_sample(f, z, parts)
     if usable >= 0:

@@ -1,4 +1,6 @@
-"""One sample on its way into an estimator: turn rates and pose, checked, and the estimate on its way out."""
+"""One sample on its way into an estimator: turn rates and pose, checked, and the estimate on its
+way out.
+"""
 
 import math
 
@@ -31,14 +33,17 @@ class Sample:
     def __reduce__(self) -> tuple[type["Sample"], tuple[Array]]:
         return Sample, (self.z,)
 
-    def read(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None) -> int:
+    def read(
+        self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
+    ) -> int:
         """Take in turn rates (4,) and what there is of a pose, (3,) and (4,); return its parts.
 
         Raises:
             InputError: a shape is wrong.
         """
         try:
-            # a memory view takes in arrays of doubles of its own shape, in half the time that NumPy would need
+            # a memory view takes in arrays of doubles of its own shape, in half the time that NumPy
+            # would need
             self._speeds[:] = rotor_speeds  # type: ignore[assignment]
             if position is None:
                 if quaternion is None:
@@ -50,16 +55,22 @@ class Sample:
                 return POSITION
             self._quaternion[:] = quaternion  # type: ignore[assignment]
             return POSITION + ATTITUDE
-        # a list, another shape, memory out of order, another type of number: each a different error of a memory view
+        # a list, another shape, memory out of order, another type of number: each a different error
+        # of a memory view
         except (TypeError, ValueError, BufferError, NotImplementedError):
             return self._convert(rotor_speeds, position, quaternion)
 
-    def _convert(self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None) -> int:
+    def _convert(
+        self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
+    ) -> int:
         """Do the same with anything that NumPy can make numbers of."""
         parts = 0
         try:
-            for value, where, part in ((rotor_speeds, self.z[0:4], 0), (position, self.z[4:7], POSITION),
-                                       (quaternion, self.z[7:11], ATTITUDE)):
+            for value, where, part in (
+                (rotor_speeds, self.z[0:4], 0),
+                (position, self.z[4:7], POSITION),
+                (quaternion, self.z[7:11], ATTITUDE),
+            ):
                 if value is None and part:
                     continue
                 if len(value) != len(where):  # type: ignore[arg-type]
@@ -68,21 +79,25 @@ class Sample:
                 parts += part
         except (TypeError, ValueError):
             raise InputError(
-                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; got shapes "
+                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; "
+                "got shapes "
                 f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
             ) from None
         return parts
 
     def bad_quaternion(self) -> InputError:
         """Return the error for a quaternion that is no rotation."""
-        return InputError(f"step: quaternion must have length 1, got {np.linalg.norm(self.z[7:11]):g}")
+        return InputError(
+            f"step: quaternion must have length 1, got {np.linalg.norm(self.z[7:11]):g}"
+        )
 
 
 @compiled
 def check_sample(f: Record, z: Array, parts: int) -> int:
     """Return the ``parts`` of ``z`` (11,) that can be used, or -1 if the quaternion is no rotation.
 
-    Turn rates that are not finite become the last ones that were; the quaternion is brought to length 1.
+    Turn rates that are not finite become the last ones that were; the quaternion is brought to
+    length 1.
     """
     usable = 0
     if parts & 1 != 0 and math.isfinite(z[4] + z[5] + z[6]):
@@ -107,7 +122,8 @@ def check_sample(f: Record, z: Array, parts: int) -> int:
 def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
     """Return the checked ``parts`` of ``z`` (11,) as they were before the declared sensing effects.
 
-    Turn rates count where ``dt`` is positive. Where the attitude was not measured, the estimated one stands in for it.
+    Turn rates count where ``dt`` is positive. Where the attitude was not measured, the estimated
+    one stands in for it.
     """
     sample: Array = f.sample[0:11]
     for i in range(11):

@@ -1,8 +1,9 @@
 """The twelve sigma points of attitude and rate side by side, for a vehicle without wrench effects.
 
-Each loop takes one operation of the model to all points at once, which is what a processor's vector unit does well. The
-arithmetic is, operation by operation, that of ``displace``, ``propagate`` and ``error_from`` with one point at a time, and
-so are the results, bit for bit. Arrays here have a row for each number and a column for each point.
+Each loop takes one operation of the model to all points at once, which is what a processor's vector
+unit does well. The arithmetic is, operation by operation, that of ``displace``, ``propagate`` and
+``error_from`` with one point at a time, and so are the results, bit for bit. Arrays here have a row
+for each number and a column for each point.
 """
 
 import math
@@ -17,7 +18,9 @@ POINTS = 2 * PAIRS  # forwards along each, then backwards
 
 @side_by_side
 def spread_points(f: Record, spread: float) -> None:
-    """Write the points ``spread`` along the first columns of the root into ``f.points`` (19, 12), as ``displace`` does."""
+    """Write the points ``spread`` along the first columns of the root into ``f.points`` (19, 12),
+    as ``displace`` does.
+    """
     x, S, X, D = f.x, f.S, f.points, f.errors
     for i in range(0, 18, 2):
         for j in range(PAIRS):
@@ -30,7 +33,12 @@ def spread_points(f: Record, spread: float) -> None:
         r0, r1, r2 = D[0, k], D[1, k], D[2, k]
         square = r0 * r0 + r1 * r1 + r2 * r2
         scale = 1.0 / (1.0 + square)
-        a0, a1, a2, a3 = (1.0 - square) * scale, 2.0 * r0 * scale, 2.0 * r1 * scale, 2.0 * r2 * scale
+        a0, a1, a2, a3 = (
+            (1.0 - square) * scale,
+            2.0 * r0 * scale,
+            2.0 * r1 * scale,
+            2.0 * r2 * scale,
+        )
         X[3, k] = a0 * q0 - a1 * q1 - a2 * q2 - a3 * q3
         X[4, k] = a0 * q1 + a1 * q0 + a2 * q3 - a3 * q2
         X[5, k] = a0 * q2 - a1 * q3 + a2 * q0 + a3 * q1
@@ -46,16 +54,40 @@ def spread_points(f: Record, spread: float) -> None:
 
 @side_by_side
 def propagate_points(f: Record, dt: float) -> None:
-    """Carry ``f.points`` (19, 12) ``dt`` s ahead, in place, as ``propagate`` does: (2)-(5), (11)-(14)."""
+    """Carry ``f.points`` (19, 12) ``dt`` s ahead, in place, as ``propagate`` does: (2)-(5),
+    (11)-(14).
+    """
     X, C, A = f.points, f.turns, f.accelerations
     J, inverse, com = f.body.inertia, f.body.inverse_inertia, f.body.com
     # read ahead of the loop: a compiler cannot know that the loop does not write there
     J00, J01, J02, J10, J11, J12, J20, J21, J22 = (
-        J[0, 0], J[0, 1], J[0, 2], J[1, 0], J[1, 1], J[1, 2], J[2, 0], J[2, 1], J[2, 2])
+        J[0, 0],
+        J[0, 1],
+        J[0, 2],
+        J[1, 0],
+        J[1, 1],
+        J[1, 2],
+        J[2, 0],
+        J[2, 1],
+        J[2, 2],
+    )
     I00, I01, I02, I10, I11, I12, I20, I21, I22 = (
-        inverse[0, 0], inverse[0, 1], inverse[0, 2], inverse[1, 0], inverse[1, 1], inverse[1, 2], inverse[2, 0],
-        inverse[2, 1], inverse[2, 2])
-    thrust, moment_x, moment_y, moment_z = f.rotor_wrench[0], f.rotor_wrench[1], f.rotor_wrench[2], f.rotor_wrench[3]
+        inverse[0, 0],
+        inverse[0, 1],
+        inverse[0, 2],
+        inverse[1, 0],
+        inverse[1, 1],
+        inverse[1, 2],
+        inverse[2, 0],
+        inverse[2, 1],
+        inverse[2, 2],
+    )
+    thrust, moment_x, moment_y, moment_z = (
+        f.rotor_wrench[0],
+        f.rotor_wrench[1],
+        f.rotor_wrench[2],
+        f.rotor_wrench[3],
+    )
     cx, cy, cz = -com[0], -com[1], -com[2]
     inverse_mass, gravity = 1.0 / f.body.mass, f.body.gravity
     for k in range(POINTS):
@@ -84,15 +116,22 @@ def propagate_points(f: Record, dt: float) -> None:
         pz = ax * cy - ay * cx + wx * ny - wy * nx
         A[0, k] = (R02 * thrust + X[16, k]) * inverse_mass + (R00 * px + R01 * py + R02 * pz)
         A[1, k] = (R12 * thrust + X[17, k]) * inverse_mass + (R10 * px + R11 * py + R12 * pz)
-        A[2, k] = (R22 * thrust + X[18, k]) * inverse_mass + (R20 * px + R21 * py + R22 * pz) - gravity
+        A[2, k] = (
+            (R22 * thrust + X[18, k]) * inverse_mass + (R20 * px + R21 * py + R22 * pz) - gravity
+        )
     half = 0.5 * dt
     for k in range(POINTS):
         # (13), (14); the series of ``turn_body``
         wx, wy, wz = X[10, k], X[11, k], X[12, k]
         square = half * half * (wx * wx + wy * wy + wz * wz)
         C[0, k] = square
-        C[1, k] = 1.0 - square / 2.0 * (1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0)))
-        C[2, k] = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0))))
+        C[1, k] = 1.0 - square / 2.0 * (
+            1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))
+        )
+        C[2, k] = half * (
+            1.0
+            - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
+        )
     for k in range(POINTS):
         large = C[0, k] >= 0.01
         if any_of(large):
@@ -115,7 +154,9 @@ def propagate_points(f: Record, dt: float) -> None:
 
 @side_by_side
 def errors_of_points(f: Record) -> None:
-    """Write the error states of ``f.points`` seen from ``f.centre`` into ``f.errors`` (18, 12), as ``error_from``, (24)."""
+    """Write the error states of ``f.points`` seen from ``f.centre`` into ``f.errors`` (18, 12), as
+    ``error_from``, (24).
+    """
     X, c, D = f.points, f.centre, f.errors
     q0, q1, q2, q3 = c[3], c[4], c[5], c[6]
     for k in range(POINTS):
@@ -137,7 +178,9 @@ def errors_of_points(f: Record) -> None:
 
 @side_by_side
 def halve_pairs(f: Record, scale: float, weight: float) -> None:
-    """Write scaled half differences and half sums of each pair's errors, and their mean, into ``f.H``, ``f.E``, ``f.mean``."""
+    """Write scaled half differences and half sums of each pair's errors, and their mean, into
+    ``f.H``, ``f.E``, ``f.mean``.
+    """
     D, T, H, E, mean = f.errors, f.rows, f.H, f.E, f.mean
     for i in range(0, 18, 2):
         for k in range(POINTS):

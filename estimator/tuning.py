@@ -18,19 +18,25 @@ _ARM = 0.1262
 
 @dataclass(frozen=True)
 class UKFTuning:
-    """Standard deviations per step, each a scalar or (3,) for x, y, z; the defaults suit ``ardrone2`` at 200 Hz.
+    """Standard deviations per step, each a scalar or (3,) for x, y, z; the defaults suit
+    ``ardrone2`` at 200 Hz.
 
-    The 10-90 % rise time of the force estimate is about ``2.2 * period * thrust_noise / force_walk``, and of the
-    torque estimate likewise: about 1 s as given. A ``motor_torque_noise`` far below the model's real error makes the
-    filter lose the attitude when the torque steps, which shows as a wrong lateral force.
+    The 10-90 % rise time of the force estimate is about
+    ``2.2 * period * thrust_noise / force_walk``, and of the torque estimate likewise: about 1 s as
+    given. A ``motor_torque_noise`` far below the model's real error makes the filter lose the
+    attitude when the torque steps, which shows as a wrong lateral force.
     """
 
-    motor_torque_noise: ArrayLike = 0.03  # Nm, body frame: torque that the rotor model misses, new each step
+    motor_torque_noise: ArrayLike = (
+        0.03  # Nm, body frame: torque that the rotor model misses, new each step
+    )
     torque_walk: ArrayLike = 3.26e-4  # Nm, world frame: change of the external torque in a step
     thrust_noise: ArrayLike = 0.3  # N, body frame: force that the rotor model misses, new each step
     force_walk: ArrayLike = 3.26e-3  # N, world frame: change of the external force in a step
     position_noise: ArrayLike = 0.001  # m, one measurement
-    attitude_noise: ArrayLike = 0.005  # rad, one measurement; the quarter of an MRP is handled inside
+    attitude_noise: ArrayLike = (
+        0.005  # rad, one measurement; the quarter of an MRP is handled inside
+    )
     kappa: float = 2.0  # spread of the sigma points, (28)
     gyro_noise: ArrayLike = 0.005  # rad/s, one measurement of ``correct_imu``
     accelerometer_noise: ArrayLike = 0.05  # m/s2, likewise
@@ -44,15 +50,27 @@ class UKFTuning:
                     raise TypeError
                 array = array.astype(np.float64)
             except (TypeError, ValueError) as error:
-                raise InputError(f"UKFTuning: {f.name} must be a number or three, got {value!r}") from error
-            if array.shape not in ((), (3,)) or not np.all(np.isfinite(array)) or np.any(array <= 0):
-                raise InputError(f"UKFTuning: {f.name} must be positive and finite, a number or three, got {value!r}")
+                raise InputError(
+                    f"UKFTuning: {f.name} must be a number or three, got {value!r}"
+                ) from error
+            if (
+                array.shape not in ((), (3,))
+                or not np.all(np.isfinite(array))
+                or np.any(array <= 0)
+            ):
+                raise InputError(
+                    f"UKFTuning: {f.name} must be positive and finite, a number or three, got "
+                    f"{value!r}"
+                )
         if np.ndim(self.kappa) != 0:
             raise InputError(f"UKFTuning: kappa must be one number, got {self.kappa!r}")
 
     @classmethod
-    def for_vehicle(cls, vehicle: Vehicle, period: float = _PERIOD, rise_time: float = 1.0) -> "UKFTuning":
-        """Return the default tuning scaled to a vehicle's weight and size, its motion capture and the period in s.
+    def for_vehicle(
+        cls, vehicle: Vehicle, period: float = _PERIOD, rise_time: float = 1.0
+    ) -> "UKFTuning":
+        """Return the default tuning scaled to a vehicle's weight and size, its motion capture and
+        the period in s.
 
         ``rise_time`` (s, 10-90 %) is that of the estimated force and torque.
         """

@@ -1,14 +1,19 @@
-"""The wrench filter: an unscented Kalman filter over pose, twist and external wrench of a quadrotor.
+"""The wrench filter: an unscented Kalman filter over pose, twist and external wrench of a
+quadrotor.
 
-McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016, (15)-(37).
-The filter is exact to the paper's 61 and 49 sigma points and cheaper:
+McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016,
+(15)-(37). The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 
-* The noise enters linearly, and so do those directions of the state that leave attitude and rate alone. Their pairs of
-  sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the covariance. What is left are the 13
-  points of attitude and rate (25 where a declared effect depends on position or velocity).
-* The root of the covariance is lower triangular, so only its first 6 (or 12) columns are needed; the others enter
+* The noise enters linearly, and so do those directions of the state that leave attitude and rate
+alone. Their pairs of
+  sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the covariance. What is
+  left are the 13 points of attitude and rate (25 where a declared effect depends on position or
+  velocity).
+* The root of the covariance is lower triangular, so only its first 6 (or 12) columns are needed;
+the others enter
   through the Schur complement.
-* The measurement is linear in the error state, so the correction by 49 redrawn points is the Kalman update.
+* The measurement is linear in the error state, so the correction by 49 redrawn points is the Kalman
+update.
 """
 
 import math
@@ -51,7 +56,9 @@ _PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
 
 @compiled
 def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weight: float) -> None:
-    """Do what ``sigma_points`` does with six pairs of points with twelve, one point at a time: effects are called so."""
+    """Do what ``sigma_points`` does with six pairs of points with twelve, one point at a time:
+    effects are called so.
+    """
     x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
     for i in range(N):
         mean[i] = 0.0
@@ -89,7 +96,9 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 
 @compiled
 def carry(f: Record, dt: float) -> None:
-    """Carry a filter without wrench effects ahead, its rotors' wrench and the matrix of its attitude being known."""
+    """Carry a filter without wrench effects ahead, its rotors' wrench and the matrix of its
+    attitude being known.
+    """
     spread, weight, scale = _spread_of(f)
     root_of_six(f)
     move(f, f.x, dt, f.centre)
@@ -104,10 +113,12 @@ def carry(f: Record, dt: float) -> None:
 
 @compiled
 def _spread_of(f: Record) -> tuple[float, float, float]:
-    """Return how far out sigma points lie, and the factors of a pair's mean and of its differences."""
+    """Return how far out sigma points lie, and the factors of a pair's mean and of
+    its differences.
+    """
     weight = 0.5 / (N + NOISE + f.kappa)  # (28)
-    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the second half is only
-    # there where the model is nonlinear, in the first 12 rows
+    # with a pair of errors e and d: ee' + dd' = ((e - d)(e - d)' + (e + d)(e + d)') / 2, and the
+    # second half is only there where the model is nonlinear, in the first 12 rows
     return math.sqrt(N + NOISE + f.kappa), weight, math.sqrt(0.5 * weight)
 
 
@@ -134,13 +145,16 @@ def _gather(f: Record) -> None:
 
 
 @compiled
-def correct(f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool) -> None:
+def correct(
+    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+) -> None:
     """Take in what was measured of a pose, (rho, x), (27)-(37), unless the gate refuses it."""
     x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
     attitude_error(quaternion, x[3:7], y[0:3])
     for i in range(3):
         y[3 + i] = position[i] - x[i]
-    # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes zero
+    # y becomes the whitened innovation; whatever stands there of what was not measured, it becomes
+    # zero
     nis = 0.0
     for i in range(6):
         measured = with_attitude if i < 3 else with_position
@@ -149,7 +163,9 @@ def correct(f: Record, position: Array, quaternion: Array, with_position: bool, 
             total = P[a, j if j < 3 else j + 3]
             for k in range(j):
                 total -= L[i, k] * L[j, k]
-            L[i, j] = choose(measured & (with_attitude if j < 3 else with_position), total / L[j, j], 0.0)
+            L[i, j] = choose(
+                measured & (with_attitude if j < 3 else with_position), total / L[j, j], 0.0
+            )
             y[i] -= L[i, j] * y[j]
         total = P[a, a] + f.noise[i]
         for k in range(i):
@@ -187,9 +203,11 @@ def correct_parts(f: Record, z: Array, parts: int) -> None:
 
 @compiled
 def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,) that were measured.
+    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,)
+    that were measured.
 
-    Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no rotation.
+    Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no
+    rotation.
     """
     usable: int = check_sample(f, z, parts)
     if usable >= 0:
@@ -214,17 +232,18 @@ def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
 class WrenchUKF:
     """Unscented Kalman filter for the external force and torque on a quadrotor.
 
-    Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct`` with measurements that
-    come at their own times. A measurement, or a part of it, that is None or not finite was not made. The sign of a
-    quaternion means nothing. Turn rates that are not finite are taken to be the last ones that were.
+    Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct``
+    with measurements that come at their own times. A measurement, or a part of it, that is None or
+    not finite was not made. The sign of a quaternion means nothing. Turn rates that are not finite
+    are taken to be the last ones that were.
 
     Args:
-        vehicle: the declared vehicle; its declared effects are part of the prediction model, and the estimated wrench
-            is what they do not explain.
+        vehicle: the declared vehicle; its declared effects are part of the prediction model, and
+            the estimated wrench is what they do not explain.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
-        gate: refuse measurements whose NIS has a smaller chance than ``1 - gate`` (0.999, say); None takes in any.
-            After 0.1 s of nothing but refusals the next one is believed.
+        gate: refuse measurements whose NIS has a smaller chance than ``1 - gate`` (0.999, say);
+            None takes in any. After 0.1 s of nothing but refusals the next one is believed.
 
     Raises:
         InputError: period or gate out of range.
@@ -234,12 +253,18 @@ class WrenchUKF:
     _step_by_address = staticmethod(_step_at)
 
     def __init__(
-        self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005, gate: float | None = None
+        self,
+        vehicle: Vehicle,
+        tuning: UKFTuning | None = None,
+        period: float = 0.005,
+        gate: float | None = None,
     ) -> None:
         if not (math.isfinite(period) and period > 0):
             raise InputError(f"WrenchUKF: period must be positive, in s, got {period!r}")
         if gate is not None and not 0.5 <= gate < 1.0:
-            raise InputError(f"WrenchUKF: gate must be a probability from 0.5 to below 1, got {gate!r}")
+            raise InputError(
+                f"WrenchUKF: gate must be a probability from 0.5 to below 1, got {gate!r}"
+            )
         self.vehicle = vehicle
         self.tuning = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
         self.period = float(period)
@@ -256,7 +281,11 @@ class WrenchUKF:
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_sample", "_now", "_call")}
+        return {
+            name: value
+            for name, value in self.__dict__.items()
+            if name not in ("_sample", "_now", "_call")
+        }
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
@@ -281,16 +310,21 @@ class WrenchUKF:
             angular_velocity: (3,) rad/s, body.
 
         Raises:
-            InputError: a shape is wrong, a number is not finite, the quaternion is not one of a rotation, or the
-                covariance is not symmetric and positive definite.
+            InputError: a shape is wrong, a number is not finite, the quaternion is not one of a
+                rotation, or the covariance is not symmetric and positive definite.
         """
         x = np.zeros(STATE_SIZE)
-        for name, value, where in (("position", position, slice(0, 3)), ("quaternion", quaternion, slice(3, 7)),
-                                   ("velocity", velocity, slice(7, 10)),
-                                   ("angular_velocity", angular_velocity, slice(10, 13))):
+        for name, value, where in (
+            ("position", position, slice(0, 3)),
+            ("quaternion", quaternion, slice(3, 7)),
+            ("velocity", velocity, slice(7, 10)),
+            ("angular_velocity", angular_velocity, slice(10, 13)),
+        ):
             array = np.asarray(value, dtype=np.float64)
             if array.shape != x[where].shape or not np.all(np.isfinite(array)):
-                raise InputError(f"reset: {name} must be {x[where].size} finite numbers, got {value!r}")
+                raise InputError(
+                    f"reset: {name} must be {x[where].size} finite numbers, got {value!r}"
+                )
             x[where] = array
         length = float(np.linalg.norm(x[3:7]))
         if not 0.9 < length < 1.1:
@@ -301,8 +335,15 @@ class WrenchUKF:
             P = default_covariance(self.vehicle, self.tuning)
         else:
             P = np.array(covariance, dtype=np.float64)
-            if P.shape != (N, N) or not np.all(np.isfinite(P)) or not np.allclose(P, P.T, rtol=1e-8, atol=1e-300):
-                raise InputError(f"reset: covariance must be a finite symmetric (18, 18) matrix, got shape {P.shape}")
+            if (
+                P.shape != (N, N)
+                or not np.all(np.isfinite(P))
+                or not np.allclose(P, P.T, rtol=1e-8, atol=1e-300)
+            ):
+                raise InputError(
+                    f"reset: covariance must be a finite symmetric (18, 18) matrix, got shape "
+                    f"{P.shape}"
+                )
             if np.linalg.eigvalsh(P)[0] <= 0:
                 raise InputError("reset: covariance must be positive definite")
         f = self.record[0]
@@ -318,7 +359,9 @@ class WrenchUKF:
 
     @property
     def covariance(self) -> Array:
-        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a world-frame MRP."""
+        """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
+        world-frame MRP.
+        """
         return np.array(self.record[0]["P"])
 
     @property
@@ -333,7 +376,8 @@ class WrenchUKF:
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Predict over one period with the turn rates of that period, then take in the pose at its end.
+        """Predict over one period with the turn rates of that period, then take in the pose at its
+        end.
 
         Args:
             rotor_speeds: (4,) rad/s.
@@ -342,12 +386,15 @@ class WrenchUKF:
             voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the quaternion's length is not 1; the filter stays as it was.
+            InputError: a shape is wrong or the quaternion's length is not 1; the filter stays as it
+                was.
         """
         parts = self._sample.read(rotor_speeds, position, quaternion)
         return self._run(parts, self.period, voltage)
 
-    def predict(self, rotor_speeds: ArrayLike, dt: float | None = None, voltage: float | None = None) -> WrenchEstimate:
+    def predict(
+        self, rotor_speeds: ArrayLike, dt: float | None = None, voltage: float | None = None
+    ) -> WrenchEstimate:
         """Carry the filter ``dt`` s (default: one period) ahead without a measurement."""
         dt = self.period if dt is None else dt
         if not (math.isfinite(dt) and dt > 0):
@@ -358,22 +405,30 @@ class WrenchUKF:
         """Take in a pose, or a part of one, measured now."""
         return self._run(self._sample.read(self._sample.z[0:4], position, quaternion), 0.0, None)
 
-    def correct_imu(self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None) -> WrenchEstimate:
+    def correct_imu(
+        self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None
+    ) -> WrenchEstimate:
         """Take in an inertial measurement made now, at the geometric centre; see ``estimator.imu``.
 
         Args:
             gyro: (3,) rad/s, body, without bias, or None.
-            accelerometer: (3,) m/s2, body, specific force (+g along z at hover), without bias, or None.
+            accelerometer: (3,) m/s2, body, specific force (+g along z at hover), without bias, or
+                None.
 
         Raises:
             InputError: a shape is wrong or a number is not finite; the filter stays as it was.
         """
         z = np.zeros(6)
-        for name, value, where in (("gyro", gyro, slice(0, 3)), ("accelerometer", accelerometer, slice(3, 6))):
+        for name, value, where in (
+            ("gyro", gyro, slice(0, 3)),
+            ("accelerometer", accelerometer, slice(3, 6)),
+        ):
             if value is not None:
                 array = np.asarray(value, dtype=np.float64)
                 if array.shape != (3,) or not np.all(np.isfinite(array)):
-                    raise InputError(f"correct_imu: {name} must be three finite numbers, got {value!r}")
+                    raise InputError(
+                        f"correct_imu: {name} must be three finite numbers, got {value!r}"
+                    )
                 z[where] = array
         take_in_imu(self.record, z, gyro is not None, accelerometer is not None)
         return self.estimate
@@ -388,7 +443,9 @@ class WrenchUKF:
 
 
 def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:
-    """Return the covariance (18, 18) of a vehicle that was just seen, near rest, with an unknown wrench."""
+    """Return the covariance (18, 18) of a vehicle that was just seen, near rest, with an unknown
+    wrench.
+    """
     deviations = np.empty(N)
     deviations[0:3] = np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0
     deviations[3:6] = 0.5  # rad/s

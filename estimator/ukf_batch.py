@@ -1,7 +1,8 @@
 """Wrench filters of many vehicles, stepped together.
 
-Filters of one vehicle without effects stand side by side in the lanes of a vector unit (``ukf_lanes``). Filters of different
-vehicles, or with declared effects, which remember, are stepped one after the other in a compiled loop.
+Filters of one vehicle without effects stand side by side in the lanes of a vector unit
+(``ukf_lanes``). Filters of different vehicles, or with declared effects, which remember, are
+stepped one after the other in a compiled loop.
 """
 
 import math
@@ -33,7 +34,9 @@ def _first_bad_quaternion(z: Array) -> int:
 
 
 @released
-def _step_records(records: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array) -> None:
+def _step_records(
+    records: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array
+) -> None:
     for n in range(len(records)):
         f = records[n]
         step(f, z[n], parts, dt, voltage[n])
@@ -107,10 +110,11 @@ class WrenchEstimates:
 
 
 class WrenchUKFBatch:
-    """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one call.
+    """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one
+    call.
 
-    Filters of one vehicle without declared effects cost less than half of what a single one does in a compiled loop, others
-    as much (``windwrench speed`` prints it).
+    Filters of one vehicle without declared effects cost less than half of what a single one does in
+    a compiled loop, others as much (``windwrench speed`` prints it).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
@@ -134,12 +138,17 @@ class WrenchUKFBatch:
         given = [vehicles] if isinstance(vehicles, Vehicle) else list(vehicles)
         self.count = len(given) if count is None else count
         if self.count < 1 or len(given) not in (1, self.count):
-            raise InputError(f"WrenchUKFBatch: expected one vehicle or one for each of {self.count}, got {len(given)}")
+            raise InputError(
+                f"WrenchUKFBatch: expected one vehicle or one for each of {self.count}, got "
+                f"{len(given)}"
+            )
         self._filters = [WrenchUKF(vehicle, tuning, period, gate) for vehicle in given]
         self.period = self._filters[0].period
         self._memory = self._new_memory()
         self._compiled = False  # as far as this one knows
-        self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(np.float64)
+        self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(
+            np.float64
+        )
         self._z = np.zeros((self.count, 11))
 
     def __len__(self) -> int:
@@ -148,7 +157,9 @@ class WrenchUKFBatch:
 
     def _new_memory(self) -> Blocks | _Records:
         first = self._filters[0].record
-        if len(self._filters) == 1 and not any(first[f"{kind}_count"][0] for kind in ("wrench", "rotor", "sense")):
+        if len(self._filters) == 1 and not any(
+            first[f"{kind}_count"][0] for kind in ("wrench", "rotor", "sense")
+        ):
             return Blocks(first, self.count)
         return _Records(np.concatenate([self._of(n).record for n in range(self.count)]))
 
@@ -164,7 +175,8 @@ class WrenchUKFBatch:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Start at poses, without an external wrench; what is given without the first axis holds for all.
+        """Start at poses, without an external wrench; what is given without the first axis holds
+        for all.
 
         Args:
             position: (n, 3) m, world.
@@ -174,17 +186,27 @@ class WrenchUKFBatch:
             angular_velocity: (n, 3) rad/s, body.
 
         Raises:
-            InputError: a shape is wrong, or what ``WrenchUKF.reset`` refuses; the filters stay as they were.
+            InputError: a shape is wrong, or what ``WrenchUKF.reset`` refuses; the filters stay as
+                they were.
         """
         names = ("position", "quaternion", "velocity", "angular_velocity")
-        rows = [_rows(name, value, shape, self.count) for name, value, shape in zip(
-            names, (position, quaternion, velocity, angular_velocity), ((3,), (4,), (3,), (3,)), strict=True)]
+        rows = [
+            _rows(name, value, shape, self.count)
+            for name, value, shape in zip(
+                names,
+                (position, quaternion, velocity, angular_velocity),
+                ((3,), (4,), (3,), (3,)),
+                strict=True,
+            )
+        ]
         P = None if covariance is None else _rows("covariance", covariance, (N, N), self.count)
         memory = self._new_memory()
         for n in range(self.count):
             ukf = self._of(n)
             try:
-                ukf.reset(rows[0][n], rows[1][n], None if P is None else P[n], rows[2][n], rows[3][n])
+                ukf.reset(
+                    rows[0][n], rows[1][n], None if P is None else P[n], rows[2][n], rows[3][n]
+                )
             except InputError as error:
                 raise InputError(f"{error} (filter {n})") from None
             memory.put(n, ukf.record)
@@ -207,7 +229,8 @@ class WrenchUKFBatch:
         quaternion: ArrayLike | None = None,
         voltage: ArrayLike | None = None,
     ) -> WrenchEstimates:
-        """Predict over one period with the turn rates of that period, then take in the poses at its end.
+        """Predict over one period with the turn rates of that period, then take in the poses at its
+        end.
 
         Args:
             rotor_speeds: (n, 4) rad/s.
@@ -216,22 +239,32 @@ class WrenchUKFBatch:
             voltage: (n,) V, or one for all; default: ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the length of a quaternion is not 1; the filters stay as they were.
+            InputError: a shape is wrong or the length of a quaternion is not 1; the filters stay as
+                they were.
         """
         z, parts = self._z, 0
-        for name, value, where, part in (("rotor_speeds", rotor_speeds, slice(0, 4), 0),
-                                         ("position", position, slice(4, 7), 1), ("quaternion", quaternion, slice(7, 11), 2)):
+        for name, value, where, part in (
+            ("rotor_speeds", rotor_speeds, slice(0, 4), 0),
+            ("position", position, slice(4, 7), 1),
+            ("quaternion", quaternion, slice(7, 11), 2),
+        ):
             if value is None:
                 z[:, where] = math.nan
                 continue
             array = np.asarray(value, dtype=np.float64)
             if array.shape != (self.count, where.stop - where.start):
-                raise InputError(f"step: {name} must be ({self.count}, {where.stop - where.start}), got shape {array.shape}")
+                raise InputError(
+                    f"step: {name} must be ({self.count}, {where.stop - where.start}), got shape "
+                    f"{array.shape}"
+                )
             z[:, where] = array
             parts += part
         bad = _first_bad_quaternion(z)
         if bad >= 0:
-            raise InputError(f"step: quaternion must have length 1, got {np.linalg.norm(z[bad, 7:11]):g} (filter {bad})")
+            raise InputError(
+                f"step: quaternion must have length 1, got {np.linalg.norm(z[bad, 7:11]):g} "
+                f"(filter {bad})"
+            )
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
         out = np.empty((self.count, STATE_SIZE))
         with nullcontext() if self._compiled else announced():
@@ -251,5 +284,7 @@ def _rows(name: str, value: ArrayLike, shape: tuple[int, ...], count: int) -> Ar
         if array.shape not in (shape, (count, *shape)):
             raise ValueError
     except (TypeError, ValueError):
-        raise InputError(f"WrenchUKFBatch: {name} must be {(count, *shape)}, got shape {np.shape(value)}") from None
+        raise InputError(
+            f"WrenchUKFBatch: {name} must be {(count, *shape)}, got shape {np.shape(value)}"
+        ) from None
     return np.array(np.broadcast_to(array, (count, *shape)))

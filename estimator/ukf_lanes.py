@@ -1,7 +1,9 @@
-"""Wrench filters side by side: the single filter's own functions, compiled for lanes (``dynamics.lanes``).
+"""Wrench filters side by side: the single filter's own functions, compiled for lanes
+(``dynamics.lanes``).
 
-Eight filters of one vehicle without effects make a block. Between steps a block is its estimates and covariances; what it
-works on in a step lies in one record for all blocks, so that a few hundred filters stay in a core's cache.
+Eight filters of one vehicle without effects make a block. Between steps a block is its estimates
+and covariances; what it works on in a step lies in one record for all blocks, so that a few hundred
+filters stay in a core's cache.
 """
 
 import math
@@ -18,20 +20,66 @@ from .estimate import STATE_SIZE, Array
 from .filter_record import FILTER, N
 from .ukf import carry, correct
 
-_KEPT = ("x", "P", "last_speeds", "refused")  # what a filter must not forget from one step to the next
-_SHARED = ("body", "motor_torque", "torque_walk", "thrust", "force_walk", "noise", "kappa", "period", "gate", "patience",
-           "effect_wrench")
-_WORK = LaneRecord(FILTER, (
-    *_KEPT, "z", "rotor_wrench", "acceleration", "rotation", "centre_rotation", "S", "M", "Y", "Z", "H", "E", "points",
-    "accelerations", "turns", "errors", "rows", "B", "mean", "point", "centre", "q", "L", "scales", "W", "innovation",
-), _SHARED)
+_KEPT = (
+    "x",
+    "P",
+    "last_speeds",
+    "refused",
+)  # what a filter must not forget from one step to the next
+_SHARED = (
+    "body",
+    "motor_torque",
+    "torque_walk",
+    "thrust",
+    "force_walk",
+    "noise",
+    "kappa",
+    "period",
+    "gate",
+    "patience",
+    "effect_wrench",
+)
+_WORK = LaneRecord(
+    FILTER,
+    (
+        *_KEPT,
+        "z",
+        "rotor_wrench",
+        "acceleration",
+        "rotation",
+        "centre_rotation",
+        "S",
+        "M",
+        "Y",
+        "Z",
+        "H",
+        "E",
+        "points",
+        "accelerations",
+        "turns",
+        "errors",
+        "rows",
+        "B",
+        "mean",
+        "point",
+        "centre",
+        "q",
+        "L",
+        "scales",
+        "W",
+        "innovation",
+    ),
+    _SHARED,
+)
 _BLOCK = LaneRecord(FILTER, _KEPT)
 _work_at, _block_at, _BLOCK_SIZE = _WORK.at, _BLOCK.at, _BLOCK.dtype.itemsize
 
 
 @compiled
 def _check(f: Record) -> None:
-    """Do with ``f.z`` what ``check_sample`` does with a single sample whose quaternion is that of a rotation, or missing."""
+    """Do with ``f.z`` what ``check_sample`` does with a single sample whose quaternion is that of a
+    rotation, or missing.
+    """
     z, last = f.z, f.last_speeds
     scale = 1.0 / math.sqrt(z[7] * z[7] + z[8] * z[8] + z[9] * z[9] + z[10] * z[10])
     for i in range(7, 11):
@@ -54,7 +102,9 @@ def _move_estimate(source: Record, target: Record) -> None:
 
 
 @released
-def _step_blocks(work: int, work_z: Array, blocks: int, estimates: Array, z: Array, dt: float, out: Array) -> None:
+def _step_blocks(
+    work: int, work_z: Array, blocks: int, estimates: Array, z: Array, dt: float, out: Array
+) -> None:
     f = _work_at(work)
     count = len(z)
     for b in range(len(estimates)):
@@ -69,7 +119,13 @@ def _step_blocks(work: int, work_z: Array, blocks: int, estimates: Array, z: Arr
         quaternion_to_matrix(f.x[3:7], f.rotation)
         carry(f, dt)
         s = f.z
-        correct(f, s[4:7], s[7:11], math.isfinite(s[4] + s[5] + s[6]), math.isfinite(s[7] + s[8] + s[9] + s[10]))
+        correct(
+            f,
+            s[4:7],
+            s[7:11],
+            math.isfinite(s[4] + s[5] + s[6]),
+            math.isfinite(s[7] + s[8] + s[9] + s[10]),
+        )
         _move_estimate(f, k)
         for lane in range(min(WIDTH, count - WIDTH * b)):
             for i in range(STATE_SIZE):
@@ -77,7 +133,9 @@ def _step_blocks(work: int, work_z: Array, blocks: int, estimates: Array, z: Arr
 
 
 class Blocks:
-    """Memory of ``count`` filters side by side, all like the one in ``record`` (1,), and their step."""
+    """Memory of ``count`` filters side by side, all like the one in ``record`` (1,), and their
+    step.
+    """
 
     def __init__(self, record: np.ndarray, count: int) -> None:
         self.count = count
@@ -87,17 +145,29 @@ class Blocks:
             self._work[name] = record[name]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, _blocks=_BLOCK.like(state["_blocks"]), _work=_WORK.like(state["_work"]))
+        self.__dict__.update(
+            state, _blocks=_BLOCK.like(state["_blocks"]), _work=_WORK.like(state["_work"])
+        )
 
     def put(self, n: int, record: np.ndarray) -> None:
-        """Let filter ``n`` stand where the one in ``record`` stands, and with the last the lanes to spare."""
+        """Let filter ``n`` stand where the one in ``record`` stands, and with the last the lanes to
+        spare.
+        """
         lanes = slice(n % WIDTH, None if n == self.count - 1 else n % WIDTH + 1)
         for name in _KEPT:
             self._blocks[name][n // WIDTH][..., lanes] = record[name][0][..., np.newaxis]
 
     def step(self, z: Array, _parts: int, dt: float, _voltage: Array, out: Array) -> None:
         """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 20), written."""
-        _step_blocks(self._work.ctypes.data, self._work["z"][0], self._blocks.ctypes.data, self._blocks["x"], z, dt, out)
+        _step_blocks(
+            self._work.ctypes.data,
+            self._work["z"][0],
+            self._blocks.ctypes.data,
+            self._blocks["x"],
+            z,
+            dt,
+            out,
+        )
 
     @property
     def state(self) -> Array:

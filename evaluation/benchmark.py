@@ -43,7 +43,8 @@ class Row:
 
 
 def make_pilot(name: str) -> Controller:
-    """Return a new controller by its name, by the path of a trained policy, or by FILE.py:CLASS of a file that is then run.
+    """Return a new controller by its name, by the path of a trained policy, or by FILE.py:CLASS of
+    a file that is then run.
 
     Raises:
         InputError: no controller has this name, or the file holds none.
@@ -54,7 +55,9 @@ def make_pilot(name: str) -> Controller:
     return load_policy(name) if is_policy_path(name) else make_controller(name)
 
 
-def check_request(controllers: Sequence[str], scenarios: Sequence[str], episodes: int, seed: int) -> None:
+def check_request(
+    controllers: Sequence[str], scenarios: Sequence[str], episodes: int, seed: int
+) -> None:
     """Check what ``fly_all`` is asked for, before anything is flown.
 
     Raises:
@@ -88,7 +91,8 @@ def fly_all(
         seed: of the benchmark.
         jobs: processes; default: one a core. The results do not depend on it.
         advance: called with the number of episodes flown since the last call.
-        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this machine; default: none.
+        cluster: address of a Ray cluster that flies, or ``local`` for one of its own on this
+            machine; default: none.
 
     Raises:
         InputError: as ``check_request``.
@@ -96,8 +100,12 @@ def fly_all(
     check_request(controllers, scenarios, episodes, seed)
     wanted = list(dict.fromkeys([*controllers, *_REFERENCES]))
     seeds = benchmark_seeds(seed, episodes)
-    tasks = [(controller, scenario, seeds[i : i + _CHUNK])
-             for scenario in dict.fromkeys(scenarios) for controller in wanted for i in range(0, episodes, _CHUNK)]
+    tasks = [
+        (controller, scenario, seeds[i : i + _CHUNK])
+        for scenario in dict.fromkeys(scenarios)
+        for controller in wanted
+        for i in range(0, episodes, _CHUNK)
+    ]
     results: Results = {(c, s): [] for s in scenarios for c in wanted}
     jobs = min(jobs or os.cpu_count() or 1, len(tasks))
 
@@ -128,7 +136,10 @@ def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes
 def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
     name, scenario, seeds = task
     controller = make_pilot(name)
-    env = scenario_env(scenario, controller.features.sources if isinstance(controller, TrainedPolicy) else frozenset())
+    env = scenario_env(
+        scenario,
+        controller.features.sources if isinstance(controller, TrainedPolicy) else frozenset(),
+    )
     return [fly_episode(env, controller, seed) for seed in seeds]
 
 
@@ -136,19 +147,32 @@ def leaderboard(results: Results, controllers: Sequence[str], seed: int) -> list
     """Return the leaderboard's rows, scenario by scenario, best first."""
     rows = []
     for scenario in dict.fromkeys(s for _, s in results):
-        rmse = {c: np.array([e.rmse for e in flown]) for (c, s), flown in results.items() if s == scenario}
+        rmse = {
+            c: np.array([e.rmse for e in flown])
+            for (c, s), flown in results.items()
+            if s == scenario
+        }
         span = rmse["hover"].mean() - rmse["oracle"].mean()
         some = []
         for name in dict.fromkeys(controllers):
             flown, values = results[name, scenario], rmse[name]
             ahead = values - rmse["admittance"]
-            some.append(Row(
-                controller=name, scenario=scenario, episodes=len(flown), seed=seed, rmse_m=float(values.mean()),
-                rmse_ci95_m=_interval(values), median_rmse_m=float(np.median(values)),
-                lost_fraction=float(np.mean([e.lost for e in flown])),
-                score=float((rmse["hover"].mean() - values.mean()) / span) if span > 0 else math.nan,
-                wins_over_admittance=float(np.mean(ahead < 0) + 0.5 * np.mean(ahead == 0)),
-            ))
+            some.append(
+                Row(
+                    controller=name,
+                    scenario=scenario,
+                    episodes=len(flown),
+                    seed=seed,
+                    rmse_m=float(values.mean()),
+                    rmse_ci95_m=_interval(values),
+                    median_rmse_m=float(np.median(values)),
+                    lost_fraction=float(np.mean([e.lost for e in flown])),
+                    score=float((rmse["hover"].mean() - values.mean()) / span)
+                    if span > 0
+                    else math.nan,
+                    wins_over_admittance=float(np.mean(ahead < 0) + 0.5 * np.mean(ahead == 0)),
+                )
+            )
         rows.extend(sorted(some, key=lambda row: row.rmse_m))
     return rows
 
@@ -162,9 +186,14 @@ def _interval(values: np.ndarray) -> tuple[float, float]:
 
 
 def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
-    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing is null."""
+    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing
+    is null.
+    """
     path = folder / "leaderboard.json"
-    data = [{key: None if value != value else value for key, value in asdict(row).items()} for row in rows]
+    data = [
+        {key: None if value != value else value for key, value in asdict(row).items()}
+        for row in rows
+    ]
     with replaced(path) as partial:
         partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path

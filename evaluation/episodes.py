@@ -12,7 +12,8 @@ from ..envs.plant import TICK
 
 Array = NDArray[np.float64]
 DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)
-# Seeds of episodes that score controllers; those of training and validation lie below, so none is shared.
+# Seeds of episodes that score controllers; those of training and validation lie below, so none is
+# shared.
 FIRST_TEST_SEED = 1_000_000
 
 
@@ -66,8 +67,19 @@ def fly_episode(
         if lost:
             break
     t, y, fan_y, command = np.array(rows).T
-    return Episode(seed, info["fan_motion"], bool(info["lost"]), total, t, y, fan_y, command,
-                   np.array(observations, dtype=np.float64), np.array(forces), np.array(torques))
+    return Episode(
+        seed,
+        info["fan_motion"],
+        bool(info["lost"]),
+        total,
+        t,
+        y,
+        fan_y,
+        command,
+        np.array(observations, dtype=np.float64),
+        np.array(forces),
+        np.array(torques),
+    )
 
 
 def benchmark_seeds(seed: int, episodes: int) -> list[int]:

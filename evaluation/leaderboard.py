@@ -24,7 +24,9 @@ REFERENCES = ("hover", "oracle")
 
 @dataclass(frozen=True)
 class Line:
-    """All that is known of one controller: RMSE (seeds, episodes) in m and losses, world by world."""
+    """All that is known of one controller: RMSE (seeds, episodes) in m and losses,
+    world by world.
+    """
 
     name: str
     group: str
@@ -35,7 +37,9 @@ class Line:
 
 @dataclass(frozen=True)
 class Row:
-    """One controller in one world. ``change`` is relative to a rival's mean RMSE: -0.1 is ten per cent less error."""
+    """One controller in one world. ``change`` is relative to a rival's mean RMSE: -0.1 is ten per
+    cent less error.
+    """
 
     world: str
     name: str
@@ -59,18 +63,27 @@ class Row:
 
 
 def lines_of(results: Sequence[Result], plan: Mapping[str, Any]) -> list[Line]:
-    """Return the controllers of the study, those of which something is known, in the plan's order."""
+    """Return the controllers of the study, those of which something is known, in
+    the plan's order.
+    """
     episodes = plan["episodes"]
     names = [*plan["designed"], *plan["learned"]]
     if plan["ablation"]:
         names += [plan["ablation"]["reference"], *plan["ablation"]["changes"]]
     lines = []
     for name in names:
-        some = sorted((r for r in results if r["name"] == name), key=lambda r: -1 if r["seed"] is None else r["seed"])
+        some = sorted(
+            (r for r in results if r["name"] == name),
+            key=lambda r: -1 if r["seed"] is None else r["seed"],
+        )
         rmse: dict[str, Array] = {}
         lost: dict[str, Array] = {}
         for world in plan["worlds"]:
-            flown = [s for r in some if len((s := r["scores"].get(world, {})).get("rmse_m", ())) >= episodes]
+            flown = [
+                s
+                for r in some
+                if len((s := r["scores"].get(world, {})).get("rmse_m", ())) >= episodes
+            ]
             if flown:
                 rmse[world] = np.array([s["rmse_m"][:episodes] for s in flown], dtype=np.float64)
                 lost[world] = np.array([s["lost"][:episodes] for s in flown], dtype=np.float64)
@@ -80,15 +93,20 @@ def lines_of(results: Sequence[Result], plan: Mapping[str, Any]) -> list[Line]:
 
 
 def best_of(lines: Sequence[Line], law: str, world: str) -> Line | None:
-    """Return the law with the gains, tuned or as it comes, that have the smallest mean RMSE in this very world.
+    """Return the law with the gains, tuned or as it comes, that have the smallest mean RMSE in this
+    very world.
 
     The choice looks at the test episodes, which favours the law and nobody else.
     """
-    some = [x for x in lines if x.group == "designed" and x.name.startswith(law) and world in x.rmse]
+    some = [
+        x for x in lines if x.group == "designed" and x.name.startswith(law) and world in x.rmse
+    ]
     return min(some, key=lambda x: float(x.rmse[world].mean()), default=None)
 
 
-def rows_of(results: Sequence[Result], plan: Mapping[str, Any], ablation: bool = False) -> list[Row]:
+def rows_of(
+    results: Sequence[Result], plan: Mapping[str, Any], ablation: bool = False
+) -> list[Row]:
     """Return the rows of the leaderboard, or of the ablations, world by world, best first."""
     lines = lines_of(results, plan)
     by_name = {x.name: x for x in lines}
@@ -106,25 +124,42 @@ def rows_of(results: Sequence[Result], plan: Mapping[str, Any], ablation: bool =
             if world not in line.rmse or (line.group == "ablation") is not ablation:
                 continue
             x = line.rmse[world]
-            some.append(Row(
-                world=world, name=line.name, group=line.group, seeds=len(x), episodes=x.shape[1], rmse_m=float(x.mean()),
-                interval=stratified_bootstrap(mean, x, tasks=True),
-                by_seed=tuple(x.mean(axis=1).tolist()), median_m=float(np.median(x)),
-                lost_fraction=float(line.lost[world].mean()), score=(hover - float(x.mean())) / (hover - oracle),
-                rival=admittance.name, change=float(relative_change(x, a)),
-                change_interval=stratified_bootstrap(relative_change, x, a, tasks=True),
-                wins=float(paired_wins(x, a)), improvement=float(probability_of_improvement(-x, -a)),
-                ratio_rival=ratio.name, ratio_change=float(relative_change(x, r)),
-                ratio_interval=stratified_bootstrap(relative_change, x, r, tasks=True),
-            ))
+            some.append(
+                Row(
+                    world=world,
+                    name=line.name,
+                    group=line.group,
+                    seeds=len(x),
+                    episodes=x.shape[1],
+                    rmse_m=float(x.mean()),
+                    interval=stratified_bootstrap(mean, x, tasks=True),
+                    by_seed=tuple(x.mean(axis=1).tolist()),
+                    median_m=float(np.median(x)),
+                    lost_fraction=float(line.lost[world].mean()),
+                    score=(hover - float(x.mean())) / (hover - oracle),
+                    rival=admittance.name,
+                    change=float(relative_change(x, a)),
+                    change_interval=stratified_bootstrap(relative_change, x, a, tasks=True),
+                    wins=float(paired_wins(x, a)),
+                    improvement=float(probability_of_improvement(-x, -a)),
+                    ratio_rival=ratio.name,
+                    ratio_change=float(relative_change(x, r)),
+                    ratio_interval=stratified_bootstrap(relative_change, x, r, tasks=True),
+                )
+            )
         rows.extend(sorted(some, key=lambda row: row.rmse_m))
     return rows
 
 
 def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Array | None:
-    """Return scores (seeds, worlds * episodes) between hover (0) and oracle (1) of each world; None where one is missing."""
+    """Return scores (seeds, worlds * episodes) between hover (0) and oracle (1) of each world; None
+    where one is missing.
+    """
     by_name = {x.name: x for x in lines}
-    if any(world not in line.rmse or any(world not in by_name[n].rmse for n in REFERENCES) for world in worlds):
+    if any(
+        world not in line.rmse or any(world not in by_name[n].rmse for n in REFERENCES)
+        for world in worlds
+    ):
         return None
     columns = []
     for world in worlds:
@@ -135,9 +170,11 @@ def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Arra
 
 
 def aggregate(lines: Sequence[Line], worlds: Sequence[str]) -> list[tuple[str, float, Interval]]:
-    """Return name, interquartile mean of the normalised score over all worlds, and its interval; best first.
+    """Return name, interquartile mean of the normalised score over all worlds, and its interval;
+    best first.
 
-    The interval is over training seeds, stratified by episode; a law that was designed has one run, and episodes vary.
+    The interval is over training seeds, stratified by episode; a law that was designed has one run,
+    and episodes vary.
     """
     found = []
     for line in lines:

@@ -21,15 +21,23 @@ def colour_of(name: str, index: int = 0) -> str:
 
 
 def draw_episode(episode: Episode, title: str, path: Path) -> None:
-    """Draw one episode in the manner of the paper's Fig. 7: fan and vehicle, torque, force, command over time."""
+    """Draw one episode in the manner of the paper's Fig. 7: fan and vehicle, torque, force, command
+    over time.
+    """
     figure = Figure(figsize=(9, 8.5), layout="constrained")
-    top, torque, force, command = figure.subplots(4, 1, sharex=True, height_ratios=[2.2, 1.2, 1.2, 0.9])
+    top, torque, force, command = figure.subplots(
+        4, 1, sharex=True, height_ratios=[2.2, 1.2, 1.2, 0.9]
+    )
     t = episode.time
-    top.fill_between(t, episode.fan_y - 0.45, episode.fan_y + 0.45, color=_JET, label="width of the fan")
+    top.fill_between(
+        t, episode.fan_y - 0.45, episode.fan_y + 0.45, color=_JET, label="width of the fan"
+    )
     top.plot(t, episode.fan_y, "--", color="#222222", lw=1.5, label="fan")
     top.plot(t, episode.y, color=COLOURS["admittance"], lw=2, label="vehicle")
     end = "lost" if episode.lost else "never lost"
-    top.set_title(f"{title}: RMSE {episode.rmse:.3f} m, {end} (fan: {episode.motion}, seed {episode.seed})")
+    top.set_title(
+        f"{title}: RMSE {episode.rmse:.3f} m, {end} (fan: {episode.motion}, seed {episode.seed})"
+    )
     top.set_ylabel("y (m)")
     top.legend(loc="upper left", ncols=3, frameon=False)
     low, high = top.get_ylim()
@@ -56,7 +64,9 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
 
 
 def draw_leaderboard(rows: Sequence[Row], results: Results, path: Path) -> None:
-    """Draw every episode's RMSE and the mean with its interval, and one episode's paths, a scenario a row."""
+    """Draw every episode's RMSE and the mean with its interval, and one episode's paths, a scenario
+    a row.
+    """
     scenarios = list(dict.fromkeys(row.scenario for row in rows))
     figure = Figure(figsize=(11, 1.0 + 3.0 * len(scenarios)), layout="constrained")
     grid = figure.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.25, 1])
@@ -68,19 +78,33 @@ def draw_leaderboard(rows: Sequence[Row], results: Results, path: Path) -> None:
             jitter = np.random.default_rng(0).uniform(-0.24, 0.24, len(values))
             colour = colour_of(row.controller, i)
             left.scatter(values, i + jitter, s=11, color=colour, alpha=0.4, lw=0)
-            left.plot(row.rmse_ci95_m, [i, i], color="black", lw=2.2, solid_capstyle="butt", zorder=4)
+            left.plot(
+                row.rmse_ci95_m, [i, i], color="black", lw=2.2, solid_capstyle="butt", zorder=4
+            )
             left.plot(row.rmse_m, i, "o", color=colour, mec="black", ms=8, zorder=5)
-            left.annotate(f"{row.rmse_m:.3f} m", (1.01, i), xycoords=("axes fraction", "data"), va="center", fontsize=9)
+            left.annotate(
+                f"{row.rmse_m:.3f} m",
+                (1.01, i),
+                xycoords=("axes fraction", "data"),
+                va="center",
+                fontsize=9,
+            )
         left.set_yticks(range(len(some)), names)
         left.invert_yaxis()
         left.set_xlim(left=0)
-        left.set_title(f"{scenario}: RMSE of each episode, mean, 95 % interval", loc="left", fontsize=10)
+        left.set_title(
+            f"{scenario}: RMSE of each episode, mean, 95 % interval", loc="left", fontsize=10
+        )
         left.set_xlabel("RMSE of the offset (m)")
-        middle = np.argsort([e.rmse for e in results["admittance", scenario]])[len(results["admittance", scenario]) // 2]
+        middle = np.argsort([e.rmse for e in results["admittance", scenario]])[
+            len(results["admittance", scenario]) // 2
+        ]
         for i, name in enumerate(names):
             episode = results[name, scenario][middle]
             right.plot(episode.time, episode.y, color=colour_of(name, i), lw=1.6, label=name)
-        longest = max((results[name, scenario][middle] for name in names), key=lambda e: len(e.time))
+        longest = max(
+            (results[name, scenario][middle] for name in names), key=lambda e: len(e.time)
+        )
         right.plot(longest.time, longest.fan_y, "--", color="black", lw=1.3, label="fan")
         right.set_xlim(0, DECISIONS * 0.08)
         right.set_title("the admittance controller's median episode", loc="left", fontsize=10)

@@ -1,9 +1,9 @@
 """Statistics of scores over runs and tasks, as small functions of a matrix.
 
-A score matrix has a row for each run (training seed) and a column for each task (a test episode in a world). Every
-statistic also takes a stack of matrices (..., runs, tasks) and then returns (...). The definitions are those of Agarwal,
-Schwarzer, Castro, Courville and Bellemare, *Deep reinforcement learning at the edge of the statistical precipice*,
-NeurIPS 2021.
+A score matrix has a row for each run (training seed) and a column for each task (a test episode in
+a world). Every statistic also takes a stack of matrices (..., runs, tasks) and then returns (...).
+The definitions are those of Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep
+reinforcement learning at the edge of the statistical precipice*, NeurIPS 2021.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,9 @@ def score_matrix(scores: ArrayLike) -> Array:
     """
     matrix = np.atleast_2d(np.asarray(scores, dtype=np.float64))
     if matrix.size == 0 or not np.all(np.isfinite(matrix)):
-        raise InputError(f"scores: expected a matrix (runs, tasks) of finite numbers, got shape {matrix.shape}")
+        raise InputError(
+            f"scores: expected a matrix (runs, tasks) of finite numbers, got shape {matrix.shape}"
+        )
     return matrix
 
 
@@ -38,7 +40,8 @@ def mean(scores: ArrayLike) -> Any:
 
 
 def interquartile_mean(scores: ArrayLike) -> Any:
-    """Return the mean of the middle half of all scores, runs and tasks together; a quarter is cut off at either end.
+    """Return the mean of the middle half of all scores, runs and tasks together; a quarter is cut
+    off at either end.
 
     Of n scores, ``floor(n / 4)`` go at either end.
     """
@@ -49,19 +52,24 @@ def interquartile_mean(scores: ArrayLike) -> Any:
 
 
 def optimality_gap(scores: ArrayLike, target: float = 1.0) -> Any:
-    """Return by how much scores fall short of ``target`` on average; what is above counts as the target."""
+    """Return by how much scores fall short of ``target`` on average; what is above counts as the
+    target.
+    """
     return target - np.minimum(score_matrix(scores), target).mean(axis=_LAST_TWO)
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
-    """Return, for each of ``thresholds`` (n,), the share (..., n) of all scores that are above it."""
+    """Return, for each of ``thresholds`` (n,), the share (..., n) of all scores
+    that are above it.
+    """
     matrix = score_matrix(scores)
     limits = np.atleast_1d(np.asarray(thresholds, dtype=np.float64))
     return np.stack([(matrix > limit).mean(axis=_LAST_TWO) for limit in limits], axis=-1)
 
 
 def probability_of_improvement(x: ArrayLike, y: ArrayLike) -> Any:
-    """Return the probability that a run of X beats a run of Y on a task drawn at random; a tie counts half.
+    """Return the probability that a run of X beats a run of Y on a task drawn at random; a tie
+    counts half.
 
     The Mann-Whitney statistic over all pairs of runs, task by task: scores where more is better.
 
@@ -80,7 +88,8 @@ def relative_change(x: ArrayLike, y: ArrayLike) -> Any:
 
 
 def paired_wins(x: ArrayLike, y: ArrayLike) -> Any:
-    """Return the share of runs and tasks where X is smaller than Y's mean over its runs on the same task; a tie is half.
+    """Return the share of runs and tasks where X is smaller than Y's mean over its runs on the same
+    task; a tie is half.
 
     For errors, where less is better.
 
@@ -93,14 +102,18 @@ def paired_wins(x: ArrayLike, y: ArrayLike) -> Any:
 
 
 def stratified_bootstrap(
-    statistic: Callable[..., Any], *matrices: ArrayLike, resamples: int = _RESAMPLES, seed: int = 0, level: float = 0.95,
+    statistic: Callable[..., Any],
+    *matrices: ArrayLike,
+    resamples: int = _RESAMPLES,
+    seed: int = 0,
+    level: float = 0.95,
     tasks: bool = False,
 ) -> tuple[float, float]:
     """Return the percentile bootstrap interval of a statistic of one or more score matrices.
 
-    Runs are drawn anew with replacement for each task by itself (stratified by task). With ``tasks``, which a paired
-    comparison needs, tasks are drawn anew first, the same ones in every matrix: the interval then speaks of
-    other episodes, too, and not of other training seeds alone.
+    Runs are drawn anew with replacement for each task by itself (stratified by task). With
+    ``tasks``, which a paired comparison needs, tasks are drawn anew first, the same ones in every
+    matrix: the interval then speaks of other episodes, too, and not of other training seeds alone.
 
     Args:
         statistic: takes as many stacks (k, runs, tasks) as there are matrices; returns (k,).
@@ -137,5 +150,7 @@ def stratified_bootstrap(
 def _same_tasks(*matrices: ArrayLike) -> list[Array]:
     given = [score_matrix(m) for m in matrices]
     if len({m.shape[-1] for m in given}) > 1:
-        raise InputError(f"scores: expected the same tasks, got {' and '.join(str(m.shape[-1]) for m in given)}")
+        raise InputError(
+            f"scores: expected the same tasks, got {' and '.join(str(m.shape[-1]) for m in given)}"
+        )
     return given

@@ -3,8 +3,8 @@
 A log that is refused has its error in the table, and the others go on.
 
 Install:  pip install .    (in a checkout)
-Logs:     windwrench record --effect rotor_drag --seconds 30 --out results/logs/drag.csv    (some, of one vehicle)
-Run:      python examples/diagnose_a_folder.py results/logs ardrone2
+Logs:     windwrench record --effect rotor_drag --seconds 30 --out results/logs/drag.csv    (some,
+of one vehicle) Run:      python examples/diagnose_a_folder.py results/logs ardrone2
 """
 
 import csv
@@ -33,15 +33,26 @@ def diagnose_one(path, vehicle):
         return row
     row["verdict"] = found.verdict
     row["effects"] = "; ".join(
-        effect.name + (" (tentative)" if effect.tentative else "") + ": "
-        + ", ".join(f"{name} = {value:.3g} {effect.units[name]}" for name, value in effect.coefficients.items())
-        for effect in found.effects)
-    row["force_before_N"], row["force_after_N"] = f"{found.before.force_rms:.4f}", f"{found.after.force_rms:.4f}"
+        effect.name
+        + (" (tentative)" if effect.tentative else "")
+        + ": "
+        + ", ".join(
+            f"{name} = {value:.3g} {effect.units[name]}"
+            for name, value in effect.coefficients.items()
+        )
+        for effect in found.effects
+    )
+    row["force_before_N"], row["force_after_N"] = (
+        f"{found.before.force_rms:.4f}",
+        f"{found.after.force_rms:.4f}",
+    )
     return row
 
 
 def main(folder="results/logs", vehicle="ardrone2", out=None):
-    """Diagnose all CSV logs in ``folder``; write, print and return the table (default: ``folder/diagnoses/summary.csv``)."""
+    """Diagnose all CSV logs in ``folder``; write, print and return the table (default:
+    ``folder/diagnoses/summary.csv``).
+    """
     logs = sorted(Path(folder).glob("*.csv"))
     if not logs:
         raise InputError(f"{folder}: holds no .csv file; expected a folder of flight logs")
@@ -55,7 +66,10 @@ def main(folder="results/logs", vehicle="ardrone2", out=None):
         writer.writeheader()
         writer.writerows(rows)
     for row in rows:
-        print(f"{row['log']}: {row['error'] or row['verdict']}" + (f": {row['effects']}" if row["effects"] else ""))
+        print(
+            f"{row['log']}: {row['error'] or row['verdict']}"
+            + (f": {row['effects']}" if row["effects"] else "")
+        )
     print(table)
     return rows
 

@@ -1,4 +1,5 @@
-"""Fans that move as one pleases: a chirp and sudden steps, followed by the admittance controller, in one picture.
+"""Fans that move as one pleases: a chirp and sudden steps, followed by the admittance controller,
+in one picture.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/fan_path.py
@@ -18,7 +19,9 @@ import matplotlib.pyplot as plt
 
 
 def chirp(t):
-    """Return a sine of 0.4 m that quickens from 0.02 to 0.12 Hz within 20 s: y (n,) m at times (n,) s."""
+    """Return a sine of 0.4 m that quickens from 0.02 to 0.12 Hz within 20 s: y (n,) m at times (n,)
+    s.
+    """
     return 0.4 * np.sin(2 * np.pi * (0.02 + 0.0025 * t) * t)
 
 
@@ -31,17 +34,24 @@ PATHS = {"chirp": chirp, "steps": steps}
 
 
 def main(out="results/fan_path", controller="admittance", seed=4):
-    """Fly each path, save ``fan_path.png`` in the folder ``out``, print and return the RMSE of the offset in m by path."""
+    """Fly each path, save ``fan_path.png`` in the folder ``out``, print and return the RMSE of the
+    offset in m by path.
+    """
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(len(PATHS), 1, sharex=True, figsize=(7, 5), layout="constrained")
     found = {}
     for ax, (name, path) in zip(axes, PATHS.items(), strict=True):
-        flown = fly_episode(FanTrackingEnv("base", fan_path=path), make_controller(controller), seed)
+        flown = fly_episode(
+            FanTrackingEnv("base", fan_path=path), make_controller(controller), seed
+        )
         found[name] = flown.rmse
         ax.plot(flown.time, flown.fan_y, label="fan")
         ax.plot(flown.time, flown.y, label=f"vehicle, {controller}")
-        ax.set(title=f"{name}: {flown.rmse:.2f} m RMSE" + (", lost" if flown.lost else ""), ylabel="y (m)")
+        ax.set(
+            title=f"{name}: {flown.rmse:.2f} m RMSE" + (", lost" if flown.lost else ""),
+            ylabel="y (m)",
+        )
         print(f"{name}: {flown.rmse:.3f} m off the axis (RMSE){', lost' if flown.lost else ''}")
     axes[0].legend()
     axes[-1].set_xlabel("time (s)")

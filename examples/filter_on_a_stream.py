@@ -1,7 +1,9 @@
-"""The filter alone on a stream of messages, as in a ROS node: two callbacks, late messages, gaps and outliers.
+"""The filter alone on a stream of messages, as in a ROS node: two callbacks, late messages, gaps
+and outliers.
 
-Motor speeds and poses come at their own times. The filter runs at the time of the poses: it waits with the motor speeds until a
-pose says up to when to use them, so that a pose which comes late is taken in where it belongs.
+Motor speeds and poses come at their own times. The filter runs at the time of the poses: it waits
+with the motor speeds until a pose says up to when to use them, so that a pose which comes late is
+taken in where it belongs.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/filter_on_a_stream.py
@@ -19,10 +21,14 @@ PATIENCE = 0.2  # s that the filter waits for a pose; one that is later than tha
 
 
 class WrenchNode:
-    """What a node does with its messages; stamps are times in s, on one clock, of when something was measured."""
+    """What a node does with its messages; stamps are times in s, on one clock, of when something
+    was measured.
+    """
 
     def __init__(self, vehicle):
-        self.ukf = WrenchUKF(vehicle, period=0.005, gate=0.999)  # the gate refuses outliers; the noise follows each dt
+        self.ukf = WrenchUKF(
+            vehicle, period=0.005, gate=0.999
+        )  # the gate refuses outliers; the noise follows each dt
         self.speeds = 4 * [vehicle.hover_rate]  # rad/s, in use at self.now
         self.waiting = deque()  # stamps and motor speeds that the filter has not come to
         self.now = None  # s, up to where the filter is; None before the first pose
@@ -35,7 +41,9 @@ class WrenchNode:
             self.run_to(stamp - PATIENCE)
 
     def on_pose(self, stamp, position, quaternion):
-        """Take in a pose, m and body to world, and return the estimate; None for one that is too late."""
+        """Take in a pose, m and body to world, and return the estimate; None for one that is too
+        late.
+        """
         if self.now is None:
             self.ukf.reset(position, quaternion)
             self.now = stamp
@@ -46,7 +54,9 @@ class WrenchNode:
         return self.ukf.correct(position, quaternion)
 
     def run_to(self, stamp):
-        """Predict up to ``stamp``, with each set of motor speeds until the next one was measured."""
+        """Predict up to ``stamp``, with each set of motor speeds until the next
+        one was measured.
+        """
         while self.now < stamp:
             while self.waiting and self.waiting[0][0] <= self.now:
                 self.speeds = self.waiting.popleft()[1]
@@ -56,17 +66,28 @@ class WrenchNode:
 
 
 def stream(vehicle, seconds, force, rng):
-    """Return messages (arrival, kind, stamp, values) of a hover that is pushed with ``force`` (3,) N, by arrival."""
+    """Return messages (arrival, kind, stamp, values) of a hover that is pushed with ``force`` (3,)
+    N, by arrival.
+    """
     push = np.array([*force, 0.0, 0.0, 0.0])
-    flown = record_flight(vehicle, trajectory="hover", seconds=seconds, push=lambda loop: push if loop.time > 2.0 else None)
+    flown = record_flight(
+        vehicle,
+        trajectory="hover",
+        seconds=seconds,
+        push=lambda loop: push if loop.time > 2.0 else None,
+    )
     messages = []
     for k, t in enumerate(flown["t"]):
         messages.append((t + rng.uniform(0.001, 0.004), "motors", t, (flown["rotor_speeds"][k],)))
         in_gap = 0.5 * seconds < t < 0.5 * seconds + 0.4
-        if k % 2 == 0 and not in_gap and rng.random() > 0.1:  # 100 Hz; a tenth gets lost, and there is a gap of 0.4 s
+        if (
+            k % 2 == 0 and not in_gap and rng.random() > 0.1
+        ):  # 100 Hz; a tenth gets lost, and there is a gap of 0.4 s
             wrong = rng.normal(0.0, 0.3, 3) if rng.random() < 0.01 else 0.0
             late = 0.1 if rng.random() < 0.02 else rng.uniform(0.015, 0.03)
-            messages.append((t + late, "pose", t, (flown["position"][k] + wrong, flown["quaternion"][k])))
+            messages.append(
+                (t + late, "pose", t, (flown["position"][k] + wrong, flown["quaternion"][k]))
+            )
     return sorted(messages, key=lambda message: message[0])
 
 

@@ -1,7 +1,8 @@
-"""A controller of one's own in the plain Gymnasium loop, beside a vehicle that hovers and the paper's law.
+"""A controller of one's own in the plain Gymnasium loop, beside a vehicle that hovers and the
+paper's law.
 
-This one answers the yaw torque that the filter feels and the torque's rate, smoothed over 0.2 s: it brakes before it is on
-the axis.
+This one answers the yaw torque that the filter feels and the torque's rate, smoothed over 0.2 s: it
+brakes before it is on the axis.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/own_controller.py
@@ -19,7 +20,9 @@ LOST = 2.5  # m, at which the remaining time of a lost vehicle counts
 
 
 class Lead:
-    """Velocity against the yaw torque (``gain``, m/s per Nm) and its rate (``rate_gain``, m per Nm)."""
+    """Velocity against the yaw torque (``gain``, m/s per Nm) and its rate (``rate_gain``, m per
+    Nm).
+    """
 
     def __init__(self, gain=18.0, rate_gain=2.0, smoothing=0.2):
         self.gain, self.rate_gain, self.smoothing = gain, rate_gain, smoothing
@@ -31,11 +34,15 @@ class Lead:
 
     def __call__(self, observation, info=None):
         """Return the velocity (1,) m/s along world y for an observation (8,)."""
-        torque_z = float(observation[5])  # Nm, world: positive where the vehicle is on the fan's left
+        torque_z = float(
+            observation[5]
+        )  # Nm, world: positive where the vehicle is on the fan's left
         change = 0.0 if self.last is None else (torque_z - self.last) / DECISION
         self.rate += DECISION / self.smoothing * (change - self.rate)
         self.last = torque_z
-        return np.clip([-self.gain * torque_z - self.rate_gain * self.rate], -1.0, 1.0).astype(np.float32)
+        return np.clip([-self.gain * torque_z - self.rate_gain * self.rate], -1.0, 1.0).astype(
+            np.float32
+        )
 
 
 def rmse(env, controller, seed):
@@ -53,8 +60,15 @@ def rmse(env, controller, seed):
 def main(episodes=20, scenario="base"):
     """Fly all on the same episodes; print and return their mean RMSE in m."""
     env = gym.make("windwrench/FanTracking-v0", scenario=scenario)
-    laws = {"hover": make_controller("hover"), "admittance": make_controller("admittance"), "own": Lead()}
-    found = {name: float(np.mean([rmse(env, law, seed) for seed in range(episodes)])) for name, law in laws.items()}
+    laws = {
+        "hover": make_controller("hover"),
+        "admittance": make_controller("admittance"),
+        "own": Lead(),
+    }
+    found = {
+        name: float(np.mean([rmse(env, law, seed) for seed in range(episodes)]))
+        for name, law in laws.items()
+    }
     env.close()
     for name, value in found.items():
         print(f"{name:10s} {value:.3f} m off the axis (RMSE, mean of {episodes} episodes)")

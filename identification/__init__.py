@@ -6,7 +6,8 @@ __all__ = ["FlightLog", "diagnose", "estimate_log", "read_log", "report_data"]
 
 
 def __getattr__(name: str) -> Any:
-    # what a name needs is imported when it is asked for: reading a log needs no inference, and no page
+    # what a name needs is imported when it is asked for: reading a log needs no inference, and no
+    # page
     if name in ("FlightLog", "read_log"):
         from .logs import flight_log, reading
 

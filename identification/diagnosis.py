@@ -1,8 +1,9 @@
 """From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
 
-The residual wrench is regressed on whole effects of the library (``search``), every name is asked what else it could be
-(``equivalence``) and the remainder whether a law is still in it (``structure``). Structure and coefficients are chosen on the
-fit's blocks of flight; the errors before and after are those of blocks, or logs, that the fit never saw.
+The residual wrench is regressed on whole effects of the library (``search``), every name is asked
+what else it could be (``equivalence``) and the remainder whether a law is still in it
+(``structure``). Structure and coefficients are chosen on the fit's blocks of flight; the errors
+before and after are those of blocks, or logs, that the fit never saw.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +15,17 @@ from numpy.typing import NDArray
 from ..dynamics.effects import get, names
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
-from .findings import CHANNELS, Candidate, Diagnosis, Errors, Gusts, NamedEffect, Signature, Structure, Trace
+from .findings import (
+    CHANNELS,
+    Candidate,
+    Diagnosis,
+    Errors,
+    Gusts,
+    NamedEffect,
+    Signature,
+    Structure,
+    Trace,
+)
 from .inference.candidate_regressors import drives
 from .inference.coefficient_range import beyond_belief
 from .inference.commanded_rotors import shared
@@ -34,10 +45,16 @@ from .prediction import nis_without_wrench_state, rollout_error
 Array = NDArray[np.float64]
 
 AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
-CALM = 0.006, 0.0015  # nor have gusts of up to this share of the weight, and of the weight times the arm, below
-CALM_HZ = 2.0  # quicker ones are noise in part: of the pose, of the step to which turn rates are rounded
+CALM = (
+    0.006,
+    0.0015,
+)  # nor have gusts of up to this share of the weight, and of the weight times the arm, below
+CALM_HZ = (
+    2.0  # quicker ones are noise in part: of the pose, of the step to which turn rates are rounded
+)
 LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
-_FAINT = 0.1  # share of the remainder's energy: a name that explains less beside a large remainder is tentative
+# share of the remainder's energy: a name that explains less beside a large remainder is tentative
+_FAINT = 0.1
 _POINTS = 600  # of a signature
 _LEAST_SHIFT = 0.001  # s, of the turn rates, worth a note
 
@@ -53,8 +70,10 @@ def diagnose(
 
     Args:
         logs: flights to learn from.
-        vehicle: as it is declared. An effect that it declares with some coefficients left out has those fitted.
-        test: flights on which alone the error is reported; default: 3 s of each 12 s of ``logs``, which the fit never sees.
+        vehicle: as it is declared. An effect that it declares with some coefficients left out has
+            those fitted.
+        test: flights on which alone the error is reported; default: 3 s of each 12 s of ``logs``,
+            which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
 
@@ -78,42 +97,76 @@ def diagnose(
     if follow == "as behind a lag":
         fit = with_lag(search, fit)
     report("asking what else it could be")
-    classes = {e: (*equivalents(search, fit, e), *overshadowed(search, fit, e)) for e in fit.effects}
-    classes |= {e: tuple(dict.fromkeys([*classes[e], *more])) for e, more in others_late(search, fit, follow).items()}
+    classes = {
+        e: (*equivalents(search, fit, e), *overshadowed(search, fit, e)) for e in fit.effects
+    }
+    classes |= {
+        e: tuple(dict.fromkeys([*classes[e], *more]))
+        for e, more in others_late(search, fit, follow).items()
+    }
     report("looking for what is left")
     signs, gusty = structure(search, fit)
     fit = measured(search, fit)
     mimics = [*composites(flights, fit), *unlisted(search, fit)]
     if not flights.commanded:
-        mimics += [*beyond_belief(search, fit), *at_odds(flights, fit.setting), *lag_or_delay(search, fit, follow)]
+        mimics += [
+            *beyond_belief(search, fit),
+            *at_odds(flights, fit.setting),
+            *lag_or_delay(search, fit, follow),
+        ]
 
-    before, after = flights.residual({}), flights.residual(shared(fit.setting))  # no flight's own scale or lean
+    before, after = (
+        flights.residual({}),
+        flights.residual(shared(fit.setting)),
+    )  # no flight's own scale or lean
     held = ~flights.fit
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held]), _rms(after[held])
     noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
-    gusts = () if flights.commanded else tuple(
-        Gusts(channel, *found) for channel, found in zip(CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True))
+    gusts = (
+        ()
+        if flights.commanded
+        else tuple(
+            Gusts(channel, *found)
+            for channel, found in zip(
+                CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True
+            )
+        )
+    )
     calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
     pushed = () if flights.commanded else tuple(pushes(flights, fit.setting))
-    windy = bool(pushed) or any(found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False))
+    windy = bool(pushed) or any(
+        found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False)
+    )
     remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
     large = noisy if flights.commanded else windy
-    effects = tuple(_named(search, fit, effect, classes[effect], bool(signs or mimics), large) for effect in fit.effects)
-    if not flights.commanded and any(effect.tentative for effect in effects):  # what one name has too much, another one lacks
+    effects = tuple(
+        _named(search, fit, effect, classes[effect], bool(signs or mimics), large)
+        for effect in fit.effects
+    )
+    if not flights.commanded and any(
+        effect.tentative for effect in effects
+    ):  # what one name has too much, another one lacks
         effects = tuple(replace(effect, tentative=True) for effect in effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
-    verdict = ("explained" if sure else "partly explained") if effects else (
-        "nothing to explain" if remainder == "none" else "unexplained")
+    verdict = (
+        ("explained" if sure else "partly explained")
+        if effects
+        else ("nothing to explain" if remainder == "none" else "unexplained")
+    )
     notes += mimics
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
     nuisances = fit.setting.get(SHIFT[0], {})
     shift = nuisances.get(SHIFT[1], 0.0)
-    if abs(shift) > _LEAST_SHIFT and Innovations(flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}).confirm(
-            fit.setting):
-        notes.append(f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than at their sample")
+    if abs(shift) > _LEAST_SHIFT and Innovations(
+        flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}
+    ).confirm(fit.setting):
+        notes.append(
+            f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than "
+            f"at their sample"
+        )
     return Diagnosis(
         verdict=verdict,
         remainder=remainder,
@@ -142,18 +195,30 @@ def diagnose(
 
 def _rms(wrench: Array) -> tuple[float, float]:
     """Return the RMS of force (N) and torque (Nm) over rows and axes."""
-    return float(np.sqrt(np.mean(np.square(wrench[:, :3])))), float(np.sqrt(np.mean(np.square(wrench[:, 3:]))))
+    return float(np.sqrt(np.mean(np.square(wrench[:, :3])))), float(
+        np.sqrt(np.mean(np.square(wrench[:, 3:])))
+    )
 
 
-def _named(search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool) -> NamedEffect:
+def _named(
+    search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool
+) -> NamedEffect:
     error = search.error(fit)
     gain = search.error_without(fit, effect) - error
     std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
     if search.delay is not None and search.held(effect):
         gain, std = search.delay.evidence, {COEFFICIENT: search.delay.std}
     # that a law acts at the rotors, as it is written, is nothing to report
-    values = {k: v for k, v in fit.setting[effect].items() if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)}
-    sizes = [abs(v) / typical((effect, k), search.flights.vehicle) for k, v in values.items() if k != CENTRAL]
+    values = {
+        k: v
+        for k, v in fit.setting[effect].items()
+        if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)
+    }
+    sizes = [
+        abs(v) / typical((effect, k), search.flights.vehicle)
+        for k, v in values.items()
+        if k != CENTRAL
+    ]
     return NamedEffect(
         name=effect,
         coefficients=values,
@@ -161,22 +226,38 @@ def _named(search: Search, fit: Fit, effect: str, others: tuple[str, ...], struc
         units={k: coefficient((effect, k)).unit for k in values},
         tentative=structured or (noisy and gain < _FAINT * error),
         indistinguishable_from=others,
-        evidence={"energy_explained": gain / (gain + error), "energy_explained_in_noise_units": gain,
-                  "largest_coefficient_in_typical_sizes": max(sizes, default=0.0)},
+        evidence={
+            "energy_explained": gain / (gain + error),
+            "energy_explained_in_noise_units": gain,
+            "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
+        },
     )
 
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
     held = ~flights.fit
-    begins = np.flatnonzero(held & (flights.start | np.concatenate([[True], flights.fit[:-1]])
-                                    | (np.diff(flights.block, prepend=-1) != 0)))
+    begins = np.flatnonzero(
+        held
+        & (
+            flights.start
+            | np.concatenate([[True], flights.fit[:-1]])
+            | (np.diff(flights.block, prepend=-1) != 0)
+        )
+    )
     ends = [int(np.flatnonzero(flights.block == flights.block[b])[-1]) for b in begins]
-    return [(int(flights.log[b]), float(flights.t[b]), float(flights.t[e])) for b, e in zip(begins, ends, strict=True)]
+    return [
+        (int(flights.log[b]), float(flights.t[b]), float(flights.t[e]))
+        for b, e in zip(begins, ends, strict=True)
+    ]
 
 
-def _errors(flights: Flights, vehicle: Vehicle, segments: Sequence[tuple[int, float, float]],
-            rms: tuple[float, float]) -> Errors:
+def _errors(
+    flights: Flights,
+    vehicle: Vehicle,
+    segments: Sequence[tuple[int, float, float]],
+    rms: tuple[float, float],
+) -> Errors:
     nis, distance, weight = [], [], []
     for i, log in enumerate(flights.logs):
         own = [(a, b) for k, a, b in segments if k == i]
@@ -184,12 +265,18 @@ def _errors(flights: Flights, vehicle: Vehicle, segments: Sequence[tuple[int, fl
             nis.append(nis_without_wrench_state(log, vehicle, own))
             distance.append(rollout_error(log, vehicle, own))
             weight.append(sum(b - a for a, b in own))
-    return Errors(*rms, _mean(np.array(nis), weight), float(np.sqrt(_mean(np.square(distance), weight))))
+    return Errors(
+        *rms, _mean(np.array(nis), weight), float(np.sqrt(_mean(np.square(distance), weight)))
+    )
 
 
 def _mean(values: Array, weight: Sequence[float]) -> float:
     good = np.isfinite(values)
-    return float(np.average(values[good], weights=np.array(weight)[good])) if good.any() else float("nan")
+    return (
+        float(np.average(values[good], weights=np.array(weight)[good]))
+        if good.any()
+        else float("nan")
+    )
 
 
 def _candidates(first: Sequence[Gain], fit: Fit, search: Search) -> tuple[Candidate, ...]:
@@ -200,8 +287,16 @@ def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
     begins = np.flatnonzero(flights.start)
     out = []
     for a, b in zip(begins, [*begins[1:], len(flights.t)], strict=True):
-        out.append(Trace(flights.logs[flights.log[a]].name, flights.period, flights.t[a:b], before[a:b], after[a:b],
-                         ~flights.fit[a:b]))
+        out.append(
+            Trace(
+                flights.logs[flights.log[a]].name,
+                flights.period,
+                flights.t[a:b],
+                before[a:b],
+                after[a:b],
+                ~flights.fit[a:b],
+            )
+        )
     return out
 
 
@@ -209,13 +304,20 @@ def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signatu
     """Return the channel in which an effect is largest, against what it follows most closely."""
     share = flights.residual(fit.without(effect).setting) - after
     noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
-    channel = int(np.argmax(share.std(axis=0) / noise)) if np.any(share.std(axis=0) > 0.3 * noise) else int(
-        np.argmax(np.abs(share).mean(axis=0) / noise))
+    channel = (
+        int(np.argmax(share.std(axis=0) / noise))
+        if np.any(share.std(axis=0) > 0.3 * noise)
+        else int(np.argmax(np.abs(share).mean(axis=0) / noise))
+    )
     y = share[:, channel]
     known = drives(flights, fit.setting)
-    name, x = max(known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0)
+    name, x = max(
+        known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0
+    )
     thin = slice(None, None, max(1, len(y) // _POINTS))
-    return Signature(effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin])
+    return Signature(
+        effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin]
+    )
 
 
 def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: str) -> list[str]:
@@ -223,14 +325,24 @@ def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: s
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
-            out.append(f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
-                       + "; ".join(f"{name}: {get(name).excitation}" for name in group))
+            out.append(
+                f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
+                + "; ".join(f"{name}: {get(name).excitation}" for name in group)
+            )
     if remainder == "structured":
-        out.append("A law is left in the remainder that no effect of the library fits: the names are tentative. Fly one thing "
-                   "at a time (hover, climbs, level flight at several speeds, turns) to see what the remainder follows.")
+        out.append(
+            "A law is left in the remainder that no effect of the library fits: the names are "
+            "tentative. Fly one thing "
+            "at a time (hover, climbs, level flight at several speeds, turns) to see what the "
+            "remainder follows."
+        )
     if drowned:
-        out.append("These flights could not show: " + ", ".join(drowned) + ". To look for one of them, fly: "
-                   + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4]))
+        out.append(
+            "These flights could not show: "
+            + ", ".join(drowned)
+            + ". To look for one of them, fly: "
+            + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4])
+        )
     return out
 
 

@@ -1,7 +1,7 @@
 """What a diagnosis finds, as plain data: ``diagnosis.py`` fills it, ``report.py`` writes it down.
 
-Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in the world frame, torque
-about the centre of mass in the body frame.
+Everything that was compared was low-passed at ``Diagnosis.cutoff_hz`` with zero phase. Force is in
+the world frame, torque about the centre of mass in the body frame.
 """
 
 import math
@@ -29,7 +29,9 @@ class NamedEffect:
     units: Mapping[str, str]
     tentative: bool  # something has the name that may be another's: see ``Diagnosis.structure``
     indistinguishable_from: tuple[str, ...]  # effects that would explain these logs as well
-    evidence: Mapping[str, float]  # e.g. share of the residual on held-out blocks that it alone explains
+    evidence: Mapping[
+        str, float
+    ]  # e.g. share of the residual on held-out blocks that it alone explains
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,9 @@ class Candidate:
     """An effect that was tried first, alone, against the bare model."""
 
     name: str
-    gain: float  # share of the residual's whitened energy on blocks left out in turn that it explains; may be negative
+    # share of the residual's whitened energy on blocks left out in turn that it explains; may be
+    # negative
+    gain: float
     named: bool
 
 
@@ -86,7 +90,9 @@ class Structure:
 
 @dataclass(frozen=True)
 class Gusts:
-    """What a model leaves of one channel, taken for gusts: an Ornstein-Uhlenbeck process, by maximum likelihood."""
+    """What a model leaves of one channel, taken for gusts: an Ornstein-Uhlenbeck process, by
+    maximum likelihood.
+    """
 
     channel: str  # one of CHANNELS
     rms: float  # N, or Nm
@@ -94,7 +100,9 @@ class Gusts:
 
     def below(self, frequency: float) -> float:
         """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
-        return self.rms * math.sqrt(2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time))
+        return self.rms * math.sqrt(
+            2.0 / math.pi * math.atan(2.0 * math.pi * frequency * self.time)
+        )
 
 
 @dataclass(frozen=True)
@@ -120,13 +128,19 @@ class Diagnosis:
     floor_force_rms: float  # N, what sensors alone leave
     floor_torque_rms: float  # Nm
     advice: tuple[str, ...]  # what to fly to separate what these logs cannot
-    notes: tuple[str, ...]  # doubts about the logs, thrust models of readers, corrections that were made
+    notes: tuple[
+        str, ...
+    ]  # doubts about the logs, thrust models of readers, corrections that were made
     candidates: tuple[Candidate, ...]  # best first
     traces: tuple[Trace, ...]
     signatures: tuple[Signature, ...]
     structure: tuple[Structure, ...]  # strongest first
     gusts: tuple[Gusts, ...]  # of each channel; none where turn rates are worked out from commands
-    pushes: tuple[Push, ...]  # one a channel at most, the plainest first; none where turn rates are worked out from commands
+    pushes: tuple[
+        Push, ...
+        # one a channel at most, the plainest first; none where turn rates are worked out from
+        # commands
+    ]
     cutoff_hz: float
     declared: Vehicle
     amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment

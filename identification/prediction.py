@@ -1,8 +1,10 @@
-"""How well a vehicle's model, with the effects that it declares, predicts a logged flight: in metres and as NIS.
+"""How well a vehicle's model, with the effects that it declares, predicts a logged flight: in
+metres and as NIS.
 
-Both figures run the very model of plant and filter. ``rollout_error`` is what a planner would see: the model is let go from
-the flight's own state and compared with the flight a second later. ``nis_without_wrench_state`` is what a filter would see
-that has nothing but the model to explain the motion with.
+Both figures run the very model of plant and filter. ``rollout_error`` is what a planner would see:
+the model is let go from the flight's own state and compared with the flight a second later.
+``nis_without_wrench_state`` is what a filter would see that has nothing but the model to explain
+the motion with.
 """
 
 import math
@@ -31,9 +33,13 @@ Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
 
 _ROTOR_STEP = 0.005  # s, longest over which rotors are held
-_MOTION_STEPS = 4  # of the motion in one of those: one alone, at its zero-order hold, adds 5 mm in a second
+_MOTION_STEPS = (
+    4  # of the motion in one of those: one alone, at its zero-order hold, adds 5 mm in a second
+)
 _POSITION_HZ = 10.0
-_BLEND_HZ = 1.0  # with the true model, predictions of 46 flights out of 46 came nearer than with 1.5
+_BLEND_HZ = (
+    1.0  # with the true model, predictions of 46 flights out of 46 came nearer than with 1.5
+)
 _SETTLE = 0.5  # s at an end of unbroken pose, where a low-pass has but one side to go by
 _MOST = 2000  # starts in a piece, spread over it: each keeps a model of 25 kB
 _AHEAD = 0.1  # s, the same for the position that a prediction is compared with
@@ -48,19 +54,22 @@ _MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8
 def rollout_error(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float = 1.0, every: float = 0.25
 ) -> float:
-    """Return the RMS distance (m) between flight and model after ``horizon`` s of open-loop prediction.
+    """Return the RMS distance (m) between flight and model after ``horizon`` s of open-loop
+    prediction.
 
-    Every ``every`` s the model starts from the flight's position, velocity, attitude and body rate, and from then on is
-    given the logged turn rates and voltage alone; a turn rate holds over the interval that ends at its sample. Rotors and
-    effects start with the memory that the flight before gave them. Declared sensing effects are taken out of the log.
+    Every ``every`` s the model starts from the flight's position, velocity, attitude and body rate,
+    and from then on is given the logged turn rates and voltage alone; a turn rate holds over the
+    interval that ends at its sample. Rotors and effects start with the memory that the flight
+    before gave them. Declared sensing effects are taken out of the log.
 
-    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of body rate is 16 mm. See
-    ``start_states``.
+    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of body
+    rate is 16 mm. See ``start_states``.
 
     Args:
         log: the flight.
         vehicle: whose model predicts, with its declared effects.
-        segments: times (s) from and to; a prediction counts if it lies in one of them from its start to its end.
+        segments: times (s) from and to; a prediction counts if it lies in one of them from its
+            start to its end.
         horizon: s.
         every: s.
 
@@ -75,14 +84,25 @@ def rollout_error(
         pieces = log_signals(log)
     except InputError:
         return math.nan
-    squares = [_squared_errors(piece, vehicle, segments, horizon, every, float(log.t[0])) for piece in pieces]
+    squares = [
+        _squared_errors(piece, vehicle, segments, horizon, every, float(log.t[0]))
+        for piece in pieces
+    ]
     squared = np.concatenate(squares)
     return math.sqrt(float(np.mean(squared))) if squared.size else math.nan
 
 
-def _squared_errors(signals: Signals, vehicle: Vehicle, segments: Segments, horizon: float, every: float,
-                    take_off: float) -> Array:
-    """Return the squared distances (starts,) in m2 over one unbroken piece of a log that began at ``take_off`` s."""
+def _squared_errors(
+    signals: Signals,
+    vehicle: Vehicle,
+    segments: Segments,
+    horizon: float,
+    every: float,
+    take_off: float,
+) -> Array:
+    """Return the squared distances (starts,) in m2 over one unbroken piece of a log that began at
+    ``take_off`` s.
+    """
     period = signals.period
     ahead = max(1, round(horizon / period))
     starts = _start_samples(signals, segments, horizon, every)
@@ -99,9 +119,20 @@ def _squared_errors(signals: Signals, vehicle: Vehicle, segments: Segments, hori
     models[0]["time"] = signals.t[0] - take_off
     modelled = np.zeros((len(signals.t), 6))
     # another memory layout would be another type, and compiled anew
-    speeds, voltage, position, rotation, velocity, rate = map(np.ascontiguousarray, (
-        signals.rotor_speeds, voltage, signals.position, signals.rotation, signals.velocity, signals.rate))
-    _fly_along(models, starts, dt, held, speeds, voltage, position, rotation, velocity, rate, modelled)
+    speeds, voltage, position, rotation, velocity, rate = map(
+        np.ascontiguousarray,
+        (
+            signals.rotor_speeds,
+            voltage,
+            signals.position,
+            signals.rotation,
+            signals.velocity,
+            signals.rate,
+        ),
+    )
+    _fly_along(
+        models, starts, dt, held, speeds, voltage, position, rotation, velocity, rate, modelled
+    )
     states = start_states(signals, modelled)
     ends = states[starts]
     _roll_out(models, starts, dt, held, ahead, speeds, voltage, ends)
@@ -109,60 +140,94 @@ def _squared_errors(signals: Signals, vehicle: Vehicle, segments: Segments, hori
     return squares
 
 
-def _start_samples(signals: Signals, segments: Segments, horizon: float, every: float) -> NDArray[np.intp]:
-    """Return the samples at which predictions start that lie in a segment and well inside this piece."""
+def _start_samples(
+    signals: Signals, segments: Segments, horizon: float, every: float
+) -> NDArray[np.intp]:
+    """Return the samples at which predictions start that lie in a segment and well inside this
+    piece.
+    """
     first, last = signals.t[0] + _SETTLE, signals.t[-1] - max(horizon + _AHEAD, _SETTLE)
-    times = np.concatenate([np.empty(0), *(np.arange(t0, t1 - horizon + 1e-9, every) for t0, t1 in segments)])
+    times = np.concatenate(
+        [np.empty(0), *(np.arange(t0, t1 - horizon + 1e-9, every) for t0, t1 in segments)]
+    )
     times = times[(times >= first) & (times <= last)]
     return np.unique(np.round((times - signals.t[0]) / signals.period).astype(np.intp))
 
 
 def start_states(signals: Signals, modelled: Array) -> Array:
-    """Return the flight's state (n, STATE_SIZE) in the filter's layout, without the wrench and without a filter's delay.
+    """Return the flight's state (n, STATE_SIZE) in the filter's layout, without the wrench and
+    without a filter's delay.
 
-    Velocity, attitude and body rate are the pose's below 1 Hz and the model's above, where the pose is mostly noise:
-    what the two differ by goes through a zero-phase low-pass. A quadrotor steers above 1 Hz, but what its model lacks
-    acts mostly below. At 5 mrad of noise in a pose at 200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the
-    pose alone, cut at 5 Hz, it is 1.1 mrad, 19 mrad/s and the flight's own quick motion lost.
+    Velocity, attitude and body rate are the pose's below 1 Hz and the model's above, where the pose
+    is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor steers
+    above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at 200 Hz
+    that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the pose alone, cut at 5 Hz, it is 1.1
+    mrad, 19 mrad/s and the flight's own quick motion lost.
 
     Args:
         signals: n samples.
-        modelled: (n, 6) the model's acceleration (m/s2, world) and angular acceleration (rad/s2, body) over the interval
-            that ends at each sample.
+        modelled: (n, 6) the model's acceleration (m/s2, world) and angular acceleration (rad/s2,
+            body) over the interval that ends at each sample.
     """
     period = signals.period
     integral = period * np.cumsum(modelled, axis=0)
     measured = np.column_stack([signals.velocity, signals.rate])
     twist = integral + low_pass(measured - integral, _BLEND_HZ, period)
-    # the attitude that this rate integrates to drifts slowly off the measured one: low-pass the difference
+    # the attitude that this rate integrates to drifts slowly off the measured one: low-pass the
+    # difference
     attitude = Rotation.from_matrix(signals.rotation)
     turned = np.empty((len(signals.t), 4))
     turned[0] = attitude[0].as_quat(scalar_first=True)
     _integrate_rate(np.ascontiguousarray(twist[:, 3:]), period, turned)
     path = Rotation.from_quat(turned, scalar_first=True)
     drift = (attitude * path.inv()).as_quat(scalar_first=True)
-    # a quaternion and its negative are one attitude: make the sequence continuous before it is smoothed
+    # a quaternion and its negative are one attitude: make the sequence continuous before it is
+    # smoothed
     signs = np.where(np.sum(drift[1:] * drift[:-1], axis=1) < 0.0, -1.0, 1.0)
     drift = low_pass(drift * np.cumprod(np.concatenate([[1.0], signs]))[:, None], _BLEND_HZ, period)
     states = np.zeros((len(signals.t), STATE_SIZE))
     states[:, 0:3] = low_pass(signals.position, _POSITION_HZ, period)
-    states[:, 3:7] = (Rotation.from_quat(drift, scalar_first=True) * path).as_quat(scalar_first=True)
+    states[:, 3:7] = (Rotation.from_quat(drift, scalar_first=True) * path).as_quat(
+        scalar_first=True
+    )
     states[:, 7:13] = twist
     return states
 
 
 @compiled
 def _integrate_rate(rate: Array, period: float, out: Array) -> None:
-    """Write the attitude (n, 4) that turns at a body rate (n, 3) into ``out``, from its first row on."""
+    """Write the attitude (n, 4) that turns at a body rate (n, 3) into ``out``, from its first row
+    on.
+    """
     for k in range(1, len(rate)):
         a, b = rate[k - 1], rate[k]
-        turn_body(out[k - 1], 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]), period, out[k])
+        turn_body(
+            out[k - 1],
+            0.5 * (a[0] + b[0]),
+            0.5 * (a[1] + b[1]),
+            0.5 * (a[2] + b[2]),
+            period,
+            out[k],
+        )
 
 
 @compiled
-def _fly_along(models: Record, starts: np.ndarray, dt: float, held: int, speeds: Array, voltage: Array, position: Array,
-               rotation: Array, velocity: Array, rate: Array, modelled: Array) -> None:
-    """Run the first model along a flight: accelerations (n, 6), and the model as it was at each start in the others."""
+def _fly_along(
+    models: Record,
+    starts: np.ndarray,
+    dt: float,
+    held: int,
+    speeds: Array,
+    voltage: Array,
+    position: Array,
+    rotation: Array,
+    velocity: Array,
+    rate: Array,
+    modelled: Array,
+) -> None:
+    """Run the first model along a flight: accelerations (n, 6), and the model as it was at each
+    start in the others.
+    """
     f = models[0]
     nothing = np.zeros(3)
     at = 0
@@ -172,8 +237,16 @@ def _fly_along(models: Record, starts: np.ndarray, dt: float, held: int, speeds:
             for _ in range(held):
                 drive(f, speeds[k], dt, voltage[k])
                 apply_effects(f, position[j], rotation[j], velocity[j], rate[j])
-                accelerations(f.body, rotation[j], rate[j], f.rotor_wrench, nothing, nothing, f.effect_wrench,
-                              f.acceleration)
+                accelerations(
+                    f.body,
+                    rotation[j],
+                    rate[j],
+                    f.rotor_wrench,
+                    nothing,
+                    nothing,
+                    f.effect_wrench,
+                    f.acceleration,
+                )
                 f.time += dt
                 for i in range(6):
                     modelled[k, i] += f.acceleration[i] / held
@@ -183,9 +256,19 @@ def _fly_along(models: Record, starts: np.ndarray, dt: float, held: int, speeds:
 
 
 @compiled
-def _roll_out(models: Record, starts: np.ndarray, dt: float, held: int, ahead: int, speeds: Array, voltage: Array,
-              states: Array) -> None:
-    """Carry each state (starts, STATE_SIZE) ``ahead`` samples on, in place, by a model of its own behind the first."""
+def _roll_out(
+    models: Record,
+    starts: np.ndarray,
+    dt: float,
+    held: int,
+    ahead: int,
+    speeds: Array,
+    voltage: Array,
+    states: Array,
+) -> None:
+    """Carry each state (starts, STATE_SIZE) ``ahead`` samples on, in place, by a model of its own
+    behind the first.
+    """
     after = np.zeros(states.shape[1])
     fine = dt / _MOTION_STEPS
     for n in range(len(starts)):
@@ -200,11 +283,13 @@ def _roll_out(models: Record, starts: np.ndarray, dt: float, held: int, ahead: i
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
-    """Return the mean NIS over the segments of a wrench filter whose external wrench is held at zero.
+    """Return the mean NIS over the segments of a wrench filter whose external wrench is held at
+    zero.
 
-    The filter runs over the whole log as in ``estimate_log``, with ``UKFTuning.for_vehicle``, and undoes declared sensing
-    effects by itself. As the wrench cannot move, what the model lacks stays in the innovations. The mean is 6 for a
-    model whose errors are as large as the tuning says, and lower for a better one.
+    The filter runs over the whole log as in ``estimate_log``, with ``UKFTuning.for_vehicle``, and
+    undoes declared sensing effects by itself. As the wrench cannot move, what the model lacks stays
+    in the innovations. The mean is 6 for a model whose errors are as large as the tuning says, and
+    lower for a better one.
 
     Args:
         log: the flight.
@@ -225,31 +310,53 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
         return math.nan
     period = log.period
     tuning = UKFTuning.for_vehicle(vehicle, period)
-    tuning = replace(tuning, force_walk=_OFF * np.asarray(tuning.force_walk),
-                     torque_walk=_OFF * np.asarray(tuning.torque_walk))
+    tuning = replace(
+        tuning,
+        force_walk=_OFF * np.asarray(tuning.force_walk),
+        torque_walk=_OFF * np.asarray(tuning.torque_walk),
+    )
     covariance = default_covariance(vehicle, tuning)
     covariance[12:18, 12:18] *= _OFF**2
     ukf = WrenchUKF(vehicle, tuning, period=period)
     voltage = np.full(len(log.t), vehicle.voltage_ref) if log.voltage is None else log.voltage
     # another memory layout would be another type, and compiled anew
-    t, speeds, voltage, position, quaternion = map(np.ascontiguousarray, (
-        log.t, log.rotor_speeds, voltage, log.position, log.quaternion))
+    t, speeds, voltage, position, quaternion = map(
+        np.ascontiguousarray, (log.t, log.rotor_speeds, voltage, log.position, log.quaternion)
+    )
     valid = np.ascontiguousarray(log.valid)
     nis = np.full(len(t), np.nan)
     for rows in np.split(seen, np.flatnonzero(np.diff(log.t[seen]) > _LOST) + 1):
         piece = slice(int(rows[0]), int(rows[-1]) + 1)
         ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
         ukf.record[0]["time"] = t[rows[0]] - t[0]
-        _filter(ukf.record, t[piece], speeds[piece], voltage[piece], position[piece], quaternion[piece], valid[piece],
-                period, nis[piece])
+        _filter(
+            ukf.record,
+            t[piece],
+            speeds[piece],
+            voltage[piece],
+            position[piece],
+            quaternion[piece],
+            valid[piece],
+            period,
+            nis[piece],
+        )
         inside[rows[0]] = False  # the filter's start has nothing to compare with
     values = nis[inside & log.valid]
     return float(np.mean(values)) if values.size else math.nan
 
 
 @compiled
-def _filter(record: Record, t: Array, speeds: Array, voltage: Array, position: Array, quaternion: Array,
-            seen: np.ndarray, period: float, nis: Array) -> None:
+def _filter(
+    record: Record,
+    t: Array,
+    speeds: Array,
+    voltage: Array,
+    position: Array,
+    quaternion: Array,
+    seen: np.ndarray,
+    period: float,
+    nis: Array,
+) -> None:
     """Run a filter from its first row on and write the NIS (n,) of the rows that have a pose."""
     f = record[0]
     z = np.zeros(11)

@@ -39,27 +39,36 @@ class WrenchSeries:
     notes: tuple[str, ...] = ()
 
 
-def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None,
-                 report: Callable[[float], None] = lambda share: None) -> WrenchSeries:
+def estimate_log(
+    log: FlightLog,
+    vehicle: Vehicle,
+    tuning: UKFTuning | None = None,
+    report: Callable[[float], None] = lambda share: None,
+) -> WrenchSeries:
     """Estimate the external force and torque at every row of a log.
 
-    The filter starts at the first pose. Each row's prediction uses the mean of its turn rates and those of the row
-    before, in steps of at most one median period; a row without a pose is prediction alone. After 2 s without a
-    pose the estimate is held, and the filter starts anew at the next pose. Rows before the first pose hold the
-    filter's estimate at that pose: no wrench, and its standard deviation.
+    The filter starts at the first pose. Each row's prediction uses the mean of its turn rates and
+    those of the row before, in steps of at most one median period; a row without a pose is
+    prediction alone. After 2 s without a pose the estimate is held, and the filter starts anew at
+    the next pose. Rows before the first pose hold the filter's estimate at that pose: no wrench,
+    and its standard deviation.
 
     Args:
         log: the flight.
-        vehicle: the declared vehicle; the wrench is what it and its declared effects do not explain.
+        vehicle: the declared vehicle; the wrench is what it and its declared effects do not
+            explain.
         tuning: default ``UKFTuning.for_vehicle(vehicle, log.period)``.
         report: called now and then with the share that is done.
 
     Raises:
-        InputError: the log has no pose at all, or its turn rates make the filter's numbers overflow.
+        InputError: the log has no pose at all, or its turn rates make the filter's numbers
+            overflow.
     """
     seen = np.flatnonzero(log.valid)
     if not seen.size:
-        raise InputError(f"{log.source or log.name}: no row has a pose; expected at least one to start from")
+        raise InputError(
+            f"{log.source or log.name}: no row has a pose; expected at least one to start from"
+        )
     period = log.period
     ukf = WrenchUKF(vehicle, tuning, period=period)
     count = len(log.t)
@@ -70,7 +79,9 @@ def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = No
     first = int(seen[0])
     ukf.reset(log.position[first], log.quaternion[first])
     last_pose = float(log.t[first])
-    with np.errstate(over="ignore", invalid="ignore"):  # an estimate that overflows is refused below
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # an estimate that overflows is refused below
         for k in range(first, count):
             t = float(log.t[k])
             if k % _REPORTED == 0:
@@ -82,7 +93,10 @@ def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = No
                         nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
                 elif log.valid[k]:
                     ukf.reset(log.position[k], log.quaternion[k])
-                    notes.append(f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter starts anew there")
+                    notes.append(
+                        f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter starts anew "
+                        f"there"
+                    )
             if log.valid[k]:
                 last_pose = t
             estimate = ukf.estimate
@@ -91,8 +105,11 @@ def estimate_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = No
     state[:first], deviation[:first] = state[first], deviation[first]
     if not (np.isfinite(state).all() and np.isfinite(deviation).all()):
         bad = int(np.flatnonzero(~np.isfinite(np.column_stack([state, deviation])).all(axis=1))[0])
-        raise InputError(f"{log.source or log.name}: the estimate overflows at t = {log.t[bad]:.6g} s; expected turn "
-                         f"rates and poses that {vehicle.name} can fly")
+        raise InputError(
+            f"{log.source or log.name}: the estimate overflows at t = {log.t[bad]:.6g} s; expected "
+            f"turn "
+            f"rates and poses that {vehicle.name} can fly"
+        )
     return WrenchSeries(
         t=log.t,
         force=state[:, 16:19],
@@ -120,13 +137,17 @@ def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
 
 
 def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
-    """Write ``wrench.csv`` (t, force, torque, their standard deviations, nis) into a folder and return its path.
+    """Write ``wrench.csv`` (t, force, torque, their standard deviations, nis) into a folder and
+    return its path.
 
     Raises:
         InputError: the file cannot be written.
     """
     columns = {"t": series.t}
-    for prefix, force, torque in (("", series.force, series.torque), ("std_", series.std_force, series.std_torque)):
+    for prefix, force, torque in (
+        ("", series.force, series.torque),
+        ("std_", series.std_force, series.std_torque),
+    ):
         columns |= {f"{prefix}f{axis}": force[:, i] for i, axis in enumerate("xyz")}
         columns |= {f"{prefix}t{axis}": torque[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
@@ -136,8 +157,12 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
 
 
 def truth_rmse(series: WrenchSeries, log: FlightLog) -> tuple[Array, Array] | None:
-    """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None without one."""
+    """Return the RMSE (3,) of force in N and (3,) of torque in Nm against the log's truth, or None
+    without one.
+    """
     if log.force is None or log.torque is None:
         return None
-    return (np.sqrt(np.mean(np.square(series.force - log.force), axis=0)),
-            np.sqrt(np.mean(np.square(series.torque - log.torque), axis=0)))
+    return (
+        np.sqrt(np.mean(np.square(series.force - log.force), axis=0)),
+        np.sqrt(np.mean(np.square(series.torque - log.torque), axis=0)),
+    )

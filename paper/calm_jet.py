@@ -1,4 +1,6 @@
-"""The wrench of the fan's mean jet on a level vehicle at rest: what maps and bounds are held against."""
+"""The wrench of the fan's mean jet on a level vehicle at rest: what maps and bounds are held
+against.
+"""
 
 import math
 
@@ -18,7 +20,8 @@ def calm_jet(fan: Fan, vehicle: Vehicle, x: Array, y: Array) -> Array:
 
     Args:
         fan: at the origin of x and y.
-        vehicle: level, at rest, at the height of the fan's axis and facing the fan (yaw of half a turn).
+        vehicle: level, at rest, at the height of the fan's axis and facing the fan (yaw of half a
+            turn).
         x: distances (n,) m along the jet.
         y: offsets (n,) m from its axis.
     """
@@ -33,7 +36,9 @@ def calm_jet(fan: Fan, vehicle: Vehicle, x: Array, y: Array) -> Array:
 
 
 def strongest_torque(fan: Fan, vehicle: Vehicle, distance: float) -> tuple[float, float]:
-    """Return the largest yaw torque (Nm) of the mean jet at a distance (m), and the offset (m) where it acts."""
+    """Return the largest yaw torque (Nm) of the mean jet at a distance (m), and the offset (m)
+    where it acts.
+    """
     y = np.linspace(0.0, 1.5, 301)
     torque = calm_jet(fan, vehicle, np.full_like(y, distance), y)[:, 5]
     best = int(np.argmax(torque))

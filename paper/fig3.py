@@ -1,8 +1,9 @@
 """Fig. 3, calibration: hover, 53 g under the centre, 53 g under the front pair of rotors.
 
-Each flight's estimates of vertical force and pitch torque must gather about the known wrench of the mass. A Gaussian
-mixture that is not told which flight an estimate comes from must find the three wrenches. The same flights, with one
-source of noise left out or alone, say what the spread is made of.
+Each flight's estimates of vertical force and pitch torque must gather about the known wrench of the
+mass. A Gaussian mixture that is not told which flight an estimate comes from must find the three
+wrenches. The same flights, with one source of noise left out or alone, say what the spread is made
+of.
 """
 
 import importlib
@@ -29,10 +30,14 @@ SEEDS = 2
 
 Array = NDArray[np.float64]
 LOADS: dict[str, SuspendedLoad | None] = {
-    "hover": None, "53 g under the centre": CENTRE_LOAD, "53 g under the front rotors": ROTOR_LOAD}
+    "hover": None,
+    "53 g under the centre": CENTRE_LOAD,
+    "53 g under the front rotors": ROTOR_LOAD,
+}
 TARGETS = np.array([[0.0, 0.0], [FORCE, 0.0], [FORCE, TORQUE]])  # (N, Nm)
-# s that count of a flight: actuator noise shifts a flight's mean torque by 1.4 mNm (standard deviation) in 30 s and by 0.9 mNm
-# in 90 s, so that one seed stays within the 3 mNm of the requirement
+# s that count of a flight: actuator noise shifts a flight's mean torque by 1.4 mNm (standard
+# deviation) in 30 s and by 0.9 mNm in 90 s, so that one seed stays within the 3 mNm of the
+# requirement
 _COUNTED = 90.0
 _HANG, _SETTLED = 1.0, 12.0  # s; the position integral takes 10 s to trim out the mass
 # What the requirement allows of a cluster: mean off its target, and standard deviation, (N, Nm)
@@ -65,7 +70,9 @@ class Cluster:
 
 
 def run(seeds: int, progress: Progress, seconds: float = _COUNTED) -> Result:
-    """Fly the three flights with every source of noise and with some; ``seconds`` s of each count, once it has settled."""
+    """Fly the three flights with every source of noise and with some; ``seconds`` s of each count,
+    once it has settled.
+    """
     vehicle = load_vehicle("ardrone2")
     estimates: dict[str, Array] = {}
     offset = np.zeros((len(TARGETS), 2))
@@ -85,14 +92,23 @@ def run(seeds: int, progress: Progress, seconds: float = _COUNTED) -> Result:
         "torque_pitch_Nm": main[..., 1].ravel(),
     }
     figures = _figures(clusters, spread, offset)
-    return Result(figures, data, _draw(main, clusters, spread), _compare(clusters), _remarks(clusters, spread, offset))
+    return Result(
+        figures,
+        data,
+        _draw(main, clusters, spread),
+        _compare(clusters),
+        _remarks(clusters, spread, offset),
+    )
 
 
-def fly_loads(vehicle: Vehicle, present: tuple[bool, bool, bool], seeds: int, seconds: float) -> tuple[Array, Array]:
+def fly_loads(
+    vehicle: Vehicle, present: tuple[bool, bool, bool], seeds: int, seconds: float
+) -> tuple[Array, Array]:
     """Fly the three loads with the sources of noise that are ``present``.
 
     Returns:
-        The estimates (3 loads, seeds, n, 2) in N and Nm, and what the actuator noise really added to the wrench in the
+        The estimates (3 loads, seeds, n, 2) in N and Nm, and what the actuator noise really added
+            to the wrench in the
         mean (3 loads, 2).
     """
     sensor, bits, actuator = present
@@ -102,15 +118,21 @@ def fly_loads(vehicle: Vehicle, present: tuple[bool, bool, bool], seeds: int, se
     estimates, added = [], []
     # every load and every seed its own noise, the same with and without a source
     for i, load in enumerate(LOADS.values()):
-        flights = [hover(flier, load, end, _HANG, 1000 * i + seed, settings=settings) for seed in range(seeds)]
+        flights = [
+            hover(flier, load, end, _HANG, 1000 * i + seed, settings=settings)
+            for seed in range(seeds)
+        ]
         counted = flights[0].between(_SETTLED, end)
-        estimates.append([np.stack([f.force[:, 2], f.torque[:, 1]], axis=1)[counted] for f in flights])
+        estimates.append(
+            [np.stack([f.force[:, 2], f.torque[:, 1]], axis=1)[counted] for f in flights]
+        )
         added.append(np.mean([f.actuator[counted][:, [2, 4]] for f in flights], axis=(0, 1)))
     return np.array(estimates), np.array(added)
 
 
 def fit_clusters(estimates: Array) -> list[Cluster]:
-    """Fit a Gaussian mixture to estimates (3 loads, seeds, n, 2); return its components in the order of the targets.
+    """Fit a Gaussian mixture to estimates (3 loads, seeds, n, 2); return its components in the
+    order of the targets.
 
     Raises:
         InputError: scikit-learn is not installed.
@@ -118,16 +140,24 @@ def fit_clusters(estimates: Array) -> list[Cluster]:
     try:
         mixture: Any = importlib.import_module("sklearn.mixture")
     except ImportError as error:
-        raise InputError("fig3 fits a Gaussian mixture with scikit-learn, which is not installed: "
-                         "pip install 'windwrench[paper]'") from error
+        raise InputError(
+            "fig3 fits a Gaussian mixture with scikit-learn, which is not installed: "
+            "pip install 'windwrench[paper]'"
+        ) from error
     # in units of the allowed spread: newtons and newton metres are not alike
     scaled = estimates.reshape(-1, 2) / _STD_BOUND
     model = mixture.GaussianMixture(len(TARGETS), n_init=5, random_state=0).fit(scaled)
-    means, covariances = model.means_ * _STD_BOUND, model.covariances_ * np.outer(_STD_BOUND, _STD_BOUND)
+    means, covariances = (
+        model.means_ * _STD_BOUND,
+        model.covariances_ * np.outer(_STD_BOUND, _STD_BOUND),
+    )
     distance = np.linalg.norm((TARGETS[:, None] - means[None]) / _STD_BOUND, axis=2)
     _, match = linear_sum_assignment(distance)
     taken = model.predict(scaled).reshape(len(TARGETS), -1)
-    return [Cluster(means[j], covariances[j], float(np.mean(taken[i] == j))) for i, j in enumerate(match)]
+    return [
+        Cluster(means[j], covariances[j], float(np.mean(taken[i] == j)))
+        for i, j in enumerate(match)
+    ]
 
 
 def _spread(estimates: Array) -> Array:
@@ -140,46 +170,80 @@ def _figures(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
     rows = []
     for name, target, cluster, real in zip(LOADS, TARGETS, clusters, added, strict=True):
         error = np.abs(cluster.mean - target)
-        rows.append({
-            "load": name, "target_N": float(target[0]), "target_Nm": float(target[1]),
-            "mean_N": float(cluster.mean[0]), "mean_Nm": float(cluster.mean[1]),
-            "std_N": float(cluster.std[0]), "std_Nm": float(cluster.std[1]),
-            "actuator_mean_N": float(real[0]), "actuator_mean_Nm": float(real[1]),
-            "own_estimates": cluster.own,
-            "mean_within_one_std": bool(np.all(error < cluster.std)),
-            "mean_within_bounds": bool(np.all(error < _MEAN_BOUND)),
-            "std_within_bounds": bool(np.all(cluster.std < _STD_BOUND)),
-        })
-    limits = [{"source": name, "std_N": float(std[0]), "std_Nm": float(std[1])} for name, std in spread.items()]
+        rows.append(
+            {
+                "load": name,
+                "target_N": float(target[0]),
+                "target_Nm": float(target[1]),
+                "mean_N": float(cluster.mean[0]),
+                "mean_Nm": float(cluster.mean[1]),
+                "std_N": float(cluster.std[0]),
+                "std_Nm": float(cluster.std[1]),
+                "actuator_mean_N": float(real[0]),
+                "actuator_mean_Nm": float(real[1]),
+                "own_estimates": cluster.own,
+                "mean_within_one_std": bool(np.all(error < cluster.std)),
+                "mean_within_bounds": bool(np.all(error < _MEAN_BOUND)),
+                "std_within_bounds": bool(np.all(cluster.std < _STD_BOUND)),
+            }
+        )
+    limits = [
+        {"source": name, "std_N": float(std[0]), "std_Nm": float(std[1])}
+        for name, std in spread.items()
+    ]
     return {"clusters": rows, "limits": limits}
 
 
 def _compare(clusters: Sequence[Cluster]) -> list[Comparison]:
     rows = []
     for name, target, cluster in zip(LOADS, TARGETS, clusters, strict=True):
-        rows.append(Comparison(f"{name}: force z (N), pitch torque (Nm)", f"{target[0]:.2f}, {target[1]:.3f}",
-                               f"{cluster.mean[0]:+.3f}, {cluster.mean[1]:+.4f}"))
+        rows.append(
+            Comparison(
+                f"{name}: force z (N), pitch torque (Nm)",
+                f"{target[0]:.2f}, {target[1]:.3f}",
+                f"{cluster.mean[0]:+.3f}, {cluster.mean[1]:+.4f}",
+            )
+        )
     worst = np.max([cluster.std for cluster in clusters], axis=0)
-    rows.append(Comparison("largest standard deviation (N, Nm)", "0.05, 0.02 allowed", f"{worst[0]:.3f}, {worst[1]:.4f}"))
+    rows.append(
+        Comparison(
+            "largest standard deviation (N, Nm)",
+            "0.05, 0.02 allowed",
+            f"{worst[0]:.3f}, {worst[1]:.4f}",
+        )
+    )
     return rows
 
 
 def _remarks(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array) -> list[str]:
     off = np.array([cluster.mean for cluster in clusters]) - TARGETS
     plain, rest = np.abs(off).max(axis=0), np.abs(off - added).max(axis=0)
-    alone = {name: spread[f"{name} alone"] for name in ("sensor noise", "8-bit turn rates", "actuator noise")}
-    told = "; ".join(f"{name} alone {std[0] * 1e3:.1f} mN and {std[1] * 1e3:.2f} mNm" for name, std in alone.items())
+    alone = {
+        name: spread[f"{name} alone"]
+        for name in ("sensor noise", "8-bit turn rates", "actuator noise")
+    }
+    told = "; ".join(
+        f"{name} alone {std[0] * 1e3:.1f} mN and {std[1] * 1e3:.2f} mNm"
+        for name, std in alone.items()
+    )
     most = [max(alone, key=lambda name, axis=axis: float(alone[name][axis])) for axis in (0, 1)]  # type: ignore[misc]
     calm = spread["without actuator noise"]
     return [
-        f"What limits the spread: {told}. The largest part is {most[0]} for the force and {most[1]} for the torque. "
-        "Actuator noise is a real wrench that nobody modelled (0.03 N, 0.01 Nm, 0.3 s): the filter is right to follow "
-        f"it, so that part measures the vehicle rather than the filter. Without it {calm[0] * 1e3:.1f} mN and "
-        f"{calm[1] * 1e3:.2f} mNm are left. It does not average out over the flights either: the means are off their targets "
-        f"by up to {plain[0] * 1e3:.1f} mN and {plain[1] * 1e3:.2f} mNm, but off the mass plus the mean of the actuator noise "
+        f"What limits the spread: {told}. The largest part is {most[0]} for the force and "
+        f"{most[1]} for the torque. "
+        "Actuator noise is a real wrench that nobody modelled (0.03 N, 0.01 Nm, 0.3 s): the filter "
+        "is right to follow "
+        f"it, so that part measures the vehicle rather than the filter. Without it "
+        f"{calm[0] * 1e3:.1f} mN and "
+        f"{calm[1] * 1e3:.2f} mNm are left. It does not average out over the flights either: the "
+        f"means are off their targets "
+        f"by up to {plain[0] * 1e3:.1f} mN and {plain[1] * 1e3:.2f} mNm, but off the mass plus the "
+        f"mean of the actuator noise "
         f"that really acted by up to {rest[0] * 1e3:.1f} mN and {rest[1] * 1e3:.2f} mNm.",
-        "The pair of rotors is a choice: here the mass hangs under rotors 1 and 4 (front), 0.129 m ahead of the centre, the "
-        "arm that the targets imply. The torque is the one about the vehicle's level left axis, nose down positive.",
+        "The pair of rotors is a choice: here the mass hangs under rotors 1 and 4 (front), 0.129 m "
+        "ahead of the centre, the "
+        "arm that the targets imply. The torque is the one about the vehicle's level left axis, "
+        "nose down positive.",
     ]
 
 
@@ -188,13 +252,21 @@ def _draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array
     plane, force, torque = figure.subplots(1, 3, width_ratios=[2.1, 1, 1])
     _draw_plane(plane, estimates, clusters)
     names = list(spread)
-    for axis, (axes, label, scale, unit) in enumerate(((force, "force z", 1e3, "mN"), (torque, "pitch torque", 1e3, "mNm"))):
+    for axis, (axes, label, scale, unit) in enumerate(
+        ((force, "force z", 1e3, "mN"), (torque, "pitch torque", 1e3, "mNm"))
+    ):
         values = [spread[name][axis] * scale for name in names]
         colours = ["#222222"] + [_COLOURS[1]] * 3 + ["#b8c9d9"] * 3
         axes.barh(range(len(names)), values, 0.62, color=colours)
         for y, value in enumerate(values):
-            axes.annotate(f"{value:.{1 + axis}f} {unit}", (value, y), (3, 0), textcoords="offset points", va="center",
-                          fontsize=9)
+            axes.annotate(
+                f"{value:.{1 + axis}f} {unit}",
+                (value, y),
+                (3, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=9,
+            )
         axes.set_yticks(range(len(names)), names if axis == 0 else [""] * len(names))
         axes.invert_yaxis()
         axes.margins(x=0.4)
@@ -205,21 +277,59 @@ def _draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array
 
 
 def _draw_plane(axes: Any, estimates: Array, clusters: Sequence[Cluster]) -> None:
-    """Draw estimates, the mixture's ellipses and the targets in the plane of force (N) and torque (mNm)."""
+    """Draw estimates, the mixture's ellipses and the targets in the plane of force (N) and torque
+    (mNm).
+    """
     thin = max(1, estimates[0].size // 2 // 1000)
     for i, (load, colour, cluster) in enumerate(zip(LOADS, _COLOURS, clusters, strict=True)):
         some, (x, y) = estimates[i].reshape(-1, 2)[::thin], TARGETS[i]
-        axes.scatter(some[:, 0], some[:, 1] * 1e3, s=6, color=colour, alpha=0.35, lw=0,
-                     label="estimates" if i == 0 else None)
+        axes.scatter(
+            some[:, 0],
+            some[:, 1] * 1e3,
+            s=6,
+            color=colour,
+            alpha=0.35,
+            lw=0,
+            label="estimates" if i == 0 else None,
+        )
         _ellipses(axes, cluster, colour)
-        axes.plot(x, y * 1e3, "+", color="black", ms=17, mew=1.8, ls="none", zorder=6, label="target" if i == 0 else None)
-        axes.plot(cluster.mean[0], cluster.mean[1] * 1e3, "o", color="white", mec="black", ms=5, ls="none", zorder=7,
-                  label="mixture: mean, 1 and 2 standard deviations" if i == 0 else None)
-        text = (f"{cluster.mean[0]:+.3f} ± {cluster.std[0]:.3f} N\n"
-                f"{cluster.mean[1] * 1e3:+.1f} ± {cluster.std[1] * 1e3:.1f} mNm")
+        axes.plot(
+            x,
+            y * 1e3,
+            "+",
+            color="black",
+            ms=17,
+            mew=1.8,
+            ls="none",
+            zorder=6,
+            label="target" if i == 0 else None,
+        )
+        axes.plot(
+            cluster.mean[0],
+            cluster.mean[1] * 1e3,
+            "o",
+            color="white",
+            mec="black",
+            ms=5,
+            ls="none",
+            zorder=7,
+            label="mixture: mean, 1 and 2 standard deviations" if i == 0 else None,
+        )
+        text = (
+            f"{cluster.mean[0]:+.3f} ± {cluster.std[0]:.3f} N\n"
+            f"{cluster.mean[1] * 1e3:+.1f} ± {cluster.std[1] * 1e3:.1f} mNm"
+        )
         # above its cloud
-        axes.annotate(load, (x, (y + 4.2 * cluster.std[1]) * 1e3), (0, 26), textcoords="offset points", ha="center",
-                      fontsize=10, color=colour, weight="bold")
+        axes.annotate(
+            load,
+            (x, (y + 4.2 * cluster.std[1]) * 1e3),
+            (0, 26),
+            textcoords="offset points",
+            ha="center",
+            fontsize=10,
+            color=colour,
+            weight="bold",
+        )
         axes.annotate(text, (x, (y + 4.2 * cluster.std[1]) * 1e3), ha="center", fontsize=9)
     axes.margins(x=0.16)
     low, top = axes.get_ylim()[0], (TARGETS[2, 1] + 4.2 * clusters[2].std[1]) * 1e3
@@ -238,5 +348,15 @@ def _ellipses(axes: Any, cluster: Cluster, colour: str) -> None:
     moments, directions = np.linalg.eigh(scale @ cluster.covariance @ scale)
     angle = np.degrees(np.arctan2(directions[1, 1], directions[0, 1]))
     for sigmas in (1, 2):
-        axes.add_patch(Ellipse((cluster.mean[0], cluster.mean[1] * 1e3), 2 * sigmas * np.sqrt(moments[1]),
-                               2 * sigmas * np.sqrt(moments[0]), angle=angle, fill=False, ec=colour, lw=1.6, zorder=5))
+        axes.add_patch(
+            Ellipse(
+                (cluster.mean[0], cluster.mean[1] * 1e3),
+                2 * sigmas * np.sqrt(moments[1]),
+                2 * sigmas * np.sqrt(moments[0]),
+                angle=angle,
+                fill=False,
+                ec=colour,
+                lw=1.6,
+                zorder=5,
+            )
+        )

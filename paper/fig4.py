@@ -1,11 +1,13 @@
-"""Fig. 4, step response: 53 g is hung on under the front rotors at 7 s, and the estimates of force and torque rise.
+"""Fig. 4, step response: 53 g is hung on under the front rotors at 7 s, and the estimates of force
+and torque rise.
 
-The filter's tuning trades rise time against noise; the sweep gives the curve from which a user chooses. Every flight is
-paired with one that sees the same noise but has no mass hung on: the difference of the two is the response to the mass
-alone, and the second tells the noise.
+The filter's tuning trades rise time against noise; the sweep gives the curve from which a user
+chooses. Every flight is paired with one that sees the same noise but has no mass hung on: the
+difference of the two is the response to the mass alone, and the second tells the noise.
 
-The thread really pulls sideways when the vehicle tips and slides. The lateral estimate itself is held against the bound;
-what it has beyond that true pull, as the filter would show it, is the lateral force that the filter makes up.
+The thread really pulls sideways when the vehicle tips and slides. The lateral estimate itself is
+held against the bound; what it has beyond that true pull, as the filter would show it, is the
+lateral force that the filter makes up.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +38,9 @@ _RISE, _RISE_BOUND, _LATERAL_BOUND = 1.0, 0.2, 0.1  # s, s, N
 
 
 def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Result:
-    """Fly the step at every tuning of ``sweep`` (s), at both noise levels, with and without actuator noise."""
+    """Fly the step at every tuning of ``sweep`` (s), at both noise levels, with and without
+    actuator noise.
+    """
     vehicle = load_vehicle("ardrone2")
     steps = []
     for noise in NOISES:
@@ -48,47 +52,86 @@ def run(seeds: int, progress: Progress, sweep: Sequence[float] = SWEEP) -> Resul
     shown = [step for step in steps if step.actuator and step.tuned in _SHOWN]
     held = [row for row in rows if row["actuator_noise"]]
     figures = {
-        "rise_within_bounds": all(abs(row[name] - _RISE) <= _RISE_BOUND for row in held if row["tuned_rise_s"] == _RISE
-                                  for name in ("force_rise_s", "torque_rise_s")),
+        "rise_within_bounds": all(
+            abs(row[name] - _RISE) <= _RISE_BOUND
+            for row in held
+            if row["tuned_rise_s"] == _RISE
+            for name in ("force_rise_s", "torque_rise_s")
+        ),
         "lateral_within_bounds": all(row["lateral_N"] <= _LATERAL_BOUND for row in rows),
         "sweep": rows,
     }
     columns = [_columns(step) for step in shown]
     data = {name: np.concatenate([some[name] for some in columns]) for name in columns[0]}
-    return Result(figures, data, draw(steps, _SHOWN, _LATERAL_BOUND), _compare(rows), _remarks(rows))
+    return Result(
+        figures, data, draw(steps, _SHOWN, _LATERAL_BOUND), _compare(rows), _remarks(rows)
+    )
 
 
 def _columns(step: Step) -> dict[str, NDArray[np.generic]]:
     same = np.ones(len(step.time))
     return {
-        "noise_m": step.noise[0] * same, "noise_rad": step.noise[1] * same, "tuned_rise_s": step.tuned * same, "t_s": step.time,
-        "force_z_N": step.force, "torque_pitch_Nm": step.torque, "force_lateral_N": step.lateral,
-        "true_force_z_N": step.pull[:, 0], "true_torque_pitch_Nm": step.pull[:, 1], "true_force_lateral_N": step.pull[:, 2],
+        "noise_m": step.noise[0] * same,
+        "noise_rad": step.noise[1] * same,
+        "tuned_rise_s": step.tuned * same,
+        "t_s": step.time,
+        "force_z_N": step.force,
+        "torque_pitch_Nm": step.torque,
+        "force_lateral_N": step.lateral,
+        "true_force_z_N": step.pull[:, 0],
+        "true_torque_pitch_Nm": step.pull[:, 1],
+        "true_force_lateral_N": step.pull[:, 2],
     }
 
 
-def fly_step(vehicle: Vehicle, noise: tuple[float, float], actuator: bool, tuned: float, seeds: int) -> Step:
+def fly_step(
+    vehicle: Vehicle, noise: tuple[float, float], actuator: bool, tuned: float, seeds: int
+) -> Step:
     """Fly the step and its pair without the mass with each seed."""
     settings = PlantSettings() if actuator else CALM
     flier = with_noise(vehicle, *noise)
-    hung, bare = ([hover(flier, load, _END, HANG, seed, tuned, settings, _EVERY) for seed in range(seeds)]
-                  for load in (ROTOR_LOAD, None))
+    hung, bare = (
+        [hover(flier, load, _END, HANG, seed, tuned, settings, _EVERY) for seed in range(seeds)]
+        for load in (ROTOR_LOAD, None)
+    )
     time = hung[0].time
     force, torque = np.array([f.force for f in hung]), np.array([f.torque for f in hung])
     bare_force, bare_torque = np.array([f.force for f in bare]), np.array([f.torque for f in bare])
     pull: Array = np.array([f.pull for f in hung]).mean(axis=0)
     settled, transient = time >= 3.0, (time >= HANG) & (time < HANG + _TRANSIENT)
-    rise, rise_error = zip(*(_with_error(lambda mean: rise_time(time, mean), response) for response in (
-        force[..., 2] - bare_force[..., 2], torque[..., 1] - bare_torque[..., 1])), strict=True)
+    rise, rise_error = zip(
+        *(
+            _with_error(lambda mean: rise_time(time, mean), response)
+            for response in (
+                force[..., 2] - bare_force[..., 2],
+                torque[..., 1] - bare_torque[..., 1],
+            )
+        ),
+        strict=True,
+    )
     response = force[..., :2] - bare_force[..., :2]
     peak, peak_error = _with_error(lambda mean: float(_size(mean)[transient].max()), response)
-    made_up = response.mean(axis=0) - as_shown(time, (force - bare_force)[..., 2].mean(axis=0), pull[:, :2])
+    made_up = response.mean(axis=0) - as_shown(
+        time, (force - bare_force)[..., 2].mean(axis=0), pull[:, :2]
+    )
     return Step(
-        noise, actuator, tuned, time, force[..., 2].mean(axis=0), torque[..., 1].mean(axis=0), _size(response.mean(axis=0)),
-        np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1), (rise[0], rise[1]), (rise_error[0], rise_error[1]),
-        peak, peak_error, float(_size(force.mean(axis=0))[transient].max()), float(_size(made_up)[transient].max()),
+        noise,
+        actuator,
+        tuned,
+        time,
+        force[..., 2].mean(axis=0),
+        torque[..., 1].mean(axis=0),
+        _size(response.mean(axis=0)),
+        np.stack([pull[:, 2], pull[:, 4], _size(pull)], axis=1),
+        (rise[0], rise[1]),
+        (rise_error[0], rise_error[1]),
+        peak,
+        peak_error,
+        float(_size(force.mean(axis=0))[transient].max()),
+        float(_size(made_up)[transient].max()),
         (float(bare_force[:, settled, 2].std()), float(bare_torque[:, settled, 1].std())),
-        float(_size(force)[:, transient].max()), float(_size(bare_force)[:, transient].max()),
+        float(_size(force)[:, transient].max()),
+        float(_size(bare_force)[:, transient].max()),
     )
 
 
@@ -99,7 +142,9 @@ def _size(vectors: Array) -> Array:
 
 
 def rise_time(time: Array, response: Array) -> float:
-    """Return the time (s) from 10 to 90 % of a step response (n,), which ends at its mean over the last 5 s."""
+    """Return the time (s) from 10 to 90 % of a step response (n,), which ends at its mean over the
+    last 5 s.
+    """
     share = response / response[time >= time[-1] - 5.0].mean()
     last = int(np.argmax(share >= 0.9))
     # noise may cross 10 % more than once: the last time before 90 %
@@ -108,25 +153,31 @@ def rise_time(time: Array, response: Array) -> float:
 
 
 def as_shown(time: Array, response: Array, pull: Array) -> Array:
-    """Return what a filter shows of a true pull (n, m) N, from its response (n,) N along z to the mass hung on at ``HANG``.
+    """Return what a filter shows of a true pull (n, m) N, from its response (n,) N along z to the
+    mass hung on at ``HANG``.
 
-    To the filter the axes are alike as far as it knows its attitude: a pull is smoothed by the slope of the step response.
+    To the filter the axes are alike as far as it knows its attitude: a pull is smoothed by the
+    slope of the step response.
     """
     after = time >= HANG
     slope = np.diff(response[after] / response[time >= time[-1] - 5.0].mean(), prepend=0.0)
     shown = np.zeros_like(pull)
     for axis in range(pull.shape[1]):
-        shown[after, axis] = np.convolve(pull[after, axis], slope)[:len(slope)]
+        shown[after, axis] = np.convolve(pull[after, axis], slope)[: len(slope)]
     return shown
 
 
 def _cross(time: Array, share: Array, i: int, level: float) -> float:
     """Return when the straight line between samples i - 1 and i reaches a level."""
-    return float(time[i - 1] + (level - share[i - 1]) / (share[i] - share[i - 1]) * (time[i] - time[i - 1]))
+    return float(
+        time[i - 1] + (level - share[i - 1]) / (share[i] - share[i - 1]) * (time[i] - time[i - 1])
+    )
 
 
 def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[float, float]:
-    """Return a number of the mean of responses (seeds, n, ...), and its standard error by the jackknife."""
+    """Return a number of the mean of responses (seeds, n, ...), and its standard error by the
+    jackknife.
+    """
     value, count = number(responses.mean(axis=0)), len(responses)
     if count == 1:
         return value, float("nan")
@@ -135,17 +186,28 @@ def _with_error(number: Callable[[Array], float], responses: Array) -> tuple[flo
 
 
 def _row(step: Step) -> dict[str, Any]:
-    errors = [None if np.isnan(error) else error for error in (*step.rise_error, step.peak_error)]  # JSON has no NaN
+    errors = [
+        None if np.isnan(error) else error for error in (*step.rise_error, step.peak_error)
+    ]  # JSON has no NaN
     after = step.time >= HANG
     return {
-        "position_noise_m": step.noise[0], "attitude_noise_rad": step.noise[1], "actuator_noise": step.actuator,
-        "tuned_rise_s": step.tuned, "force_rise_s": step.rise[0], "force_rise_error_s": errors[0],
-        "torque_rise_s": step.rise[1], "torque_rise_error_s": errors[1],
-        "force_std_N": step.std[0], "torque_std_Nm": step.std[1],
-        "lateral_N": step.peak, "lateral_error_N": errors[2],
-        "unpaired_lateral_N": step.unpaired_peak, "made_up_lateral_N": step.made_up,
+        "position_noise_m": step.noise[0],
+        "attitude_noise_rad": step.noise[1],
+        "actuator_noise": step.actuator,
+        "tuned_rise_s": step.tuned,
+        "force_rise_s": step.rise[0],
+        "force_rise_error_s": errors[0],
+        "torque_rise_s": step.rise[1],
+        "torque_rise_error_s": errors[1],
+        "force_std_N": step.std[0],
+        "torque_std_Nm": step.std[1],
+        "lateral_N": step.peak,
+        "lateral_error_N": errors[2],
+        "unpaired_lateral_N": step.unpaired_peak,
+        "made_up_lateral_N": step.made_up,
         "true_lateral_N": float(step.pull[after, 2].max()),
-        "worst_flight_lateral_N": step.worst_lateral, "worst_flight_lateral_without_mass_N": step.calm_lateral,
+        "worst_flight_lateral_N": step.worst_lateral,
+        "worst_flight_lateral_without_mass_N": step.calm_lateral,
     }
 
 
@@ -158,52 +220,104 @@ def _compare(rows: Sequence[dict[str, Any]]) -> list[Comparison]:
     held = [row for row in rows if row["actuator_noise"] and row["tuned_rise_s"] in _SHOWN]
     for row in held:
         if row["tuned_rise_s"] == _RISE:
-            lines.append(Comparison(f"rise time of force, torque (s) at {_name(row)}", "about 1, 1",
-                                    f"{row['force_rise_s']:.2f}, {row['torque_rise_s']:.2f}"))
-            lines.append(Comparison(f"standard deviation (N, Nm) at {_name(row)}", "-",
-                                    f"{row['force_std_N']:.3f}, {row['torque_std_Nm']:.4f}"))
+            lines.append(
+                Comparison(
+                    f"rise time of force, torque (s) at {_name(row)}",
+                    "about 1, 1",
+                    f"{row['force_rise_s']:.2f}, {row['torque_rise_s']:.2f}",
+                )
+            )
+            lines.append(
+                Comparison(
+                    f"standard deviation (N, Nm) at {_name(row)}",
+                    "-",
+                    f"{row['force_std_N']:.3f}, {row['torque_std_Nm']:.4f}",
+                )
+            )
     if rows:
         worst = max(rows, key=lambda row: float(row["lateral_N"]))
         tuned = [float(row["tuned_rise_s"]) for row in rows]
-        lines.append(Comparison(f"largest lateral-force transient (N), tuned to {min(tuned):g} to {max(tuned):g} s", "-",
-                                f"{worst['lateral_N']:.3f} ({worst['tuned_rise_s']:g} s, {_name(worst)})"))
-        lines.append(Comparison("of it beyond the thread's true sideways pull, largest (N)", "-",
-                                f"{max(row['made_up_lateral_N'] for row in rows):.3f}"))
+        lines.append(
+            Comparison(
+                f"largest lateral-force transient (N), tuned to {min(tuned):g} to {max(tuned):g} s",
+                "-",
+                f"{worst['lateral_N']:.3f} ({worst['tuned_rise_s']:g} s, {_name(worst)})",
+            )
+        )
+        lines.append(
+            Comparison(
+                "of it beyond the thread's true sideways pull, largest (N)",
+                "-",
+                f"{max(row['made_up_lateral_N'] for row in rows):.3f}",
+            )
+        )
     return lines
 
 
 def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
-    worst, lateral = (max(rows, key=lambda row, name=name: float(row[name]))  # type: ignore[misc]
-                      for name in ("worst_flight_lateral_N", "lateral_N"))
-    over = [row for row in rows if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND]
-    listed = "; ".join(f"{row['lateral_N']:.3f} (standard error {row['lateral_error_N'] or 0.0:.3f}) N tuned to "
-                       f"{row['tuned_rise_s']:g} s at {_name(row)} "
-                       f"{'with' if row['actuator_noise'] else 'without'} actuator noise" for row in over)
+    worst, lateral = (
+        max(rows, key=lambda row, name=name: float(row[name]))  # type: ignore[misc]
+        for name in ("worst_flight_lateral_N", "lateral_N")
+    )
+    over = [
+        row
+        for row in rows
+        if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND
+    ]
+    listed = "; ".join(
+        f"{row['lateral_N']:.3f} (standard error {row['lateral_error_N'] or 0.0:.3f}) N tuned to "
+        f"{row['tuned_rise_s']:g} s at {_name(row)} "
+        f"{'with' if row['actuator_noise'] else 'without'} actuator noise"
+        for row in over
+    )
     remarks = [
-        f"How the mass is hung on: at 7 s, all at once, at rest on a taut thread of {THREAD:g} m below the front rotors' axis. "
-        "The lateral force is the size of the level part of the estimate, with the flight of the same noise without the mass "
-        f"subtracted, in the mean of the flights; its transient is its largest value in the {_TRANSIENT:g} s after. Without "
-        f"that subtraction it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, noise and all.",
-        "Part of it is real: the mass tips the vehicle until the flight loop has trimmed it out, the vehicle slides from over "
-        f"the mass, and the thread pulls sideways by up to {max(row['true_lateral_N'] for row in rows):.2f} N in the mean of "
-        "the flights; the filter is right to show that, smoothed by its rise time. Beyond the true pull, smoothed by the "
+        f"How the mass is hung on: at 7 s, all at once, at rest on a taut thread of {THREAD:g} m "
+        f"below the front rotors' axis. "
+        "The lateral force is the size of the level part of the estimate, with the flight of the "
+        "same noise without the mass "
+        f"subtracted, in the mean of the flights; its transient is its largest value in the "
+        f"{_TRANSIENT:g} s after. Without "
+        f"that subtraction it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, "
+        f"noise and all.",
+        "Part of it is real: the mass tips the vehicle until the flight loop has trimmed it out, "
+        "the vehicle slides from over "
+        f"the mass, and the thread pulls sideways by up to "
+        f"{max(row['true_lateral_N'] for row in rows):.2f} N in the mean of "
+        "the flights; the filter is right to show that, smoothed by its rise time. Beyond the true "
+        "pull, smoothed by the "
         "step response that the filter showed along z, the lateral estimate never had more than "
-        f"{max(row['made_up_lateral_N'] for row in rows):.3f} N. The flights use stiffer attitude and yaw loops than the "
-        "benchmark's. On a thread of 0.25 m, which swings in 1 s as the position loop does, the pull reached 0.24 N and the "
+        f"{max(row['made_up_lateral_N'] for row in rows):.3f} N. The flights use stiffer attitude "
+        f"and yaw loops than the "
+        "benchmark's. On a thread of 0.25 m, which swings in 1 s as the position loop does, the "
+        "pull reached 0.24 N and the "
         "estimate tuned to 0.5 s at the higher noise about 0.1 N.",
         "Lateral transients not clearly below "
-        f"{_LATERAL_BOUND:g} N (value plus two standard errors, every tuning): {listed or 'none'}. The largest is "
-        f"{lateral['lateral_N']:.3f} (standard error {lateral['lateral_error_N'] or 0.0:.3f}) N. Single flights are noisier: "
-        f"in one the lateral estimate reached {worst['worst_flight_lateral_N']:.2f} N (tuned to {worst['tuned_rise_s']:g} s, "
-        f"{_name(worst)}), where without the mass noise alone makes {worst['worst_flight_lateral_without_mass_N']:.2f} N.",
+        f"{_LATERAL_BOUND:g} N (value plus two standard errors, every tuning): {listed or 'none'}. "
+        f"The largest is "
+        f"{lateral['lateral_N']:.3f} (standard error {lateral['lateral_error_N'] or 0.0:.3f}) N. "
+        f"Single flights are noisier: "
+        f"in one the lateral estimate reached {worst['worst_flight_lateral_N']:.2f} N (tuned to "
+        f"{worst['tuned_rise_s']:g} s, "
+        f"{_name(worst)}), where without the mass noise alone makes "
+        f"{worst['worst_flight_lateral_without_mass_N']:.2f} N.",
     ]
-    pair = {(row["tuned_rise_s"], row["position_noise_m"]): row for row in rows if not row["actuator_noise"]}
+    pair = {
+        (row["tuned_rise_s"], row["position_noise_m"]): row
+        for row in rows
+        if not row["actuator_noise"]
+    }
     clean, noisy = (pair.get((_RISE, noise[0])) for noise in NOISES)
     if clean is not None and noisy is not None:
         remarks.append(
-            "Choosing a tuning: with the unmodelled actuator noise of the standard plant (0.03 N, 0.01 Nm, 0.3 s) the spread "
-            "hardly depends on the motion capture and falls slowly with the rise time, because the filter follows a real "
-            "wrench. With rotors that do as they are told it falls about in inverse proportion to the rise time: "
-            f"{clean['force_std_N'] * 1e3:.1f} mN and {clean['torque_std_Nm'] * 1e3:.2f} mNm at 1 s, and ten times the sensor "
-            f"noise makes {noisy['force_std_N'] * 1e3:.1f} mN and {noisy['torque_std_Nm'] * 1e3:.2f} mNm of it.")
+            "Choosing a tuning: with the unmodelled actuator noise of the standard plant (0.03 N, "
+            "0.01 Nm, 0.3 s) the spread "
+            "hardly depends on the motion capture and falls slowly with the rise time, because the "
+            "filter follows a real "
+            "wrench. With rotors that do as they are told it falls about in inverse proportion to "
+            "the rise time: "
+            f"{clean['force_std_N'] * 1e3:.1f} mN and {clean['torque_std_Nm'] * 1e3:.2f} mNm at 1 "
+            f"s, and ten times the sensor "
+            f"noise makes {noisy['force_std_N'] * 1e3:.1f} mN and "
+            f"{noisy['torque_std_Nm'] * 1e3:.2f} mNm of it."
+        )
     return remarks

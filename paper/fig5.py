@@ -1,10 +1,13 @@
-"""Fig. 5: the wrench filter against a nonlinear observer, an EKF and a public filter, at low and at high noise.
+"""Fig. 5: the wrench filter against a nonlinear observer, an EKF and a public filter, at low and at
+high noise.
 
-An external force and torque hit a hovering and a yawing vehicle at 7 s. All estimators take the same recorded samples.
-Three ways of tuning, each the same for filter and observer, so that a ratio compares methods and not tunings:
+An external force and torque hit a hovering and a yawing vehicle at 7 s. All estimators take the
+same recorded samples. Three ways of tuning, each the same for filter and observer, so that a ratio
+compares methods and not tunings:
 
 * ``1 s``: set to a rise time of 1 s, whatever the noise (the observer's low-pass for low noise);
-* ``low``: gains and process noise that an optimiser found at low noise, then given either noise. The paper's comparison;
+* ``low``: gains and process noise that an optimiser found at low noise, then given either noise.
+The paper's comparison;
 * ``anew``: the optimiser's for each noise level.
 """
 
@@ -31,7 +34,10 @@ from .fig5_peer import installed, run_peer
 from .fig5_picture import draw
 from .result import Comparison, Progress, Result
 
-TITLE = "Fig. 5: force and torque at two noise levels, against a nonlinear observer, an EKF and a public filter"
+TITLE = (
+    "Fig. 5: force and torque at two noise levels, against a nonlinear observer, an EKF and "
+    "a public filter"
+)
 SEEDS = 20
 
 PEER = "drone-estimators"
@@ -73,7 +79,10 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120, peer: bool =
     for i, (plant, noise) in enumerate(cases):
         own = [f for flight in FLIGHTS for f in fly(flight, noise, plant, _TUNING_SEEDS)]
         vehicle = vehicle_at(noise)
-        tunings[plant, noise] = tune_ukf(vehicle, own, evaluations), tune_observer(vehicle, own, evaluations)
+        tunings[plant, noise] = (
+            tune_ukf(vehicle, own, evaluations),
+            tune_observer(vehicle, own, evaluations),
+        )
         for flight in FLIGHTS:
             flights[plant, flight, noise] = fly(flight, noise, plant, range(seeds))
         progress(0.5 * (i + 1) / len(cases))
@@ -95,22 +104,40 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120, peer: bool =
             status = f"failed: {error}"
     progress(0.98)
     ratios = _ratios(scores)
-    picture = draw(ratios, [label for label, _, _ in PAIRS], flights["exact", "hover", "low"][0].wrench, examples, seeds)
+    picture = draw(
+        ratios,
+        [label for label, _, _ in PAIRS],
+        flights["exact", "hover", "low"][0].wrench,
+        examples,
+        seeds,
+    )
     return Result(
-        figures=_figures(scores, ratios, tunings, seeds, status), data=_columns(scores), picture=picture,
-        comparison=_comparison(scores, ratios, status), remarks=_remarks(ratios, status, seeds),
-        timing=[Comparison(f"time of a step of {name} from Python, one run (us)", "-", f"{value:.3g}")
-                for name, value in times.items()])
+        figures=_figures(scores, ratios, tunings, seeds, status),
+        data=_columns(scores),
+        picture=picture,
+        comparison=_comparison(scores, ratios, status),
+        remarks=_remarks(ratios, status, seeds),
+        timing=[
+            Comparison(f"time of a step of {name} from Python, one run (us)", "-", f"{value:.3g}")
+            for name, value in times.items()
+        ],
+    )
 
 
-def _runners(plant: str, noise: str, tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]]
-             ) -> dict[str, Runner]:
+def _runners(
+    plant: str, noise: str, tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]]
+) -> dict[str, Runner]:
     """Return all our estimators, by name, for flights of a plant at a noise level."""
     vehicle = vehicle_at(noise)
     base = UKFTuning.for_vehicle(vehicle, TICK)
-    (ukf_low, observer_low), (ukf_anew, observer_anew) = tunings[plant, "low"], tunings[plant, noise]
+    (ukf_low, observer_low), (ukf_anew, observer_anew) = (
+        tunings[plant, "low"],
+        tunings[plant, noise],
+    )
     # a filter is told how noisy its measurements are: that is no tuning
-    ukf_low = replace(ukf_low, position_noise=base.position_noise, attitude_noise=base.attitude_noise)
+    ukf_low = replace(
+        ukf_low, position_noise=base.position_noise, attitude_noise=base.attitude_noise
+    )
     return {
         "UKF 1 s": ukf_runner(vehicle, base),
         "EKF 1 s": ukf_runner(vehicle, base, linearised=True),
@@ -127,7 +154,9 @@ def _rows(states: Sequence[Array], flights: Sequence[Flight]) -> Array:
     return np.array([[row[name] for name in (*ERRORS, "nis")] for row in scored])
 
 
-def _score_peer(flights: Mapping[tuple[str, str, str], Sequence[Flight]], scores: Scores) -> dict[str, float]:
+def _score_peer(
+    flights: Mapping[tuple[str, str, str], Sequence[Flight]], scores: Scores
+) -> dict[str, float]:
     """Add the peer's scores, if it is installed; return the times of a step in us."""
     samples, keys = {}, {}
     for noise in NOISES:
@@ -142,7 +171,9 @@ def _score_peer(flights: Mapping[tuple[str, str, str], Sequence[Flight]], scores
 
 
 def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:
-    """Return the ratio of two mean errors (seeds,) of the same flights, and its 95 % interval by a paired bootstrap."""
+    """Return the ratio of two mean errors (seeds,) of the same flights, and its 95 % interval by a
+    paired bootstrap.
+    """
     pick = np.random.default_rng(0).integers(len(rows), size=(_RESAMPLES, len(rows)))
     low, high = np.quantile(rows[pick].mean(axis=1) / rival[pick].mean(axis=1), [0.025, 0.975])
     return float(rows.mean() / rival.mean()), float(low), float(high)
@@ -167,31 +198,60 @@ def _round(value: float) -> float | None:
     return float(f"{value:.4g}") if np.isfinite(value) else None
 
 
-def _figures(scores: Scores, ratios: Ratios, tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]],
-             seeds: int, status: str) -> dict[str, Any]:
+def _figures(
+    scores: Scores,
+    ratios: Ratios,
+    tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]],
+    seeds: int,
+    status: str,
+) -> dict[str, Any]:
     return {
         "seeds": seeds,
         "drone_estimators": status.split(":")[0],
         "rmse_ratio": [
-            {"plant": plant, "flight": flight, "noise": noise, "pair": label, "error": error, "ratio": _round(value[0]),
-             "ci95": [_round(value[1]), _round(value[2])]}
-            for (plant, flight, noise, label, error), value in ratios.items()],
+            {
+                "plant": plant,
+                "flight": flight,
+                "noise": noise,
+                "pair": label,
+                "error": error,
+                "ratio": _round(value[0]),
+                "ci95": [_round(value[1]), _round(value[2])],
+            }
+            for (plant, flight, noise, label, error), value in ratios.items()
+        ],
         "rmse": [
-            {"plant": plant, "flight": flight, "noise": noise, "estimator": name,
-             **{error: _round(v) for error, v in zip((*ERRORS, "nis"), rows.mean(axis=0), strict=True)}}
-            for (plant, flight, noise, name), rows in scores.items()],
+            {
+                "plant": plant,
+                "flight": flight,
+                "noise": noise,
+                "estimator": name,
+                **{
+                    error: _round(v)
+                    for error, v in zip((*ERRORS, "nis"), rows.mean(axis=0), strict=True)
+                },
+            }
+            for (plant, flight, noise, name), rows in scores.items()
+        ],
         "tuning": [
-            {"plant": plant, "noise": noise, "UKF": {k: _round(float(np.asarray(getattr(ukf, k)))) for k in UKF_TUNED},
-             "observer": {k: _round(float(np.asarray(v))) for k, v in asdict(observer).items()}}
-            for (plant, noise), (ukf, observer) in tunings.items()],
+            {
+                "plant": plant,
+                "noise": noise,
+                "UKF": {k: _round(float(np.asarray(getattr(ukf, k)))) for k in UKF_TUNED},
+                "observer": {k: _round(float(np.asarray(v))) for k, v in asdict(observer).items()},
+            }
+            for (plant, noise), (ukf, observer) in tunings.items()
+        ],
     }
 
 
 def _columns(scores: Scores) -> dict[str, Any]:
     keys = [key for key, rows in scores.items() for _ in rows]
     values = np.concatenate(list(scores.values()))
-    columns: dict[str, Any] = {name: np.array([key[i] for key in keys])
-                               for i, name in enumerate(("plant", "flight", "noise", "estimator"))}
+    columns: dict[str, Any] = {
+        name: np.array([key[i] for key in keys])
+        for i, name in enumerate(("plant", "flight", "noise", "estimator"))
+    }
     columns["seed"] = np.concatenate([np.arange(len(rows)) for rows in scores.values()])
     for i, name in enumerate((*ERRORS, "nis")):
         unit = {"f": "_N", "t": "_Nm", "n": ""}[name[0]]
@@ -210,21 +270,39 @@ def _comparison(scores: Scores, ratios: Ratios, status: str) -> list[Comparison]
                 if ("disturbed", flight, noise, one) in scores:
                     some = [ratios["disturbed", flight, noise, label, error] for error in ERRORS]
                     words = [f"{v:.2f} [{a:.2f}, {b:.2f}]" for v, a, b in some]
-                    here = (f"force {words[0]} transient, {words[1]} steady; torque {words[2]} transient, "
-                            f"{words[3]} steady")
+                    here = (
+                        f"force {words[0]} transient, {words[1]} steady; torque {words[2]} "
+                        f"transient, "
+                        f"{words[3]} steady"
+                    )
                 table.append(Comparison(quantity, paper, here))
     for name in ("UKF 1 s", "EKF 1 s", "UKF anew", PEER):
-        values = [f"{plant} plant, {noise} noise {np.mean([scores[plant, f, noise, name][:, 4] for f in FLIGHTS]):.2f}"
-                  for plant in PLANTS for noise in NOISES if (plant, "hover", noise, name) in scores]
-        table.append(Comparison(f"mean NIS of {name} in steady state (a pose has 6 numbers)", "-",
-                                "; ".join(values) or f"not compared ({status})"))
+        values = [
+            f"{plant} plant, {noise} noise "
+            f"{np.mean([scores[plant, f, noise, name][:, 4] for f in FLIGHTS]):.2f}"
+            for plant in PLANTS
+            for noise in NOISES
+            if (plant, "hover", noise, name) in scores
+        ]
+        table.append(
+            Comparison(
+                f"mean NIS of {name} in steady state (a pose has 6 numbers)",
+                "-",
+                "; ".join(values) or f"not compared ({status})",
+            )
+        )
     return table
 
 
-def _span(ratios: Ratios, label: str, noise: str, errors: Sequence[str], plant: str | None = None) -> str:
+def _span(
+    ratios: Ratios, label: str, noise: str, errors: Sequence[str], plant: str | None = None
+) -> str:
     """Return the range of the ratios of a pair over plants and flights."""
-    values = [v[0] for (p, _, n, name, error), v in ratios.items()
-              if name == label and n == noise and error in errors and plant in (None, p)]
+    values = [
+        v[0]
+        for (p, _, n, name, error), v in ratios.items()
+        if name == label and n == noise and error in errors and plant in (None, p)
+    ]
     return f"{min(values):.2f} to {max(values):.2f}" if values else "nothing"
 
 
@@ -233,41 +311,69 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
     low, anew, second, ekf, public, mixed, gain = (label for label, _, _ in PAIRS)
     close = max(v[0] for key, v in ratios.items() if key[3] == anew) < 1.3
     remarks = [
-        f"RMSE ratios below 1 favour the one that is named first. Each is over {seeds} seeds, with a paired bootstrap interval "
-        "of 95 %. Truth is all of the external wrench, unmodelled disturbance included; transient: 7 to 9.5 s, steady: from "
-        "11 s. The standard plant has an unmodelled actuator disturbance (0.03 N, 0.01 Nm, over 0.3 s), the exact one has "
+        f"RMSE ratios below 1 favour the one that is named first. Each is over {seeds} seeds, with "
+        f"a paired bootstrap interval "
+        "of 95 %. Truth is all of the external wrench, unmodelled disturbance included; transient: "
+        "7 to 9.5 s, steady: from "
+        "11 s. The standard plant has an unmodelled actuator disturbance (0.03 N, 0.01 Nm, over "
+        "0.3 s), the exact one has "
         "none; both have motor lag (with the true rate logged) and 8-bit turn rates.",
-        "The paper's comparison, an observer tuned for low noise and then given the high: the steady-state error is "
-        f"{_span(ratios, low, 'high', steady, 'exact')} times that of the filter on the exact plant and "
-        f"{_span(ratios, low, 'high', steady, 'disturbed')} times on the standard one; the filter is only told of the new "
+        "The paper's comparison, an observer tuned for low noise and then given the high: the "
+        "steady-state error is "
+        f"{_span(ratios, low, 'high', steady, 'exact')} times that of the filter on the exact "
+        f"plant and "
+        f"{_span(ratios, low, 'high', steady, 'disturbed')} times on the standard one; the filter "
+        f"is only told of the new "
         "measurement noise.",
-        f"Re-tuned to the noise, the observer {'comes close' if close else 'comes closer'}: at low noise "
-        f"{_span(ratios, anew, 'low', transient)} (transient) and {_span(ratios, anew, 'low', steady)} (steady) times the "
-        f"error of a filter that was tuned in the same way, at high noise {_span(ratios, anew, 'high', transient)} and "
-        f"{_span(ratios, anew, 'high', steady)}. Most of what separates them in the paper's comparison is tuning: the "
-        "filter's advantage is that one number, the measurement noise, carries it from one noise level to the other.",
-        f"A re-tuned observer against the filter as the paper tunes it (1 s): {_span(ratios, mixed, 'low', transient)} "
+        f"Re-tuned to the noise, the observer {'comes close' if close else 'comes closer'}: at low "
+        f"noise "
+        f"{_span(ratios, anew, 'low', transient)} (transient) and "
+        f"{_span(ratios, anew, 'low', steady)} (steady) times the "
+        f"error of a filter that was tuned in the same way, at high noise "
+        f"{_span(ratios, anew, 'high', transient)} and "
+        f"{_span(ratios, anew, 'high', steady)}. Most of what separates them in the paper's "
+        f"comparison is tuning: the "
+        "filter's advantage is that one number, the measurement noise, carries it from one noise "
+        "level to the other.",
+        f"A re-tuned observer against the filter as the paper tunes it (1 s): "
+        f"{_span(ratios, mixed, 'low', transient)} "
         f"(transient) and {_span(ratios, mixed, 'low', steady)} (steady) at low noise, "
-        f"{_span(ratios, mixed, 'high', transient)} and {_span(ratios, mixed, 'high', steady)} at high noise; the "
-        f"re-tuned filter against the same: {_span(ratios, gain, 'low', transient)}, {_span(ratios, gain, 'low', steady)}, "
+        f"{_span(ratios, mixed, 'high', transient)} and {_span(ratios, mixed, 'high', steady)} at "
+        f"high noise; the "
+        f"re-tuned filter against the same: {_span(ratios, gain, 'low', transient)}, "
+        f"{_span(ratios, gain, 'low', steady)}, "
         f"{_span(ratios, gain, 'high', transient)} and {_span(ratios, gain, 'high', steady)}. "
-        "Both re-tuned ones rise faster and pay for it in steady state where nothing but the noise moves. Both set to 1 s, "
-        f"the observer errs {_span(ratios, second, 'low', steady)} times as much in steady state at low noise and "
+        "Both re-tuned ones rise faster and pay for it in steady state where nothing but the noise "
+        "moves. Both set to 1 s, "
+        f"the observer errs {_span(ratios, second, 'low', steady)} times as much in steady state "
+        f"at low noise and "
         f"{_span(ratios, second, 'high', steady)} times at high noise.",
-        f"An EKF on the same model is as good: {_span(ratios, ekf, 'low', (*transient, *steady))} at low and "
-        f"{_span(ratios, ekf, 'high', (*transient, *steady))} at high noise. The unscented transform gains nothing here.",
-        "The optimiser (Nelder and Mead over logarithms) had flights of its own for each plant and noise level and minimised "
-        "the sum of all four errors, force as a share of 0.52 N and torque of 0.067 Nm. It knows size and time scale of what "
-        "is to come: both re-tuned estimators are better than one can tune without that. The flights were steered by the "
+        f"An EKF on the same model is as good: {_span(ratios, ekf, 'low', (*transient, *steady))} "
+        f"at low and "
+        f"{_span(ratios, ekf, 'high', (*transient, *steady))} at high noise. The unscented "
+        f"transform gains nothing here.",
+        "The optimiser (Nelder and Mead over logarithms) had flights of its own for each plant and "
+        "noise level and minimised "
+        "the sum of all four errors, force as a share of 0.52 N and torque of 0.067 Nm. It knows "
+        "size and time scale of what "
+        "is to come: both re-tuned estimators are better than one can tune without that. The "
+        "flights were steered by the "
         "1 s filter, the same samples for all.",
     ]
     if status == "installed":
         remarks.append(
-            "drone-estimators 0.1 (force and torque states, quaternion as a plain vector, Euler steps) with this vehicle's "
-            f"model and the same noises comes to {_span(ratios, public, 'low', (*transient, *steady))} at low and "
-            f"{_span(ratios, public, 'high', (*transient, *steady))} at high noise: as accurate. It was helped twice: the "
-            "measured quaternion's sign is chosen to fit its estimate (its innovation is a plain difference), and crazyflow's "
-            "model, which stumbles over one command for many sigma points, is given one for each.")
+            "drone-estimators 0.1 (force and torque states, quaternion as a plain vector, Euler "
+            "steps) with this vehicle's "
+            f"model and the same noises comes to "
+            f"{_span(ratios, public, 'low', (*transient, *steady))} at low and "
+            f"{_span(ratios, public, 'high', (*transient, *steady))} at high noise: as accurate. "
+            f"It was helped twice: the "
+            "measured quaternion's sign is chosen to fit its estimate (its innovation is a plain "
+            "difference), and crazyflow's "
+            "model, which stumbles over one command for many sigma points, is given one for each."
+        )
     else:
-        remarks.append(f"drone-estimators was not compared: {status}. It comes with the extra ``compare``.")
+        remarks.append(
+            f"drone-estimators was not compared: {status}. It comes with the extra ``compare``."
+        )
     return remarks

@@ -1,4 +1,6 @@
-"""The estimators of Fig. 5 on recorded flights: run, scored, and tuned anew on flights of their own."""
+"""The estimators of Fig. 5 on recorded flights: run, scored, and tuned anew on flights of their
+own.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -67,7 +69,9 @@ def _run_ekf(record: Record, z: Array, dt: float, voltage: float, out: Array) ->
 
 
 @compiled
-def _run_observer(model: Record, record: Record, z: Array, dt: float, voltage: float, out: Array) -> None:
+def _run_observer(
+    model: Record, record: Record, z: Array, dt: float, voltage: float, out: Array
+) -> None:
     f, o = model[0], record[0]
     for k in range(1, len(z)):
         observer_step(f, o, z[k], check_sample(f, z[k], 3), dt, voltage)
@@ -109,23 +113,30 @@ def score(states: Array, flight: Flight) -> Score:
     """Return the errors of the states (n, 20) against a flight's truth."""
     force = np.sum(np.square(states[:, FORCE_STATE] - flight.wrench[:, :3]), axis=1)
     torque = np.sum(np.square(states[:, TORQUE_STATE] - flight.wrench[:, 3:]), axis=1)
-    a, b, c, d = (float(np.sqrt(np.mean(square[window(limits)]))) for square in (force, torque)
-                  for limits in (TRANSIENT, STEADY))
+    a, b, c, d = (
+        float(np.sqrt(np.mean(square[window(limits)])))
+        for square in (force, torque)
+        for limits in (TRANSIENT, STEADY)
+    )
     return Score(a, b, c, d, float(np.mean(states[window(STEADY), NIS])))
 
 
 def cost(run: Runner, flights: Sequence[Flight]) -> float:
-    """Return the mean over the flights of all four errors, each as a share of the step that was applied."""
+    """Return the mean over the flights of all four errors, each as a share of the step that was
+    applied.
+    """
     total = 0.0
     for flight in flights:
         s = score(run(flight.samples), flight)
-        total += ((s.force_transient + s.force_steady) / _FORCE_SIZE
-                  + (s.torque_transient + s.torque_steady) / _TORQUE_SIZE)
+        total += (s.force_transient + s.force_steady) / _FORCE_SIZE + (
+            s.torque_transient + s.torque_steady
+        ) / _TORQUE_SIZE
     return total / len(flights) if np.isfinite(total) else _WORST
 
 
 def tune_observer(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> ObserverTuning:
-    """Return the gains and cutoffs that err least on ``flights``, by Nelder and Mead on their logarithms.
+    """Return the gains and cutoffs that err least on ``flights``, by Nelder and Mead on their
+    logarithms.
 
     Other starts, a budget of 600 and differential evolution all led to the same tuning.
     """
@@ -133,13 +144,18 @@ def tune_observer(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int)
     def build(p: Array) -> ObserverTuning:
         return ObserverTuning(*(float(v) for v in p))
 
-    # much faster than the default: from there the optimum is a walk along one valley, slower pose against faster gain
-    p = _best(lambda p: observer_runner(vehicle, build(p)), (3.0, 6.0, 10.0, 10.0), flights, evaluations)
+    # much faster than the default: from there the optimum is a walk along one valley, slower pose
+    # against faster gain
+    p = _best(
+        lambda p: observer_runner(vehicle, build(p)), (3.0, 6.0, 10.0, 10.0), flights, evaluations
+    )
     return build(p)
 
 
 def tune_ukf(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> UKFTuning:
-    """Return the process noise that errs least on ``flights``, likewise; what is measured is as noisy as it is."""
+    """Return the process noise that errs least on ``flights``, likewise; what is measured is as
+    noisy as it is.
+    """
     base = UKFTuning.for_vehicle(vehicle, TICK)
     default = [float(np.asarray(getattr(base, name))) for name in UKF_TUNED]
 
@@ -151,8 +167,14 @@ def tune_ukf(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> U
     return build(_best(lambda p: ukf_runner(vehicle, build(p)), start, flights, evaluations))
 
 
-def _best(build: Callable[[Array], Runner], start: Sequence[float], flights: Sequence[Flight], evaluations: int) -> Array:
-    """Return the parameters, all positive, that cost least; none further than a factor of 20 from its start.
+def _best(
+    build: Callable[[Array], Runner],
+    start: Sequence[float],
+    flights: Sequence[Flight],
+    evaluations: int,
+) -> Array:
+    """Return the parameters, all positive, that cost least; none further than a factor of 20 from
+    its start.
 
     The limit matters on the exact plant, where the best white noise of the rotors is zero.
     """
@@ -163,6 +185,10 @@ def _best(build: Callable[[Array], Runner], start: Sequence[float], flights: Seq
 
     simplex = np.vstack([np.zeros_like(centre), np.log(_FACTOR) * np.eye(len(centre))])
     options: Any = {"initial_simplex": simplex, "maxfev": evaluations, "xatol": 0.01, "fatol": 1e-5}
-    result = minimize(lambda offset: cost(build(parameters(offset)), flights), np.zeros(len(centre)),
-                      method="Nelder-Mead", options=options)
+    result = minimize(
+        lambda offset: cost(build(parameters(offset)), flights),
+        np.zeros(len(centre)),
+        method="Nelder-Mead",
+        options=options,
+    )
     return parameters(result.x)

@@ -1,4 +1,6 @@
-"""The flights of Fig. 5: a hovering and a yawing vehicle that an external force and torque hit, at two noise levels."""
+"""The flights of Fig. 5: a hovering and a yawing vehicle that an external force and torque hit, at
+two noise levels.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +37,8 @@ _START_YAW = np.deg2rad(120.0)
 class Flight:
     """What was measured in one flight, and the truth; row k is at k times 5 ms."""
 
-    samples: Array  # (n, 11) turn rates (rad/s) of the interval that ends at the row, position (m), quaternion
+    # (n, 11) turn rates (rad/s) of the interval that ends at the row, position (m), quaternion
+    samples: Array
     wrench: Array  # (n, 6) true external force (N) and torque (Nm) over that interval, world
 
 
@@ -52,7 +55,8 @@ def vehicle_at(noise: str) -> Vehicle:
 def setpoints(flight: str, t: Array) -> Array:
     """Return the set points (n, 11) of a flight at times ``t`` (n,) s.
 
-    The yawing flight starts at 120 degrees, turns at 1.5 to 4.5 rad/s and translates at up to about 1.5 m/s.
+    The yawing flight starts at 120 degrees, turns at 1.5 to 4.5 rad/s and translates at up to about
+    1.5 m/s.
     """
     path = np.tile([0.0, 0.0, 1.5, 0.0], (len(t), 1))
     if flight == "yawing":
@@ -64,7 +68,9 @@ def setpoints(flight: str, t: Array) -> Array:
         path[:, 3] = _START_YAW + TICK * np.cumsum(fade * (3.0 + 1.5 * np.sin(1.1 * t)))
     speed = np.gradient(path, t, axis=0)
     acceleration = np.gradient(speed[:, :3], t, axis=0)
-    return np.concatenate([path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1)
+    return np.concatenate(
+        [path[:, :3], speed[:, :3], acceleration, path[:, 3:], speed[:, 3:]], axis=1
+    )
 
 
 def fly(flight: str, noise: str, plant: str, seeds: Sequence[int]) -> list[Flight]:
@@ -95,7 +101,8 @@ def fly(flight: str, noise: str, plant: str, seeds: Sequence[int]) -> list[Fligh
             samples[k, :4], wrench[k] = loop.sample[:4], loop.external
             loop.run(unit[k : k + 1])
             samples[k, 4:] = loop.sample[4:]
-        # far from the set point is no harm, the step may push it metres away; the floor would be a wrench that nobody counts
+        # far from the set point is no harm, the step may push it metres away; the floor would be a
+        # wrench that nobody counts
         if not loop.healthy() or float(samples[:, 6].min()) < _LOWEST:
             raise InputError(f"fig5: the {flight} flight of seed {seed} at {noise} noise crashed")
         flights.append(Flight(samples, wrench))

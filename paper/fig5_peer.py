@@ -1,19 +1,26 @@
-"""The nearest public filter, ``drone-estimators``, on the flights of Fig. 5, in a process of its own.
+"""The nearest public filter, ``drone-estimators``, on the flights of Fig. 5, in a process of its
+own.
 
-Its unscented filter has 19 states (position, quaternion, velocity, body rate, force, torque); the quaternion is a plain
-vector of four to it: sigma points, mean and correction add and subtract it. Set up here through its functional core, as
-``KalmanFilter`` does it, with
+Its unscented filter has 19 states (position, quaternion, velocity, body rate, force, torque); the
+quaternion is a plain vector of four to it: sigma points, mean and correction add and subtract it.
+Set up here through its functional core, as ``KalmanFilter`` does it, with
 
-* crazyflow's ``first_principles`` model with this vehicle's mass, inertia, rotors and mixing, without drag and rotor inertia,
-  commanded with the logged turn rates (in RPM), so that it predicts with the very same forces as ``WrenchUKF``;
-* Q of the same four noises as ``UKFTuning``, mapped to velocity and position, body rate, torque and force, at the start's
-  attitude where a body axis matters (ours are equal in all axes, and the inertia is taken as it is);
-* R of the same pose noise: a quaternion's component is as noisy as half the angle, in all four directions;
+* crazyflow's ``first_principles`` model with this vehicle's mass, inertia, rotors and mixing,
+without drag and rotor inertia,
+  commanded with the logged turn rates (in RPM), so that it predicts with the very same forces as
+  ``WrenchUKF``;
+* Q of the same four noises as ``UKFTuning``, mapped to velocity and position, body rate, torque and
+force, at the start's
+  attitude where a body axis matters (ours are equal in all axes, and the inertia is taken as it
+  is);
+* R of the same pose noise: a quaternion's component is as noisy as half the angle, in all four
+directions;
 * its own sigma points (alpha = 1, beta = 2, kappa = 0) and its own Euler integration;
-* the sign of each measured quaternion chosen to be near the estimate: its innovation is a plain difference.
+* the sign of each measured quaternion chosen to be near the estimate: its innovation is a plain
+difference.
 
-crazyflow wants ``SCIPY_ARRAY_API`` to be set before scipy is loaded and brings jax: reason enough for another process.
-``python -m windwrench.paper.fig5_peer IN OUT`` is that process.
+crazyflow wants ``SCIPY_ARRAY_API`` to be set before scipy is loaded and brings jax: reason enough
+for another process. ``python -m windwrench.paper.fig5_peer IN OUT`` is that process.
 """
 
 import os
@@ -50,7 +57,14 @@ _ROUNDS = 7
 _TIMED_STEPS = 200
 _TIME_LIMIT = 900.0  # s
 # columns of its state
-_P, _Q, _V, _W, _F, _T = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 19)
+_P, _Q, _V, _W, _F, _T = (
+    slice(0, 3),
+    slice(3, 7),
+    slice(7, 10),
+    slice(10, 13),
+    slice(13, 16),
+    slice(16, 19),
+)
 
 
 def installed() -> bool:
@@ -58,7 +72,9 @@ def installed() -> bool:
     return all(find_spec(name) is not None for name in ("drone_estimators", "crazyflow", "jax"))
 
 
-def run_peer(samples: dict[str, Array], timed: bool = True) -> tuple[dict[str, Array], dict[str, float]]:
+def run_peer(
+    samples: dict[str, Array], timed: bool = True
+) -> tuple[dict[str, Array], dict[str, float]]:
     """Run the peer over flights at each noise level, and time a step of every estimator.
 
     Args:
@@ -66,7 +82,8 @@ def run_peer(samples: dict[str, Array], timed: bool = True) -> tuple[dict[str, A
         timed: whether to take times.
 
     Returns:
-        Noise level -> states (m, n, 20) laid out as ours, empty without ``drone-estimators``; and the time of a step in us
+        Noise level -> states (m, n, 20) laid out as ours, empty without ``drone-estimators``; and
+            the time of a step in us
         by estimator, the median of interleaved rounds (none if not ``timed``).
 
     Raises:
@@ -79,13 +96,22 @@ def run_peer(samples: dict[str, Array], timed: bool = True) -> tuple[dict[str, A
         np.savez(source, **names)  # type: ignore[arg-type]
         one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
         done = subprocess.run(
-            [sys.executable, "-m", __name__, str(source), str(target), *words], capture_output=True, text=True, check=False,
-            timeout=_TIME_LIMIT, env={**os.environ, **one, "SCIPY_ARRAY_API": "1", "JAX_PLATFORMS": "cpu"})
+            [sys.executable, "-m", __name__, str(source), str(target), *words],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=_TIME_LIMIT,
+            env={**os.environ, **one, "SCIPY_ARRAY_API": "1", "JAX_PLATFORMS": "cpu"},
+        )
         if done.returncode != 0:
             raise RuntimeError(done.stderr.strip()[-500:])
         with np.load(target) as out:
-            states = {noise: out[f"states_{noise}"] for noise in samples if f"states_{noise}" in out}
-            return states, {str(n): float(v) for n, v in zip(out["names"], out["times"], strict=True)}
+            states = {
+                noise: out[f"states_{noise}"] for noise in samples if f"states_{noise}" in out
+            }
+            return states, {
+                str(n): float(v) for n, v in zip(out["names"], out["times"], strict=True)
+            }
 
 
 def _model(vehicle: Vehicle) -> Callable[..., Any]:
@@ -94,14 +120,23 @@ def _model(vehicle: Vehicle) -> Callable[..., Any]:
 
     x, y = np.sign(vehicle.positions[:, 0]), np.sign(vehicle.positions[:, 1])
     law = partial(
-        dynamics, mass=vehicle.mass, L=np.array([vehicle.arm_l]), prop_inertia=np.zeros(1),
-        gravity_vec=np.array([0.0, 0.0, -vehicle.gravity]), J=vehicle.inertia, J_inv=np.linalg.inv(vehicle.inertia),
+        dynamics,
+        mass=vehicle.mass,
+        L=np.array([vehicle.arm_l]),
+        prop_inertia=np.zeros(1),
+        gravity_vec=np.array([0.0, 0.0, -vehicle.gravity]),
+        J=vehicle.inertia,
+        J_inv=np.linalg.inv(vehicle.inertia),
         rpm2thrust=np.stack([0 * vehicle.k, 0 * vehicle.k, vehicle.k / _RPM**2], axis=1),
         rpm2torque=np.stack([0 * vehicle.p, 0 * vehicle.p, vehicle.p / _RPM**2], axis=1),
-        mixing_matrix=np.stack([y, -x, -vehicle.spin]), drag_matrix=np.zeros((3, 3)), rotor_dyn_coef=np.zeros((1, 4)))
+        mixing_matrix=np.stack([y, -x, -vehicle.spin]),
+        drag_matrix=np.zeros((3, 3)),
+        rotor_dyn_coef=np.zeros((1, 4)),
+    )
 
     def move(pos: Any, cmd: Any, rotor_vel: None, **others: Any) -> tuple[Any, ...]:
-        # the rotors turn as commanded, at every sigma point: crazyflow 0.4.0 stumbles over one command for all of them
+        # the rotors turn as commanded, at every sigma point: crazyflow 0.4.0 stumbles over one
+        # command for all of them
         cmd = cmd + 0.0 * pos[..., :1]
         return *law(pos=pos, cmd=cmd, rotor_vel=cmd, **others)[:4], None
 
@@ -127,11 +162,15 @@ def _settings(vehicle: Vehicle, tuning: UKFTuning) -> Any:
     measured[:3, :3] = variance(tuning.position_noise)
     measured[3:, 3:] = np.eye(4) * (float(np.mean(np.asarray(tuning.attitude_noise))) / 2.0) ** 2
     points = SigmaPointsSettings.create(n=19, alpha=1.0, beta=2.0, kappa=0.0)
-    return UKFSettings.create(SPsettings=points, Q=noise, R=measured, fx=_model(vehicle), hx=observation_function)
+    return UKFSettings.create(
+        SPsettings=points, Q=noise, R=measured, fx=_model(vehicle), hx=observation_function
+    )
 
 
 def _start(vehicle: Vehicle, tuning: UKFTuning, samples: Array) -> Any:
-    """Return the peer's data at the first of samples (m, n, 11), with the start's covariance as ours has it."""
+    """Return the peer's data at the first of samples (m, n, 11), with the start's covariance as
+    ours has it.
+    """
     from drone_estimators.structs.estimator_data import EstimatorData
 
     data = EstimatorData.create_empty(dist_f=True, dist_t=True, batch_shape=samples.shape[:-2])
@@ -141,15 +180,22 @@ def _start(vehicle: Vehicle, tuning: UKFTuning, samples: Array) -> Any:
     diagonal[_Q] = 4.0 * ours[0]  # a component of the quaternion is twice an MRP
     diagonal[_F], diagonal[_T] = ours[15:18], ours[12:15]
     covariance = np.broadcast_to(np.diag(diagonal), data.covariance.shape)
-    return data.replace(pos=samples[..., 0, 4:7], quat=np.roll(samples[..., 0, 7:11], -1, axis=-1), covariance=covariance,
-                        dt=np.full(samples.shape[:-2], TICK))
+    return data.replace(
+        pos=samples[..., 0, 4:7],
+        quat=np.roll(samples[..., 0, 7:11], -1, axis=-1),
+        covariance=covariance,
+        dt=np.full(samples.shape[:-2], TICK),
+    )
 
 
 def _measured(data: Any, sample: Array) -> Any:
     """Return ``data`` with the turn rates and the pose of a sample (..., 11)."""
     q = np.roll(sample[..., 7:11], -1, axis=-1)
     near = np.sum(q * np.asarray(data.quat), axis=-1, keepdims=True)
-    return data.replace(u=sample[..., :4] * _RPM, z=np.concatenate([sample[..., 4:7], np.where(near < 0, -q, q)], axis=-1))
+    return data.replace(
+        u=sample[..., :4] * _RPM,
+        z=np.concatenate([sample[..., 4:7], np.where(near < 0, -q, q)], axis=-1),
+    )
 
 
 def _run(vehicle: Vehicle, tuning: UKFTuning, samples: Array) -> Array:
@@ -161,18 +207,28 @@ def _run(vehicle: Vehicle, tuning: UKFTuning, samples: Array) -> Array:
     weights = settings.SPsettings
     for k in range(1, samples.shape[1]):
         data = ukf_predict(_measured(data, samples[:, k]), settings)
-        expected, covariance = ukf_unscented_transform(data.sigmas_h, weights.Wm, weights.Wc, settings.R)
+        expected, covariance = ukf_unscented_transform(
+            data.sigmas_h, weights.Wm, weights.Wc, settings.R
+        )
         error = (data.z - expected)[..., None]
         out[:, k, NIS] = np.sum(error * np.linalg.solve(covariance, error), axis=(-2, -1))
         data = ukf_correct(data, settings)
-        for where, value in ((POSITION, data.pos), (QUATERNION, np.roll(data.quat, 1, axis=-1)), (VELOCITY, data.vel),
-                             (RATE, data.ang_vel), (TORQUE, data.dist_t), (FORCE, data.dist_f)):
+        for where, value in (
+            (POSITION, data.pos),
+            (QUATERNION, np.roll(data.quat, 1, axis=-1)),
+            (VELOCITY, data.vel),
+            (RATE, data.ang_vel),
+            (TORQUE, data.dist_t),
+            (FORCE, data.dist_f),
+        ):
             out[:, k, where] = value
     return out
 
 
 def _peer_stepper(vehicle: Vehicle, samples: Array, jit: bool) -> Callable[[], None]:
-    """Return what takes the peer through samples (n, 11) of one flight, as its ``KalmanFilter.step`` does."""
+    """Return what takes the peer through samples (n, 11) of one flight, as its
+    ``KalmanFilter.step`` does.
+    """
     import jax
     from drone_estimators.filterpy import ukf_predict_correct
 
@@ -200,7 +256,9 @@ def _our_stepper(estimator: WrenchUKF | NonlinearObserver, samples: Array) -> Ca
 
 
 def _times(samples: Array, peer: bool) -> dict[str, float]:
-    """Return the time of a step from Python in us, the median of interleaved rounds over samples (n, 11)."""
+    """Return the time of a step from Python in us, the median of interleaved rounds over samples
+    (n, 11).
+    """
     vehicle = vehicle_at("low")
     steppers = {
         "UKF": _our_stepper(WrenchUKF(vehicle, None, TICK), samples),

@@ -1,4 +1,6 @@
-"""The picture of Fig. 5: estimates over time as in the paper, and who errs how much less than whom."""
+"""The picture of Fig. 5: estimates over time as in the paper, and who errs how
+much less than whom.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,13 +15,21 @@ from .fig5_flights import FLIGHTS, NOISES, Array
 
 _COLOURS = {"low": "#7fb0d8", "high": "#17375e"}
 _MARKERS = {"hover": "o", "yawing": "^"}
-_LINES = {"observer low": ("#d1495b", "observer, tuned at low noise"), "observer anew": ("#edae49", "observer, re-tuned"),
-          "UKF low": ("#30638e", "UKF, tuned at low noise")}
+_LINES = {
+    "observer low": ("#d1495b", "observer, tuned at low noise"),
+    "observer anew": ("#edae49", "observer, re-tuned"),
+    "UKF low": ("#30638e", "UKF, tuned at low noise"),
+}
 _PLANT_TITLES = {"exact": "exact plant", "disturbed": "standard plant (unmodelled disturbance)"}
 
 
-def draw(ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]], labels: Sequence[str], truth: Array,
-         examples: Mapping[tuple[str, str], Array], seeds: int) -> Figure:
+def draw(
+    ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]],
+    labels: Sequence[str],
+    truth: Array,
+    examples: Mapping[tuple[str, str], Array],
+    seeds: int,
+) -> Figure:
     """Return the picture.
 
     Args:
@@ -38,13 +48,17 @@ def draw(ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, flo
     return figure
 
 
-def _draw_examples(figure: SubFigure, truth: Array, examples: Mapping[tuple[str, str], Array]) -> None:
+def _draw_examples(
+    figure: SubFigure, truth: Array, examples: Mapping[tuple[str, str], Array]
+) -> None:
     grid = figure.subplots(2, 2, sharex=True, sharey="row")
     rows = slice(round(6.0 / TICK), round(13.0 / TICK))
     t = TICK * np.arange(len(truth))[rows]
     for column, noise in enumerate(NOISES):
-        for axes, true, state, label in ((grid[0, column], 2, 18, r"force $f_z$ (N)"),
-                                         (grid[1, column], 3, 13, r"torque $\tau_x$ (Nm)")):
+        for axes, true, state, label in (
+            (grid[0, column], 2, 18, r"force $f_z$ (N)"),
+            (grid[1, column], 3, 13, r"torque $\tau_x$ (Nm)"),
+        ):
             for name, (colour, text) in _LINES.items():
                 axes.plot(t, examples[noise, name][rows, state], color=colour, lw=1.3, label=text)
             axes.plot(t, truth[rows, true], color="black", lw=1.0, ls="--", label="true")
@@ -52,31 +66,54 @@ def _draw_examples(figure: SubFigure, truth: Array, examples: Mapping[tuple[str,
             if column == 0:
                 axes.set_ylabel(label)
         sizes = f"{1e3 * NOISES[noise].sigma_pos_m:g} mm, {NOISES[noise].sigma_att_rad:g} rad"
-        grid[0, column].set_title(f"{noise} noise ({sizes}): one hovering flight, exact plant", loc="left", fontsize=11)
+        grid[0, column].set_title(
+            f"{noise} noise ({sizes}): one hovering flight, exact plant", loc="left", fontsize=11
+        )
         grid[1, column].set_xlabel("time (s)")
     grid[1, 0].legend(frameon=False, fontsize=9, loc="lower right")
 
 
-def _draw_ratios(figure: SubFigure, plant: str, ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]],
-                 labels: Sequence[str], seeds: int) -> None:
+def _draw_ratios(
+    figure: SubFigure,
+    plant: str,
+    ratios: Mapping[tuple[str, str, str, str, str], tuple[float, float, float]],
+    labels: Sequence[str],
+    seeds: int,
+) -> None:
     shown = [v for (p, *_), value in ratios.items() if p == plant for v in value]
     lowest, highest = min([0.5, *shown]) / 1.1, max([2.0, *shown]) * 1.1
     panels = figure.subplots(1, len(ERRORS), sharey=True)
-    figure.suptitle(f"Ratio of RMSE, {_PLANT_TITLES[plant]}: in the green the first named errs less "
-                    f"(95 % intervals, {seeds} seeds)", fontsize=11, x=0.01, ha="left")
+    figure.suptitle(
+        f"Ratio of RMSE, {_PLANT_TITLES[plant]}: in the green the first named errs less "
+        f"(95 % intervals, {seeds} seeds)",
+        fontsize=11,
+        x=0.01,
+        ha="left",
+    )
     for axes, error in zip(panels, ERRORS, strict=True):
         axes.set_xscale("log")
         axes.set_xlim(lowest, highest)
         axes.axvspan(lowest, 1.0, color="#eef5ea", lw=0)
         axes.axvline(1.0, color="black", lw=0.9)
         for i, label in enumerate(labels):
-            _draw_pair(axes, i, {key[1:3]: value for key, value in ratios.items()
-                                 if key[0] == plant and key[3:] == (label, error)})
+            _draw_pair(
+                axes,
+                i,
+                {
+                    key[1:3]: value
+                    for key, value in ratios.items()
+                    if key[0] == plant and key[3:] == (label, error)
+                },
+            )
         axes.set_ylim(len(labels) - 0.45, -0.55)
-        ticks = [v for v in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if lowest < v < highest]
+        ticks = [
+            v for v in (0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 10, 20) if lowest < v < highest
+        ]
         axes.set_xticks(ticks, [f"{v:g}" for v in ticks], fontsize=8)
         axes.set_xticks([], minor=True)
-        axes.set_title(error.replace("_", ", ") + (" state" if "steady" in error else ""), fontsize=10)
+        axes.set_title(
+            error.replace("_", ", ") + (" state" if "steady" in error else ""), fontsize=10
+        )
         axes.grid(axis="x", color="0.9", lw=0.6)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
@@ -84,11 +121,15 @@ def _draw_ratios(figure: SubFigure, plant: str, ratios: Mapping[tuple[str, str, 
     panels[0].set_yticks(range(len(labels)), labels, fontsize=9)
     for noise in NOISES:
         for flight in FLIGHTS:
-            panels[-1].plot([], [], _MARKERS[flight], color=_COLOURS[noise], label=f"{noise} noise, {flight}")
+            panels[-1].plot(
+                [], [], _MARKERS[flight], color=_COLOURS[noise], label=f"{noise} noise, {flight}"
+            )
     panels[-1].legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _draw_pair(axes: Axes, row: int, values: Mapping[tuple[str, str], tuple[float, float, float]]) -> None:
+def _draw_pair(
+    axes: Axes, row: int, values: Mapping[tuple[str, str], tuple[float, float, float]]
+) -> None:
     """Draw a pair's four ratios, (flight, noise) -> ratio and interval, one below the other."""
     if not values:
         axes.text(1.02, row, "not compared", fontsize=8, va="center", color="0.5")

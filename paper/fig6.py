@@ -1,8 +1,9 @@
 """Fig. 6 of McKinnon and Schoellig (2016): the map of a fan's jet, felt by a hovering quadrotor.
 
-The vehicle faces the fan and hovers 5 s at each point of a 0.5 m grid in the plane of the fan's axis; the filter's force
-and torque, averaged over each hover, are the map. A finer line across the jet at 2.3 m shows the profile that the
-tracking of Fig. 7 rests on. Unlike a real flight this one also knows the truth.
+The vehicle faces the fan and hovers 5 s at each point of a 0.5 m grid in the plane of the fan's
+axis; the filter's force and torque, averaged over each hover, are the map. A finer line across the
+jet at 2.3 m shows the profile that the tracking of Fig. 7 rests on. Unlike a real flight this one
+also knows the truth.
 """
 
 import math
@@ -35,26 +36,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Hovers:
-    """The hovers of one flight, in order; wrenches are force (N) and torque (Nm) in the world frame."""
+    """The hovers of one flight, in order; wrenches are force (N) and torque (Nm) in the world
+    frame.
+    """
 
     points: Array  # (n, 2) m, where they should be
     position: Array  # (n, 3) m, where they were, true mean
     estimate: Array  # (n, 6) mean over the hover
-    truth: Array  # (n, 6) likewise: the jet with its gusts on the moving vehicle, and the unmodelled disturbance
+    # (n, 6) likewise: the jet with its gusts on the moving vehicle, and the unmodelled disturbance
+    truth: Array
     jet: Array  # (n, 6) the jet's part of the truth
     spread: Array  # (n, 6) standard deviation of the estimate within the hover
     traces: Array  # (n, 2, 2, ticks) estimate and truth, of f_x and tau_z
 
 
 def fly_points(points: Array, seed: int, seconds: float = HOVER, fan: Fan | None = None) -> Hovers:
-    """Hover at ``points`` (n, 2) m in the plane of the fan's axis, one after the other in a single flight.
+    """Hover at ``points`` (n, 2) m in the plane of the fan's axis, one after the other in a single
+    flight.
 
     Raises:
         InputError: a point farther than 2 m from the last, or hovers shorter than a tick.
     """
     legs = np.diff(points, axis=0, prepend=points[:1])
     if float(np.max(np.linalg.norm(legs, axis=1))) > 2.0 or seconds < TICK:
-        raise InputError("fig6: points must lie within 2 m of one another, and hovers last at least a tick")
+        raise InputError(
+            "fig6: points must lie within 2 m of one another, and hovers last at least a tick"
+        )
     fan = fan or Fan()
     loop = ClosedLoop(load_vehicle("ardrone2"), fan=fan)
     rng = np.random.default_rng([6, seed])
@@ -63,7 +70,8 @@ def fly_points(points: Array, seed: int, seconds: float = HOVER, fan: Fan | None
     jet = loop.record[0]["plant"]["jet"]
     kept = np.empty((n, ticks, 21))
     for k in range(n):
-        # a set point that moves, not one that jumps: a jump of 0.5 m would tilt the vehicle by 11 degrees
+        # a set point that moves, not one that jumps: a jump of 0.5 m would tilt the vehicle by 11
+        # degrees
         loop.setpoint[3:5] = legs[k] / TRANSIT
         loop.run(rng.standard_normal((round(TRANSIT / TICK), NOISE)))
         loop.setpoint[3:6] = 0.0
@@ -76,12 +84,25 @@ def fly_points(points: Array, seed: int, seconds: float = HOVER, fan: Fan | None
             row[9:12], row[12:18], row[18:] = loop.external[3:], jet, loop.position
     mean = kept.mean(axis=1)
     traces = np.stack([kept[:, :, [0, 6]], kept[:, :, [5, 11]]], axis=1).transpose(0, 1, 3, 2)
-    return Hovers(points, mean[:, 18:], mean[:, :6], mean[:, 6:12], mean[:, 12:18], kept[:, :, :6].std(axis=1), traces)
+    return Hovers(
+        points,
+        mean[:, 18:],
+        mean[:, :6],
+        mean[:, 6:12],
+        mean[:, 12:18],
+        kept[:, :, :6].std(axis=1),
+        traces,
+    )
 
 
 def grid_points() -> Array:
-    """Return the map's points (49, 2) in the order of flight: back and forth along y, away from the fan."""
-    rows = [np.stack([np.full(len(GRID_Y), x), GRID_Y[:: 1 if i % 2 == 0 else -1]], axis=1) for i, x in enumerate(GRID_X)]
+    """Return the map's points (49, 2) in the order of flight: back and forth along y, away from the
+    fan.
+    """
+    rows = [
+        np.stack([np.full(len(GRID_Y), x), GRID_Y[:: 1 if i % 2 == 0 else -1]], axis=1)
+        for i, x in enumerate(GRID_X)
+    ]
     return np.concatenate(rows)
 
 
@@ -98,15 +119,19 @@ def _as_maps(points: Array, wrenches: Array) -> Array:
 
 
 def odd_share(values: Array) -> float:
-    """Return which share of a map's (..., y) power, with y about 0, changes its sign with y: 1 is antisymmetric."""
+    """Return which share of a map's (..., y) power, with y about 0, changes its sign with y: 1 is
+    antisymmetric.
+    """
     odd, even = values - values[..., ::-1], values + values[..., ::-1]
     return float(np.sum(odd**2) / (np.sum(odd**2) + np.sum(even**2)))
 
 
 def peak(y: Array, torque: Array) -> tuple[float, float]:
-    """Return offset (m) and size (Nm) of the largest torque of a profile, by a parabola through its antisymmetric part.
+    """Return offset (m) and size (Nm) of the largest torque of a profile, by a parabola through its
+    antisymmetric part.
 
-    The top is flat, and noise would pick any of its points: the parabola takes all within 0.2 m of the largest.
+    The top is flat, and noise would pick any of its points: the parabola takes all within 0.2 m of
+    the largest.
     """
     half = y > 1e-9
     offset, odd = y[half], 0.5 * (torque - torque[::-1])[half]
@@ -142,8 +167,13 @@ def run(seeds: int, progress: Progress) -> Result:
     calm_map, calm_line = calm_jet(fan, vehicle, *points.T), calm_jet(fan, vehicle, *line.T)
     # which points count as jet is the fan's matter and must not depend on the noise of a flight
     inside = np.linalg.norm(calm_map[:, :3], axis=1) > JET_FORCE
-    estimate, truth, jet = (np.array([getattr(m, name) for m in maps]) for name in ("estimate", "truth", "jet"))
-    profile, profile_truth = np.array([p.estimate for p in profiles]), np.array([p.truth for p in profiles])
+    estimate, truth, jet = (
+        np.array([getattr(m, name) for m in maps]) for name in ("estimate", "truth", "jet")
+    )
+    profile, profile_truth = (
+        np.array([p.estimate for p in profiles]),
+        np.array([p.truth for p in profiles]),
+    )
     traces = np.array([m.traces[inside] for m in maps])  # (seeds, n, 2, 2, ticks)
     axis = int(np.argmin(np.abs(PROFILE_Y)))
     at, size = peak(PROFILE_Y, profile[:, :, 5].mean(axis=0))
@@ -155,8 +185,12 @@ def run(seeds: int, progress: Progress) -> Result:
         "points_in_jet": int(inside.sum()),
         "correlation_force_x": _correlation(estimate[:, inside, 0], truth[:, inside, 0]),
         "correlation_torque_z": _correlation(estimate[:, inside, 5], truth[:, inside, 5]),
-        "correlation_force_x_with_jet_alone": _correlation(estimate[:, inside, 0], jet[:, inside, 0]),
-        "correlation_torque_z_with_jet_alone": _correlation(estimate[:, inside, 5], jet[:, inside, 5]),
+        "correlation_force_x_with_jet_alone": _correlation(
+            estimate[:, inside, 0], jet[:, inside, 0]
+        ),
+        "correlation_torque_z_with_jet_alone": _correlation(
+            estimate[:, inside, 5], jet[:, inside, 5]
+        ),
         "correlation_force_x_200hz": _correlation(traces[:, :, 0, 0], traces[:, :, 0, 1]),
         "correlation_torque_z_200hz": _correlation(traces[:, :, 1, 0], traces[:, :, 1, 1]),
         "error_rms_force_x_N": _rms(error[:, :, 0]),
@@ -172,45 +206,84 @@ def run(seeds: int, progress: Progress) -> Result:
         "map_largest_torque_Nm": float(np.abs(torque_map).max()),
         "profile_force_x_on_axis_N": float(profile[:, axis, 0].mean()),
         "true_force_x_on_axis_N": float(profile_truth[:, axis, 0].mean()),
-        "hover_offset_rms_m": _rms(np.concatenate(
-            [np.linalg.norm(m.position[:, :2] - m.points, axis=1) for m in maps])),
+        "hover_offset_rms_m": _rms(
+            np.concatenate([np.linalg.norm(m.position[:, :2] - m.points, axis=1) for m in maps])
+        ),
     }
     return Result(
         figures=figures,
         data=_columns(maps, profiles, calm_map, calm_line),
-        picture=draw_map(GRID_X, GRID_Y, _as_maps(points, estimate), _as_maps(points, truth), PROFILE_Y,
-                         profile, profile_truth, calm_line, inside=as_map(points, inside.astype(np.float64)) > 0,
-                         correlations=(figures["correlation_force_x"], figures["correlation_torque_z"])),
+        picture=draw_map(
+            GRID_X,
+            GRID_Y,
+            _as_maps(points, estimate),
+            _as_maps(points, truth),
+            PROFILE_Y,
+            profile,
+            profile_truth,
+            calm_line,
+            inside=as_map(points, inside.astype(np.float64)) > 0,
+            correlations=(figures["correlation_force_x"], figures["correlation_torque_z"]),
+        ),
         comparison=[
-            Comparison("tau_z across the jet (world frame)", "antisymmetric about the axis",
-                       f"{figures['torque_z_antisymmetry']:.1%} of the map's power is antisymmetric"),
-            Comparison("offset of the largest tau_z (m)", "about 0.5", f"{at:.2f} (true mean jet {calm_at:.2f})"),
-            Comparison("largest tau_z at 2.3 m (Nm)", "-", f"{size:.4f} (true mean jet {calm_size:.4f})"),
-            Comparison("force along the axis", "strong, away from the fan",
-                       f"{figures['profile_force_x_on_axis_N']:.2f} N on the axis at 2.3 m"),
-            Comparison("correlation with the truth, f_x", "- (no truth to compare with)",
-                       f"{figures['correlation_force_x']:.4f}"),
-            Comparison("correlation with the truth, tau_z", "- (no truth to compare with)",
-                       f"{figures['correlation_torque_z']:.4f}"),
+            Comparison(
+                "tau_z across the jet (world frame)",
+                "antisymmetric about the axis",
+                f"{figures['torque_z_antisymmetry']:.1%} of the map's power is antisymmetric",
+            ),
+            Comparison(
+                "offset of the largest tau_z (m)",
+                "about 0.5",
+                f"{at:.2f} (true mean jet {calm_at:.2f})",
+            ),
+            Comparison(
+                "largest tau_z at 2.3 m (Nm)", "-", f"{size:.4f} (true mean jet {calm_size:.4f})"
+            ),
+            Comparison(
+                "force along the axis",
+                "strong, away from the fan",
+                f"{figures['profile_force_x_on_axis_N']:.2f} N on the axis at 2.3 m",
+            ),
+            Comparison(
+                "correlation with the truth, f_x",
+                "- (no truth to compare with)",
+                f"{figures['correlation_force_x']:.4f}",
+            ),
+            Comparison(
+                "correlation with the truth, tau_z",
+                "- (no truth to compare with)",
+                f"{figures['correlation_torque_z']:.4f}",
+            ),
         ],
         remarks=[
-            f"Each of {seeds} flights hovers {HOVER:g} s at {len(points)} points, at most 0.5 m apart, after {TRANSIT:g} s on "
-            f"the way and {SETTLE:g} s to settle; the vehicle faces the fan. The position loop's integral holds it against "
+            f"Each of {seeds} flights hovers {HOVER:g} s at {len(points)} points, at most 0.5 m "
+            f"apart, after {TRANSIT:g} s on "
+            f"the way and {SETTLE:g} s to settle; the vehicle faces the fan. The position loop's "
+            f"integral holds it against "
             f"the jet to {figures['hover_offset_rms_m']:.3f} m.",
-            "The truth is the plant's whole external wrench: the jet with its gusts on the tilting, drifting vehicle, and the "
-            "unmodelled actuator disturbance (0.03 N and 0.01 Nm over 0.3 s), which the filter cannot tell from the wind. "
-            f"Against the jet's part alone the correlation is {figures['correlation_force_x_with_jet_alone']:.3f} for f_x and "
-            f"{figures['correlation_torque_z_with_jet_alone']:.3f} for tau_z: the error of the map as a map of the fan, most "
+            "The truth is the plant's whole external wrench: the jet with its gusts on the "
+            "tilting, drifting vehicle, and the "
+            "unmodelled actuator disturbance (0.03 N and 0.01 Nm over 0.3 s), which the filter "
+            "cannot tell from the wind. "
+            f"Against the jet's part alone the correlation is "
+            f"{figures['correlation_force_x_with_jet_alone']:.3f} for f_x and "
+            f"{figures['correlation_torque_z_with_jet_alone']:.3f} for tau_z: the error of the map "
+            f"as a map of the fan, most "
             "of it that disturbance, averaged over only 5 s.",
-            f"The jet counts as present where its mean force exceeds {JET_FORCE:g} N: {int(inside.sum())} of the "
-            f"{len(points)} points. Correlations are over the 5 s means of every point and flight; over the single samples, "
-            f"which the filter's rise time of 1 s smooths, they are {figures['correlation_force_x_200hz']:.3f} and "
+            f"The jet counts as present where its mean force exceeds {JET_FORCE:g} N: "
+            f"{int(inside.sum())} of the "
+            f"{len(points)} points. Correlations are over the 5 s means of every point and flight; "
+            f"over the single samples, "
+            f"which the filter's rise time of 1 s smooths, they are "
+            f"{figures['correlation_force_x_200hz']:.3f} and "
             f"{figures['correlation_torque_z_200hz']:.3f}.",
         ],
     )
 
 
-def _columns(maps: list[Hovers], profiles: list[Hovers], calm_map: Array, calm_line: Array) -> dict[str, NDArray[np.generic]]:
+def _columns(
+    maps: list[Hovers], profiles: list[Hovers], calm_map: Array, calm_line: Array
+) -> dict[str, NDArray[np.generic]]:
     """Return one row for each hover."""
     flights = [("map", seed, m, calm_map) for seed, m in enumerate(maps)]
     flights += [("profile", seed, p, calm_line) for seed, p in enumerate(profiles)]

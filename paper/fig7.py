@@ -1,8 +1,9 @@
 """Fig. 7 of McKinnon and Schoellig (2016): staying in the jet of a fan by its torque alone.
 
-The fan stands 2.3 m away. Three experiments with the admittance controller, which moves against the estimated yaw torque:
-the vehicle catches the jet from 0.8 m off its axis; it follows a fan that moves along y; and, for each gain and rise time of
-the filter, the fastest fan that it holds, beside the bound: a command ``gain * torque`` is at most ``gain * tau_max``.
+The fan stands 2.3 m away. Three experiments with the admittance controller, which moves against the
+estimated yaw torque: the vehicle catches the jet from 0.8 m off its axis; it follows a fan that
+moves along y; and, for each gain and rise time of the filter, the fastest fan that it holds, beside
+the bound: a command ``gain * torque`` is at most ``gain * tau_max``.
 """
 
 import math
@@ -34,8 +35,9 @@ RISE_TIMES = (0.45, 1.0)  # s, of the filter
 FAN_SPEEDS = (0.1, 0.2, 0.4)  # m/s, of the fan that swings
 SWING = 1.0  # m, to either side
 CAPTURED = 0.3  # m, offset below which the jet is caught
-# m, offset beyond which a fan counts as lost. The torque grows up to 0.46 m off the axis: a vehicle held steadily stays
-# inside. Noise may carry it over the top and back; at 0.9 m the torque is down to a fifth, and few come back.
+# m, offset beyond which a fan counts as lost. The torque grows up to 0.46 m off the axis: a vehicle
+# held steadily stays inside. Noise may carry it over the top and back; at 0.9 m the torque is down
+# to a fifth, and few come back.
 HELD_OFFSET = 0.9
 HELD_SHARE = 0.8  # of the seeds
 START = 2.0  # s, in which the fan gathers speed
@@ -68,18 +70,26 @@ def ramp(speed: float, start: float = START) -> Path:
 
 
 def triangle(speed: float) -> Path:
-    """Return the path of a fan that swings ``SWING`` m to either side at a steady ``speed`` (m/s)."""
+    """Return the path of a fan that swings ``SWING`` m to either side at a steady
+    ``speed`` (m/s).
+    """
     return lambda t: SWING * 2 / math.pi * np.arcsin(np.sin(math.pi / 2 * speed / SWING * t))
 
 
 def make_env(rise_time: float, noises: Collection[str] = NOISES) -> FanTrackingEnv:
-    """Return the environment with a filter of a rise time (s), from near the axis, with only some of its ``NOISES``.
+    """Return the environment with a filter of a rise time (s), from near the axis, with only some
+    of its ``NOISES``.
 
-    The filter's tuning does not change with what is left out, so that its rise time does not either.
+    The filter's tuning does not change with what is left out, so that its rise time does not
+    either.
     """
-    scenario = Scenario("the fan's path is given", motions=("still",), rise_time=rise_time,
-                        offset=(0.0, 0.1 if noises else 0.0),
-                        turbulence=Scenario("").turbulence if "gusts" in noises else 0.0)
+    scenario = Scenario(
+        "the fan's path is given",
+        motions=("still",),
+        rise_time=rise_time,
+        offset=(0.0, 0.1 if noises else 0.0),
+        turbulence=Scenario("").turbulence if "gusts" in noises else 0.0,
+    )
     settings = PlantSettings(sensor_noise="sensor noise" in noises)
     if "disturbance" not in noises:
         settings = replace(settings, disturbance_force=0.0, disturbance_torque=0.0)
@@ -87,7 +97,9 @@ def make_env(rise_time: float, noises: Collection[str] = NOISES) -> FanTrackingE
 
 
 def holds(env: FanTrackingEnv, gain: float, path: Path, seed: int) -> bool:
-    """Return whether the vehicle stays within ``HELD_OFFSET`` of a fan's axis for a whole episode of 20 s."""
+    """Return whether the vehicle stays within ``HELD_OFFSET`` of a fan's axis for a whole episode
+    of 20 s.
+    """
     env.fan_path = path
     controller = Admittance(gain)
     observation, _ = env.reset(seed=seed)
@@ -110,8 +122,12 @@ def enough_hold(env: FanTrackingEnv, gain: float, path: Path, seeds: int) -> boo
     return held >= needed
 
 
-def fastest_held(env: FanTrackingEnv, gain: float, bound: float, seeds: int, start: float = START) -> float:
-    """Return the fastest fan (m/s) that was tried and held, by halving ``BRACKET`` of the bound; 0 if none was."""
+def fastest_held(
+    env: FanTrackingEnv, gain: float, bound: float, seeds: int, start: float = START
+) -> float:
+    """Return the fastest fan (m/s) that was tried and held, by halving ``BRACKET`` of the bound; 0
+    if none was.
+    """
     low, high = BRACKET
     fastest = 0.0
     for _ in range(HALVINGS):
@@ -124,21 +140,33 @@ def fastest_held(env: FanTrackingEnv, gain: float, bound: float, seeds: int, sta
 
 
 def sweep(seeds: int, largest: float, progress: Progress) -> list[Fastest]:
-    """Find the fastest fan for each rise time and gain; ``largest`` is the jet's largest torque, Nm."""
+    """Find the fastest fan for each rise time and gain; ``largest`` is the jet's largest torque,
+    Nm.
+    """
     rows = []
     for rise_time in RISE_TIMES:
         standard, calm = make_env(rise_time), make_env(rise_time, noises=())
         for gain in GAINS:
             bound = min(gain * largest, MAX_COMMAND)
             # nothing is random in calm air: one flight says it all
-            rows.append(Fastest(gain, rise_time, bound, fastest_held(standard, gain, bound, seeds),
-                                fastest_held(calm, gain, bound, 1), fastest_held(calm, gain, bound, 1, start=0.0)))
+            rows.append(
+                Fastest(
+                    gain,
+                    rise_time,
+                    bound,
+                    fastest_held(standard, gain, bound, seeds),
+                    fastest_held(calm, gain, bound, 1),
+                    fastest_held(calm, gain, bound, 1, start=0.0),
+                )
+            )
             progress(len(rows) / (len(GAINS) * len(RISE_TIMES)))
     return rows
 
 
 def capture_time(episode: Episode) -> float:
-    """Return when the vehicle first comes within ``CAPTURED`` m of the axis, s; NaN if it is not there at the end."""
+    """Return when the vehicle first comes within ``CAPTURED`` m of the axis, s; NaN if it is not
+    there at the end.
+    """
     inside = episode.offset < CAPTURED
     # at the end: the mean of the last 5 s, as noise lets any vehicle stray for a moment
     if not inside.any() or float(np.mean(episode.offset[-62:])) > CAPTURED:
@@ -146,12 +174,20 @@ def capture_time(episode: Episode) -> float:
     return float(episode.time[int(np.argmax(inside))])
 
 
-def _capture_figures(gain: float, rise_time: float, episodes: list[Episode]) -> dict[str, float | None]:
+def _capture_figures(
+    gain: float, rise_time: float, episodes: list[Episode]
+) -> dict[str, float | None]:
     times = np.array([capture_time(e) for e in episodes])
     caught = np.isfinite(times)
-    return {"gain": gain, "rise_time_s": rise_time, "captured": float(caught.mean()),
-            "median_time_s": float(np.median(times[caught])) if caught.any() else None,
-            "rmse_last_10_s_m": float(np.sqrt(np.mean([e.offset[DECISIONS // 2:] ** 2 for e in episodes])))}
+    return {
+        "gain": gain,
+        "rise_time_s": rise_time,
+        "captured": float(caught.mean()),
+        "median_time_s": float(np.median(times[caught])) if caught.any() else None,
+        "rmse_last_10_s_m": float(
+            np.sqrt(np.mean([e.offset[DECISIONS // 2 :] ** 2 for e in episodes]))
+        ),
+    }
 
 
 def run(seeds: int, progress: Progress) -> Result:
@@ -166,105 +202,225 @@ def run(seeds: int, progress: Progress) -> Result:
     captures: dict[tuple[float, float], list[Episode]] = {}
     for rise_time in RISE_TIMES:
         static = SCENARIOS["static"]
-        env = FanTrackingEnv(Scenario(static.summary, motions=static.motions, offset=static.offset, rise_time=rise_time))
+        env = FanTrackingEnv(
+            Scenario(
+                static.summary, motions=static.motions, offset=static.offset, rise_time=rise_time
+            )
+        )
         for gain in SHOWN_GAINS:
-            captures[rise_time, gain] = [fly_episode(env, Admittance(gain), seed) for seed in range(seeds)]
+            captures[rise_time, gain] = [
+                fly_episode(env, Admittance(gain), seed) for seed in range(seeds)
+            ]
             progress(0.15 * len(captures) / (len(RISE_TIMES) * len(SHOWN_GAINS)))
     tracks: dict[tuple[float, float], list[Episode]] = {}
     env = make_env(RISE_TIMES[0])
     for speed in FAN_SPEEDS:
         env.fan_path = triangle(speed)
         for gain in SHOWN_GAINS:
-            tracks[speed, gain] = [fly_episode(env, Admittance(gain), seed) for seed in range(seeds)]
+            tracks[speed, gain] = [
+                fly_episode(env, Admittance(gain), seed) for seed in range(seeds)
+            ]
             progress(0.15 + 0.2 * len(tracks) / (len(FAN_SPEEDS) * len(SHOWN_GAINS)))
     fastest = sweep(seeds, largest, lambda share: progress(0.35 + 0.55 * share))
     bound = min(NOISE_GAIN * largest, MAX_COMMAND)
-    alone = {noise: fastest_held(make_env(RISE_TIMES[0], (noise,)), NOISE_GAIN, bound, seeds) / bound for noise in NOISES}
+    alone = {
+        noise: fastest_held(make_env(RISE_TIMES[0], (noise,)), NOISE_GAIN, bound, seeds) / bound
+        for noise in NOISES
+    }
     progress(1.0)
-    capture_rows = [_capture_figures(gain, rise_time, episodes) for (rise_time, gain), episodes in captures.items()]
-    track_rows = [{"fan_speed_m_s": speed, "gain": gain, "rmse_m": float(np.mean([e.rmse for e in episodes])),
-                   "share_within_fan_radius": float(np.mean([e.offset < Fan().radius for e in episodes])),
-                   "lost": float(np.mean([e.lost for e in episodes]))} for (speed, gain), episodes in tracks.items()]
-    fastest_rows = [{"gain": f.gain, "rise_time_s": f.rise_time, "bound_m_s": f.bound, "held_m_s": f.held,
-                     "held_share_of_bound": f.held / f.bound, "calm_m_s": f.calm, "calm_sudden_m_s": f.sudden}
-                    for f in fastest]
-    figures = {"seeds": seeds, "jet_largest_torque_Nm": largest, "jet_largest_torque_at_m": at, "held_offset_m": HELD_OFFSET,
-               "held_share_of_seeds": HELD_SHARE, "speed_step_share_of_bound": (BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
-               "capture": capture_rows, "tracking": track_rows, "fastest": fastest_rows,
-               "held_share_of_bound_with_one_noise": alone}
-    return Result(figures=figures, data=_traces(captures, tracks),
-                  picture=draw_tracking(captures, tracks, fastest, largest, at, HELD_OFFSET),
-                  comparison=_comparison(capture_rows, track_rows, fastest),
-                  remarks=_remarks(seeds, largest, at, fastest, alone))
+    capture_rows = [
+        _capture_figures(gain, rise_time, episodes)
+        for (rise_time, gain), episodes in captures.items()
+    ]
+    track_rows = [
+        {
+            "fan_speed_m_s": speed,
+            "gain": gain,
+            "rmse_m": float(np.mean([e.rmse for e in episodes])),
+            "share_within_fan_radius": float(np.mean([e.offset < Fan().radius for e in episodes])),
+            "lost": float(np.mean([e.lost for e in episodes])),
+        }
+        for (speed, gain), episodes in tracks.items()
+    ]
+    fastest_rows = [
+        {
+            "gain": f.gain,
+            "rise_time_s": f.rise_time,
+            "bound_m_s": f.bound,
+            "held_m_s": f.held,
+            "held_share_of_bound": f.held / f.bound,
+            "calm_m_s": f.calm,
+            "calm_sudden_m_s": f.sudden,
+        }
+        for f in fastest
+    ]
+    figures = {
+        "seeds": seeds,
+        "jet_largest_torque_Nm": largest,
+        "jet_largest_torque_at_m": at,
+        "held_offset_m": HELD_OFFSET,
+        "held_share_of_seeds": HELD_SHARE,
+        "speed_step_share_of_bound": (BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
+        "capture": capture_rows,
+        "tracking": track_rows,
+        "fastest": fastest_rows,
+        "held_share_of_bound_with_one_noise": alone,
+    }
+    return Result(
+        figures=figures,
+        data=_traces(captures, tracks),
+        picture=draw_tracking(captures, tracks, fastest, largest, at, HELD_OFFSET),
+        comparison=_comparison(capture_rows, track_rows, fastest),
+        remarks=_remarks(seeds, largest, at, fastest, alone),
+    )
 
 
-def _comparison(captures: list[dict[str, float | None]], tracks: list[dict[str, float]],
-                fastest: list[Fastest]) -> list[Comparison]:
+def _comparison(
+    captures: list[dict[str, float | None]], tracks: list[dict[str, float]], fastest: list[Fastest]
+) -> list[Comparison]:
     caught = float(np.mean([c["captured"] or 0.0 for c in captures]))
-    rows = [Comparison("catches the jet of a still fan from 0.8 m off its axis", "yes", f"{caught:.0%} of flights")]
+    rows = [
+        Comparison(
+            "catches the jet of a still fan from 0.8 m off its axis",
+            "yes",
+            f"{caught:.0%} of flights",
+        )
+    ]
     for c in captures:
         median = "-" if c["median_time_s"] is None else f"{c['median_time_s']:.1f}"
-        rows.append(Comparison(f"time to come within {CAPTURED:g} m, gain {c['gain']:g}, rise {c['rise_time_s']:g} s (s)", "-",
-                               median))
+        rows.append(
+            Comparison(
+                f"time to come within {CAPTURED:g} m, gain {c['gain']:g}, rise "
+                f"{c['rise_time_s']:g} s (s)",
+                "-",
+                median,
+            )
+        )
     # the paper's own claim: to stay in the wind field; the middle gain stands for its controller
     middle = SHOWN_GAINS[len(SHOWN_GAINS) // 2]
-    inside = ", ".join(f"{t['share_within_fan_radius']:.0%} ({t['fan_speed_m_s']:g} m/s)"
-                       for t in tracks if t["gain"] == middle)
-    rows.append(Comparison(f"time within the radius of a fan that swings along y, gain {middle:g}", "stays in its wind",
-                           inside))
-    rows += [Comparison(f"RMSE behind a fan that swings at {t['fan_speed_m_s']:g} m/s, gain {t['gain']:g} (m)", "-",
-                        f"{t['rmse_m']:.2f}") for t in tracks]
-    rows += [Comparison(f"fastest fan held, gain {f.gain:g}, rise {f.rise_time:g} s (m/s)", "-",
-                        f"{f.held:.2f}: {f.held / f.bound:.0%} of the bound {f.bound:.2f} "
-                        f"(calm air {f.calm:.2f}, and with a sudden start {f.sudden:.2f})") for f in fastest]
+    inside = ", ".join(
+        f"{t['share_within_fan_radius']:.0%} ({t['fan_speed_m_s']:g} m/s)"
+        for t in tracks
+        if t["gain"] == middle
+    )
+    rows.append(
+        Comparison(
+            f"time within the radius of a fan that swings along y, gain {middle:g}",
+            "stays in its wind",
+            inside,
+        )
+    )
+    rows += [
+        Comparison(
+            f"RMSE behind a fan that swings at {t['fan_speed_m_s']:g} m/s, gain {t['gain']:g} (m)",
+            "-",
+            f"{t['rmse_m']:.2f}",
+        )
+        for t in tracks
+    ]
+    rows += [
+        Comparison(
+            f"fastest fan held, gain {f.gain:g}, rise {f.rise_time:g} s (m/s)",
+            "-",
+            f"{f.held:.2f}: {f.held / f.bound:.0%} of the bound {f.bound:.2f} "
+            f"(calm air {f.calm:.2f}, and with a sudden start {f.sudden:.2f})",
+        )
+        for f in fastest
+    ]
     return rows
 
 
-def _remarks(seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, float]) -> list[str]:
+def _remarks(
+    seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, float]
+) -> list[str]:
     step = (BRACKET[1] - BRACKET[0]) / 2**HALVINGS
 
     def shares(name: str) -> str:
         return "; ".join(
-            ", ".join(f"{getattr(f, name) / f.bound:.0%}" for f in fastest if f.rise_time == rise_time)
-            + f" (rise time {rise_time:g} s)" for rise_time in RISE_TIMES)
+            ", ".join(
+                f"{getattr(f, name) / f.bound:.0%}" for f in fastest if f.rise_time == rise_time
+            )
+            + f" (rise time {rise_time:g} s)"
+            for rise_time in RISE_TIMES
+        )
 
-    best = "; ".join(f"gain {f.gain:g} with {f.held:.2f} m/s (rise time {rise_time:g} s)" for rise_time in RISE_TIMES
-                     for f in [max((f for f in fastest if f.rise_time == rise_time), key=lambda f: f.held)])
+    best = "; ".join(
+        f"gain {f.gain:g} with {f.held:.2f} m/s (rise time {rise_time:g} s)"
+        for rise_time in RISE_TIMES
+        for f in [max((f for f in fastest if f.rise_time == rise_time), key=lambda f: f.held)]
+    )
     return [
-        f"The bound: the jet's torque is largest {at:.2f} m off the axis, {largest:.4f} Nm at {DISTANCE:g} m, so a command "
-        f"k tau_z is at most k times that on average, and at most {MAX_COMMAND:g} m/s, the largest command. A faster fan runs "
+        f"The bound: the jet's torque is largest {at:.2f} m off the axis, {largest:.4f} Nm at "
+        f"{DISTANCE:g} m, so a command "
+        f"k tau_z is at most k times that on average, and at most {MAX_COMMAND:g} m/s, the largest "
+        f"command. A faster fan runs "
         "away from any vehicle that flies by this law.",
-        f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, {START:g} s of which the fan takes to "
-        f"gather speed, in at least {HELD_SHARE:.0%} of {seeds} paired seeds. A vehicle that is held lies on the torque's "
-        f"rising flank, inside {at:.2f} m; noise may carry it over the top and back, but at {HELD_OFFSET:g} m the torque is "
+        f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, {START:g} s "
+        f"of which the fan takes to "
+        f"gather speed, in at least {HELD_SHARE:.0%} of {seeds} paired seeds. A vehicle that is "
+        f"held lies on the torque's "
+        f"rising flank, inside {at:.2f} m; noise may carry it over the top and back, but at "
+        f"{HELD_OFFSET:g} m the torque is "
         f"down to a fifth and few return. Speeds are found by halving, to {step:.0%} of the bound.",
-        f"Lag: in calm air (no gusts, no disturbance, no sensor noise) and behind a fan that starts gently, the gains "
-        f"{', '.join(f'{gain:g}' for gain in GAINS)} hold these shares of their bounds: {shares('calm')}. Flight loop and "
-        "filter cost little once the fan moves steadily. More than 100 % is a fan that outruns the vehicle so slowly that "
+        f"Lag: in calm air (no gusts, no disturbance, no sensor noise) and behind a fan that "
+        f"starts gently, the gains "
+        f"{', '.join(f'{gain:g}' for gain in GAINS)} hold these shares of their bounds: "
+        f"{shares('calm')}. Flight loop and "
+        "filter cost little once the fan moves steadily. More than 100 % is a fan that outruns the "
+        "vehicle so slowly that "
         "20 s do not lose it.",
-        f"A sudden start shows the rise time: {shares('sudden')}. The fan is past the torque's top before the filter has "
+        f"A sudden start shows the rise time: {shares('sudden')}. The fan is past the torque's top "
+        f"before the filter has "
         "reported it and the vehicle has gathered speed; the faster the fan, the more that costs.",
-        f"Noise limits before the bound does: in the standard air the same gains hold {shares('held')}. Near the bound the "
-        "vehicle rides on the flat top of the torque with no reserve, and any disturbance throws it over. "
-        f"Held with one of them alone, at gain {NOISE_GAIN:g} and a rise time of {RISE_TIMES[0]:g} s, "
+        f"Noise limits before the bound does: in the standard air the same gains hold "
+        f"{shares('held')}. Near the bound the "
+        "vehicle rides on the flat top of the torque with no reserve, and any disturbance throws "
+        "it over. "
+        f"Held with one of them alone, at gain {NOISE_GAIN:g} and a rise time of {RISE_TIMES[0]:g} "
+        f"s, "
         + ", ".join(f"{noise}: {share:.0%}" for noise, share in alone.items())
-        + ". The actuators' unmodelled torque (0.01 Nm, a third of the jet's largest) reads like the jet's own. A high gain "
-        f"turns it into motion, the more so through a slow filter, and a command cut at {MAX_COMMAND:g} m/s no longer "
+        + ". The actuators' unmodelled torque (0.01 Nm, a third of the jet's largest) reads like "
+        "the jet's own. A high gain "
+        f"turns it into motion, the more so through a slow filter, and a command cut at "
+        f"{MAX_COMMAND:g} m/s no longer "
         f"averages it out. The best here: {best}.",
     ]
 
 
-def _traces(captures: dict[tuple[float, float], list[Episode]],
-            tracks: dict[tuple[float, float], list[Episode]]) -> dict[str, NDArray[np.generic]]:
+def _traces(
+    captures: dict[tuple[float, float], list[Episode]],
+    tracks: dict[tuple[float, float], list[Episode]],
+) -> dict[str, NDArray[np.generic]]:
     """Return every flown sample of capture and tracking, a row a decision."""
-    flights = [("capture", 0.0, rise_time, gain, e) for (rise_time, gain), episodes in captures.items() for e in episodes]
-    flights += [("tracking", speed, RISE_TIMES[0], gain, e) for (speed, gain), episodes in tracks.items() for e in episodes]
+    flights = [
+        ("capture", 0.0, rise_time, gain, e)
+        for (rise_time, gain), episodes in captures.items()
+        for e in episodes
+    ]
+    flights += [
+        ("tracking", speed, RISE_TIMES[0], gain, e)
+        for (speed, gain), episodes in tracks.items()
+        for e in episodes
+    ]
     columns: dict[str, list[NDArray[np.generic]]] = {}
     for part, speed, rise_time, gain, e in flights:
-        for name, value in (("part", part), ("fan_speed", speed), ("rise_time", rise_time), ("gain", gain), ("seed", e.seed)):
+        for name, value in (
+            ("part", part),
+            ("fan_speed", speed),
+            ("rise_time", rise_time),
+            ("gain", gain),
+            ("seed", e.seed),
+        ):
             columns.setdefault(name, []).append(np.full(len(e.time), value))
-        for name, values in (("t", e.time), ("fan_y", e.fan_y), ("y", e.y), ("command", e.command),
-                             ("fx_estimate", e.observation[:, 0]), ("fx_true", e.force[:, 0]),
-                             ("tz_estimate", e.observation[:, 5]), ("tz_true", e.torque[:, 2])):
+        for name, values in (
+            ("t", e.time),
+            ("fan_y", e.fan_y),
+            ("y", e.y),
+            ("command", e.command),
+            ("fx_estimate", e.observation[:, 0]),
+            ("fx_true", e.force[:, 0]),
+            ("tz_estimate", e.observation[:, 5]),
+            ("tz_true", e.torque[:, 2]),
+        ):
             columns.setdefault(name, []).append(values)
     return {name: np.concatenate(parts) for name, parts in columns.items()}

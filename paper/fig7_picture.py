@@ -1,4 +1,6 @@
-"""The picture of tracking a fan: capture, swinging fans, and the fastest fan held beside the bound."""
+"""The picture of tracking a fan: capture, swinging fans, and the fastest fan held
+beside the bound.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -33,8 +35,14 @@ class _Fastest(Protocol):
     def sudden(self) -> float: ...
 
 
-def draw_tracking(captures: Mapping[tuple[float, float], list[Episode]], tracks: Mapping[tuple[float, float], list[Episode]],
-                  fastest: Sequence[_Fastest], largest: float, at: float, held_offset: float) -> Figure:
+def draw_tracking(
+    captures: Mapping[tuple[float, float], list[Episode]],
+    tracks: Mapping[tuple[float, float], list[Episode]],
+    fastest: Sequence[_Fastest],
+    largest: float,
+    at: float,
+    held_offset: float,
+) -> Figure:
     """Draw the three experiments.
 
     Args:
@@ -51,25 +59,37 @@ def draw_tracking(captures: Mapping[tuple[float, float], list[Episode]], tracks:
     first = None
     for column, rise_time in enumerate(rise_times):
         first = axes = figure.add_subplot(grid[0, column], sharey=first)
-        _capture(axes, {gain: flights for (rise, gain), flights in captures.items() if rise == rise_time})
-        axes.set_title(f"capture from 0.8 m, filter rise time {rise_time:g} s", fontsize=10, loc="left")
+        _capture(
+            axes, {gain: flights for (rise, gain), flights in captures.items() if rise == rise_time}
+        )
+        axes.set_title(
+            f"capture from 0.8 m, filter rise time {rise_time:g} s", fontsize=10, loc="left"
+        )
     axes = figure.add_subplot(grid[0, 2])
     _torque(axes, captures[rise_times[0], 18.0][0], largest)
-    axes.set_title(f"its torque, gain 18, rise time {rise_times[0]:g} s, one flight", fontsize=10, loc="left")
+    axes.set_title(
+        f"its torque, gain 18, rise time {rise_times[0]:g} s, one flight", fontsize=10, loc="left"
+    )
     first = second = None
     for column, speed in enumerate(sorted({speed for speed, _ in tracks})):
         flights = {gain: some for (fan, gain), some in tracks.items() if fan == speed}
         first = axes = figure.add_subplot(grid[1, column], sharey=first)
         _follow(axes, flights)
-        axes.set_title(f"fan at {speed:g} m/s, rise time {rise_times[0]:g} s", fontsize=10, loc="left")
+        axes.set_title(
+            f"fan at {speed:g} m/s, rise time {rise_times[0]:g} s", fontsize=10, loc="left"
+        )
         second = axes = figure.add_subplot(grid[2, column], sharex=axes, sharey=second)
         _torque(axes, flights[18.0][0], largest)
         axes.set_title("its torque, gain 18", fontsize=10, loc="left")
     _speeds(figure.add_subplot(grid[3, :2]), fastest, largest)
     _shares(figure.add_subplot(grid[3, 2]), fastest)
-    figure.suptitle(f"Following a fan 2.3 m away by its torque. The jet's largest torque, {1e3 * largest:.0f} mNm, acts "
-                    f"{at:.2f} m off the axis; a fan counts as held while the offset stays below {held_offset:g} m",
-                    fontsize=11)
+    figure.suptitle(
+        f"Following a fan 2.3 m away by its torque. The jet's largest torque, {1e3 * largest:.0f} "
+        f"mNm, acts "
+        f"{at:.2f} m off the axis; a fan counts as held while the offset stays below "
+        f"{held_offset:g} m",
+        fontsize=11,
+    )
     return figure
 
 
@@ -87,8 +107,13 @@ def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
         for e, offset in zip(some, signed, strict=True):
             axes.plot(e.time, offset, color=_GAINS[gain], lw=0.6, alpha=0.35)
         shortest = min(len(offset) for offset in signed)
-        axes.plot(some[0].time[:shortest], np.median([offset[:shortest] for offset in signed], axis=0), color=_GAINS[gain],
-                  lw=2.2, label=f"gain {gain:g}")
+        axes.plot(
+            some[0].time[:shortest],
+            np.median([offset[:shortest] for offset in signed], axis=0),
+            color=_GAINS[gain],
+            lw=2.2,
+            label=f"gain {gain:g}",
+        )
     axes.axhline(0, ls="--", color="#222222", lw=1.2)
     axes.set_ylim(-0.8, 1.3)
     axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
@@ -98,11 +123,15 @@ def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
 def _follow(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
     """Draw fan and vehicle of the first seed, with the RMSE over all."""
     longest = max((some[0] for some in flights.values()), key=lambda e: len(e.time))
-    axes.fill_between(longest.time, longest.fan_y - _RADIUS, longest.fan_y + _RADIUS, color=_JET, lw=0)
+    axes.fill_between(
+        longest.time, longest.fan_y - _RADIUS, longest.fan_y + _RADIUS, color=_JET, lw=0
+    )
     axes.plot(longest.time, longest.fan_y, "--", color="#222222", lw=1.5, label="fan")
     for gain, some in flights.items():
         e, lost = some[0], float(np.mean([e.lost for e in some]))
-        text = f"gain {gain:g}: RMSE {np.mean([e.rmse for e in some]):.2f} m" + (f", {lost:.0%} lost" if lost else "")
+        text = f"gain {gain:g}: RMSE {np.mean([e.rmse for e in some]):.2f} m" + (
+            f", {lost:.0%} lost" if lost else ""
+        )
         axes.plot(e.time, e.y, color=_GAINS[gain], lw=1.8, label=text)
     axes.set_ylim(-1.7, 2.9)
     axes.legend(frameon=False, fontsize=8, loc="upper left")
@@ -113,7 +142,13 @@ def _torque(axes: Any, episode: Episode, largest: float) -> None:
     for bound in (-largest, largest):
         axes.axhline(1e3 * bound, color="black", lw=0.8, ls=":")
     axes.plot(episode.time, 1e3 * episode.torque[:, 2], color="#9a9a9a", lw=0.8, label="true")
-    axes.plot(episode.time, 1e3 * episode.observation[:, 5], color=COLOURS["oracle"], lw=1.6, label="estimated")
+    axes.plot(
+        episode.time,
+        1e3 * episode.observation[:, 5],
+        color=COLOURS["oracle"],
+        lw=1.6,
+        label="estimated",
+    )
     axes.axhline(0, color="black", lw=0.5)
     axes.set_ylim(-62, 62)
     axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
@@ -122,28 +157,72 @@ def _torque(axes: Any, episode: Episode, largest: float) -> None:
 
 def _rows(fastest: Sequence[_Fastest]) -> list[tuple[float, str, list[_Fastest]]]:
     rises = sorted({f.rise_time for f in fastest})
-    return [(rise, colour, [f for f in fastest if f.rise_time == rise]) for rise, colour in zip(rises, _FILTERS, strict=False)]
+    return [
+        (rise, colour, [f for f in fastest if f.rise_time == rise])
+        for rise, colour in zip(rises, _FILTERS, strict=False)
+    ]
 
 
 def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     """Draw the fastest fan held over the gain, beside the bound."""
     gains = np.array(sorted({f.gain for f in fastest}))
     line = np.linspace(0.0, 1.08 * gains[-1], 200)
-    bound = np.minimum(line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf)
-    axes.plot(line, bound, color="black", lw=1.6, label=r"bound $k\,\tau_{max}$ (and the largest command, 1 m/s)")
+    bound = np.minimum(
+        line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf
+    )
+    axes.plot(
+        line,
+        bound,
+        color="black",
+        lw=1.6,
+        label=r"bound $k\,\tau_{max}$ (and the largest command, 1 m/s)",
+    )
     axes.fill_between(line, bound, 1.3, color="0.93", lw=0)
     for rise, colour, some in _rows(fastest):
         x = [f.gain for f in some]
-        axes.plot(x, [f.held for f in some], "o-", color=colour, lw=2.2, ms=7, label=f"held, rise time {rise:g} s")
-        axes.plot(x, [f.calm for f in some], "^--", color=colour, lw=1, ms=5, mfc="white", label="… in calm air")
-        axes.plot(x, [f.sudden for f in some], "s:", color=colour, lw=1, ms=4, mfc="white",
-                  label="… in calm air, sudden start")
+        axes.plot(
+            x,
+            [f.held for f in some],
+            "o-",
+            color=colour,
+            lw=2.2,
+            ms=7,
+            label=f"held, rise time {rise:g} s",
+        )
+        axes.plot(
+            x,
+            [f.calm for f in some],
+            "^--",
+            color=colour,
+            lw=1,
+            ms=5,
+            mfc="white",
+            label="… in calm air",
+        )
+        axes.plot(
+            x,
+            [f.sudden for f in some],
+            "s:",
+            color=colour,
+            lw=1,
+            ms=4,
+            mfc="white",
+            label="… in calm air, sudden start",
+        )
     for gain in gains:
         held = [f.held for _, _, some in _rows(fastest) for f in some if f.gain == gain]
-        axes.text(gain, min(held) - 0.08, " / ".join(f"{speed:.2f}" for speed in held), fontsize=8, ha="center")
+        axes.text(
+            gain,
+            min(held) - 0.08,
+            " / ".join(f"{speed:.2f}" for speed in held),
+            fontsize=8,
+            ha="center",
+        )
     axes.set_ylim(0, 1.2)
     axes.set_xlim(0, line[-1])
-    axes.text(0.55 * line[-1], 1.08, "beyond the bound no fan can be followed", color="0.45", fontsize=9)
+    axes.text(
+        0.55 * line[-1], 1.08, "beyond the bound no fan can be followed", color="0.45", fontsize=9
+    )
     axes.legend(frameon=False, fontsize=8, loc="upper left")
     axes.set_title("the fastest fan held by four flights of five", fontsize=10, loc="left")
     _bare(axes, "gain k (m/s per Nm)", "speed of the fan (m/s)")
@@ -154,9 +233,20 @@ def _shares(axes: Any, fastest: Sequence[_Fastest]) -> None:
     axes.axhline(100, color="black", lw=1.6)
     for _, colour, some in _rows(fastest):
         x = [f.gain for f in some]
-        for name, style, width, size in (("held", "o-", 2.2, 7), ("calm", "^--", 1, 5), ("sudden", "s:", 1, 4)):
-            axes.plot(x, [100 * getattr(f, name) / f.bound for f in some], style, color=colour, lw=width, ms=size,
-                      mfc=colour if name == "held" else "white")
+        for name, style, width, size in (
+            ("held", "o-", 2.2, 7),
+            ("calm", "^--", 1, 5),
+            ("sudden", "s:", 1, 4),
+        ):
+            axes.plot(
+                x,
+                [100 * getattr(f, name) / f.bound for f in some],
+                style,
+                color=colour,
+                lw=width,
+                ms=size,
+                mfc=colour if name == "held" else "white",
+            )
     axes.set_ylim(0, 130)
     axes.set_title("the same as a share of the bound", fontsize=10, loc="left")
     _bare(axes, "gain k (m/s per Nm)", "% of the bound")

@@ -1,4 +1,6 @@
-"""Running experiments side by side, keeping what is done, and the page that compares them with the paper."""
+"""Running experiments side by side, keeping what is done, and the page that compares them with the
+paper.
+"""
 
 import csv
 import io
@@ -42,8 +44,8 @@ def reproduce(
 ) -> dict[str, bool]:
     """Run experiments, each in a process of its own, and write their files as each ends.
 
-    An experiment whose JSON of the same version and seeds lies in the folder already is not run again, so that an
-    interrupted run goes on where it stopped.
+    An experiment whose JSON of the same version and seeds lies in the folder already is not run
+    again, so that an interrupted run goes on where it stopped.
 
     Args:
         names: of the experiments.
@@ -63,7 +65,9 @@ def reproduce(
     pending = [name for name in names if not done[name]]
     count = min(jobs or os.cpu_count() or 1, max(len(pending), 1))
     with shared_dict({name: float(done[name]) for name in names}) as shares, workers(count) as pool:
-        waiting = {pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending}
+        waiting = {
+            pool.submit(_run_and_write, name, wanted[name], folder, shares) for name in pending
+        }
         while waiting:
             finished, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
             report(dict(shares))
@@ -95,19 +99,29 @@ def is_done(folder: Path, name: str, seeds: int) -> bool:
     except (OSError, ValueError):
         return False
     files = all((folder / f"{name}.{kind}").is_file() for kind in ("csv", "png", "svg"))
-    return bool(files and isinstance(kept, dict) and (kept.get("seeds"), kept.get("version")) == (seeds, __version__))
+    return bool(
+        files
+        and isinstance(kept, dict)
+        and (kept.get("seeds"), kept.get("version")) == (seeds, __version__)
+    )
 
 
 def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
-    """Run one experiment and write its files; the JSON comes last and says that the others are whole."""
+    """Run one experiment and write its files; the JSON comes last and says that the others are
+    whole.
+    """
     module = _module(name)
-    result: Result = module.run(seeds, lambda share: shares.__setitem__(name, min(float(share), 0.99)))
+    result: Result = module.run(
+        seeds, lambda share: shares.__setitem__(name, min(float(share), 0.99))
+    )
     write_result(name, module.TITLE, seeds, result, folder)
     shares[name] = 1.0
 
 
 def write_result(name: str, title: str, seeds: int, result: Result, folder: Path) -> None:
-    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json, the same bytes for the same result; times go beside them."""
+    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json, the same bytes for the same result;
+    times go beside them.
+    """
     import matplotlib
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -119,12 +133,20 @@ def write_result(name: str, title: str, seeds: int, result: Result, folder: Path
     with replaced(folder / f"{name}.csv") as partial:
         partial.write_text(_csv(result.data), encoding="utf-8")
     summary = {
-        "experiment": name, "title": title, "version": __version__, "seeds": seeds, "figures": _plain(result.figures),
-        "comparison": [asdict(row) for row in result.comparison], "remarks": result.remarks,
+        "experiment": name,
+        "title": title,
+        "version": __version__,
+        "seeds": seeds,
+        "figures": _plain(result.figures),
+        "comparison": [asdict(row) for row in result.comparison],
+        "remarks": result.remarks,
     }
     if result.timing:
         with replaced(folder / f"{name}.timing.json") as partial:
-            partial.write_text(json.dumps([asdict(row) for row in result.timing], indent=1) + "\n", encoding="utf-8")
+            partial.write_text(
+                json.dumps([asdict(row) for row in result.timing], indent=1) + "\n",
+                encoding="utf-8",
+            )
     with replaced(folder / f"{name}.json") as partial:
         partial.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
@@ -138,7 +160,9 @@ def _csv(columns: Mapping[str, NDArray[np.generic]]) -> str:
 
 
 def _cell(value: Any) -> Any:
-    """Return a number with the six digits that a picture's data need, and anything else as it is."""
+    """Return a number with the six digits that a picture's data need, and anything
+    else as it is.
+    """
     plain = _plain(value)
     return float(f"{plain:.6g}") if isinstance(plain, float) else plain
 
@@ -156,23 +180,43 @@ def _plain(value: Any) -> Any:
 
 def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
     """Write the page "the paper / this kit" from the experiments' JSON files in a folder."""
-    parts = ["# The paper, reproduced figure by figure", "",
-             "C. D. McKinnon and A. P. Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016.",
-             "Every number and picture on this page was written by the command beside it.", ""]
+    parts = [
+        "# The paper, reproduced figure by figure",
+        "",
+        "C. D. McKinnon and A. P. Schoellig, *Unscented External Force and Torque Estimation for "
+        "Quadrotors*, IROS 2016.",
+        "Every number and picture on this page was written by the command beside it.",
+        "",
+    ]
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     for name in names:
         try:
             kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        parts += [f"## {kept['title']}", "", f"`windwrench reproduce {name} --seeds {kept['seeds']}`", "",
-                  f"![{kept['title']}]({where}/{name}.png)", "", "| quantity | the paper | this kit |", "| --- | --- | --- |"]
+        parts += [
+            f"## {kept['title']}",
+            "",
+            f"`windwrench reproduce {name} --seeds {kept['seeds']}`",
+            "",
+            f"![{kept['title']}]({where}/{name}.png)",
+            "",
+            "| quantity | the paper | this kit |",
+            "| --- | --- | --- |",
+        ]
         timing = folder / f"{name}.timing.json"
-        rows = kept["comparison"] + (json.loads(timing.read_text(encoding="utf-8")) if timing.is_file() else [])
+        rows = kept["comparison"] + (
+            json.loads(timing.read_text(encoding="utf-8")) if timing.is_file() else []
+        )
         parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in rows]
         for remark in kept["remarks"]:
             parts += ["", remark]
-        parts += ["", f"Data: [{name}.csv]({where}/{name}.csv), figures of merit: [{name}.json]({where}/{name}.json), "
-                  f"[picture as SVG]({where}/{name}.svg).", ""]
+        parts += [
+            "",
+            f"Data: [{name}.csv]({where}/{name}.csv), figures of merit: "
+            f"[{name}.json]({where}/{name}.json), "
+            f"[picture as SVG]({where}/{name}.svg).",
+            "",
+        ]
     with replaced(page) as partial:
         partial.write_text("\n".join(parts), encoding="utf-8")

@@ -23,11 +23,17 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Result:
-    """An experiment's outcome. Every experiment is a module with ``TITLE``, ``SEEDS`` and ``run(seeds, progress)``."""
+    """An experiment's outcome. Every experiment is a module with ``TITLE``, ``SEEDS`` and
+    ``run(seeds, progress)``.
+    """
 
     figures: Mapping[str, Any]  # figures of merit, as JSON
     data: Mapping[str, NDArray[np.generic]]  # columns (rows,) of the CSV, numbers or text
     picture: Figure
     comparison: list[Comparison]
-    remarks: list[str] = field(default_factory=list)  # what the reader should know, one paragraph each
-    timing: list[Comparison] = field(default_factory=list)  # what differs from run to run, and is kept apart for that
+    remarks: list[str] = field(
+        default_factory=list
+    )  # what the reader should know, one paragraph each
+    timing: list[Comparison] = field(
+        default_factory=list
+    )  # what differs from run to run, and is kept apart for that

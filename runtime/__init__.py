@@ -1,1 +1,3 @@
-"""Machinery under all rooms: errors, files written whole, compiled calls, vector lanes, worker processes."""
+"""Machinery under all rooms: errors, files written whole, compiled calls, vector lanes, worker
+processes.
+"""

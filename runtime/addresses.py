@@ -1,7 +1,8 @@
-"""Functions and memory by their addresses: a compiled loop calls the filter it was given and holds the code of no other.
+"""Functions and memory by their addresses: a compiled loop calls the filter it was given and holds
+the code of no other.
 
-So one compiled call works for environments that each have their own arrays, and code is compiled once, not once for each of
-its callers.
+So one compiled call works for environments that each have their own arrays, and code is compiled
+once, not once for each of its callers.
 """
 
 from collections.abc import Callable
@@ -27,13 +28,19 @@ def _machine_code(function: Callable[..., Any], signature: Any) -> Any:
 
 
 def address_of(function: Callable[..., Any], signature: Any = STEP) -> int:
-    """Return the address of a plain function, a filter's step if nothing else is said, compiled now if it was not."""
+    """Return the address of a plain function, a filter's step if nothing else is said, compiled now
+    if it was not.
+    """
     return int(_machine_code(function, signature).address)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def call_step(_typing_context: Any, address: Any, record: Any, parts: Any, dt: Any, voltage: Any) -> Any:
-    """Call the step at ``address`` for the filter in ``record``; what it returns are the parts of ``record.z`` it used."""
+def call_step(
+    _typing_context: Any, address: Any, record: Any, parts: Any, dt: Any, voltage: Any
+) -> Any:
+    """Call the step at ``address`` for the filter in ``record``; what it returns are the parts of
+    ``record.z`` it used.
+    """
     signature = types.int64(types.int64, record, types.int64, types.float64, types.float64)
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -47,8 +54,12 @@ def call_step(_typing_context: Any, address: Any, record: Any, parts: Any, dt: A
 
 @intrinsic  # type: ignore[untyped-decorator]
 def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
-    """Call the C function at ``address``, which returns nothing, with whole numbers of 64 bits; addresses are such."""
-    signature = types.void(types.int64, types.StarArgTuple.from_types((types.int64,) * len(arguments)))
+    """Call the C function at ``address``, which returns nothing, with whole numbers of 64 bits;
+    addresses are such.
+    """
+    signature = types.void(
+        types.int64, types.StarArgTuple.from_types((types.int64,) * len(arguments))
+    )
 
     def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
         values = cgutils.unpack_tuple(builder, given[1])
@@ -62,6 +73,7 @@ def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
 @intrinsic  # type: ignore[untyped-decorator]
 def pointer_to(_typing_context: Any, address: Any) -> Any:
     """Return an address as a pointer, for ``carray``."""
+
     def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
         return builder.inttoptr(given[0], ir.IntType(8).as_pointer())
 
@@ -70,5 +82,7 @@ def pointer_to(_typing_context: Any, address: Any) -> Any:
 
 @compiled
 def numbers_at(address: int, shape: Any) -> Array:
-    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns it keeps it alive."""
+    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns
+    it keeps it alive.
+    """
     return carray(pointer_to(address), shape, np.float64)  # type: ignore[no-any-return]

@@ -15,7 +15,8 @@ RETRIES = 3  # of a run or task whose process is lost
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """Give Ray, connected to a cluster's address, or to one of its own on this machine for ``local``.
+    """Give Ray, connected to a cluster's address, or to one of its own on this machine for
+    ``local``.
 
     Raises:
         InputError: Ray is not installed, or there is no cluster at the address.
@@ -28,8 +29,12 @@ def connected(address: str) -> Iterator[Any]:
         if address != "local":
             _reach(address)
         try:
-            ray.init(address=None if address == "local" else address, include_dashboard=False, log_to_driver=False,
-                     logging_level="error")
+            ray.init(
+                address=None if address == "local" else address,
+                include_dashboard=False,
+                log_to_driver=False,
+                logging_level="error",
+            )
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise InputError(f"--cluster {address}: no Ray cluster there: {error}") from error
     try:
@@ -45,11 +50,14 @@ def _reach(address: str) -> None:
     try:
         socket.create_connection((host, int(port)), timeout=10).close()
     except (OSError, ValueError) as error:
-        raise InputError(f"--cluster {address}: no Ray cluster there: {error}; expected HOST:PORT or local") from error
+        raise InputError(
+            f"--cluster {address}: no Ray cluster there: {error}; expected HOST:PORT or local"
+        ) from error
 
 
 def spread(work: Callable[[T], R], tasks: Sequence[T], address: str) -> Iterator[R]:
-    """Yield ``work`` of each task, in order, done on a Ray cluster; what is lost with a process is done again.
+    """Yield ``work`` of each task, in order, done on a Ray cluster; what is lost with a process is
+    done again.
 
     Raises:
         InputError: as ``connected``.

@@ -1,4 +1,6 @@
-"""The error that a user's mistake raises: always a message that names the file, the field and what was expected."""
+"""The error that a user's mistake raises: always a message that names the file, the field and what
+was expected.
+"""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -11,7 +13,9 @@ class InputError(ValueError):
 
 
 def unknown_name(what: str, name: str, known: Iterable[str], where: str = "") -> InputError:
-    """Return the error for a name that is not among the known ones, with the nearest of them as a suggestion."""
+    """Return the error for a name that is not among the known ones, with the nearest of them as a
+    suggestion.
+    """
     names = sorted(map(str, known))
     near = get_close_matches(str(name), names, n=1, cutoff=_LIKENESS)
     hint = f" Did you mean {near[0]!r}?" if near else ""

@@ -12,4 +12,7 @@ def need(module: str, extra: str) -> None:
         InputError: it is not; the message says how to install it.
     """
     if find_spec(module) is None:
-        raise InputError(f"{module.replace('_', '-')} is not installed; pip install 'windwrench[{extra}]' brings it")
+        raise InputError(
+            f"{module.replace('_', '-')} is not installed; pip install 'windwrench[{extra}]' "
+            f"brings it"
+        )

@@ -1,4 +1,6 @@
-"""Modules that have moved: their old import paths keep working, with a ``DeprecationWarning`` that names the new ones."""
+"""Modules that have moved: their old import paths keep working, with a ``DeprecationWarning`` that
+names the new ones.
+"""
 
 import sys
 import warnings
@@ -59,7 +61,10 @@ MOVED: dict[str, tuple[str, ...]] = {
     "identification.conventions": ("identification.logs.conventions",),
     "identification.dictionary": ("identification.inference.candidate_regressors",),
     "identification.equivalence": ("identification.inference.equivalence",),
-    "identification.estimate": ("identification.wrench_series", "identification.report.wrench_picture"),
+    "identification.estimate": (
+        "identification.wrench_series",
+        "identification.report.wrench_picture",
+    ),
     "identification.excerpt": ("identification.logs.excerpt",),
     "identification.files": ("identification.logs.tables",),
     "identification.flight_log": ("identification.logs.flight_log", "identification.logs.reading"),
@@ -78,7 +83,6 @@ MOVED: dict[str, tuple[str, ...]] = {
     "identification.readers.streams": ("identification.logs.readers.streams",),
     "identification.readers.unpacking": ("identification.logs.readers.unpacking",),
     "identification.regression": ("identification.inference.regression",),
-    "identification.report": ("identification.report.files",),
     "identification.report_page": ("identification.report.page",),
     "identification.report_pictures": ("identification.report.pictures",),
     "identification.report_words": ("identification.report.words",),
@@ -135,13 +139,22 @@ class _MovedFinder(MetaPathFinder, Loader):
     ) -> ModuleSpec | None:
         """Return how a module that has moved is imported; None for any other name."""
         package, _, name = fullname.partition(".")
-        return ModuleSpec(fullname, self, is_package=True) if package == _PACKAGE and name in MOVED else None
+        return (
+            ModuleSpec(fullname, self, is_package=True)
+            if package == _PACKAGE and name in MOVED
+            else None
+        )
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Import what took a module's place, and return a module of the old name that forwards to it."""
+        """Import what took a module's place, and return a module of the old name that forwards to
+        it.
+        """
         places = [f"{_PACKAGE}.{new}" for new in MOVED[spec.name.partition(".")[2]]]
-        # the warning points at the import statement: above it are this and five frames of the import system
-        warnings.warn(f"{spec.name} is now {' and '.join(places)}", DeprecationWarning, stacklevel=7)
+        # the warning points at the import statement: above it are this and five frames of the
+        # import system
+        warnings.warn(
+            f"{spec.name} is now {' and '.join(places)}", DeprecationWarning, stacklevel=7
+        )
         return _Forwarder(spec.name, tuple(import_module(place) for place in places))
 
     def exec_module(self, module: ModuleType) -> None:

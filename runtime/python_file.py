@@ -10,9 +10,11 @@ from .errors import InputError
 
 
 def import_file(path: str | Path, what: str) -> ModuleType:
-    """Return the module in a file, run once in a process; ``what`` says in errors what was expected.
+    """Return the module in a file, run once in a process; ``what`` says in errors what was
+    expected.
 
-    It goes by its absolute path among the modules, so that it never hides another and is found again.
+    It goes by its absolute path among the modules, so that it never hides another and is found
+    again.
 
     Raises:
         InputError: there is no such file, or running it fails; the message names the line.
@@ -35,7 +37,16 @@ def import_file(path: str | Path, what: str) -> ModuleType:
         if isinstance(error, SyntaxError):
             line = error.lineno
         else:
-            line = next((f.lineno for f in reversed(traceback.extract_tb(error.__traceback__)) if f.filename == name), None)
+            line = next(
+                (
+                    f.lineno
+                    for f in reversed(traceback.extract_tb(error.__traceback__))
+                    if f.filename == name
+                ),
+                None,
+            )
         where = f", line {line}" if line else ""
-        raise InputError(f"{path}{where}: {type(error).__name__}: {error}; expected {what}") from error
+        raise InputError(
+            f"{path}{where}: {type(error).__name__}: {error}; expected {what}"
+        ) from error
     return module

@@ -1,9 +1,11 @@
-"""Numbers of several vehicles side by side: one value of compiled code, one register of a processor's vector unit.
+"""Numbers of several vehicles side by side: one value of compiled code, one register of a
+processor's vector unit.
 
-A function written for single numbers is compiled a second time for values of this kind, as a C++ template is: arrays of
-them are indexed and sliced, records have them as fields, and each operation rounds as that of single numbers does. What
-differs is a question: a comparison has an answer for each lane, so code for both uses ``choose``, ``all_of`` and
-``any_of`` where single numbers would do with ``if``.
+A function written for single numbers is compiled a second time for values of this kind, as a C++
+template is: arrays of them are indexed and sliced, records have them as fields, and each operation
+rounds as that of single numbers does. What differs is a question: a comparison has an answer for
+each lane, so code for both uses ``choose``, ``all_of`` and ``any_of`` where single numbers would do
+with ``if``.
 """
 
 import math
@@ -74,9 +76,14 @@ class _AnswersModel(models.PrimitiveModel):
 
 
 def _splat(builder: Any, value: Any, kind: Any) -> Any:
-    first = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined),
-                                  ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+    first = builder.insert_element(
+        ir.Constant(kind, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
+    )
+    return builder.shuffle_vector(
+        first,
+        ir.Constant(kind, ir.Undefined),
+        ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH),
+    )
 
 
 @lower_cast(types.Number, _Lanes)
@@ -89,10 +96,15 @@ def _truth_to_answers(context: Any, builder: Any, given: Any, _wanted: Any, valu
     return _splat(builder, context.cast(builder, value, given, types.boolean), _TRUTHS)
 
 
-def _define(function: Any, result: Any, operands: tuple[Any, ...], generate: Callable[..., Any]) -> None:
+def _define(
+    function: Any, result: Any, operands: tuple[Any, ...], generate: Callable[..., Any]
+) -> None:
     """Give a function of Python a meaning for lanes."""
-    template = type(f"_{getattr(function, '__name__', 'lanes')}", (ConcreteTemplate,),
-                    {"cases": [signature(result, *operands)]})
+    template = type(
+        f"_{getattr(function, '__name__', 'lanes')}",
+        (ConcreteTemplate,),
+        {"cases": [signature(result, *operands)]},
+    )
     infer_global(function)(template)
 
     @lower_builtin(function, *operands)
@@ -100,49 +112,85 @@ def _define(function: Any, result: Any, operands: tuple[Any, ...], generate: Cal
         return generate(builder, *arguments)
 
 
-for _names, _method in ((("add", "iadd"), "fadd"), (("sub", "isub"), "fsub"), (("mul", "imul"), "fmul"),
-                        (("truediv", "itruediv"), "fdiv")):
+for _names, _method in (
+    (("add", "iadd"), "fadd"),
+    (("sub", "isub"), "fsub"),
+    (("mul", "imul"), "fmul"),
+    (("truediv", "itruediv"), "fdiv"),
+):
     for _name in _names:
-        _define(getattr(operator, _name), LANES, (LANES, LANES),
-                lambda builder, a, b, method=_method: getattr(builder, method)(a, b))
+        _define(
+            getattr(operator, _name),
+            LANES,
+            (LANES, LANES),
+            lambda builder, a, b, method=_method: getattr(builder, method)(a, b),
+        )
 for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">=")):
-    _define(getattr(operator, _name), ANSWERS, (LANES, LANES),
-            lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+    _define(
+        getattr(operator, _name),
+        ANSWERS,
+        (LANES, LANES),
+        lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
+    )
 _define(operator.and_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.and_(a, b))
 _define(operator.or_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.or_(a, b))
-_define(operator.neg, LANES, (LANES,),
-        lambda builder, a: builder.fsub(ir.Constant(_VECTOR, [-0.0] * WIDTH), a))
+_define(
+    operator.neg,
+    LANES,
+    (LANES,),
+    lambda builder, a: builder.fsub(ir.Constant(_VECTOR, [-0.0] * WIDTH), a),
+)
 
 
 def _intrinsic_of(builder: Any, name: str, kind: Any) -> Any:
     return cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
 
 
-_define(math.sqrt, LANES, (LANES,),
-        lambda builder, a: builder.call(_intrinsic_of(builder, f"llvm.sqrt.v{WIDTH}f64", _VECTOR), [a]))
+_define(
+    math.sqrt,
+    LANES,
+    (LANES,),
+    lambda builder, a: builder.call(_intrinsic_of(builder, f"llvm.sqrt.v{WIDTH}f64", _VECTOR), [a]),
+)
 for _function in (math.cos, math.sin):
+
     def _each(builder: Any, a: Any, name: str = _function.__name__) -> Any:
         """Lane by lane with the function of single numbers: rare, and so with its digits."""
         out, one = a, _intrinsic_of(builder, f"llvm.{name}.f64", ir.DoubleType())
         for lane in range(WIDTH):
             place = ir.Constant(ir.IntType(32), lane)
-            out = builder.insert_element(out, builder.call(one, [builder.extract_element(a, place)]), place)
+            out = builder.insert_element(
+                out, builder.call(one, [builder.extract_element(a, place)]), place
+            )
         return out
 
     _define(_function, LANES, (LANES,), _each)
 # finite: less than infinity in size, which NaN is not
-_define(math.isfinite, ANSWERS, (LANES,), lambda builder, a: builder.and_(
-    builder.fcmp_ordered("<", a, ir.Constant(_VECTOR, [math.inf] * WIDTH)),
-    builder.fcmp_ordered(">", a, ir.Constant(_VECTOR, [-math.inf] * WIDTH))))
+_define(
+    math.isfinite,
+    ANSWERS,
+    (LANES,),
+    lambda builder, a: builder.and_(
+        builder.fcmp_ordered("<", a, ir.Constant(_VECTOR, [math.inf] * WIDTH)),
+        builder.fcmp_ordered(">", a, ir.Constant(_VECTOR, [-math.inf] * WIDTH)),
+    ),
+)
 # as numba orders single numbers
-_define(max, LANES, (LANES, LANES), lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a))
+_define(
+    max,
+    LANES,
+    (LANES, LANES),
+    lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a),
+)
 
 
 @intrinsic
 def _select(_context: Any, condition: Any, a: Any, b: Any) -> Any:
     def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        values = [context.cast(builder, value, kind, LANES) for value, kind in
-                  zip(arguments[1:], given.args[1:], strict=True)]
+        values = [
+            context.cast(builder, value, kind, LANES)
+            for value, kind in zip(arguments[1:], given.args[1:], strict=True)
+        ]
         return builder.select(arguments[0], *values)
 
     return LANES(condition, a, b), generate
@@ -209,23 +257,41 @@ class LaneRecord:
 
     Args:
         single: the structured type of single numbers.
-        lanes: names of the fields that become lanes; their numbers stand in the last axis, ``WIDTH`` of them.
+        lanes: names of the fields that become lanes; their numbers stand in the last axis,
+            ``WIDTH`` of them.
         shared: names of the fields that stay single numbers, for all lanes.
     """
 
     def __init__(self, single: np.dtype, lanes: Sequence[str], shared: Sequence[str] = ()) -> None:
         forms: dict[str, Any] = {}
         fields, offset = [], 0
-        for name in (*lanes, *shared):  # lanes first: they are loaded from addresses that are multiples of their size
+        for name in (
+            *lanes,
+            *shared,
+        ):  # lanes first: they are loaded from addresses that are multiples of their size
             kind = single[name]
             element = LANES if name in lanes else from_dtype(kind.base)
             form = np.dtype((np.float64, (*kind.shape, WIDTH)) if name in lanes else kind)
-            fields.append((name, {"type": types.NestedArray(element, kind.shape) if kind.shape else element, "offset": offset}))
+            fields.append(
+                (
+                    name,
+                    {
+                        "type": types.NestedArray(element, kind.shape) if kind.shape else element,
+                        "offset": offset,
+                    },
+                )
+            )
             forms[name] = (form, offset)
             offset += form.itemsize
         size = -(-offset // _ALIGNMENT) * _ALIGNMENT
-        self.dtype = np.dtype({"names": list(forms), "formats": [form for form, _ in forms.values()],
-                               "offsets": [where for _, where in forms.values()], "itemsize": size})
+        self.dtype = np.dtype(
+            {
+                "names": list(forms),
+                "formats": [form for form, _ in forms.values()],
+                "offsets": [where for _, where in forms.values()],
+                "itemsize": size,
+            }
+        )
         record = _LaneRecord(fields, size, True)
 
         @intrinsic
@@ -245,7 +311,9 @@ class LaneRecord:
         return room[first : first + size].view(self.dtype)
 
     def like(self, records: np.ndarray) -> np.ndarray:
-        """Return a copy of records (n,) where lanes may be loaded; NumPy's own copies lie anywhere."""
+        """Return a copy of records (n,) where lanes may be loaded; NumPy's own
+        copies lie anywhere.
+        """
         copy = self.zeros(len(records))
         copy[...] = records
         return copy

@@ -11,10 +11,11 @@ from .errors import InputError
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside ``path`` that takes its place once the block has ended without an error.
+    """Give a temporary path beside ``path`` that takes its place once the block has ended without
+    an error.
 
-    Whoever reads ``path`` sees the old file or the whole new one, never a part. What a killed process has left beside it
-    goes.
+    Whoever reads ``path`` sees the old file or the whole new one, never a part. What a killed
+    process has left beside it goes.
 
     Raises:
         InputError: the file cannot be written.

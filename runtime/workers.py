@@ -18,9 +18,11 @@ _CONTEXT = multiprocessing.get_context("spawn")
 
 
 def end_with_parent() -> None:
-    """Have this process end as soon as the one that started it is gone, even if that one was killed.
+    """Have this process end as soon as the one that started it is gone, even if that one was
+    killed.
 
-    For the initializer of any pool: a killed parent tells its workers nothing, and they would wait for work for ever.
+    For the initializer of any pool: a killed parent tells its workers nothing, and they would wait
+    for work for ever.
     """
     parent = multiprocessing.parent_process()
     if parent is None:
@@ -34,7 +36,9 @@ def end_with_parent() -> None:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Starts its workers with interrupts blocked: a key press in the terminal is the parent's to answer."""
+    """Starts its workers with interrupts blocked: a key press in the terminal is the parent's to
+    answer.
+    """
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Return the future of a call in a worker."""
@@ -43,14 +47,17 @@ class _Pool(ProcessPoolExecutor):
 
     def map(self, fn: Callable[..., T], *iterables: Iterable[Any], **_: Any) -> Iterator[T]:
         """Yield the results of calls in workers, in order."""
-        # the library's own cancels what waits when it is left early, and then trips over that where workers are ended
+        # the library's own cancels what waits when it is left early, and then trips over that where
+        # workers are ended
         futures = [self.submit(fn, *arguments) for arguments in zip(*iterables, strict=False)]
         return (future.result() for future in futures)
 
 
 @contextmanager
 def workers(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Give a pool of ``count`` processes; an error or an interrupt in the block ends them at once, work or no work."""
+    """Give a pool of ``count`` processes; an error or an interrupt in the block ends them at once,
+    work or no work.
+    """
     before = {child.pid for child in multiprocessing.active_children()}
     pool = _Pool(count, mp_context=_CONTEXT, initializer=end_with_parent)
     try:

@@ -37,27 +37,42 @@ def parse_yaml(text: str, where: str) -> Any:
     """Return the plain value (mappings, lists, texts, numbers, dates) that a YAML text stands for.
 
     Raises:
-        InputError: not valid YAML, an object of another kind, or aliases that write out to too many values.
+        InputError: not valid YAML, an object of another kind, or aliases that write out to too many
+            values.
     """
     try:
         _check_depth(text)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if node is not None and _size(node, {}, 0) > _MOST_VALUES:
-            raise InputError(f"{where}: more than {_MOST_VALUES} values, its aliases written out; expected a few")
+            raise InputError(
+                f"{where}: more than {_MOST_VALUES} values, its aliases written out; expected a few"
+            )
         return yaml.safe_load(text)
     except InputError:
         raise
     # what a constructor makes of a spoiled date or number is any error of Python's
-    except (yaml.YAMLError, ValueError, TypeError, AttributeError, KeyError, IndexError, OverflowError,
-            RecursionError) as error:
+    except (
+        yaml.YAMLError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        KeyError,
+        IndexError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise InputError(f"{where}: not valid YAML: {error or type(error).__name__}") from error
 
 
 def _check_depth(text: str) -> None:
-    """Raise ValueError where values lie too deep in one another: what builds them would go as deep, and slowly."""
+    """Raise ValueError where values lie too deep in one another: what builds them would go as deep,
+    and slowly.
+    """
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
+            event, yaml.CollectionEndEvent
+        )
         if depth > _DEEPEST:
             raise ValueError(f"values within values, more than {_DEEPEST} deep")
 

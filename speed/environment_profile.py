@@ -1,4 +1,6 @@
-"""Where the time of an environment's step goes: its parts, each repeated by itself on the state of a flight."""
+"""Where the time of an environment's step goes: its parts, each repeated by itself on the state of
+a flight.
+"""
 
 import time
 from collections.abc import Callable
@@ -27,18 +29,44 @@ def _filter(loops: np.ndarray, count: int) -> None:
 
 
 @released
-def _jet(loops: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Array, noise: Array, count: int) -> None:
+def _jet(
+    loops: np.ndarray,
+    axial: Array,
+    radial: Array,
+    qpos: Array,
+    qvel: Array,
+    noise: Array,
+    count: int,
+) -> None:
     loop = loops[0]
     plant, fan = loop.plant, loop.fan
     for _ in range(count):
         gust(fan, noise[:36])
-        jet_wrench(fan, axial, radial, qpos[0:3], plant.rotation, qvel[0:3], qvel[3:6], plant.body.com, plant.scratch,
-                   plant.jet)
+        jet_wrench(
+            fan,
+            axial,
+            radial,
+            qpos[0:3],
+            plant.rotation,
+            qvel[0:3],
+            qvel[3:6],
+            plant.body.com,
+            plant.scratch,
+            plant.jet,
+        )
 
 
 @released
-def _plant(loops: np.ndarray, axial: Array, radial: Array, qpos: Array, qvel: Array, noise: Array, xfrc: Array,
-           count: int) -> None:
+def _plant(
+    loops: np.ndarray,
+    axial: Array,
+    radial: Array,
+    qpos: Array,
+    qvel: Array,
+    noise: Array,
+    xfrc: Array,
+    count: int,
+) -> None:
     loop = loops[0]
     plant, flight, x = loop.plant, loop.flight, loop.filter.x
     for _ in range(count):
@@ -68,7 +96,9 @@ def _per_tick(work: Callable[[], object], ticks: int) -> float:
 
 
 def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
-    """Return the parts of a step of one environment, in us a tick of 5 ms and as shares: the least of several rounds."""
+    """Return the parts of a step of one environment, in us a tick of 5 ms and as shares: the least
+    of several rounds.
+    """
     env, action = FanTrackingEnv("static", estimator=estimator), np.zeros(1, dtype=np.float32)
     env.reset(seed=0)
     loop = env.loop
@@ -92,12 +122,17 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
 
     parts: dict[str, Callable[[], float]] = {
         f"filter ({estimator})": lambda: _per_tick(lambda: _filter(copy, _REPEATS), _REPEATS),
-        "jet and gusts": lambda: _per_tick(lambda: _jet(copy, *loop.jet_table, q, v, noise, _REPEATS), _REPEATS),
+        "jet and gusts": lambda: _per_tick(
+            lambda: _jet(copy, *loop.jet_table, q, v, noise, _REPEATS), _REPEATS
+        ),
         "MuJoCo": lambda: _per_tick(lambda: _mujoco(twin.record, _REPEATS), _REPEATS),
-        "random numbers": lambda: _per_tick(lambda: _normals(normals_address(), bits_address(rng), noise, _REPEATS), _REPEATS),
+        "random numbers": lambda: _per_tick(
+            lambda: _normals(normals_address(), bits_address(rng), noise, _REPEATS), _REPEATS
+        ),
         "reward, info, Python": lambda: _per_tick(look_on, 100 * DECISION_TICKS),
         "motors, sensors, flight loop": lambda: _per_tick(
-            lambda: _plant(copy, *loop.jet_table, q, v, noise, np.zeros(6), _REPEATS), _REPEATS),
+            lambda: _plant(copy, *loop.jet_table, q, v, noise, np.zeros(6), _REPEATS), _REPEATS
+        ),
         "whole": lambda: _per_tick(fly_on, 12 * DECISION_TICKS),
     }
     times: dict[str, list[float]] = {name: [] for name in parts}
@@ -112,12 +147,20 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     whole = least.pop("whole")
     least["what the parts disturb in each other"] = max(whole - sum(least.values()), 0.0)
     largest = max(least, key=lambda name: least[name])
-    rows = [[name, f"{value:.2f}", f"{value / whole:.0%}"] for name, value in sorted(least.items(), key=lambda p: -p[1])]
+    rows = [
+        [name, f"{value:.2f}", f"{value / whole:.0%}"]
+        for name, value in sorted(least.items(), key=lambda p: -p[1])
+    ]
     rows.append(["whole step", f"{whole:.2f}", "100%"])
     without = TICK * 1e6 / (whole - least[largest])
-    return Section(f"Where the time goes: {estimator}", ["part", "us a tick", "share"], rows,
-                   f"One environment, a tick of 5 ms: {TICK * 1e6 / whole:.0f} times real time. The next limit is: {largest}; "
-                   f"if that cost nothing, it would be {without:.0f} times real time.")
+    return Section(
+        f"Where the time goes: {estimator}",
+        ["part", "us a tick", "share"],
+        rows,
+        f"One environment, a tick of 5 ms: {TICK * 1e6 / whole:.0f} times real time. The next "
+        f"limit is: {largest}; "
+        f"if that cost nothing, it would be {without:.0f} times real time.",
+    )
 
 
 def profiles(rounds: int) -> list[Section]:

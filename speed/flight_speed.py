@@ -1,4 +1,6 @@
-"""Flights against real time: the fan-tracking environment alone and side by side, and other simulators beside it."""
+"""Flights against real time: the fan-tracking environment alone and side by side, and other
+simulators beside it.
+"""
 
 import importlib.util
 import os
@@ -16,27 +18,56 @@ from ..dynamics import load_vehicle
 from .contenders import Contender
 
 _UNIT = "x real time"
-_EVERYTHING = "jet at 12 stations, gusts, motors, sensors, 200 Hz UKF, flight loop, MuJoCo at 400 Hz"
+_EVERYTHING = (
+    "jet at 12 stations, gusts, motors, sensors, 200 Hz UKF, flight loop, MuJoCo at 400 Hz"
+)
 _DECISIONS = 128  # of a run of one environment
 _TOGETHER = 512  # of a run of many, over all of them
 
 
 def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
-    """Return what flies, in simulated seconds a second; peers have no wind, no sensors and no estimator.
+    """Return what flies, in simulated seconds a second; peers have no wind, no sensors and no
+    estimator.
 
     ``counts``: how many environments fly together.
     """
     cores = os.cpu_count() or 1
-    out = [Contender("FanTracking, 1 environment", _UNIT, _EVERYTHING, _single("ukf"), reference=True)]
+    out = [
+        Contender("FanTracking, 1 environment", _UNIT, _EVERYTHING, _single("ukf"), reference=True)
+    ]
     for count in counts:
-        out.append(Contender(f"FanTracking, {count} in one process", _UNIT, "the same, all of them together", many(count)))
+        out.append(
+            Contender(
+                f"FanTracking, {count} in one process",
+                _UNIT,
+                "the same, all of them together",
+                many(count),
+            )
+        )
         if cores > 1:
-            out.append(Contender(f"FanTracking, {count} on {cores} threads", _UNIT, "the same", many(count, threads=cores)))
-    out += [Contender("constant gain, 1 environment", _UNIT, "the same, with a filter of constant gain",
-                      _single("constant-gain")),
-            Contender(f"constant gain, {counts[0]} in one process", _UNIT, "the same, all of them together",
-                      many(counts[0], estimator="constant-gain")),
-            _ant()]
+            out.append(
+                Contender(
+                    f"FanTracking, {count} on {cores} threads",
+                    _UNIT,
+                    "the same",
+                    many(count, threads=cores),
+                )
+            )
+    out += [
+        Contender(
+            "constant gain, 1 environment",
+            _UNIT,
+            "the same, with a filter of constant gain",
+            _single("constant-gain"),
+        ),
+        Contender(
+            f"constant gain, {counts[0]} in one process",
+            _UNIT,
+            "the same, all of them together",
+            many(counts[0], estimator="constant-gain"),
+        ),
+        _ant(),
+    ]
     for name, peer in (("rotorpy", _rotorpy), ("PyFlyt", _pyflyt), ("crazyflow", _crazyflow)):
         if importlib.util.find_spec(name):
             out.append(peer())
@@ -61,13 +92,17 @@ def _single(estimator: str) -> Callable[[], float]:
 
 
 def many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], float]:
-    """Return what flies ``count`` environments together and returns how many times faster than real time."""
+    """Return what flies ``count`` environments together and returns how many times faster than real
+    time.
+    """
     from ..envs.fan_tracking import DECISION_TICKS
     from ..envs.plant import TICK
     from ..envs.vector import FanTrackingVectorEnv
 
     # a fan that stands still never leaves the vehicle behind: no reset falls into a run
-    envs = FanTrackingVectorEnv(count, max_episode_steps=10**9, threads=threads, scenario="static", estimator=estimator)
+    envs = FanTrackingVectorEnv(
+        count, max_episode_steps=10**9, threads=threads, scenario="static", estimator=estimator
+    )
     actions, steps = np.zeros((count, 1), dtype=np.float32), max(2, _TOGETHER // count)
     envs.reset(seed=0)
 
@@ -81,7 +116,9 @@ def many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], f
 
 
 def many_us(count: int) -> Callable[[], float]:
-    """Return what flies ``count`` environments and returns the time of one environment's tick in us."""
+    """Return what flies ``count`` environments and returns the time of one environment's tick in
+    us.
+    """
     from ..envs.plant import TICK
 
     run = many(count)
@@ -118,13 +155,20 @@ def _rotorpy() -> Contender:
             state = vehicle.step(state, command, 0.01)
         return steps * 0.01 / (time.perf_counter() - begin)
 
-    return Contender(f"RotorPy {version('rotorpy')}", _UNIT, "rigid body, motors and aerodynamics at 100 Hz", run)
+    return Contender(
+        f"RotorPy {version('rotorpy')}", _UNIT, "rigid body, motors and aerodynamics at 100 Hz", run
+    )
 
 
 def _pyflyt() -> Contender:
     from PyFlyt.core import Aviary
 
-    world: Any = Aviary(start_pos=np.array([[0.0, 0.0, 1.0]]), start_orn=np.zeros((1, 3)), drone_type="quadx", render=False)
+    world: Any = Aviary(
+        start_pos=np.array([[0.0, 0.0, 1.0]]),
+        start_orn=np.zeros((1, 3)),
+        drone_type="quadx",
+        render=False,
+    )
     world.set_mode(7)  # a position is held
 
     def run(steps: int = 60) -> float:
@@ -136,10 +180,16 @@ def _pyflyt() -> Contender:
             world.step()
         return float(world.elapsed_time - start) / (time.perf_counter() - begin)
 
-    return Contender(f"PyFlyt {version('PyFlyt')}", _UNIT, "PyBullet at 240 Hz, motors, a position controller", run)
+    return Contender(
+        f"PyFlyt {version('PyFlyt')}",
+        _UNIT,
+        "PyBullet at 240 Hz, motors, a position controller",
+        run,
+    )
 
 
-# crazyflow wants a setting of SciPy's that must be there before SciPy is imported: a process of its own, one run a line
+# crazyflow wants a setting of SciPy's that must be there before SciPy is imported: a process of its
+# own, one run a line
 _CRAZYFLOW = """
 import sys, time
 import jax, numpy as np
@@ -166,10 +216,17 @@ def _crazyflow(count: int = 1024) -> Contender:
 
     def run() -> float:
         if not worker:
-            worker.append(subprocess.Popen(
-                [sys.executable, "-c", _CRAZYFLOW.format(count=count)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, text=True, env=os.environ | {"SCIPY_ARRAY_API": "1"},
-                cwd=tempfile.gettempdir()))  # where MuJoCo's log of its warnings goes
+            worker.append(
+                subprocess.Popen(
+                    [sys.executable, "-c", _CRAZYFLOW.format(count=count)],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    text=True,
+                    env=os.environ | {"SCIPY_ARRAY_API": "1"},
+                    cwd=tempfile.gettempdir(),
+                )
+            )  # where MuJoCo's log of its warnings goes
         to, back = worker[0].stdin, worker[0].stdout
         assert to is not None
         assert back is not None
@@ -180,5 +237,9 @@ def _crazyflow(count: int = 1024) -> Contender:
                 return float(line.split()[1])
         raise RuntimeError("crazyflow: the measurement ended without a result")
 
-    return Contender(f"crazyflow {version('crazyflow')}, {count} vehicles", _UNIT,
-                     "its default dynamics and attitude controller at 500 Hz in JAX, on all cores", run)
+    return Contender(
+        f"crazyflow {version('crazyflow')}, {count} vehicles",
+        _UNIT,
+        "its default dynamics and attitude controller at 500 Hz in JAX, on all cores",
+        run,
+    )

@@ -1,4 +1,6 @@
-"""A digest of the code that made a result: results of other code are not comparable, and not reused."""
+"""A digest of the code that made a result: results of other code are not comparable, and not
+reused.
+"""
 
 import hashlib
 from functools import cache
@@ -9,7 +11,8 @@ _ROOMS = ("runtime", "dynamics", "estimator", "controllers", "identification", "
 
 @cache
 def code_stamp(*modules: str) -> str:
-    """Return a digest (16 hexadecimal digits) of all rooms that fly and diagnose, and of these modules of the studies.
+    """Return a digest (16 hexadecimal digits) of all rooms that fly and diagnose, and of these
+    modules of the studies.
 
     Args:
         modules: paths below this folder without their ending, such as ``trials/outsiders``.
@@ -17,7 +20,10 @@ def code_stamp(*modules: str) -> str:
     root = Path(__file__).resolve().parent.parent
     files = [root / "studies" / f"{name}.py" for name in modules]
     files += [
-        path for room in _ROOMS for path in (root / room).rglob("*") if path.suffix in (".py", ".yaml", ".xml")
+        path
+        for room in _ROOMS
+        for path in (root / room).rglob("*")
+        if path.suffix in (".py", ".yaml", ".xml")
     ]
     digest = hashlib.sha256()
     for path in sorted(files):

@@ -1,8 +1,9 @@
 """Checkpoints from which a run goes on as if it had never stopped.
 
-A checkpoint holds all that the rest of a run depends on: networks, optimisers, replay memory, the state of every random
-generator, and of each environment the episode's number and the actions since its start, from which the environment is
-flown back to where it was. It is one file of tensors and text, and reading it runs no code.
+A checkpoint holds all that the rest of a run depends on: networks, optimisers, replay memory, the
+state of every random generator, and of each environment the episode's number and the actions since
+its start, from which the environment is flown back to where it was. It is one file of tensors and
+text, and reading it runs no code.
 """
 
 import json
@@ -21,7 +22,9 @@ _NORMALS = ("_n_updates", "_episode_num", "num_timesteps")
 
 
 def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], path: Path) -> None:
-    """Write where a run stands, between two calls of ``learn``; ``extra`` is text, numbers and lists of the run's own."""
+    """Write where a run stands, between two calls of ``learn``; ``extra`` is text, numbers and
+    lists of the run's own.
+    """
     memory = env.memory()
     kind, keys, *rest = np.random.get_state()  # noqa: NPY002  the generator that SB3 draws from
     state: dict[str, Any] = {
@@ -29,10 +32,15 @@ def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], pat
         "counters": {name: getattr(learner, name) for name in _NORMALS},
         "torch": torch.get_rng_state(),
         "numpy": torch.from_numpy(np.asarray(keys).astype(np.int64)),
-        "text": json.dumps({
-            "numpy": [kind, *rest], "actions": learner.action_space.np_random.bit_generator.state,
-            "episode": memory["episode"], "recent": list(learner.ep_info_buffer or []), "extra": extra,
-        }),
+        "text": json.dumps(
+            {
+                "numpy": [kind, *rest],
+                "actions": learner.action_space.np_random.bit_generator.state,
+                "episode": memory["episode"],
+                "recent": list(learner.ep_info_buffer or []),
+                "extra": extra,
+            }
+        ),
         "flown": [torch.from_numpy(a) for a in memory["actions"]],
         "seen": torch.from_numpy(np.array(learner._last_obs)),
         "starts": torch.from_numpy(np.array(learner._last_episode_starts)),
@@ -51,10 +59,12 @@ def save_checkpoint(learner: Any, env: FeatureVecEnv, extra: dict[str, Any], pat
 
 
 def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, Any]:
-    """Put a new learner and its environments where ``save_checkpoint`` was called; return its ``extra``.
+    """Put a new learner and its environments where ``save_checkpoint`` was called; return its
+    ``extra``.
 
     Raises:
-        InputError: not a checkpoint of this configuration, or its environments do not fly back to where they were.
+        InputError: not a checkpoint of this configuration, or its environments do not fly back to
+            where they were.
     """
     try:
         state = torch.load(path, weights_only=True)
@@ -72,11 +82,17 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
     if "log_ent_coef" in state:
         learner.log_ent_coef.data.copy_(state["log_ent_coef"])
     if "lstm" in state:
-        learner._last_lstm_states = type(learner._last_lstm_states)(*(tuple(pair) for pair in state["lstm"]))
-    learner._last_obs = env.recall({"episode": text["episode"], "actions": [t.numpy() for t in state["flown"]]})
+        learner._last_lstm_states = type(learner._last_lstm_states)(
+            *(tuple(pair) for pair in state["lstm"])
+        )
+    learner._last_obs = env.recall(
+        {"episode": text["episode"], "actions": [t.numpy() for t in state["flown"]]}
+    )
     learner._last_episode_starts = state["starts"].numpy()
     if not np.array_equal(learner._last_obs, state["seen"].numpy()):
-        raise InputError(f"{path}: the environments no longer fly as they did when it was written; start anew")
+        raise InputError(
+            f"{path}: the environments no longer fly as they did when it was written; start anew"
+        )
     from collections import deque
 
     learner.ep_info_buffer = deque(text["recent"], maxlen=learner._stats_window_size)

@@ -1,4 +1,6 @@
-"""Configurations of training, as data: one YAML file an algorithm, every key of which a run may override."""
+"""Configurations of training, as data: one YAML file an algorithm, every key of which a run may
+override.
+"""
 
 import copy
 from collections.abc import Sequence
@@ -22,19 +24,24 @@ def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None
     Args:
         algorithm: one of ``ALGORITHMS``.
         overrides: ``KEY=VALUE`` in YAML, with dots for what lies deeper: ``learner.gamma=0.98``.
-        file: a YAML file of such keys, nested, that changes the algorithm's own before ``overrides`` do.
+        file: a YAML file of such keys, nested, that changes the algorithm's own before
+            ``overrides`` do.
 
     Raises:
         InputError: an algorithm, key or value that does not exist or is of another kind.
     """
     if algorithm not in ALGORITHMS:
         raise unknown_name("algorithm", algorithm, ALGORITHMS)
-    text = (resources.files(__package__) / "configs" / f"{algorithm}.yaml").read_text(encoding="utf-8")
+    text = (resources.files(__package__) / "configs" / f"{algorithm}.yaml").read_text(
+        encoding="utf-8"
+    )
     config: Config = yaml.safe_load(text)
     if file is not None:
         changes = read_yaml(file, "a configuration of training")
         if not isinstance(changes, dict):
-            raise InputError(f"{file}: expected keys and values, as in training/configs/{algorithm}.yaml")
+            raise InputError(
+                f"{file}: expected keys and values, as in training/configs/{algorithm}.yaml"
+            )
         _merge(config, changes, str(file), "")
     for text in overrides:
         key, equals, value = text.partition("=")
@@ -45,7 +52,9 @@ def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None
             nested = {part: nested}
         _merge(config, nested, "--set", "")
     if config["algorithm"] != algorithm:
-        raise InputError(f"{algorithm}: algorithm cannot be overridden, got {config['algorithm']!r}")
+        raise InputError(
+            f"{algorithm}: algorithm cannot be overridden, got {config['algorithm']!r}"
+        )
     _check(config)
     return config
 
@@ -58,7 +67,9 @@ def _merge(config: Config, changes: Config, where: str, above: str) -> None:
         old = config[key]
         if isinstance(old, dict):
             if not isinstance(value, dict):
-                raise InputError(f"{where}: {name} holds keys of its own ({', '.join(old)}), got {value!r}")
+                raise InputError(
+                    f"{where}: {name} holds keys of its own ({', '.join(old)}), got {value!r}"
+                )
             _merge(old, value, where, f"{name}.")
         else:
             config[key] = _like(old, value, f"{where}: {name}")
@@ -85,15 +96,26 @@ def _check(config: Config) -> None:
             raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
     for key in ("every", "episodes"):
         if config["validation"][key] < 1:
-            raise InputError(f"{config['algorithm']}: validation.{key} must be at least 1, got {config['validation'][key]}")
+            raise InputError(
+                f"{config['algorithm']}: validation.{key} must be at least 1, got "
+                f"{config['validation'][key]}"
+            )
     if config.get("checkpoint", 1) < 1:
-        raise InputError(f"{config['algorithm']}: checkpoint must be at least 1, got {config['checkpoint']}")
+        raise InputError(
+            f"{config['algorithm']}: checkpoint must be at least 1, got {config['checkpoint']}"
+        )
     if config["activation"] not in ("relu", "tanh"):
-        raise unknown_name("activation", config["activation"], ("relu", "tanh"), config["algorithm"])
+        raise unknown_name(
+            "activation", config["activation"], ("relu", "tanh"), config["algorithm"]
+        )
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
-        raise InputError(f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}")
+        raise InputError(
+            f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"
+        )
     if config["estimator"] not in ("ukf", "constant-gain"):
-        raise unknown_name("estimator", config["estimator"], ("ukf", "constant-gain"), config["algorithm"])
+        raise unknown_name(
+            "estimator", config["estimator"], ("ukf", "constant-gain"), config["algorithm"]
+        )
     features_of(config)
 
 

@@ -9,13 +9,18 @@ States = tuple[torch.Tensor, torch.Tensor]
 class FastLstmPolicy(RecurrentActorCriticPolicy):  # type: ignore[misc]
     """The LSTM policy of sb3-contrib, with the same numbers up to rounding.
 
-    It goes through a sequence step by step as soon as an episode starts anywhere in it, and its rollouts are cut at the
-    starts of episodes: of each sequence it is the first step, or none. A state that is zero from there on says the same.
+    It goes through a sequence step by step as soon as an episode starts anywhere in it, and its
+    rollouts are cut at the starts of episodes: of each sequence it is the first step, or none. A
+    state that is zero from there on says the same.
     """
 
     @staticmethod
-    def _process_sequence(features: torch.Tensor, lstm_states: States, episode_starts: torch.Tensor,
-                          lstm: torch.nn.LSTM) -> tuple[torch.Tensor, States]:
+    def _process_sequence(
+        features: torch.Tensor,
+        lstm_states: States,
+        episode_starts: torch.Tensor,
+        lstm: torch.nn.LSTM,
+    ) -> tuple[torch.Tensor, States]:
         count = lstm_states[0].shape[1]
         starts = episode_starts.reshape(count, -1)
         if starts.shape[1] > 1 and not torch.any(starts[:, 1:]):
@@ -23,5 +28,6 @@ class FastLstmPolicy(RecurrentActorCriticPolicy):  # type: ignore[misc]
             lstm_states = (kept * lstm_states[0], kept * lstm_states[1])
             episode_starts = torch.zeros_like(episode_starts)
         result: tuple[torch.Tensor, States] = RecurrentActorCriticPolicy._process_sequence(
-            features, lstm_states, episode_starts, lstm)
+            features, lstm_states, episode_starts, lstm
+        )
         return result

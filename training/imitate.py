@@ -1,7 +1,8 @@
 """Imitation of the oracle (DAgger): how far what a policy may see can take it.
 
-In every round the newest policy flies, the oracle says what it would have commanded in each place, and a network is fitted
-to all that was said so far. What remains of the error then is what the observation does not hold, or the network cannot.
+In every round the newest policy flies, the oracle says what it would have commanded in each place,
+and a network is fitted to all that was said so far. What remains of the error then is what the
+observation does not hold, or the network cannot.
 """
 
 import time
@@ -51,7 +52,10 @@ def imitate(
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     world = make_world(scenario, config["estimator"], features.sources)
-    judge, seeds = make_world(scenario, sources=features.sources), validation_seeds(config["validation"]["episodes"])
+    judge, seeds = (
+        make_world(scenario, sources=features.sources),
+        validation_seeds(config["validation"]["episodes"]),
+    )
     network = _network(features.size, config)
     inputs: list[Array] = []
     labels: list[Array] = []
@@ -60,7 +64,11 @@ def imitate(
     per_round = -(-config["steps"] // config["rounds"])
     oracle = Oracle(config["gain"])
     while flown < config["steps"]:
-        pilot = None if flown == 0 else TrainedPolicy(card_of(config, scenario, seed, flown, True), _weights(network))
+        pilot = (
+            None
+            if flown == 0
+            else TrainedPolicy(card_of(config, scenario, seed, flown, True), _weights(network))
+        )
         until = min(flown + per_round, config["steps"])
         while flown < until:
             seen, said = _fly(world, pilot, oracle, config, training_seed(seed, 0, episode))
@@ -95,8 +103,12 @@ def _weights(network: torch.nn.Sequential) -> Weights:
     return dense_weights(network)
 
 
-def _fly(world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config, seed: int) -> tuple[Array, Array]:
-    """Fly one episode (the oracle where there is no pilot); return what a policy saw (n, size) and was told (n,)."""
+def _fly(
+    world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config, seed: int
+) -> tuple[Array, Array]:
+    """Fly one episode (the oracle where there is no pilot); return what a policy saw (n, size) and
+    was told (n,).
+    """
     features = features_of(config)
     history = History(features, 1)
     observation, info = world.reset(seed=seed)
@@ -107,7 +119,9 @@ def _fly(world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config
     for k in range(DECISIONS):
         best = np.asarray(oracle(observation, info), dtype=np.float32)
         if k % config["repeat"] == 0:
-            frames = features.frames(observation[None], {s: np.asarray(info[s])[None] for s in features.sources})
+            frames = features.frames(
+                observation[None], {s: np.asarray(info[s])[None] for s in features.sources}
+            )
             if k == 0:
                 history.restart(frames, [0])
             else:
@@ -123,7 +137,9 @@ def _fly(world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config
     return np.array(seen, dtype=np.float32), np.array(said, dtype=np.float32)
 
 
-def _fit(network: torch.nn.Sequential, inputs: Array, labels: Array, config: Config, seed: int) -> None:
+def _fit(
+    network: torch.nn.Sequential, inputs: Array, labels: Array, config: Config, seed: int
+) -> None:
     """Fit the network to commands, by least squares with a learning rate that falls to zero."""
     generator = torch.Generator().manual_seed(seed)
     x, y = torch.from_numpy(inputs), torch.from_numpy(labels)[:, None]

@@ -1,4 +1,6 @@
-"""The learners of stable-baselines3, made from a configuration, and what they have learned as a policy's weights."""
+"""The learners of stable-baselines3, made from a configuration, and what they have learned as a
+policy's weights.
+"""
 
 from typing import Any
 
@@ -16,17 +18,28 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     """Return the SB3 algorithm that a configuration describes."""
     torch.set_num_threads(1)  # the networks are small: threads would only wait for each other
     algorithm = config["algorithm"]
-    policy: dict[str, Any] = {"net_arch": list(config["net"]), "activation_fn": _ACTIVATIONS[config["activation"]],
-                              "optimizer_kwargs": {"fused": True}}
+    policy: dict[str, Any] = {
+        "net_arch": list(config["net"]),
+        "activation_fn": _ACTIVATIONS[config["activation"]],
+        "optimizer_kwargs": {"fused": True},
+    }
     start, end = config["learner"]["learning_rate"], config["learning_rate_end"]
     learner: Any = None
 
     def rate(_: float) -> float:
-        """Fall in a straight line over the run; SB3's own share of the run begins anew with every call of ``learn``."""
+        """Fall in a straight line over the run; SB3's own share of the run begins anew with every
+        call of ``learn``.
+        """
         done = 0 if learner is None else learner.num_timesteps
         return float(start + (end - start) * min(done / config["steps"], 1.0))
 
-    given: dict[str, Any] = {**config["learner"], "learning_rate": rate, "seed": seed, "device": "cpu", "verbose": 0}
+    given: dict[str, Any] = {
+        **config["learner"],
+        "learning_rate": rate,
+        "seed": seed,
+        "device": "cpu",
+        "verbose": 0,
+    }
     learner = _LEARNERS[algorithm](config, env, policy, given)
     return learner
 
@@ -55,7 +68,9 @@ def _ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, A
     return PPO("MlpPolicy", env, policy_kwargs=_actor_critic(config, policy), **given)
 
 
-def _recurrent_ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]) -> Any:
+def _recurrent_ppo(
+    config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]
+) -> Any:
     from sb3_contrib import RecurrentPPO
 
     from .fast_lstm import FastLstmPolicy
@@ -65,14 +80,20 @@ def _recurrent_ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: d
 
 
 def _actor_critic(config: Config, policy: dict[str, Any]) -> dict[str, Any]:
-    return {**policy, "log_std_init": config["log_std_init"], "net_arch": {"pi": config["net"], "vf": config["net"]}}
+    return {
+        **policy,
+        "log_std_init": config["log_std_init"],
+        "net_arch": {"pi": config["net"], "vf": config["net"]},
+    }
 
 
 _LEARNERS = {"sac": _sac, "td3": _td3, "ppo": _ppo, "recurrent-ppo": _recurrent_ppo}
 
 
 def weights_of(learner: Any, algorithm: str) -> Weights:
-    """Return the weights of a learner's deterministic policy, as ``policy.TrainedPolicy`` wants them."""
+    """Return the weights of a learner's deterministic policy, as ``policy.TrainedPolicy`` wants
+    them.
+    """
     policy = learner.policy
     arrays: Weights = {}
     if algorithm == "sac":
@@ -83,8 +104,12 @@ def weights_of(learner: Any, algorithm: str) -> Weights:
         layers = [*policy.mlp_extractor.policy_net, policy.action_net]
         if algorithm == "recurrent-ppo":
             cell = policy.lstm_actor
-            for name, tensor in (("lstm_input", cell.weight_ih_l0), ("lstm_hidden", cell.weight_hh_l0),
-                                 ("lstm_input_bias", cell.bias_ih_l0), ("lstm_hidden_bias", cell.bias_hh_l0)):
+            for name, tensor in (
+                ("lstm_input", cell.weight_ih_l0),
+                ("lstm_hidden", cell.weight_hh_l0),
+                ("lstm_input_bias", cell.bias_ih_l0),
+                ("lstm_hidden_bias", cell.bias_hh_l0),
+            ):
                 arrays[name] = _array(tensor)
     return arrays | dense_weights(layers)
 

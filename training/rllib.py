@@ -10,7 +10,9 @@ from ..runtime.extras import need
 
 
 def register_with_rllib(name: str = "windwrench") -> None:
-    """Make the environment known to RLlib: ``config.environment("windwrench", env_config={"scenario": "base"})``."""
+    """Make the environment known to RLlib:
+    ``config.environment("windwrench", env_config={"scenario": "base"})``.
+    """
     need("ray", "cluster")
     from ray.tune import register_env
 

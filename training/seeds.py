@@ -9,7 +9,9 @@ FIRST_VALIDATION_SEED = 900_000  # below it: training
 
 
 def training_seed(seed: int, environment: int, episode: int) -> int:
-    """Return the seed of a training run's episode, the same whenever it is flown: 0 to ``FIRST_VALIDATION_SEED`` - 1."""
+    """Return the seed of a training run's episode, the same whenever it is flown: 0 to
+    ``FIRST_VALIDATION_SEED`` - 1.
+    """
     words = np.random.SeedSequence((seed, environment, episode)).generate_state(1, np.uint64)
     return int(words[0] % FIRST_VALIDATION_SEED)
 

@@ -1,7 +1,8 @@
 """A sweep: many training runs, on one machine or spread over several with Ray.
 
-Every run is the same run wherever it is done: its seed fixes it, and it goes on from its own checkpoint when the machine or
-process that did it is lost. On a cluster of several machines the results' folder must lie where all of them see it.
+Every run is the same run wherever it is done: its seed fixes it, and it goes on from its own
+checkpoint when the machine or process that did it is lost. On a cluster of several machines the
+results' folder must lie where all of them see it.
 """
 
 import itertools
@@ -26,8 +27,14 @@ class Job:
     seed: int
 
 
-def jobs_of(algorithm: str, scenario: str, seeds: Sequence[int], overrides: Sequence[str], search: Sequence[str],
-            file: Path | None = None) -> list[Job]:
+def jobs_of(
+    algorithm: str,
+    scenario: str,
+    seeds: Sequence[int],
+    overrides: Sequence[str],
+    search: Sequence[str],
+    file: Path | None = None,
+) -> list[Job]:
     """Return the runs of a sweep: every combination of the values searched, with every seed.
 
     Args:
@@ -46,7 +53,10 @@ def jobs_of(algorithm: str, scenario: str, seeds: Sequence[int], overrides: Sequ
         key, equals, values = text.partition("=")
         choices = [v for v in values.split("|") if v.strip()]
         if not equals or len(choices) < 2:
-            raise InputError(f"--search {text}: expected KEY=VALUE|VALUE|..., such as learner.gamma=0.9|0.95|0.98")
+            raise InputError(
+                f"--search {text}: expected KEY=VALUE|VALUE|..., such as "
+                f"learner.gamma=0.9|0.95|0.98"
+            )
         axes.append([f"{key}={value.strip()}" for value in choices])
     jobs = []
     for chosen in itertools.product(*axes):
@@ -69,7 +79,12 @@ def run_job(job: Job, folder: Path) -> dict[str, Any]:
     path = train(job.config, job.scenario, job.seed, folder / job.name)
     done = read_progress(folder / job.name)
     assert done is not None
-    return {"run": job.name, "policy": str(path), "validation_rmse_m": done.best_rmse, "seconds": done.seconds}
+    return {
+        "run": job.name,
+        "policy": str(path),
+        "validation_rmse_m": done.best_rmse,
+        "seconds": done.seconds,
+    }
 
 
 def run_jobs(jobs: Sequence[Job], folder: Path, address: str) -> list[dict[str, Any]]:
@@ -92,12 +107,22 @@ def run_jobs(jobs: Sequence[Job], folder: Path, address: str) -> list[dict[str, 
         tuner = tune.Tuner(
             tune.with_resources(trial, {"cpu": 1}),
             param_space={"run": tune.grid_search(list(by_name))},
-            run_config=tune.RunConfig(name="ray", storage_path=str(root), verbose=0,
-                                      failure_config=tune.FailureConfig(max_failures=RETRIES)),
+            run_config=tune.RunConfig(
+                name="ray",
+                storage_path=str(root),
+                verbose=0,
+                failure_config=tune.FailureConfig(max_failures=RETRIES),
+            ),
         )
         grid = tuner.fit()
     if grid.errors:
-        raise InputError(f"--cluster {address}: {len(grid.errors)} of {len(jobs)} runs failed: {grid.errors[0]}")
-    found = {result.metrics["run"]: {k: result.metrics[k] for k in ("run", "policy", "validation_rmse_m", "seconds")}
-             for result in grid}
+        raise InputError(
+            f"--cluster {address}: {len(grid.errors)} of {len(jobs)} runs failed: {grid.errors[0]}"
+        )
+    found = {
+        result.metrics["run"]: {
+            k: result.metrics[k] for k in ("run", "policy", "validation_rmse_m", "seconds")
+        }
+        for result in grid
+    }
     return [found[job.name] for job in jobs]

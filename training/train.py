@@ -55,23 +55,44 @@ def card_of(config: Config, scenario: str, seed: int, steps: int, squash: bool) 
     """Return the card of a policy: all that is needed to fly it, and to train it again."""
     features = features_of(config)
     return {
-        "algorithm": config["algorithm"], "scenario": scenario, "seed": seed, "steps": steps,
-        "features": asdict(features), "repeat": config["repeat"], "activation": config["activation"], "squash": squash,
-        "seeds": {"training": [0, FIRST_VALIDATION_SEED - 1],
-                  "validation": [FIRST_VALIDATION_SEED, FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1]},
-        "config": config, "versions": versions(),
+        "algorithm": config["algorithm"],
+        "scenario": scenario,
+        "seed": seed,
+        "steps": steps,
+        "features": asdict(features),
+        "repeat": config["repeat"],
+        "activation": config["activation"],
+        "squash": squash,
+        "seeds": {
+            "training": [0, FIRST_VALIDATION_SEED - 1],
+            "validation": [
+                FIRST_VALIDATION_SEED,
+                FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1,
+            ],
+        },
+        "config": config,
+        "versions": versions(),
     }
 
 
 def validate(policy: TrainedPolicy, world: Any, seeds: Sequence[int]) -> tuple[float, int]:
-    """Fly validation episodes with the full filter; return the mean RMSE (m) and how many were lost."""
+    """Fly validation episodes with the full filter; return the mean RMSE (m) and how many were
+    lost.
+    """
     flown = [fly_episode(world, policy, seed) for seed in seeds]
     return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
 
 
-def take_stock(policy: TrainedPolicy, card: dict[str, Any], progress: Progress, world: Any, seeds: Sequence[int],
-               folder: Path) -> tuple[float, int]:
-    """Validate a policy, save it as the last one, and as the best if it is, and note it in ``progress``.
+def take_stock(
+    policy: TrainedPolicy,
+    card: dict[str, Any],
+    progress: Progress,
+    world: Any,
+    seeds: Sequence[int],
+    folder: Path,
+) -> tuple[float, int]:
+    """Validate a policy, save it as the last one, and as the best if it is, and note it in
+    ``progress``.
 
     Returns:
         Its mean RMSE (m) and how many episodes were lost, as of ``validate``.
@@ -113,8 +134,10 @@ def claim(folder: Path, config: Config, scenario: str, seed: int) -> None:
     if path.exists():
         kept = json.loads(path.read_text(encoding="utf-8"))
         if {k: kept.get(k) for k in run} != run:
-            raise InputError(f"{folder}: holds a run with another configuration, scenario or seed; "
-                             "give another --out, or delete it")
+            raise InputError(
+                f"{folder}: holds a run with another configuration, scenario or seed; "
+                "give another --out, or delete it"
+            )
     write_json({**run, "versions": versions()}, path)
 
 
@@ -129,9 +152,10 @@ def train(
 ) -> Path:
     """Train a policy; return the path of the best one on the validation episodes.
 
-    ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``, ``training.json``, TensorBoard's
-    events, and ``checkpoint.pt``. Called again after a run was killed, it goes on from the last checkpoint and ends with
-    the same policies, bit for bit, as a run that was not.
+    ``folder`` then holds ``best.npz`` and ``last.npz`` with their cards, ``progress.json``,
+    ``training.json``, TensorBoard's events, and ``checkpoint.pt``. Called again after a run was
+    killed, it goes on from the last checkpoint and ends with the same policies, bit for bit, as a
+    run that was not.
 
     Args:
         config: as of ``load_config``.
@@ -152,11 +176,18 @@ def train(
     check_world(scenario)
     claim(folder, config, scenario, seed)
     features, algorithm = features_of(config), config["algorithm"]
-    worlds = make_worlds(scenario, config["environments"], config["estimator"], config["repeat"], features.sources)
-    env = FeatureVecEnv(worlds, features, lambda i, episode: training_seed(seed, i, episode), config["reward"])
+    worlds = make_worlds(
+        scenario, config["environments"], config["estimator"], config["repeat"], features.sources
+    )
+    env = FeatureVecEnv(
+        worlds, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
+    )
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
-    judge, seeds = make_world(scenario, sources=features.sources), validation_seeds(config["validation"]["episodes"])
+    judge, seeds = (
+        make_world(scenario, sources=features.sources),
+        validation_seeds(config["validation"]["episodes"]),
+    )
     progress, checkpoint = Progress(), folder / "checkpoint.pt"
     if checkpoint.exists():
         progress = Progress(**load_checkpoint(learner, env, checkpoint))
@@ -168,7 +199,10 @@ def train(
         target = min((done // every + 1) * every, (done // between + 1) * between, config["steps"])
         learner.learn(target - done, callback=follow, reset_num_timesteps=False, log_interval=4)
         done = learner.num_timesteps
-        if done // every > (progress.steps[-1] // every if progress.steps else 0) or done >= config["steps"]:
+        if (
+            done // every > (progress.steps[-1] // every if progress.steps else 0)
+            or done >= config["steps"]
+        ):
             card = card_of(config, scenario, seed, done, squashes(algorithm))
             policy = TrainedPolicy(card, weights_of(learner, algorithm))
             rmse, lost = take_stock(policy, card, progress, judge, seeds, folder)

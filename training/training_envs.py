@@ -19,7 +19,18 @@ Frame = NDArray[np.float32]
 
 # a scenario that comes twice is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
-    "wide": ("static", "base", "base", "fast", "fast", "slow-filter", "noisy", "gusty", "far", "varied"),
+    "wide": (
+        "static",
+        "base",
+        "base",
+        "fast",
+        "fast",
+        "slow-filter",
+        "noisy",
+        "gusty",
+        "far",
+        "varied",
+    ),
 }
 
 
@@ -40,9 +51,14 @@ class MixedFanTracking(gym.Env[Frame, Frame]):
         self.envs = {name: FanTrackingEnv(name, **kwargs) for name in dict.fromkeys(scenarios)}
         self._scenarios = scenarios
         self._env = self.envs[scenarios[0]]
-        self.observation_space, self.action_space = self._env.observation_space, self._env.action_space
+        self.observation_space, self.action_space = (
+            self._env.observation_space,
+            self._env.action_space,
+        )
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Frame, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Frame, dict[str, Any]]:
         """Draw a scenario and start an episode in it."""
         super().reset(seed=seed)
         self._env = self.envs[self._scenarios[self.np_random.integers(len(self._scenarios))]]
@@ -74,13 +90,16 @@ class Repeat(gym.Wrapper[Frame, Frame, Frame, Frame]):
         return frame, float(mean[0]), lost, over, info
 
 
-def make_world(name: str, estimator: str = "ukf", sources: frozenset[str] = frozenset()) -> gym.Env[Frame, Frame]:
+def make_world(
+    name: str, estimator: str = "ukf", sources: frozenset[str] = frozenset()
+) -> gym.Env[Frame, Frame]:
     """Return a training world.
 
     Args:
         name: scenario or tier.
         estimator: of the environment: ``ukf``, or ``constant-gain``, its fast stand-in.
-        sources: what ``info`` must hold beyond the environment's own (see ``envs.watched_fan_tracking``).
+        sources: what ``info`` must hold beyond the environment's own (see
+            ``envs.watched_fan_tracking``).
 
     Raises:
         InputError: a name that does not exist.
@@ -89,15 +108,27 @@ def make_world(name: str, estimator: str = "ukf", sources: frozenset[str] = froz
     if name not in TIERS:
         return scenario_env(name, sources, estimator)
     if sources - TRUTH:
-        raise InputError(f"training: quantities beside the filter's estimate need one scenario, not the tier {name!r}")
+        raise InputError(
+            f"training: quantities beside the filter's estimate need one scenario, not the tier "
+            f"{name!r}"
+        )
     return MixedFanTracking(TIERS[name], estimator=estimator)
 
 
-def make_worlds(name: str, count: int, estimator: str = "ukf", repeat: int = 1,
-                sources: frozenset[str] = frozenset()) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Return ``count`` training worlds side by side; whoever steps them resets those whose episode has ended."""
+def make_worlds(
+    name: str,
+    count: int,
+    estimator: str = "ukf",
+    repeat: int = 1,
+    sources: frozenset[str] = frozenset(),
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Return ``count`` training worlds side by side; whoever steps them resets those whose episode
+    has ended.
+    """
     if DECISIONS % repeat:
-        raise InputError(f"training: repeat must divide the {DECISIONS} decisions of an episode, got {repeat}")
+        raise InputError(
+            f"training: repeat must divide the {DECISIONS} decisions of an episode, got {repeat}"
+        )
     check_world(name)
     if name in SCENARIOS and repeat == 1 and not sources - TRUTH:
         return FanTrackingVectorEnv(count, DECISIONS, scenario=name, estimator=estimator)

@@ -34,9 +34,15 @@ def check_law(name: str) -> None:
 
 
 def tune(
-    law: str, scenario: str, trials: int, episodes: int, seed: int = 0, advance: Callable[[int], None] = lambda done: None
+    law: str,
+    scenario: str,
+    trials: int,
+    episodes: int,
+    seed: int = 0,
+    advance: Callable[[int], None] = lambda done: None,
 ) -> dict[str, Any]:
-    """Search a law's gains for the smallest mean RMSE over validation episodes (Optuna, tree-structured Parzen estimator).
+    """Search a law's gains for the smallest mean RMSE over validation episodes (Optuna,
+    tree-structured Parzen estimator).
 
     Args:
         law: a key of ``RANGES``.
@@ -47,7 +53,8 @@ def tune(
         advance: called with the number of trials done.
 
     Returns:
-        ``gains``, ``rmse_m`` and ``lost`` of the best, ``default_rmse_m`` of the law as it comes, and the request.
+        ``gains``, ``rmse_m`` and ``lost`` of the best, ``default_rmse_m`` of the law as it comes,
+            and the request.
 
     Raises:
         InputError: an unknown law or scenario, no trials, or too many episodes.
@@ -63,7 +70,10 @@ def tune(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:
-        gains = {name: trial.suggest_float(name, low, high, log=True) for name, (low, high) in RANGES[law].items()}
+        gains = {
+            name: trial.suggest_float(name, low, high, log=True)
+            for name, (low, high) in RANGES[law].items()
+        }
         controller, rmse, lost = _LAWS[law](**gains), [], 0
         for k, one in enumerate(seeds):
             episode = fly_episode(world, controller, one)
@@ -76,20 +86,31 @@ def tune(
         trial.set_user_attr("lost", lost)
         return float(np.mean(rmse))
 
-    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed),
-                                pruner=optuna.pruners.PercentilePruner(60.0, n_startup_trials=4))
+    study = optuna.create_study(
+        sampler=optuna.samplers.TPESampler(seed=seed),
+        pruner=optuna.pruners.PercentilePruner(60.0, n_startup_trials=4),
+    )
     default = _LAWS[law]()
     study.enqueue_trial({name: getattr(default, name) for name in RANGES[law]})
-    study.optimize(objective, n_trials=trials, callbacks=[lambda _, trial: advance(trial.number + 1)])
+    study.optimize(
+        objective, n_trials=trials, callbacks=[lambda _, trial: advance(trial.number + 1)]
+    )
     return {
-        "law": law, "scenario": scenario, "gains": study.best_params, "rmse_m": study.best_value,
-        "lost": study.best_trial.user_attrs["lost"], "default_rmse_m": study.trials[0].value,
-        "trials": trials, "episodes": episodes, "seed": seed,
+        "law": law,
+        "scenario": scenario,
+        "gains": study.best_params,
+        "rmse_m": study.best_value,
+        "lost": study.best_trial.user_attrs["lost"],
+        "default_rmse_m": study.trials[0].value,
+        "trials": trials,
+        "episodes": episodes,
+        "seed": seed,
     }
 
 
 def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
-    """Write what a search found into a file of tuned gains, in place of what it held for this law and scenario.
+    """Write what a search found into a file of tuned gains, in place of what it held for this law
+    and scenario.
 
     Raises:
         InputError: the file is there but holds no gains.
@@ -101,9 +122,15 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
             raise InputError(f"{path}: cannot be read as YAML: {error}") from error
         if not isinstance(kept, dict) or not all(isinstance(v, dict) for v in kept.values()):
-            raise InputError(f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml")
+            raise InputError(
+                f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"
+            )
     rounded = {name: float(f"{value:.4g}") for name, value in found["gains"].items()}
     rest = {key: value for key, value in found.items() if key not in ("law", "scenario", "gains")}
-    kept.setdefault(found["law"], {})[found["scenario"]] = {"gains": rounded, **rest, "command": command}
+    kept.setdefault(found["law"], {})[found["scenario"]] = {
+        "gains": rounded,
+        **rest,
+        "command": command,
+    }
     with replaced(path) as partial:
         partial.write_text(yaml.safe_dump(kept, sort_keys=False, width=120), encoding="utf-8")

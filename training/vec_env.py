@@ -1,4 +1,6 @@
-"""The training worlds as stable-baselines3 wants them, with the policy's features for observations."""
+"""The training worlds as stable-baselines3 wants them, with the policy's features
+for observations.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -17,22 +19,30 @@ Array = NDArray[np.float32]
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
     """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking worlds.
 
-    Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds the features that
-    ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended it, and the observation returned is the
-    first of its next episode. Every episode's seed is given by ``seed_of``, so where an environment stands follows from its
-    episode's number and the actions since: ``memory`` returns these and ``recall`` flies them again.
+    Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds
+    the features that ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended
+    it, and the observation returned is the first of its next episode. Every episode's seed is given
+    by ``seed_of``, so where an environment stands follows from its episode's number and the actions
+    since: ``memory`` returns these and ``recall`` flies them again.
 
     Args:
-        envs: the vector environment, (8,) observations; its ``reset`` takes a list of seeds and a ``reset_mask``.
+        envs: the vector environment, (8,) observations; its ``reset`` takes a list of seeds and a
+            ``reset_mask``.
         features: of the policy.
         seed_of: from environment and episode to the episode's seed.
-        reward: weights of the terms ``tracking``, ``change`` and ``squared`` (minus the squared offset in m2).
+        reward: weights of the terms ``tracking``, ``change`` and ``squared`` (minus the squared
+            offset in m2).
     """
 
     render_mode: str | None = None  # SB3 asks for it
 
-    def __init__(self, envs: gym.vector.VectorEnv[Any, Any, Any], features: Features, seed_of: Callable[[int, int], int],
-                 reward: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        envs: gym.vector.VectorEnv[Any, Any, Any],
+        features: Features,
+        seed_of: Callable[[int, int], int],
+        reward: Mapping[str, float] | None = None,
+    ) -> None:
         self.envs, self.features = envs, features
         self._seed_of = seed_of
         self._weights = dict(reward or {"tracking": 1.0, "change": 1.0, "squared": 0.0})
@@ -45,9 +55,13 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         self._commands = np.zeros((self.num_envs, 1), dtype=np.float32)
 
     def _begin(self, which: NDArray[np.bool_]) -> dict[str, Any]:
-        """Start the present episode of the environments ``which`` anew; return the environments' information."""
+        """Start the present episode of the environments ``which`` anew; return the environments'
+        information.
+        """
         seeds = [self._seed_of(i, int(e)) for i, e in enumerate(self._episode)]
-        reset: Callable[..., Any] = self.envs.reset  # Gymnasium's vector environments take a list, which its types leave out
+        reset: Callable[..., Any] = (
+            self.envs.reset
+        )  # Gymnasium's vector environments take a list, which its types leave out
         infos: dict[str, Any]
         observations, infos = reset(seed=seeds, options={"reset_mask": which.copy()})
         self._history.restart(self.features.frames(observations, infos), which)
@@ -67,11 +81,16 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         self._commands = np.array(actions, dtype=np.float32)
 
     def step_wait(self) -> tuple[Array, Array, NDArray[np.bool_], list[dict[str, Any]]]:
-        """Fly one decision everywhere; return features (n, size), rewards (n,), dones (n,) and infos."""
+        """Fly one decision everywhere; return features (n, size), rewards (n,), dones (n,) and
+        infos.
+        """
         observations, _, lost, over, infos = self.envs.step(self._commands)
         offset = np.minimum(np.abs(infos["offset"]), LOST_OFFSET)
-        rewards = (self._weights["tracking"] * infos["reward_tracking"] + self._weights["change"] * infos["reward_change"]
-                   - self._weights["squared"] * offset**2).astype(np.float32)
+        rewards = (
+            self._weights["tracking"] * infos["reward_tracking"]
+            + self._weights["change"] * infos["reward_change"]
+            - self._weights["squared"] * offset**2
+        ).astype(np.float32)
         self._returns += rewards
         self._squares += offset**2
         self._history.push(self.features.frames(observations, infos))
@@ -95,11 +114,15 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
 
     def memory(self) -> dict[str, Any]:
         """Return the episodes' numbers (n,) and, of each, the actions since its start."""
-        return {"episode": self._episode.tolist(),
-                "actions": [np.array(taken, dtype=np.float32).reshape(-1, 1) for taken in self._taken]}
+        return {
+            "episode": self._episode.tolist(),
+            "actions": [np.array(taken, dtype=np.float32).reshape(-1, 1) for taken in self._taken],
+        }
 
     def recall(self, memory: Mapping[str, Any]) -> Array:
-        """Fly back to where ``memory`` was taken; return the features (n, size) there, bit for bit the same."""
+        """Fly back to where ``memory`` was taken; return the features (n, size) there, bit for bit
+        the same.
+        """
         self._episode[:] = memory["episode"]
         plans = [np.asarray(a, dtype=np.float32) for a in memory["actions"]]
         longest = max(len(plan) for plan in plans)
@@ -109,7 +132,11 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
             first = np.array([k > 0 and k == longest - len(plan) for plan in plans])
             if first.any():
                 self._begin(first)
-            self.step_async(np.array([plan[k - longest] if k >= longest - len(plan) else [0.0] for plan in plans]))
+            self.step_async(
+                np.array(
+                    [plan[k - longest] if k >= longest - len(plan) else [0.0] for plan in plans]
+                )
+            )
             before = self._episode.copy()
             self.step_wait()
             self._episode[:] = before  # an idle one that was lost on the way counts for nothing
@@ -130,9 +157,13 @@ class FeatureVecEnv(VecEnv):  # type: ignore[misc]
         """Refuse: the environments share their settings."""
         raise AttributeError(f"FeatureVecEnv: {attr_name} cannot be set on single environments")
 
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+    def env_method(
+        self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
+    ) -> list[Any]:
         """Refuse: the environments are stepped together."""
-        raise AttributeError(f"FeatureVecEnv: {method_name} cannot be called on single environments")
+        raise AttributeError(
+            f"FeatureVecEnv: {method_name} cannot be called on single environments"
+        )
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Say that episodes are counted here, so that SB3 reads ``infos[i]["episode"]``."""

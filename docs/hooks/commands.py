@@ -1,4 +1,6 @@
-"""A page of every command and its options, made when the site is built, from the commands themselves."""
+"""A page of every command and its options, made when the site is built, from the commands
+themselves.
+"""
 
 from typing import Any
 
@@ -12,6 +14,8 @@ from windwrench.cli import app
 def on_files(files: Files, config: Any) -> Files:
     """Add ``commands.md``."""
     group = typer.main.get_command(app)
-    text = get_docs_for_click(obj=group, ctx=typer.Context(group), name="windwrench", title="Commands")
+    text = get_docs_for_click(
+        obj=group, ctx=typer.Context(group), name="windwrench", title="Commands"
+    )
     files.append(File.generated(config, "commands.md", content=text))
     return files

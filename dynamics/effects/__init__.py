@@ -1,8 +1,9 @@
 """The library of physical effects: one file an effect, found by its file's name.
 
-``get("rotor_drag")`` is the ``EFFECT`` of ``rotor_drag.py``. ``compile_effects`` prepares a vehicle's effects for
-compiled code. Folders of a user's own join the library: those in the environment variable ``WINDWRENCH_EFFECTS``, which every
-command and its workers know, and those given to ``add_folder``.
+``get("rotor_drag")`` is the ``EFFECT`` of ``rotor_drag.py``. ``compile_effects`` prepares a
+vehicle's effects for compiled code. Folders of a user's own join the library: those in the
+environment variable ``WINDWRENCH_EFFECTS``, which every command and its workers know, and those
+given to ``add_folder``.
 """
 
 import os
@@ -20,8 +21,16 @@ from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
 
 __all__ = [
-    "Bundle", "Coefficient", "Effect", "add_folder", "check_setting", "compile_effects", "get", "law_in_words",
-    "names", "parse_setting",
+    "Bundle",
+    "Coefficient",
+    "Effect",
+    "add_folder",
+    "check_setting",
+    "compile_effects",
+    "get",
+    "law_in_words",
+    "names",
+    "parse_setting",
 ]
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
@@ -29,12 +38,16 @@ _NOT_EFFECTS = {"__init__", "base", "call", "parts"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
-    """Let the files of a folder be effects, here and in processes that this one starts; return their names.
+    """Let the files of a folder be effects, here and in processes that this one starts; return
+    their names.
 
     Raises:
         InputError: there is no such folder, or a file has the name of an effect that is there.
     """
-    folders = [*filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)), str(Path(folder).resolve())]
+    folders = [
+        *filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)),
+        str(Path(folder).resolve()),
+    ]
     before = os.environ.get(_FOLDERS)
     os.environ[_FOLDERS] = os.pathsep.join(dict.fromkeys(folders))
     _files.cache_clear()
@@ -50,7 +63,11 @@ def add_folder(folder: str | Path) -> tuple[str, ...]:
 
 
 def _effects_in(folder: Path) -> list[Path]:
-    return [path for path in sorted(folder.glob("*.py")) if path.stem not in _NOT_EFFECTS and not path.stem.startswith("_")]
+    return [
+        path
+        for path in sorted(folder.glob("*.py"))
+        if path.stem not in _NOT_EFFECTS and not path.stem.startswith("_")
+    ]
 
 
 @cache
@@ -61,10 +78,16 @@ def _files() -> dict[str, Path]:
     for text in filter(None, os.environ.get(_FOLDERS, "").split(os.pathsep)):
         folder = Path(text).resolve()
         if not folder.is_dir():
-            raise InputError(f"{_FOLDERS}: {text} is no folder; expected folders of effects, with {os.pathsep} between them")
+            raise InputError(
+                f"{_FOLDERS}: {text} is no folder; expected folders of effects, with {os.pathsep} "
+                f"between them"
+            )
         for path in _effects_in(folder):
             if found.setdefault(path.stem, path) != path:
-                raise InputError(f"{path}: an effect {path.stem} is there already ({found[path.stem]}); expected another name")
+                raise InputError(
+                    f"{path}: an effect {path.stem} is there already ({found[path.stem]}); "
+                    f"expected another name"
+                )
     return found
 
 
@@ -85,8 +108,10 @@ def get(name: str) -> Effect:
         raise unknown_name("effect", name, names())
     effect = getattr(_module(name), "EFFECT", None)
     if not isinstance(effect, Effect) or effect.name != name:
-        raise InputError(f"{_files()[name]}: expected EFFECT = Effect(name={name!r}, ...), got "
-                         f"{getattr(effect, 'name', effect)!r}")
+        raise InputError(
+            f"{_files()[name]}: expected EFFECT = Effect(name={name!r}, ...), got "
+            f"{getattr(effect, 'name', effect)!r}"
+        )
     return effect
 
 
@@ -114,15 +139,19 @@ def check_setting(setting: EffectSetting, where: str = "effect") -> EffectSettin
         if name not in known:
             raise unknown_name("coefficient", name, known, f"{where}: effect {setting.name}")
         if not known[name].minimum <= value <= known[name].maximum:
-            raise InputError(f"{where}: effect {setting.name}: {name} must lie between {known[name].minimum:g} and "
-                             f"{known[name].maximum:g} {known[name].unit}, got {value:g}")
+            raise InputError(
+                f"{where}: effect {setting.name}: {name} must lie between {known[name].minimum:g} "
+                f"and "
+                f"{known[name].maximum:g} {known[name].unit}, got {value:g}"
+            )
     return setting
 
 
 def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
     """Return the effect setting of a command line's ``NAME:coef=value,coef=value``.
 
-    A bare NAME takes typical sizes, those of a 0.03 kg vehicle if ``vehicle`` weighs less than 0.1 kg.
+    A bare NAME takes typical sizes, those of a 0.03 kg vehicle if ``vehicle`` weighs less than 0.1
+    kg.
 
     Raises:
         InputError: the text is not of that form, or names no known effect or coefficient.
@@ -141,19 +170,25 @@ def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
         except ValueError:
             equals = ""
         if not equals or not np.isfinite(coefficients[key.strip()]):
-            raise InputError(f"--effect {text}: expected NAME:coef=value with finite values, got {part!r}")
+            raise InputError(
+                f"--effect {text}: expected NAME:coef=value with finite values, got {part!r}"
+            )
     return check_setting(EffectSetting(name, coefficients), "--effect")
 
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A vehicle's effects, ready for compiled code: the addresses of laws and their coefficients, kind by kind."""
+    """A vehicle's effects, ready for compiled code: the addresses of laws and their coefficients,
+    kind by kind.
+    """
 
     vehicle: Vehicle  # with the body effects applied
     constants: Array  # (VEHICLE_SIZE,) what laws may know of it
     wrench_laws: np.ndarray  # (n,) int64 addresses
     wrench_coefficients: Array  # (n, ROW_SIZE)
-    wrench_hooks: np.ndarray  # (n,) int64 addresses of what carries a law's own state on; 0: it has none
+    wrench_hooks: (
+        np.ndarray
+    )  # (n,) int64 addresses of what carries a law's own state on; 0: it has none
     rotor_laws: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
     rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor laws need
@@ -173,9 +208,23 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
         if effect.law is not None:
             rows[effect.kind].append((effect, effect.vector(setting.coefficients)))
     rows["wrench"].sort(key=lambda row: not row[0].sets_wind)
-    constants = np.concatenate([
-        [amended.mass, amended.gravity, amended.rotor_radius, amended.floor_z, amended.ceiling_z, amended.voltage_ref,
-         amended.hover_rate], amended.com, amended.positions.ravel(), amended.spin, amended.p])
+    constants = np.concatenate(
+        [
+            [
+                amended.mass,
+                amended.gravity,
+                amended.rotor_radius,
+                amended.floor_z,
+                amended.ceiling_z,
+                amended.voltage_ref,
+                amended.hover_rate,
+            ],
+            amended.com,
+            amended.positions.ravel(),
+            amended.spin,
+            amended.p,
+        ]
+    )
     assert constants.size == VEHICLE_SIZE
 
     def stack(kind: str, width: int) -> tuple[np.ndarray, Array, int]:
@@ -187,6 +236,16 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
         return addresses, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
 
     laws, coefficients, _ = stack("wrench", ROW_SIZE)
-    hooks = np.array([effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]], dtype=np.int64)
-    return Bundle(amended, constants, laws, coefficients, hooks, *stack("rotor input", PARAMETERS),
-                  *stack("sensing", PARAMETERS))
+    hooks = np.array(
+        [effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]],
+        dtype=np.int64,
+    )
+    return Bundle(
+        amended,
+        constants,
+        laws,
+        coefficients,
+        hooks,
+        *stack("rotor input", PARAMETERS),
+        *stack("sensing", PARAMETERS),
+    )

@@ -1,7 +1,8 @@
-"""Attitude gain: the reported tilt is the true one times 1 + g, as that of an onboard estimate may be.
+"""Attitude gain: the reported tilt is the true one times 1 + g, as that of an onboard estimate may
+be.
 
-With the attitude split into a turn about the vertical and a tilt by an angle about a horizontal axis, the angle is
-reported as (1 + g) times what it is, axis and turn as they are.
+With the attitude split into a turn about the vertical and a tilt by an angle about a horizontal
+axis, the angle is reported as (1 + g) times what it is, axis and turn as they are.
 """
 
 import math
@@ -29,10 +30,16 @@ def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="attitude_gain",
     kind="sensing",
-    coefficients=(Coefficient("g", "1", (0.05, 0.05), "relative change of the tilt", minimum=-0.5, maximum=1.0),),
-    source="definition; attitude from an onboard filter that trusts an accelerometer in flight reads tilt by a few per cent "
+    coefficients=(
+        Coefficient(
+            "g", "1", (0.05, 0.05), "relative change of the tilt", minimum=-0.5, maximum=1.0
+        ),
+    ),
+    source="definition; attitude from an onboard filter that trusts an accelerometer in flight "
+    "reads tilt by a few per cent "
     "wrong",
     confused_with=("rotor_drag", "body_drag", "thrust_scale", "mass"),
-    excitation="horizontal accelerations of 2 m/s2 and more: its force goes with the tilt, that of drag with the velocity",
+    excitation="horizontal accelerations of 2 m/s2 and more: its force goes with the tilt, that of "
+    "drag with the velocity",
     law=law,
 )

@@ -1,26 +1,29 @@
-"""The form of a physical effect, written once and used by the plant, the estimator and the residual of a log.
+"""The form of a physical effect, written once and used by the plant, the estimator and the residual
+of a log.
 
-An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is called through
-its address, so that every user of it (a tick of the plant, a sigma point of the filter, a sample of a log) runs
-the same machine code and a new effect recompiles none of them. There are four kinds:
+An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is
+called through its address, so that every user of it (a tick of the plant, a sigma point of the
+filter, a sample of a log) runs the same machine code and a new effect recompiles none of them.
+There are four kinds:
 
 ``rotor input``
-    changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four turn rates in
-    ``rotors``, once a step, in the order in which the vehicle lists the effects.
+    changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four
+    turn rates in ``rotors``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
-    adds force (world frame) and torque (body frame, about the centre of mass). Law ``(c, vehicle, state, wrench)``:
-    adds to the six numbers in ``wrench``. It is asked many times a step. One that has a state of its own keeps it in
-    ``c`` from ``HIDDEN`` on, all zero at the start, and carries it on in ``advance(c, vehicle, state, rotors)``,
-    called once a step before the law is asked; ``rotors[STEP]`` is the step's length.
+    adds force (world frame) and torque (body frame, about the centre of mass). Law
+    ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is asked many times a
+    step. One that has a state of its own keeps it in ``c`` from ``HIDDEN`` on, all zero at the
+    start, and carries it on in ``advance(c, vehicle, state, rotors)``, called once a step before
+    the law is asked; ``rotors[STEP]`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
 ``sensing``
-    changes what the log holds. Law ``(c, vehicle, sample, memory)``: rewrites the parts of ``sample`` that are there,
-    from the truth to what is reported where ``sample[DIRECTION]`` is +1 (the plant), and back where it is -1 (an
-    estimator that knows of the effect).
+    changes what the log holds. Law ``(c, vehicle, sample, memory)``: rewrites the parts of
+    ``sample`` that are there, from the truth to what is reported where ``sample[DIRECTION]`` is +1
+    (the plant), and back where it is -1 (an estimator that knows of the effect).
 
-``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state``, ``rotors`` and
-``sample`` are laid out by the constants below.
+``c`` holds the coefficients in the order in which the effect declares them; ``vehicle``, ``state``,
+``rotors`` and ``sample`` are laid out by the constants below.
 """
 
 from collections.abc import Callable, Mapping
@@ -72,7 +75,11 @@ SAMPLE_SPEED = 0  # 4, rad/s
 SAMPLE_POSITION = 4  # 3, m, world
 SAMPLE_QUATERNION = 7  # 4, body to world
 SAMPLE_STEP = 11  # s, since the law was last called
-HAS_SPEED, HAS_POSITION, HAS_QUATERNION = 12, 13, 14  # 1 where that part is there; a quaternion is always readable
+HAS_SPEED, HAS_POSITION, HAS_QUATERNION = (
+    12,
+    13,
+    14,
+)  # 1 where that part is there; a quaternion is always readable
 DIRECTION = 15  # +1: from truth to report, -1: back
 SAMPLE_SIZE = 16
 
@@ -81,13 +88,16 @@ HIDDEN = 8  # where a wrench law's own state starts in ``c``
 ROW_SIZE = 16  # of ``c`` of a wrench law
 
 
-# what the coefficient ``central`` means in laws that act rotor by rotor: it draws the rotors towards the centre
+# what the coefficient ``central`` means in laws that act rotor by rotor: it draws the rotors
+# towards the centre
 CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the geometric centre"
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient of an effect, with its typical size for a 0.45 kg and for a 0.03 kg vehicle."""
+    """One coefficient of an effect, with its typical size for a 0.45 kg and for a
+    0.03 kg vehicle.
+    """
 
     name: str
     unit: str
@@ -99,10 +109,11 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its law, coefficients and source. The docstring of its file states the law.
+    """A physical effect: its law, coefficients and source. The docstring of its file states the
+    law.
 
-    ``confused_with`` names the effects that can leave much the same traces in a log, and ``excitation`` says what flight
-    tells them apart.
+    ``confused_with`` names the effects that can leave much the same traces in a log, and
+    ``excitation`` says what flight tells them apart.
     """
 
     name: str
@@ -113,8 +124,11 @@ class Effect:
     excitation: str
     law: Any = None  # compiled C function, for rotor input, wrench and sensing
     advance: Any = None  # compiled C function, for a wrench that has a state of its own
-    memory: int = 0  # numbers that a rotor-input or sensing law keeps from step to step; all zero before its first
-    sets_wind: bool = False  # a wrench law that changes the wind in ``state``: asked before all others
+    # numbers that a rotor-input or sensing law keeps from step to step; all zero before its first
+    memory: int = 0
+    sets_wind: bool = (
+        False  # a wrench law that changes the wind in ``state``: asked before all others
+    )
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
 
     def vector(self, coefficients: Mapping[str, float]) -> Array:

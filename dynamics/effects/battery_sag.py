@@ -1,8 +1,8 @@
 """Battery sag: at a given logged turn rate the rotors deliver less as the battery voltage falls.
 
-Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered turn rate is W (V / voltage_ref)^(n/2). It applies
-where the turn rates are commands, or worked out from commands at the reference voltage. Nothing changes where the
-voltage is not known.
+Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered turn rate is W (V /
+voltage_ref)^(n/2). It applies where the turn rates are commands, or worked out from commands at the
+reference voltage. Nothing changes where the voltage is not known.
 """
 
 from numba import cfunc
@@ -21,8 +21,13 @@ def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="battery_sag",
     kind="rotor input",
-    coefficients=(Coefficient("n", "1", (1.0, 1.0), "exponent of the voltage ratio", minimum=0.0, maximum=3.0),),
-    source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind a regulated drive",
+    coefficients=(
+        Coefficient(
+            "n", "1", (1.0, 1.0), "exponent of the voltage ratio", minimum=0.0, maximum=3.0
+        ),
+    ),
+    source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind "
+    "a regulated drive",
     confused_with=("thrust_scale", "thrust_fade", "mass"),
     excitation="a whole battery, with loads that come and go, and the voltage in the log",
     law=law,

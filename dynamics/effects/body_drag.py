@@ -1,7 +1,8 @@
-"""Body drag: the air's force on hull and frame, linear and quadratic in the airspeed, at the geometric centre.
+"""Body drag: the air's force on hull and frame, linear and quadratic in the airspeed, at the
+geometric centre.
 
-With u = R'(v - wind) the airspeed in body axes, F = -diag(dx, dy, dz) u - |u| diag(cx, cy, cz) u in body axes. The
-quadratic part is the parasitic drag of RotorPy, c_Dx, c_Dy, c_Dz.
+With u = R'(v - wind) the airspeed in body axes, F = -diag(dx, dy, dz) u - |u| diag(cx, cy, cz) u in
+body axes. The quadratic part is the parasitic drag of RotorPy, c_Dx, c_Dy, c_Dz.
 """
 
 import math
@@ -16,22 +17,47 @@ from .parts import air_velocity, push
 def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     x, y, z = air_velocity(state, 0.0, 0.0, 0.0)
     speed = math.sqrt(x * x + y * y + z * z)
-    push(vehicle, state, wrench, 0.0, 0.0, 0.0, -(c[0] + c[3] * speed) * x, -(c[1] + c[4] * speed) * y,
-         -(c[2] + c[5] * speed) * z)
+    push(
+        vehicle,
+        state,
+        wrench,
+        0.0,
+        0.0,
+        0.0,
+        -(c[0] + c[3] * speed) * x,
+        -(c[1] + c[4] * speed) * y,
+        -(c[2] + c[5] * speed) * z,
+    )
 
 
 EFFECT = Effect(
     name="body_drag",
     kind="wrench",
     coefficients=(
-        *(Coefficient(f"d{axis}", "N/(m/s)", (0.06, 0.002), f"linear, along body {axis}", minimum=0.0) for axis in "xyz"),
-        *(Coefficient(f"c{axis}", "N/(m/s)^2", (0.02, 0.0005), f"quadratic, along body {axis}", minimum=0.0)
-          for axis in "xyz"),
+        *(
+            Coefficient(
+                f"d{axis}", "N/(m/s)", (0.06, 0.002), f"linear, along body {axis}", minimum=0.0
+            )
+            for axis in "xyz"
+        ),
+        *(
+            Coefficient(
+                f"c{axis}",
+                "N/(m/s)^2",
+                (0.02, 0.0005),
+                f"quadratic, along body {axis}",
+                minimum=0.0,
+            )
+            for axis in "xyz"
+        ),
     ),
-    source="Hoerner, Fluid-Dynamic Drag, 1965; quadratic part as in Folk, Paulos and Kumar, RotorPy, 2023 "
-    "(0.005 to 0.01 N/(m/s)^2 for 0.5 kg); sizes: 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.03 m2, 8 cm2",
+    source="Hoerner, Fluid-Dynamic Drag, 1965; quadratic part as in Folk, Paulos and Kumar, "
+    "RotorPy, 2023 "
+    "(0.005 to 0.01 N/(m/s)^2 for 0.5 kg); sizes: 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.03 m2, 8 "
+    "cm2",
     confused_with=("rotor_drag", "inflow_thrust", "wind"),
-    excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads (climbs, hard turns) to tell "
+    excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads "
+    "(climbs, hard turns) to tell "
     "it from rotor drag, whose force grows with the turn rates",
     law=law,
 )

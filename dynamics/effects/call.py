@@ -38,15 +38,32 @@ def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Record, d: Any) 
 
 
 @compiled
-def add_wrenches(laws: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array) -> None:
-    """Add what every wrench law says at ``state`` to ``wrench`` (6,): force in the world, torque in the body frame."""
+def add_wrenches(
+    laws: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array
+) -> None:
+    """Add what every wrench law says at ``state`` to ``wrench`` (6,): force in the world, torque in
+    the body frame.
+    """
     for i in range(len(laws)):
-        _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, state.ctypes.data, wrench.ctypes.data)
+        _call(
+            laws[i],
+            coefficients[i].ctypes.data,
+            vehicle.ctypes.data,
+            state.ctypes.data,
+            wrench.ctypes.data,
+        )
 
 
 @compiled
-def deliver(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array, dt: float, voltage: float,
-            rotors: Array) -> None:
+def deliver(
+    laws: np.ndarray,
+    coefficients: Array,
+    vehicle: Array,
+    memory: Array,
+    dt: float,
+    voltage: float,
+    rotors: Array,
+) -> None:
     """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
 
     ``rotors`` is (ROTORS_SIZE,) with its time filled in.
@@ -54,21 +71,46 @@ def deliver(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array
     rotors[STEP] = dt
     rotors[ROTOR_VOLTAGE] = voltage
     for i in range(len(laws)):
-        _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, rotors.ctypes.data, memory[i].ctypes.data)
+        _call(
+            laws[i],
+            coefficients[i].ctypes.data,
+            vehicle.ctypes.data,
+            rotors.ctypes.data,
+            memory[i].ctypes.data,
+        )
 
 
 @compiled
-def advance(hooks: np.ndarray, coefficients: Array, vehicle: Array, state: Array, rotors: Array) -> None:
-    """Carry the own states of the wrench laws on by ``rotors[STEP]`` s in a ``state`` that is filled in."""
+def advance(
+    hooks: np.ndarray, coefficients: Array, vehicle: Array, state: Array, rotors: Array
+) -> None:
+    """Carry the own states of the wrench laws on by ``rotors[STEP]`` s in a ``state`` that is
+    filled in.
+    """
     for i in range(len(hooks)):
         if hooks[i] != 0:
-            _call(hooks[i], coefficients[i].ctypes.data, vehicle.ctypes.data, state.ctypes.data, rotors.ctypes.data)
+            _call(
+                hooks[i],
+                coefficients[i].ctypes.data,
+                vehicle.ctypes.data,
+                state.ctypes.data,
+                rotors.ctypes.data,
+            )
 
 
 @compiled
-def report(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array, dt: float, parts: int,
-           direction: float, sample: Array) -> None:
-    """Rewrite ``sample`` (SAMPLE_SIZE,) from truth to report (``direction`` +1), or back (-1), in the reverse order.
+def report(
+    laws: np.ndarray,
+    coefficients: Array,
+    vehicle: Array,
+    memory: Array,
+    dt: float,
+    parts: int,
+    direction: float,
+    sample: Array,
+) -> None:
+    """Rewrite ``sample`` (SAMPLE_SIZE,) from truth to report (``direction`` +1), or back (-1), in
+    the reverse order.
 
     ``parts``: 1 position, 2 attitude, 4 turn rates.
     """
@@ -78,7 +120,13 @@ def report(laws: np.ndarray, coefficients: Array, vehicle: Array, memory: Array,
     sample[HAS_SPEED] = 1.0 if parts & 4 != 0 else 0.0
     for n in range(len(laws)):
         i = n if direction > 0.0 else len(laws) - 1 - n
-        _call(laws[i], coefficients[i].ctypes.data, vehicle.ctypes.data, sample.ctypes.data, memory[i].ctypes.data)
+        _call(
+            laws[i],
+            coefficients[i].ctypes.data,
+            vehicle.ctypes.data,
+            sample.ctypes.data,
+            memory[i].ctypes.data,
+        )
 
 
 __all__ = ["ROTORS_SIZE", "SPEED", "add_wrenches", "advance", "deliver", "report"]

@@ -1,13 +1,25 @@
 """Ceiling effect: a rotor near the ceiling delivers more thrust at the same turn rate.
 
-Thrust of a rotor at distance d below ``ceiling_z`` is multiplied by 1 / (1 - rho (R / (4 d))^2), the mirror image of the
-``ground_effect``. Applied rotor by rotor, so a tilted vehicle feels a torque. The distance is taken as no less than where
-the factor reaches 2. Nothing changes where the vehicle states no ceiling.
+Thrust of a rotor at distance d below ``ceiling_z`` is multiplied by 1 / (1 - rho (R / (4 d))^2),
+the mirror image of the ``ground_effect``. Applied rotor by rotor, so a tilted vehicle feels a
+torque. The distance is taken as no less than where the factor reaches 2. Nothing changes where the
+vehicle states no ceiling.
 """
 
 from numba import cfunc
 
-from .base import CEILING, CENTRAL, LAW, POSITION, ROTATION, ROTOR_POSITION, ROTOR_RADIUS, ROTOR_THRUST, Coefficient, Effect
+from .base import (
+    CEILING,
+    CENTRAL,
+    LAW,
+    POSITION,
+    ROTATION,
+    ROTOR_POSITION,
+    ROTOR_RADIUS,
+    ROTOR_THRUST,
+    Coefficient,
+    Effect,
+)
 from .parts import push
 
 
@@ -23,7 +35,17 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         distance = vehicle[CEILING] - state[POSITION + 2]
         distance -= state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
         ratio = min(scale / (distance * distance), 0.5) if distance > 1e-3 else 0.5
-        push(vehicle, state, wrench, x, y, z, 0.0, 0.0, state[ROTOR_THRUST + i] * ratio / (1.0 - ratio))
+        push(
+            vehicle,
+            state,
+            wrench,
+            x,
+            y,
+            z,
+            0.0,
+            0.0,
+            state[ROTOR_THRUST + i] * ratio / (1.0 - ratio),
+        )
 
 
 EFFECT = Effect(
@@ -33,8 +55,10 @@ EFFECT = Effect(
         Coefficient("rho", "1", (3.0, 3.0), "strength", minimum=0.0, maximum=20.0),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
-    source="form: the ground effect's (Cheeseman and Bennett, ARC R&M 3021, 1955) mirrored; a ceiling raises thrust too: "
-    "Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; size assumed as near the ground",
+    source="form: the ground effect's (Cheeseman and Bennett, ARC R&M 3021, 1955) mirrored; a "
+    "ceiling raises thrust too: "
+    "Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; size assumed as near the "
+    "ground",
     confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several distances from the ceiling, the nearest of one to two rotor diameters",
     law=law,

@@ -1,8 +1,8 @@
 """Clock offset: pose and turn rates of one row of the log are not of the same instant.
 
-With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those of -dt earlier than
-the pose. Between samples by a cubic. An estimator that knows of it delays the other of the two, and so
-estimates the flight of dt ago.
+With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those
+of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays the
+other of the two, and so estimates the flight of dt ago.
 """
 
 from numba import cfunc
@@ -53,11 +53,19 @@ EFFECT = Effect(
     name="clock_offset",
     kind="sensing",
     coefficients=(
-        Coefficient("dt", "s", (0.03, 0.02), "by which the pose is older than the turn rates", minimum=-0.06, maximum=0.06),
+        Coefficient(
+            "dt",
+            "s",
+            (0.03, 0.02),
+            "by which the pose is older than the turn rates",
+            minimum=-0.06,
+            maximum=0.06,
+        ),
     ),
     source="definition; motion capture reaches the vehicle's clock 5 to 30 ms late",
     confused_with=("latency", "motor_lag"),
-    excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency leave the same log",
+    excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency "
+    "leave the same log",
     law=law,
     memory=2 + max(8 * _POSES, 5 * _SPEEDS),
 )

@@ -1,6 +1,7 @@
 """Centre-of-mass offset: the centre of mass lies away from the geometric centre of the rotors.
 
-Thrust then makes a torque about it, and the pose, which is that of the geometric centre, swings about it.
+Thrust then makes a torque about it, and the pose, which is that of the geometric centre, swings
+about it.
 """
 
 from collections.abc import Mapping
@@ -17,18 +18,24 @@ if TYPE_CHECKING:
 
 def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
     """Return the vehicle with its centre of mass moved by (cx, cy, cz) m."""
-    return replace(vehicle, com=vehicle.com + np.array([coefficients.get(f"c{axis}", 0.0) for axis in "xyz"]))
+    return replace(
+        vehicle, com=vehicle.com + np.array([coefficients.get(f"c{axis}", 0.0) for axis in "xyz"])
+    )
 
 
 EFFECT = Effect(
     name="com_offset",
     kind="body",
     coefficients=tuple(
-        Coefficient(f"c{axis}", "m", (0.005, 0.001), f"along body {axis}", minimum=-1.0, maximum=1.0) for axis in "xyz"
+        Coefficient(
+            f"c{axis}", "m", (0.005, 0.001), f"along body {axis}", minimum=-1.0, maximum=1.0
+        )
+        for axis in "xyz"
     ),
     source="rigid-body mechanics",
     confused_with=("constant_torque", "rotor_efficiency", "marker_offset"),
-    excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll and pitch (trajectory shake) "
+    excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll "
+    "and pitch (trajectory shake) "
     "for cz",
     amend=amend,
 )

@@ -19,7 +19,8 @@ EFFECT = Effect(
     ),
     source="definition",
     confused_with=("mass", "thrust_scale", "world_tilt", "wind", "thrust_axis_tilt"),
-    excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; in hover fz is a mass or a "
+    excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; "
+    "in hover fz is a mass or a "
     "thrust scale",
     law=law,
 )

@@ -1,4 +1,6 @@
-"""Constant torque: a steady torque, fixed in the body frame (a bent arm, an unequal set of propellers)."""
+"""Constant torque: a steady torque, fixed in the body frame (a bent arm, an unequal set of
+propellers).
+"""
 
 from numba import cfunc
 
@@ -19,6 +21,7 @@ EFFECT = Effect(
     ),
     source="definition",
     confused_with=("com_offset", "rotor_efficiency"),
-    excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows with thrust",
+    excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows "
+    "with thrust",
     law=law,
 )

@@ -1,10 +1,11 @@
 """Fan jet: the jet of a drum fan, and the drag of a vehicle in it.
 
-The mean wind is that of ``dynamics.jet``: ``u^2 = u0^2 (annular disc) * Gaussian``, with the inflow that continuity asks
-for. The fan stands at (x, y, z) m and blows horizontally, along world x turned by ``heading`` about the vertical. Drag acts
-at stations, each in its own wind, which is why a symmetric vehicle feels a torque: F = kd u in its plane at each rotor,
-and F = 0.6 kg/m3 * area / 8 |u| u at each of eight points of a ring on the hull, u being the wind relative to the station.
-It is the law of the fan-tracking environment without its gusts.
+The mean wind is that of ``dynamics.jet``: ``u^2 = u0^2 (annular disc) * Gaussian``, with the inflow
+that continuity asks for. The fan stands at (x, y, z) m and blows horizontally, along world x turned
+by ``heading`` about the vertical. Drag acts at stations, each in its own wind, which is why a
+symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F = 0.6 kg/m3 * area / 8
+|u| u at each of eight points of a ring on the hull, u being the wind relative to the station. It is
+the law of the fan-tracking environment without its gusts.
 """
 
 import math
@@ -70,18 +71,29 @@ EFFECT = Effect(
     name="fan_jet",
     kind="wrench",
     coefficients=(
-        Coefficient("u0", "m/s", (3.6, 2.0), "speed of the jet at its source", minimum=0.0, maximum=50.0),
+        Coefficient(
+            "u0", "m/s", (3.6, 2.0), "speed of the jet at its source", minimum=0.0, maximum=50.0
+        ),
         Coefficient("x", "m", (-2.3, -2.3), "where the fan stands, world x"),
         Coefficient("y", "m", (0.0, 0.0), "where the fan stands, world y"),
         Coefficient("z", "m", (1.2, 1.2), "height of its axis, world z"),
-        Coefficient("heading", "rad", (0.0, 0.0), "where it blows, from world x towards y", minimum=-7.0, maximum=7.0),
+        Coefficient(
+            "heading",
+            "rad",
+            (0.0, 0.0),
+            "where it blows, from world x towards y",
+            minimum=-7.0,
+            maximum=7.0,
+        ),
         Coefficient("kd", "N/(m/s)", (0.02, 0.001), "drag of each rotor in its plane", minimum=0.0),
         Coefficient("area", "m2", (0.06, 0.0016), "drag area of the whole hull", minimum=0.0),
     ),
-    source="momentum of a jet still in its shear layer, Pope, Turbulent Flows, 2000; sizes: the wrench that McKinnon and "
+    source="momentum of a jet still in its shear layer, Pope, Turbulent Flows, 2000; sizes: the "
+    "wrench that McKinnon and "
     "Schoellig, IROS 2016, measured in the jet of a drum fan",
     confused_with=("wind", "constant_force", "body_drag", "rotor_drag"),
-    excitation="flight across the jet and out of it: force and torque depend on the place; its still-air drag is like "
+    excitation="flight across the jet and out of it: force and torque depend on the place; its "
+    "still-air drag is like "
     "rotor and body drag",
     law=law,
 )

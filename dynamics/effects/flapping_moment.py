@@ -1,7 +1,8 @@
-"""Flapping moment: the blades of a moving rotor flap, and their hub turns the vehicle away from the motion.
+"""Flapping moment: the blades of a moving rotor flap, and their hub turns the vehicle away from the
+motion.
 
-At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap W_i (u_i x e_z) in body axes. It is the
-k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: the torque -kflap W_i (u_i x e_z) in
+body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``rotor_drag``.
 """
 
 from numba import cfunc
@@ -25,9 +26,11 @@ EFFECT = Effect(
     name="flapping_moment",
     kind="wrench",
     coefficients=(Coefficient("kflap", "Nm/(rad/s m/s)", (4e-6, 1.5e-9), "per rotor"),),
-    source="Hoffmann, Huang, Waslander and Tomlin, AIAA GNC 2007; form as in Folk, Paulos and Kumar, RotorPy, 2023; "
+    source="Hoffmann, Huang, Waslander and Tomlin, AIAA GNC 2007; form as in Folk, Paulos and "
+    "Kumar, RotorPy, 2023; "
     "sizes: a thirtieth of the typical rotor drag times the arm's length",
     confused_with=("com_offset", "rotor_drag"),
-    excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and changes sign with it",
+    excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and "
+    "changes sign with it",
     law=law,
 )

@@ -1,8 +1,9 @@
 """Ground effect: a rotor near the floor delivers more thrust at the same turn rate.
 
-Thrust of a rotor at height z above the floor is multiplied by 1 / (1 - rho (R / (4 z))^2), Cheeseman and Bennett's law
-for rho = 1; rho of about 3 was measured for whole quadrotors. Applied rotor by rotor, so a tilted vehicle feels a
-torque. The height is taken as no less than where the factor reaches 2, as the law has a pole below it.
+Thrust of a rotor at height z above the floor is multiplied by 1 / (1 - rho (R / (4 z))^2),
+Cheeseman and Bennett's law for rho = 1; rho of about 3 was measured for whole quadrotors. Applied
+rotor by rotor, so a tilted vehicle feels a torque. The height is taken as no less than where the
+factor reaches 2, as the law has a pole below it.
 """
 
 from numba import cfunc
@@ -48,10 +49,18 @@ EFFECT = Effect(
     name="ground_effect",
     kind="wrench",
     coefficients=(
-        Coefficient("rho", "1", (3.0, 3.0), "strength; 1 for a single helicopter rotor", minimum=0.0, maximum=20.0),
+        Coefficient(
+            "rho",
+            "1",
+            (3.0, 3.0),
+            "strength; 1 for a single helicopter rotor",
+            minimum=0.0,
+            maximum=20.0,
+        ),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
-    source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017",
+    source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. "
+    "Aerospace Eng. 2017",
     confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several heights, the lowest of one to two rotor diameters",
     law=law,

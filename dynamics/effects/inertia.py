@@ -1,4 +1,6 @@
-"""Inertia: the moments of inertia about the body's axes are larger or smaller than declared, by the factors 1 + j."""
+"""Inertia: the moments of inertia about the body's axes are larger or smaller than declared, by the
+factors 1 + j.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,7 +20,9 @@ def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
     changes = np.array([coefficients.get(f"j{axis}", 0.0) for axis in "xyz"])
     inertia = vehicle.inertia + np.diag(changes * np.diagonal(vehicle.inertia))
     if np.linalg.eigvalsh(inertia)[0] <= 0:
-        raise InputError(f"effect inertia: {vehicle.name} would have an inertia that is not positive definite")
+        raise InputError(
+            f"effect inertia: {vehicle.name} would have an inertia that is not positive definite"
+        )
     return replace(vehicle, inertia=inertia)
 
 
@@ -26,11 +30,19 @@ EFFECT = Effect(
     name="inertia",
     kind="body",
     coefficients=tuple(
-        Coefficient(f"j{axis}", "1", (0.2, 0.2), f"relative change about body {axis}", minimum=-0.9, maximum=5.0)
+        Coefficient(
+            f"j{axis}",
+            "1",
+            (0.2, 0.2),
+            f"relative change about body {axis}",
+            minimum=-0.9,
+            maximum=5.0,
+        )
         for axis in "xyz"
     ),
     source="definition; moments from a CAD model or a bifilar pendulum are off by a tenth or two",
     confused_with=("rotor_inertia", "rotor_efficiency", "thrust_curvature", "rate_damping"),
-    excitation="quick roll, pitch and yaw: its torque follows the angular acceleration; in slow flight it does nothing",
+    excitation="quick roll, pitch and yaw: its torque follows the angular acceleration; in slow "
+    "flight it does nothing",
     amend=amend,
 )

@@ -1,7 +1,8 @@
-"""Inflow thrust: a rotor that climbs into its own inflow delivers less thrust, one that sinks delivers more.
+"""Inflow thrust: a rotor that climbs into its own inflow delivers less thrust, one that sinks
+delivers more.
 
-At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_iz along body z, applied at the rotor.
-Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -kz W_i u_iz along body z,
+applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of RotorPy.
 """
 
 from numba import cfunc
@@ -27,9 +28,11 @@ EFFECT = Effect(
         Coefficient("kz", "N/(rad/s m/s)", (2.3e-4, 7.6e-7), "per rotor", minimum=0.0),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
-    source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter Flight Dynamics and Control, "
+    source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter "
+    "Flight Dynamics and Control, "
     "AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
     confused_with=("body_drag", "rate_damping"),
-    excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping torque",
+    excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping "
+    "torque",
     law=law,
 )

@@ -1,11 +1,21 @@
-"""Marker offset: the reported position is not that of the geometric centre but of a point beside it.
+"""Marker offset: the reported position is not that of the geometric centre but of a point beside
+it.
 
-p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, measured or, where none was, estimated.
+p' = p + R m with m = (mx, my, mz) in body axes. To undo it takes the attitude, measured or, where
+none was, estimated.
 """
 
 from numba import cfunc
 
-from .base import DIRECTION, HAS_POSITION, LAW, SAMPLE_POSITION, SAMPLE_QUATERNION, Coefficient, Effect
+from .base import (
+    DIRECTION,
+    HAS_POSITION,
+    LAW,
+    SAMPLE_POSITION,
+    SAMPLE_QUATERNION,
+    Coefficient,
+    Effect,
+)
 
 
 @cfunc(LAW, cache=True)
@@ -25,11 +35,13 @@ EFFECT = Effect(
     name="marker_offset",
     kind="sensing",
     coefficients=tuple(
-        Coefficient(f"m{axis}", "m", (0.01, 0.005), f"along body {axis}", minimum=-1.0, maximum=1.0) for axis in "xyz"
+        Coefficient(f"m{axis}", "m", (0.01, 0.005), f"along body {axis}", minimum=-1.0, maximum=1.0)
+        for axis in "xyz"
     ),
     source="definition; the centroid of the markers on a vehicle is seldom its centre",
     confused_with=("com_offset", "attitude_gain"),
-    excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the point swings about "
+    excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the "
+    "point swings about "
     "the centre. An offset centre of mass also makes a torque in hover; this does not",
     law=law,
 )

@@ -1,4 +1,6 @@
-"""Mass: the vehicle is heavier (dm > 0) or lighter than declared; inertia and centre of mass stay as they are."""
+"""Mass: the vehicle is heavier (dm > 0) or lighter than declared; inertia and centre of mass stay
+as they are.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +17,10 @@ def amend(vehicle: "Vehicle", coefficients: Mapping[str, float]) -> "Vehicle":
     """Return the vehicle with ``dm`` kg added."""
     mass = vehicle.mass + coefficients.get("dm", 0.0)
     if not mass > 0:
-        raise InputError(f"effect mass: dm: {vehicle.name} would weigh {mass:g} kg; expected dm > {-vehicle.mass:g}")
+        raise InputError(
+            f"effect mass: dm: {vehicle.name} would weigh {mass:g} kg; expected dm > "
+            f"{-vehicle.mass:g}"
+        )
     return replace(vehicle, mass=mass)
 
 
@@ -25,6 +30,7 @@ EFFECT = Effect(
     coefficients=(Coefficient("dm", "kg", (0.04, 0.003), "added to the declared mass"),),
     source="definition",
     confused_with=("thrust_scale", "constant_force", "slung_payload", "battery_sag"),
-    excitation="vertical accelerations of 1 m/s2 and more: in hover a mass, a thrust scale and a vertical force are the same",
+    excitation="vertical accelerations of 1 m/s2 and more: in hover a mass, a thrust scale and a "
+    "vertical force are the same",
     amend=amend,
 )

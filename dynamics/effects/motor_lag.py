@@ -1,6 +1,7 @@
 """Motor lag: the rotors follow the logged (commanded) turn rates as a first-order system.
 
-dW/dt = (W_logged - W) / tau, integrated exactly over a step at constant W_logged; the rotors start at the first W_logged.
+dW/dt = (W_logged - W) / tau, integrated exactly over a step at constant W_logged; the rotors start
+at the first W_logged.
 """
 
 import math
@@ -23,11 +24,14 @@ def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="motor_lag",
     kind="rotor input",
-    coefficients=(Coefficient("tau", "s", (0.035, 0.05), "time constant", minimum=0.0, maximum=0.5),),
+    coefficients=(
+        Coefficient("tau", "s", (0.035, 0.05), "time constant", minimum=0.0, maximum=0.5),
+    ),
     source="Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015; "
     "Faessler et al., Thrust Mixing, Saturation, and Body-Rate Control, RA-L 2017",
     confused_with=("latency", "clock_offset", "rotor_inertia"),
-    excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight shows neither",
+    excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight "
+    "shows neither",
     law=law,
     memory=5,
 )

@@ -7,7 +7,9 @@ from ...runtime.compiled import compiled
 from .base import COM, RATE, ROTATION, SAMPLE_QUATERNION, VELOCITY, WIND
 
 _SPACING = 0.0045  # s, least time between two kept entries of a delay line
-_EVEN = 2.5  # the longest of three steps between entries over the shortest, up to which a cubic is drawn through all four
+# the longest of three steps between entries over the shortest, up to which a cubic is drawn through
+# all four
+_EVEN = 2.5
 
 # An array of a C function, in the layout of base.py
 Pointer = Any
@@ -15,23 +17,54 @@ Pointer = Any
 
 @compiled
 def air_velocity(state: Pointer, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return the velocity through the air, in body axes, of the body's point (x, y, z) m from the geometric centre."""
+    """Return the velocity through the air, in body axes, of the body's point (x, y, z) m from the
+    geometric centre.
+    """
     ax = state[VELOCITY] - state[WIND]
     ay = state[VELOCITY + 1] - state[WIND + 1]
     az = state[VELOCITY + 2] - state[WIND + 2]
     wx, wy, wz = state[RATE], state[RATE + 1], state[RATE + 2]
-    ux = state[ROTATION] * ax + state[ROTATION + 3] * ay + state[ROTATION + 6] * az + wy * z - wz * y
-    uy = state[ROTATION + 1] * ax + state[ROTATION + 4] * ay + state[ROTATION + 7] * az + wz * x - wx * z
-    uz = state[ROTATION + 2] * ax + state[ROTATION + 5] * ay + state[ROTATION + 8] * az + wx * y - wy * x
+    ux = (
+        state[ROTATION] * ax + state[ROTATION + 3] * ay + state[ROTATION + 6] * az + wy * z - wz * y
+    )
+    uy = (
+        state[ROTATION + 1] * ax
+        + state[ROTATION + 4] * ay
+        + state[ROTATION + 7] * az
+        + wz * x
+        - wx * z
+    )
+    uz = (
+        state[ROTATION + 2] * ax
+        + state[ROTATION + 5] * ay
+        + state[ROTATION + 8] * az
+        + wx * y
+        - wy * x
+    )
     return ux, uy, uz
 
 
 @compiled
-def push(vehicle: Pointer, state: Pointer, wrench: Pointer, x: float, y: float, z: float, fx: float, fy: float,
-         fz: float) -> None:
-    """Add a force (fx, fy, fz) N in body axes at the body's point (x, y, z) m from the geometric centre to ``wrench``."""
+def push(
+    vehicle: Pointer,
+    state: Pointer,
+    wrench: Pointer,
+    x: float,
+    y: float,
+    z: float,
+    fx: float,
+    fy: float,
+    fz: float,
+) -> None:
+    """Add a force (fx, fy, fz) N in body axes at the body's point (x, y, z) m from the geometric
+    centre to ``wrench``.
+    """
     for i in range(3):
-        wrench[i] += state[ROTATION + 3 * i] * fx + state[ROTATION + 3 * i + 1] * fy + state[ROTATION + 3 * i + 2] * fz
+        wrench[i] += (
+            state[ROTATION + 3 * i] * fx
+            + state[ROTATION + 3 * i + 1] * fy
+            + state[ROTATION + 3 * i + 2] * fz
+        )
     x -= vehicle[COM]
     y -= vehicle[COM + 1]
     z -= vehicle[COM + 2]
@@ -42,7 +75,9 @@ def push(vehicle: Pointer, state: Pointer, wrench: Pointer, x: float, y: float, 
 
 @compiled
 def turn_attitude(sample: Pointer, rx: float, ry: float, rz: float) -> None:
-    """Turn the attitude of a sample about the world's axes by the rotation vector (rx, ry, rz) rad."""
+    """Turn the attitude of a sample about the world's axes by the rotation vector
+    (rx, ry, rz) rad.
+    """
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     scale = math.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
     a, x, y, z = math.cos(0.5 * angle), scale * rx, scale * ry, scale * rz
@@ -55,14 +90,17 @@ def turn_attitude(sample: Pointer, rx: float, ry: float, rz: float) -> None:
 
 
 @compiled
-def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Pointer, at: int) -> None:
+def delay(
+    memory: Pointer, width: int, capacity: int, wanted: float, values: Pointer, at: int
+) -> None:
     """Replace ``width`` numbers of ``values`` from ``at`` on by what they were ``wanted`` s ago.
 
-    ``memory`` is the delay line: how many entries there are, the time since the last was added (the caller adds to it),
-    and the entries, each an age and its numbers, the newest first. Between entries runs the cubic through the nearest four,
-    within their range: a line between two would damp noise by how far from either it is, and the delay that fits a noisy log
-    best would be the one that damps most. Where the four are not about evenly apart a line must do; before the oldest it
-    holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
+    ``memory`` is the delay line: how many entries there are, the time since the last was added (the
+    caller adds to it), and the entries, each an age and its numbers, the newest first. Between
+    entries runs the cubic through the nearest four, within their range: a line between two would
+    damp noise by how far from either it is, and the delay that fits a noisy log best would be the
+    one that damps most. Where the four are not about evenly apart a line must do; before the oldest
+    it holds. A line that is fed faster than 200 Hz keeps no more than 200 entries a second.
     """
     size = width + 1
     count = int(memory[0])
@@ -89,7 +127,12 @@ def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Poi
     a, b, c, d = 1.0, 0.0, 0.0, 0.0
     cubic = share > 0.0 and count >= 4
     if cubic:
-        p, q, r, s = memory[first], memory[first + size], memory[first + 2 * size], memory[first + 3 * size]
+        p, q, r, s = (
+            memory[first],
+            memory[first + size],
+            memory[first + 2 * size],
+            memory[first + 3 * size],
+        )
         cubic = max(q - p, r - q, s - r) <= _EVEN * min(q - p, r - q, s - r)
         if cubic:  # Lagrange's weights
             a = (wanted - q) * (wanted - r) * (wanted - s) / ((p - q) * (p - r) * (p - s))
@@ -100,8 +143,15 @@ def delay(memory: Pointer, width: int, capacity: int, wanted: float, values: Poi
         late = memory[here + 1 + i]
         if cubic:
             one = first + 1 + i
-            w, x, y, z = memory[one], memory[one + size], memory[one + 2 * size], memory[one + 3 * size]
+            w, x, y, z = (
+                memory[one],
+                memory[one + size],
+                memory[one + 2 * size],
+                memory[one + 3 * size],
+            )
             value = a * w + b * x + c * y + d * z
             values[at + i] = min(max(value, min(w, x, y, z)), max(w, x, y, z))
         else:
-            values[at + i] = late if share == 0.0 else late + share * (memory[here - size + 1 + i] - late)
+            values[at + i] = (
+                late if share == 0.0 else late + share * (memory[here - size + 1 + i] - late)
+            )

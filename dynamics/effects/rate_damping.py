@@ -15,10 +15,12 @@ EFFECT = Effect(
     name="rate_damping",
     kind="wrench",
     coefficients=tuple(
-        Coefficient(f"d{axis}", "Nm/(rad/s)", (5e-3, 3e-5), f"about body {axis}", minimum=0.0) for axis in "xyz"
+        Coefficient(f"d{axis}", "Nm/(rad/s)", (5e-3, 3e-5), f"about body {axis}", minimum=0.0)
+        for axis in "xyz"
     ),
     source="linear damping; sizes: what typical rotor drag and inflow make at the rotors' arms",
     confused_with=("inflow_thrust", "rotor_drag", "inertia", "motor_lag"),
-    excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little translation",
+    excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little "
+    "translation",
     law=law,
 )

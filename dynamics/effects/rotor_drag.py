@@ -1,11 +1,25 @@
-"""Rotor drag: a force in the rotor plane against the motion of each rotor through the air, times its turn rate.
+"""Rotor drag: a force in the rotor plane against the motion of each rotor through the air, times
+its turn rate.
 
-At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(kdx, kdy, 0) u_i, applied at the rotor.
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(kdx, kdy, 0) u_i,
+applied at the rotor.
 """
 
 from numba import cfunc
 
-from .base import CENTRAL, COM, LAW, RATE, ROTATION, ROTOR_POSITION, ROTOR_SPEED, VELOCITY, WIND, Coefficient, Effect
+from .base import (
+    CENTRAL,
+    COM,
+    LAW,
+    RATE,
+    ROTATION,
+    ROTOR_POSITION,
+    ROTOR_SPEED,
+    VELOCITY,
+    WIND,
+    Coefficient,
+    Effect,
+)
 
 
 @cfunc(LAW, cache=True)
@@ -40,14 +54,20 @@ EFFECT = Effect(
     name="rotor_drag",
     kind="wrench",
     coefficients=(
-        Coefficient("kdx", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body x", minimum=0.0),
-        Coefficient("kdy", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body y", minimum=0.0),
+        Coefficient(
+            "kdx", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body x", minimum=0.0
+        ),
+        Coefficient(
+            "kdy", "N/(rad/s m/s)", (1.2e-4, 1.8e-6), "per rotor, along body y", minimum=0.0
+        ),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
-    source="Martin and Salaun, The True Role of Accelerometer Feedback in Quadrotor Control, ICRA 2010; "
+    source="Martin and Salaun, The True Role of Accelerometer Feedback in Quadrotor Control, ICRA "
+    "2010; "
     "sizes: Svacha et al., ICUAS 2017 (0.5 kg), Foerster, ETH Zurich 2015 (0.03 kg)",
     confused_with=("body_drag", "attitude_gain", "flapping_moment", "wind"),
-    excitation="horizontal flight at 1 m/s and more along both body axes, at several loads (climbs, hard turns): rotor drag "
+    excitation="horizontal flight at 1 m/s and more along both body axes, at several loads "
+    "(climbs, hard turns): rotor drag "
     "grows with the turn rates, body drag does not",
     law=law,
 )

@@ -1,6 +1,7 @@
 """Rotor efficiency: single rotors deliver more or less than declared at the same turn rate.
 
-Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered turn rate is W_i sqrt(1 + e_i).
+Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered turn rate is W_i sqrt(1 +
+e_i).
 """
 
 import math
@@ -20,12 +21,20 @@ EFFECT = Effect(
     name="rotor_efficiency",
     kind="rotor input",
     coefficients=tuple(
-        Coefficient(f"e{i}", "1", (-0.08 if i == 1 else 0.0,) * 2, f"relative change of rotor {i}", minimum=-1.0, maximum=2.0)
+        Coefficient(
+            f"e{i}",
+            "1",
+            (-0.08 if i == 1 else 0.0,) * 2,
+            f"relative change of rotor {i}",
+            minimum=-1.0,
+            maximum=2.0,
+        )
         for i in (1, 2, 3, 4)
     ),
     source="definition; a chipped or badly seated propeller loses several per cent",
     confused_with=("com_offset", "constant_torque", "thrust_scale", "mass"),
-    excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady torque stays, and an offset "
+    excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady "
+    "torque stays, and an offset "
     "centre of mass makes no yaw torque",
     law=law,
 )

@@ -1,22 +1,34 @@
 """Slung payload: a load that hangs from the geometric centre by a cable and swings.
 
-The load is a point mass m on a massless cable of length l that stays taut. With n the unit vector from vehicle to load,
-f = (sum of thrusts) R e_z / M the specific force of the rotors and a = damping (v + l n' - wind) the load's drag in the air
-by its mass, the cable's tension is T = (l |n'|^2 - n (f + a)) / (1/m + 1/M), no less than zero. It pulls the vehicle with
-T n, and the load swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the law's own state, carried on once a step; they
-start at rest, straight down. In hover it pulls with the load's weight.
+The load is a point mass m on a massless cable of length l that stays taut. With n the unit vector
+from vehicle to load, f = (sum of thrusts) R e_z / M the specific force of the rotors and a =
+damping (v + l n' - wind) the load's drag in the air by its mass, the cable's tension is T = (l
+|n'|^2 - n (f + a)) / (1/m + 1/M), no less than zero. It pulls the vehicle with T n, and the load
+swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the law's own state, carried on once a
+step; they start at rest, straight down. In hover it pulls with the load's weight.
 
-It holds while the cable is taut. Forces on the vehicle other than thrust and weight (its drag, say) are left out of the
-swing. No measurement corrects the swing: how it was at the start is forgotten, and an error of its phase dies out, at half
-the damping. With a damping well below 1/s a real load drifts out of phase with the law, which then may explain less than
-``mass`` with the same mass.
+It holds while the cable is taut. Forces on the vehicle other than thrust and weight (its drag, say)
+are left out of the swing. No measurement corrects the swing: how it was at the start is forgotten,
+and an error of its phase dies out, at half the damping. With a damping well below 1/s a real load
+drifts out of phase with the law, which then may explain less than ``mass`` with the same mass.
 """
 
 import math
 
 from numba import cfunc
 
-from .base import HIDDEN, LAW, MASS, ROTATION, ROTOR_THRUST, STEP, VELOCITY, WIND, Coefficient, Effect
+from .base import (
+    HIDDEN,
+    LAW,
+    MASS,
+    ROTATION,
+    ROTOR_THRUST,
+    STEP,
+    VELOCITY,
+    WIND,
+    Coefficient,
+    Effect,
+)
 from .parts import push
 
 # the law's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
@@ -58,12 +70,16 @@ def advance(c, vehicle, state, rotors):  # type: ignore[no-untyped-def]
         specific += state[ROTOR_THRUST + i] / vehicle[MASS]
     for i in range(3):
         drag = c[2] * (state[VELOCITY + i] + c[1] * c[_RATE + i] - state[WIND + i])
-        pull += c[1] * c[_RATE + i] ** 2 - c[_N + i] * (state[ROTATION + 3 * i + 2] * specific + drag)
+        pull += c[1] * c[_RATE + i] ** 2 - c[_N + i] * (
+            state[ROTATION + 3 * i + 2] * specific + drag
+        )
     pull = max(pull, 0.0)
     length, turning = 0.0, 0.0
     for i in range(3):
         drag = c[2] * (state[VELOCITY + i] + c[1] * c[_RATE + i] - state[WIND + i])
-        c[_RATE + i] -= dt * (state[ROTATION + 3 * i + 2] * specific + drag + pull * c[_N + i]) / c[1]
+        c[_RATE + i] -= (
+            dt * (state[ROTATION + 3 * i + 2] * specific + drag + pull * c[_N + i]) / c[1]
+        )
     for i in range(3):
         c[_N + i] += dt * c[_RATE + i]
         length += c[_N + i] ** 2
@@ -81,12 +97,21 @@ EFFECT = Effect(
     coefficients=(
         Coefficient("m", "kg", (0.03, 0.003), "mass of the load", minimum=0.0),
         Coefficient("l", "m", (0.3, 0.2), "length of the cable", minimum=0.0, maximum=20.0),
-        Coefficient("damping", "1/s", (1.0, 1.0), "drag of the load in the air by its mass", minimum=0.0, maximum=20.0),
+        Coefficient(
+            "damping",
+            "1/s",
+            (1.0, 1.0),
+            "drag of the load in the air by its mass",
+            minimum=0.0,
+            maximum=20.0,
+        ),
     ),
-    source="Sreenath, Michael and Kumar, Trajectory Generation and Control of a Quadrotor with a Cable-Suspended Load, "
+    source="Sreenath, Michael and Kumar, Trajectory Generation and Control of a Quadrotor with a "
+    "Cable-Suspended Load, "
     "ICRA 2013; sizes: a tenth of the vehicle's mass",
     confused_with=("mass", "constant_force", "thrust_scale"),
-    excitation="horizontal starts and stops, then hover: the load goes on swinging at its own frequency, which gives the "
+    excitation="horizontal starts and stops, then hover: the load goes on swinging at its own "
+    "frequency, which gives the "
     "cable's length",
     law=law,
     advance=advance,

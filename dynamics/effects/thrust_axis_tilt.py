@@ -1,14 +1,24 @@
-"""Thrust axis tilt: the frame of the rotors is turned against the body's axes, so that thrust does not point along body z.
+"""Thrust axis tilt: the frame of the rotors is turned against the body's axes, so that thrust does
+not point along body z.
 
-With Q the turn by the rotation vector (ax, ay, 0) rad, the rotors' thrust T e_z and torque tau about the geometric centre
-act as T Q e_z and Q tau: the differences to T e_z and tau are added.
+With Q the turn by the rotation vector (ax, ay, 0) rad, the rotors' thrust T e_z and torque tau
+about the geometric centre act as T Q e_z and Q tau: the differences to T e_z and tau are added.
 """
 
 import math
 
 from numba import cfunc
 
-from .base import LAW, REACTION, ROTOR_POSITION, ROTOR_SPEED, ROTOR_THRUST, SPIN, Coefficient, Effect
+from .base import (
+    LAW,
+    REACTION,
+    ROTOR_POSITION,
+    ROTOR_SPEED,
+    ROTOR_THRUST,
+    SPIN,
+    Coefficient,
+    Effect,
+)
 from .parts import push
 
 
@@ -26,7 +36,9 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         tz -= vehicle[SPIN + i] * vehicle[REACTION + i] * speed * speed
     # Rodrigues' formula about the axis (x, y, 0)
     x, y, sine, rest = c[0] / angle, c[1] / angle, math.sin(angle), 1.0 - math.cos(angle)
-    push(vehicle, state, wrench, 0.0, 0.0, 0.0, thrust * sine * y, -thrust * sine * x, -thrust * rest)
+    push(
+        vehicle, state, wrench, 0.0, 0.0, 0.0, thrust * sine * y, -thrust * sine * x, -thrust * rest
+    )
     along = rest * (x * tx + y * ty)
     wrench[3] += sine * y * tz + along * x - rest * tx
     wrench[4] += -sine * x * tz + along * y - rest * ty
@@ -37,11 +49,15 @@ EFFECT = Effect(
     name="thrust_axis_tilt",
     kind="wrench",
     coefficients=tuple(
-        Coefficient(f"a{axis}", "rad", (0.02, 0.02), f"turn about body {axis}", minimum=-0.8, maximum=0.8) for axis in "xy"
+        Coefficient(
+            f"a{axis}", "rad", (0.02, 0.02), f"turn about body {axis}", minimum=-0.8, maximum=0.8
+        )
+        for axis in "xy"
     ),
     source="definition; also markers put on the body at a small angle",
     confused_with=("world_tilt", "constant_force", "com_offset"),
-    excitation="yaw through half a turn and more: this force turns with the body, that of a tilted world or a steady force "
+    excitation="yaw through half a turn and more: this force turns with the body, that of a tilted "
+    "world or a steady force "
     "stays; vertical accelerations, with which it grows",
     law=law,
 )

@@ -1,7 +1,8 @@
 """Thrust curvature: thrust does not grow exactly with the square of the turn rate.
 
-Thrust and reaction torque are those declared times 1 + a (W^2 / W_hover^2 - 1), no less than zero, so that nothing changes
-at the turn rate of hover. The delivered turn rate is W times the root of that.
+Thrust and reaction torque are those declared times 1 + a (W^2 / W_hover^2 - 1), no less than zero,
+so that nothing changes at the turn rate of hover. The delivered turn rate is W times the root of
+that.
 """
 
 import math
@@ -21,8 +22,18 @@ def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="thrust_curvature",
     kind="rotor input",
-    coefficients=(Coefficient("a", "1", (-0.1, -0.1), "relative change at twice the hover thrust", minimum=-0.9, maximum=2.0),),
-    source="a fit to second order about hover, as thrust stands of small propellers show: Foerster, System Identification of "
+    coefficients=(
+        Coefficient(
+            "a",
+            "1",
+            (-0.1, -0.1),
+            "relative change at twice the hover thrust",
+            minimum=-0.9,
+            maximum=2.0,
+        ),
+    ),
+    source="a fit to second order about hover, as thrust stands of small propellers show: "
+    "Foerster, System Identification of "
     "the Crazyflie 2.0, ETH Zurich 2015",
     confused_with=("thrust_scale", "inertia", "mass"),
     excitation="thrusts from half to one and a half times hover: fast climbs, drops and turns",

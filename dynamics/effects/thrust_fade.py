@@ -1,7 +1,9 @@
-"""Thrust fade: thrust at a given turn rate falls steadily with flight time, as motors and battery warm up.
+"""Thrust fade: thrust at a given turn rate falls steadily with flight time, as motors and battery
+warm up.
 
-Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered turn rate is W times the root of
-that. The time t runs from the start of the flight; in an estimator from its ``reset``.
+Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered turn rate is W
+times the root of that. The time t runs from the start of the flight; in an estimator from its
+``reset``.
 """
 
 import math
@@ -21,10 +23,15 @@ def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="thrust_fade",
     kind="rotor input",
-    coefficients=(Coefficient("rate", "1/s", (1e-3, 1e-3), "relative loss of thrust", minimum=-0.1, maximum=0.1),),
+    coefficients=(
+        Coefficient(
+            "rate", "1/s", (1e-3, 1e-3), "relative loss of thrust", minimum=-0.1, maximum=0.1
+        ),
+    ),
     source="definition; size: 6 % in a minute where the logged rates are commands",
     confused_with=("battery_sag", "thrust_scale", "mass"),
-    excitation="a minute and more of flight with the battery voltage logged: loads that come and go move the voltage, and "
+    excitation="a minute and more of flight with the battery voltage logged: loads that come and "
+    "go move the voltage, and "
     "with it sag, but not time",
     law=law,
 )

@@ -20,10 +20,13 @@ def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="thrust_scale",
     kind="rotor input",
-    coefficients=(Coefficient("s", "1", (-0.05, -0.05), "relative change", minimum=-0.9, maximum=2.0),),
+    coefficients=(
+        Coefficient("s", "1", (-0.05, -0.05), "relative change", minimum=-0.9, maximum=2.0),
+    ),
     source="definition; air density and propeller wear change thrust by several per cent",
     confused_with=("mass", "battery_sag", "thrust_curvature", "constant_force", "thrust_fade"),
-    excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at hover) and a steady force; "
+    excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
+    "hover) and a steady force; "
     "a whole battery tells it from sag",
     law=law,
 )

@@ -1,7 +1,7 @@
 """Translational lift: a rotor that moves through the air edgewise delivers more thrust.
 
-At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = kh (u_ix^2 + u_iy^2) along body z, applied at the
-rotor. It is the k_h of RotorPy.
+At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = kh (u_ix^2 + u_iy^2) along body
+z, applied at the rotor. It is the k_h of RotorPy.
 """
 
 from numba import cfunc
@@ -27,7 +27,8 @@ EFFECT = Effect(
         Coefficient("kh", "N/(m/s)^2", (3.4e-3, 1e-4), "per rotor"),
         Coefficient("central", "1", (0.0, 0.0), CENTRAL, minimum=0.0, maximum=1.0),
     ),
-    source="Leishman, Principles of Helicopter Aerodynamics, 2006; size: Folk, Paulos and Kumar, RotorPy, 2023 (0.5 kg), "
+    source="Leishman, Principles of Helicopter Aerodynamics, 2006; size: Folk, Paulos and Kumar, "
+    "RotorPy, 2023 (0.5 kg), "
     "in proportion to the disc area for 0.03 kg",
     confused_with=("thrust_scale", "mass"),
     excitation="level flight at several speeds up to 2 m/s and more; in hover it does nothing",

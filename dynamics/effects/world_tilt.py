@@ -1,7 +1,7 @@
 """World tilt: the vertical of the motion capture's frame is not the true one.
 
-Position and attitude are reported in a frame in which they appear turned about the world's axes by the rotation vector
-(ax, ay, 0) rad: p' = Q p, R' = Q R.
+Position and attitude are reported in a frame in which they appear turned about the world's axes by
+the rotation vector (ax, ay, 0) rad: p' = Q p, R' = Q R.
 """
 
 import math
@@ -33,11 +33,16 @@ EFFECT = Effect(
     name="world_tilt",
     kind="sensing",
     coefficients=tuple(
-        Coefficient(f"a{axis}", "rad", (0.01, 0.01), f"about world {axis}", minimum=-0.8, maximum=0.8) for axis in "xy"
+        Coefficient(
+            f"a{axis}", "rad", (0.01, 0.01), f"about world {axis}", minimum=-0.8, maximum=0.8
+        )
+        for axis in "xy"
     ),
-    source="definition; the ground plane of a motion capture is set with a square on a floor that is level to some mrad",
+    source="definition; the ground plane of a motion capture is set with a square on a floor that "
+    "is level to some mrad",
     confused_with=("constant_force", "thrust_axis_tilt", "wind"),
-    excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady force nothing does: a level "
+    excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady "
+    "force nothing does: a level "
     "frame that is tilted leaves just a constant force, of the weight times the tilt",
     law=law,
 )

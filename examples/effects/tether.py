@@ -1,6 +1,7 @@
 """Tether: an elastic thread from the vehicle to a hook in the room, without slack.
 
-F = k (hook - x) in the world frame at the geometric centre, with the hook 2.5 m above the room's origin.
+F = k (hook - x) in the world frame at the geometric centre, with the hook 2.5 m above the room's
+origin.
 """
 
 from numba import cfunc

@@ -1,7 +1,7 @@
 """What a law may depend on, as columns: for the search for a law in what a fit leaves.
 
-Drives are scaled to one standard deviation, a column is one of them in one channel. What hardly moves, or is the sensors' noise
-in part, is left out: the noise is in the residual as well.
+Drives are scaled to one standard deviation, a column is one of them in one channel. What hardly
+moves, or is the sensors' noise in part, is left out: the noise is in the residual as well.
 """
 
 import itertools
@@ -17,12 +17,28 @@ from .regression import CUTOFF_HZ, Flights, Setting
 
 Array = NDArray[np.float64]
 
-_MOVES = {"velocity": 0.05, "speed": 0.05, "height": 0.03, "heading": 0.05, "turn rate": 0.05, "position": 0.1,
-          "voltage": 0.05, "tilt": 0.01}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
-_NOISE = 0.05  # share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as well
+_MOVES = {
+    "velocity": 0.05,
+    "speed": 0.05,
+    "height": 0.03,
+    "heading": 0.05,
+    "turn rate": 0.05,
+    "position": 0.1,
+    "voltage": 0.05,
+    "tilt": 0.01,
+}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
+# share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as
+# well
+_NOISE = 0.05
 _ROUNDING = 0.02  # the same of a rotor torque: shares of 0.045 look like a law
-_PLACES, _SEEN = 5, 0.01  # along either horizontal axis; the least mean of a bump, for places where the vehicle hardly was
-_SWINGS_HZ, _DAMPING = np.geomspace(0.4, 1.5, 11), 0.08  # of a load on a cable of 0.1 to 1.5 m, critical; loops answer faster
+_PLACES, _SEEN = (
+    5,
+    0.01,
+)  # along either horizontal axis; the least mean of a bump, for places where the vehicle hardly was
+_SWINGS_HZ, _DAMPING = (
+    np.geomspace(0.4, 1.5, 11),
+    0.08,
+)  # of a load on a cable of 0.1 to 1.5 m, critical; loops answer faster
 _MOUNTS_HZ = np.geomspace(1.0, 4.0, 12)  # of a part on a soft mount; the residual ends at 5
 
 Drive = tuple[str, Array]  # in words, (rows,)
@@ -40,24 +56,44 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
         thrust = vehicle.rotor_wrench(s.rotor_speeds)[:, 0]
         heading = np.arctan2(s.rotation[at, 1, 0], s.rotation[at, 0, 0])
         found: list[Drive] = [(f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")]
-        found += [("speed (m/s)", speed), ("squared speed (m2/s2)", speed**2), ("height (m)", s.position[at, 2]),
-                  ("sine of the heading", np.sin(heading)), ("cosine of the heading", np.cos(heading)), ("time (s)", s.t[at])]
+        found += [
+            ("speed (m/s)", speed),
+            ("squared speed (m2/s2)", speed**2),
+            ("height (m)", s.position[at, 2]),
+            ("sine of the heading", np.sin(heading)),
+            ("cosine of the heading", np.cos(heading)),
+            ("time (s)", s.t[at]),
+        ]
         if flights.lively:
             found.append(("thrust (N)", low_pass(thrust, CUTOFF_HZ, s.period)[at]))
-        found += [(f"turn rate {a} (rad/s)", low_pass(s.rate[:, i], CUTOFF_HZ, s.period)[at]) for i, a in enumerate("xyz")
-                  if plain[i]]
+        found += [
+            (f"turn rate {a} (rad/s)", low_pass(s.rate[:, i], CUTOFF_HZ, s.period)[at])
+            for i, a in enumerate("xyz")
+            if plain[i]
+        ]
         found += [(f"world position {a} (m)", s.position[at, i]) for i, a in enumerate("xy")]
         if s.voltage is not None:
             found.append(("battery voltage (V)", s.voltage[at]))
         parts.append(found)
-    joined = [(name, np.concatenate([p[i][1] for p in parts])) for i, (name, _) in enumerate(parts[0])]
-    return [(name, x) for name, x in joined if x.std() > next((least for word, least in _MOVES.items() if word in name), 1e-9)]
+    joined = [
+        (name, np.concatenate([p[i][1] for p in parts])) for i, (name, _) in enumerate(parts[0])
+    ]
+    return [
+        (name, x)
+        for name, x in joined
+        if x.std() > next((least for word, least in _MOVES.items() if word in name), 1e-9)
+    ]
 
 
 def _is_plain(flights: Flights, axis: int) -> bool:
-    """Return whether a turn rate, which is also the column of a rate's damping, is more than the sensors' noise."""
+    """Return whether a turn rate, which is also the column of a rate's damping, is more than the
+    sensors' noise.
+    """
     column = "rate_damping", f"d{'xyz'[axis]}"
-    noise, whole = (x[:, 3 + axis].var() for x in (flights.column_noise[column], flights.columns({}, [column])[column]))
+    noise, whole = (
+        x[:, 3 + axis].var()
+        for x in (flights.column_noise[column], flights.columns({}, [column])[column])
+    )
     return bool(noise <= _NOISE * whole)
 
 
@@ -81,7 +117,9 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
         if f"turn rate {a}" in known and f"turn rate {b}" in known:
             shapes[f"turn rates {a} and {b}"] = known[f"turn rate {a}"] * known[f"turn rate {b}"]
         if f"body velocity {a}" in known and f"body velocity {b}" in known:
-            shapes[f"body velocities {a} and {b}"] = known[f"body velocity {a}"] * known[f"body velocity {b}"]
+            shapes[f"body velocities {a} and {b}"] = (
+                known[f"body velocity {a}"] * known[f"body velocity {b}"]
+            )
     pieces = flights.pieces(setting)
     rotation = np.concatenate([p.signals.rotation[p.rows] for p in pieces])
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in pieces])
@@ -100,7 +138,9 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
     for name, x in limits.items():  # bumps
         low, high = np.quantile(x, [0.02, 0.98])
         for center in np.linspace(low, high, 6):
-            shapes[f"{name} near {center:.3g}"] = np.maximum(0.0, 1.0 - np.abs(x - center) / (0.2 * (high - low) + 1e-9))
+            shapes[f"{name} near {center:.3g}"] = np.maximum(
+                0.0, 1.0 - np.abs(x - center) / (0.2 * (high - low) + 1e-9)
+            )
     shapes["nothing (a constant)"] = np.ones(len(rotation))
     for name, x in shapes.items():
         for channel in range(6):
@@ -114,7 +154,9 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
 
 
 def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and the place in words."""
+    """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and
+    the place in words.
+    """
     at = np.concatenate([p.signals.position[p.rows, :2] for p in flights.pieces(setting)])
     if at.std(axis=0).min() <= _MOVES["position"]:
         return
@@ -128,11 +170,17 @@ def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
         for channel in range(6):
             column = np.zeros((len(at), 6))
             column[:, channel] = bump
-            yield CHANNELS[channel], f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m", column
+            yield (
+                CHANNELS[channel],
+                f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
+                column,
+            )
 
 
 def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of a linear drag that changes with something, in the mean nothing, and with what in words."""
+    """Yield columns (rows, 6) of a linear drag that changes with something, in the mean nothing,
+    and with what in words.
+    """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
     if velocity.std(axis=0).max() <= _MOVES["velocity"]:
         return
@@ -141,43 +189,70 @@ def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]
 
 
 def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
-    """Return columns (rows, 6) of a linear drag, and of one that changes with place, with heading and with both at once."""
+    """Return columns (rows, 6) of a linear drag, and of one that changes with place, with heading
+    and with both at once.
+    """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
     if velocity.std(axis=0).max() <= _MOVES["velocity"]:
         return []
     known = scaled(drives(flights, setting))
     places = [x for name, x in known.items() if "position" in name]
     headings = [x for name, x in known.items() if "heading" in name]
-    shapes = [np.ones(len(velocity)), *places, *headings, *(x * y for x in places for y in headings)]
+    shapes = [
+        np.ones(len(velocity)),
+        *places,
+        *headings,
+        *(x * y for x in places for y in headings),
+    ]
     return [np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)]) for x in shapes]
 
 
 def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield what a part would pull or twist (rows, 6) that the vehicle's own motion makes swing, with the channel and how fast.
+    """Yield what a part would pull or twist (rows, 6) that the vehicle's own motion makes swing,
+    with the channel and how fast.
 
-    A load on a cable is driven by the vehicle's acceleration, what is on a soft mount by the angular one. Differentiated, the
-    attitude's noise would be in column and residual alike: it is what the rotors' torque, hardly noisy, makes of the inertia.
+    A load on a cable is driven by the vehicle's acceleration, what is on a soft mount by the
+    angular one. Differentiated, the attitude's noise would be in column and residual alike: it is
+    what the rotors' torque, hardly noisy, makes of the inertia.
     """
     pieces = flights.pieces(setting)
     for hertz in _SWINGS_HZ:
-        parts = [low_pass(_swung(p.signals.acceleration[:, :2], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[p.rows]
-                 for p in pieces]
+        parts = [
+            low_pass(
+                _swung(p.signals.acceleration[:, :2], hertz, p.signals.period),
+                CUTOFF_HZ,
+                p.signals.period,
+            )[p.rows]
+            for p in pieces
+        ]
         pull = np.concatenate(parts)
-        yield "Fx and Fy", f"what swings at {hertz:.2g} Hz", np.column_stack([pull, np.zeros((len(pull), 4))])
+        yield (
+            "Fx and Fy",
+            f"what swings at {hertz:.2g} Hz",
+            np.column_stack([pull, np.zeros((len(pull), 4))]),
+        )
     vehicle = flights.amended(setting)
     torques = [vehicle.rotor_wrench(p.signals.rotor_speeds)[:, 1:] for p in pieces]
     plain = [i for i in range(3) if flights.lively and flights.rotor_noise[1 + i] < _ROUNDING]
     for hertz, i in itertools.product(_MOUNTS_HZ, plain):
-        parts = [low_pass(_swung(torque[:, i], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[p.rows]
-                 for torque, p in zip(torques, pieces, strict=True)]
+        parts = [
+            low_pass(_swung(torque[:, i], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[
+                p.rows
+            ]
+            for torque, p in zip(torques, pieces, strict=True)
+        ]
         column = np.zeros((sum(map(len, parts)), 6))
         column[:, 3 + i] = np.concatenate(parts)
         yield CHANNELS[3 + i], f"what swings at {hertz:.2g} Hz", column
 
 
 def _swung(drive: Array, hertz: float, period: float) -> Array:
-    """Return what a pendulum or a spring gives back (n, ...) of how its base is accelerated, sample by sample."""
+    """Return what a pendulum or a spring gives back (n, ...) of how its base is accelerated, sample
+    by sample.
+    """
     # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
-    shape = bilinear([-2.0 * _DAMPING * rate, -(rate**2)], [1.0, 2.0 * _DAMPING * rate, rate**2], 1.0 / period)
+    shape = bilinear(
+        [-2.0 * _DAMPING * rate, -(rate**2)], [1.0, 2.0 * _DAMPING * rate, rate**2], 1.0 / period
+    )
     return np.asarray(lfilter(*shape, drive, axis=0))

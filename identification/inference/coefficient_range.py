@@ -1,7 +1,8 @@
 """Whether a named effect leaves the range in which its law is believed.
 
-A law that stands for another one is often bent to its limit: a dry friction, named a drag, wants a quadratic part below zero.
-The truth sits at a bound too where a coefficient is zero, but nothing pulls it beyond.
+A law that stands for another one is often bent to its limit: a dry friction, named a drag, wants a
+quadratic part below zero. The truth sits at a bound too where a coefficient is zero, but nothing
+pulls it beyond.
 """
 
 import numpy as np
@@ -12,57 +13,106 @@ from .search import Fit, Search
 _PULL = 3.5  # standard deviations beyond a bound; those of true laws are within 2
 _SHARE = 0.05  # of the effect's own size, by which it must be beyond: laws are no truer than that
 _LARGEST = 10.0  # typical sizes
-_YAW_ALONE = 0.3  # of the damping about z, about x and y: rotors that climb and sink at the arms damp these more than that
-_LEAST_DRAG = 0.1  # typical sizes of a wind's own drag: true winds had 0.98 to 1.3, leaning frames 0.01 to 0.04
-# of a body's drag along its most exposed axis, along another: true ones, as found on six seeds, had 0.78 and more, RotorPy's
-# 0.34 and more, and what was named so where the library lacked the rotors' inflow 0.00 to 0.02
+# of the damping about z, about x and y: rotors that climb and sink at the arms damp these more than
+# that
+_YAW_ALONE = 0.3
+# typical sizes of a wind's own drag: true winds had 0.98 to 1.3, leaning frames 0.01 to 0.04
+_LEAST_DRAG = 0.1
+# of a body's drag along its most exposed axis, along another: true ones, as found on six seeds, had
+# 0.78 and more, RotorPy's 0.34 and more, and what was named so where the library lacked the rotors'
+# inflow 0.00 to 0.02
 _ONE_WAY = 0.15
 _SURELY = 2.0  # standard deviations
 _ANY_SIZE = frozenset({"mass", "thrust_scale", "com_offset", "constant_force", "constant_torque"})
 
 
 def beyond_belief(search: Search, fit: Fit) -> list[str]:
-    """Return in words which coefficients would leave their range if they could, or are such as no law of theirs has."""
+    """Return in words which coefficients would leave their range if they could, or are such as no
+    law of theirs has.
+    """
     vehicle = search.flights.vehicle
     found = []
-    size = {effect: max((abs(v) / typical((effect, k), vehicle) for k, v in fit.setting[effect].items() if k != CENTRAL),
-                        default=0.0) for effect in fit.effects}
+    size = {
+        effect: max(
+            (
+                abs(v) / typical((effect, k), vehicle)
+                for k, v in fit.setting[effect].items()
+                if k != CENTRAL
+            ),
+            default=0.0,
+        )
+        for effect in fit.effects
+    }
     for effect in fit.effects:
         if size[effect] > _LARGEST and effect not in _ANY_SIZE:
-            found.append(f"{effect} would be {size[effect]:.0f} times what it typically is: another effect may be behind it")
+            found.append(
+                f"{effect} would be {size[effect]:.0f} times what it typically is: another effect "
+                f"may be behind it"
+            )
     wind = fit.setting.get("wind", {})
     named = {*fit.effects, *(e.name for e in vehicle.effects)}
-    if wind and not DRAGS & named and wind["cd"] < _LEAST_DRAG * typical(("wind", "cd"), vehicle):  # drags feel a wind too
-        found.append("wind would act on hardly any drag, as a steady force does whatever the speed: another effect may be "
-                     "behind it")
+    if (
+        wind and not DRAGS & named and wind["cd"] < _LEAST_DRAG * typical(("wind", "cd"), vehicle)
+    ):  # drags feel a wind too
+        found.append(
+            "wind would act on hardly any drag, as a steady force does whatever the speed: another "
+            "effect may be "
+            "behind it"
+        )
     damping = fit.setting.get("rate_damping", {})
     if damping and 0.5 * (damping["dx"] + damping["dy"]) < _YAW_ALONE * damping["dz"]:
-        found.append("rate_damping would be about z alone, and the arms' rotors damp the other axes more: another effect may "
-                     "be behind it")
+        found.append(
+            "rate_damping would be about z alone, and the arms' rotors damp the other axes more: "
+            "another effect may "
+            "be behind it"
+        )
     if "body_drag" in fit.effects and _leaves_out_an_axis(search, fit):
-        found.append("body_drag would be along some axes alone, and air drags a body whichever way it moves: another effect "
-                     "may be behind it")
+        found.append(
+            "body_drag would be along some axes alone, and air drags a body whichever way it "
+            "moves: another effect "
+            "may be behind it"
+        )
     g = search.at(fit)
     total, k = g.blocks.sum(axis=0), len(g.columns)
     normal = total[:k, :k] + np.diag(g.precision)
     change = np.linalg.solve(normal, total[:k, -1] - g.precision * g.value)
     std = np.sqrt(np.diag(np.linalg.inv(normal)))
     beyond: dict[str, list[str]] = {}
-    for (effect, name), d, s, low, high in zip(g.columns, change, std, g.lower, g.upper, strict=True):
-        least = _SHARE * typical((effect, name), vehicle) * (1.0 if name == CENTRAL else size.get(effect, 0.0))
-        if effect and ((low >= 0.0 and d < 0.0) or (high <= 0.0 and d > 0.0)) and abs(d) > max(_PULL * s, least):
+    for (effect, name), d, s, low, high in zip(
+        g.columns, change, std, g.lower, g.upper, strict=True
+    ):
+        least = (
+            _SHARE
+            * typical((effect, name), vehicle)
+            * (1.0 if name == CENTRAL else size.get(effect, 0.0))
+        )
+        if (
+            effect
+            and ((low >= 0.0 and d < 0.0) or (high <= 0.0 and d > 0.0))
+            and abs(d) > max(_PULL * s, least)
+        ):
             beyond.setdefault(effect, []).append(name)
-    found += [f"{effect} would leave its range if it could, with {', '.join(names)}: another effect may be behind the name"
-              for effect, names in beyond.items()]
+    found += [
+        f"{effect} would leave its range if it could, with {', '.join(names)}: another effect may "
+        f"be behind the name"
+        for effect, names in beyond.items()
+    ]
     return found
 
 
 def _leaves_out_an_axis(search: Search, fit: Fit) -> bool:
-    """Return whether a named body_drag, at the flights' RMS speed, is surely hardly any along one axis beside another."""
+    """Return whether a named body_drag, at the flights' RMS speed, is surely hardly any along one
+    axis beside another.
+    """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in search.flights.pieces({})])
     speed = float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1))))
     drag = fit.setting["body_drag"]
     size = [drag.get(f"d{axis}", 0.0) + speed * drag.get(f"c{axis}", 0.0) for axis in "xyz"]
-    std = [np.hypot(fit.std.get(("body_drag", f"d{axis}"), 0.0), speed * fit.std.get(("body_drag", f"c{axis}"), 0.0))
-           for axis in "xyz"]
+    std = [
+        np.hypot(
+            fit.std.get(("body_drag", f"d{axis}"), 0.0),
+            speed * fit.std.get(("body_drag", f"c{axis}"), 0.0),
+        )
+        for axis in "xyz"
+    ]
     return any(one + _SURELY * s < _ONE_WAY * max(size) for one, s in zip(size, std, strict=True))

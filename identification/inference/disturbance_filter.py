@@ -1,6 +1,8 @@
-"""Gusts as the pose of a flight shows them: a steady Kalman filter of one axis, its innovations, and the gusts' likelihood.
+"""Gusts as the pose of a flight shows them: a steady Kalman filter of one axis, its innovations,
+and the gusts' likelihood.
 
-Gusts are an Ornstein-Uhlenbeck acceleration of a strength and a time, which those are that make the innovations least.
+Gusts are an Ornstein-Uhlenbeck acceleration of a strength and a time, which those are that make the
+innovations least.
 """
 
 import itertools
@@ -14,20 +16,27 @@ from scipy.signal import lfilter, ss2tf
 
 Array = NDArray[np.float64]
 
-STRENGTHS = 2.0 ** np.arange(-10, 47)  # variance of gusts, in the acceleration's unit squared, over that of the pose's noise
+STRENGTHS = 2.0 ** np.arange(
+    -10, 47
+)  # variance of gusts, in the acceleration's unit squared, over that of the pose's noise
 TIMES = 0.25 * 1.5 ** np.arange(-6, 6)  # s, of gusts
 _BEGIN = (24, 6)  # where among these the search begins
 _STRIDES = (4, 2, 1)  # of that search
 
 
 def likeliest(loss: Callable[[int, int], float]) -> tuple[int, int]:
-    """Return which strength and time of gusts make a loss least, by steps to the best neighbour, large ones first."""
+    """Return which strength and time of gusts make a loss least, by steps to the best neighbour,
+    large ones first.
+    """
     known = {_BEGIN: loss(*_BEGIN)}
     at = _BEGIN
     for stride in _STRIDES:
         while True:
             for i, j in itertools.product((-stride, 0, stride), repeat=2):
-                near = (int(np.clip(at[0] + i, 0, len(STRENGTHS) - 1)), int(np.clip(at[1] + j, 0, len(TIMES) - 1)))
+                near = (
+                    int(np.clip(at[0] + i, 0, len(STRENGTHS) - 1)),
+                    int(np.clip(at[1] + j, 0, len(TIMES) - 1)),
+                )
                 if near not in known:
                     known[near] = loss(*near)
             best = min(known, key=known.__getitem__)
@@ -38,30 +47,38 @@ def likeliest(loss: Callable[[int, int], float]) -> tuple[int, int]:
 
 
 def innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
-    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) drives, and gusts.
+    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c)
+    drives, and gusts.
 
-    ``strength`` is the gusts' variance, in the acceleration's unit squared, over that of the pose's noise; ``time`` (s) theirs.
+    ``strength`` is the gusts' variance, in the acceleration's unit squared, over that of the pose's
+    noise; ``time`` (s) theirs.
     """
     poles, from_pose, from_drive, _ = _filters(strength, time, period)
     acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
-    return np.asarray(lfilter(from_pose, poles, pose, axis=0) + lfilter(from_drive, poles, acting, axis=0))
+    return np.asarray(
+        lfilter(from_pose, poles, pose, axis=0) + lfilter(from_drive, poles, acting, axis=0)
+    )
 
 
 def strength_of(innovation: float, strength: float, time: float, period: float) -> float:
-    """Return the gusts' variance, in the acceleration's unit squared, from that of the innovations that they leave."""
+    """Return the gusts' variance, in the acceleration's unit squared, from that of the innovations
+    that they leave.
+    """
     return strength * innovation / _filters(strength, time, period)[-1]
 
 
 @lru_cache(maxsize=4096)
 def _filters(strength: float, time: float, period: float) -> tuple[Array, Array, Array, float]:
-    """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose and of what drives it.
+    """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose
+    and of what drives it.
 
-    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period squared). The last is the
-    innovations' variance over that of the pose's noise.
+    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period
+    squared). The last is the innovations' variance over that of the pose's noise.
     """
     rate = period / time
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
-    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a period
+    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a
+    # period
     both = np.zeros((6, 6))
     both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * strength * period**4
     both = expm(both)

@@ -1,7 +1,8 @@
-"""Which effects a residual needs: forward selection of whole effects, judged on blocks that are left out in turn.
+"""Which effects a residual needs: forward selection of whole effects, judged on blocks that are
+left out in turn.
 
-At one setting of coefficients everything is linear: each column is whitened, and all that selection, removal and comparison ask
-is in the Gram matrices of the blocks.
+At one setting of coefficients everything is linear: each column is whitened, and all that
+selection, removal and comparison ask is in the Gram matrices of the blocks.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,8 @@ from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
-# what a law allows and nobody believes: a rotor that delivers far more than it should (all four together are thrust_scale)
+# what a law allows and nobody believes: a rotor that delivers far more than it should (all four
+# together are thrust_scale)
 BELIEVED = {"rotor_efficiency": 0.05}
 _MOST_MISSING = 0.9  # of the declared mass
 _TURNS = 4  # of the search for which bounds hold, a column
@@ -37,8 +39,9 @@ PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anythin
 def columns_of(effect: str, fitted: bool) -> list[Column]:
     """Return the columns of an effect.
 
-    Whether the law of one that acts rotor by rotor makes a moment is the log's to say: while it is only tried, the moment
-    part of each column is free; once it is ``fitted``, the coefficient ``central`` is.
+    Whether the law of one that acts rotor by rotor makes a moment is the log's to say: while it is
+    only tried, the moment part of each column is free; once it is ``fitted``, the coefficient
+    ``central`` is.
     """
     own = [(effect, c.name) for c in get(effect).coefficients]
     if fitted or (effect, CENTRAL) not in own:
@@ -49,7 +52,9 @@ def columns_of(effect: str, fitted: bool) -> list[Column]:
 
 @dataclass(frozen=True, eq=False)
 class Gram:
-    """The regression at one setting, as sums over blocks of the fit: (blocks, columns + 1, columns + 1), residual last."""
+    """The regression at one setting, as sums over blocks of the fit: (blocks, columns + 1, columns
+    + 1), residual last.
+    """
 
     columns: tuple[Column, ...]
     design: Array  # (rows of the fit, 6, columns + 1), whitened
@@ -66,13 +71,16 @@ class Gram:
         return np.array([at[c] for c in wanted if c in at], dtype=np.int64)
 
     def solve(self, gram: Array, index: NDArray[np.int64]) -> Array:
-        """Return the changes (len(index),) of least squares over these columns within their bounds."""
+        """Return the changes (len(index),) of least squares over these columns
+        within their bounds.
+        """
         return self._solve(gram, index)[0]
 
     def _solve(self, gram: Array, index: NDArray[np.int64]) -> tuple[Array, NDArray[np.bool_]]:
         """Return the changes and which of them are free of their bounds.
 
-        An active set, as in Stark and Parker, Bounded-Variable Least-Squares, Computational Statistics 10 (1995).
+        An active set, as in Stark and Parker, Bounded-Variable Least-Squares, Computational
+        Statistics 10 (1995).
         """
         normal = gram[np.ix_(index, index)] + np.diag(self.precision[index])
         right = gram[index, -1] - self.precision[index] * self.value[index]
@@ -84,7 +92,11 @@ class Gram:
             if free.any():
                 step = np.linalg.solve(normal[np.ix_(free, free)], (right - normal @ change)[free])
                 room = np.where(step > 0, high[free] - change[free], change[free] - low[free])
-                share = np.where(np.abs(step) > _SMALL_PULL * scale[free], room / np.maximum(np.abs(step), 1e-300), np.inf)
+                share = np.where(
+                    np.abs(step) > _SMALL_PULL * scale[free],
+                    room / np.maximum(np.abs(step), 1e-300),
+                    np.inf,
+                )
                 first = float(share.min())
                 change[free] += min(first, 1.0) * step
                 if first < 1.0:  # the first to reach its bound stays there for now
@@ -123,8 +135,16 @@ class Gram:
         return float(total[-1, -1] - 2.0 * np.sum(change * self.blocks[:, index, -1]) + square)
 
 
-def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Column, Array], residual: Array) -> Gram:
-    """Return the regression of the residual (rows, 6) at a setting on these columns (rows, 6) each."""
+def gram(
+    flights: Flights,
+    setting: Setting,
+    whiten: Whitener,
+    columns: dict[Column, Array],
+    residual: Array,
+) -> Gram:
+    """Return the regression of the residual (rows, 6) at a setting on these
+    columns (rows, 6) each.
+    """
     names = tuple(columns)
     x = np.stack([*columns.values(), residual], axis=2)
     x = np.ascontiguousarray(whiten(x)[flights.fit])
@@ -134,10 +154,16 @@ def gram(flights: Flights, setting: Setting, whiten: Whitener, columns: dict[Col
     return Gram(names, x, begins, blocks, *room(flights, setting, names))
 
 
-def room(flights: Flights, setting: Setting, columns: Sequence[Column]) -> tuple[Array, Array, Array, Array]:
-    """Return of each column (columns,) its prior's precision, its value, and by how much this may fall and rise."""
+def room(
+    flights: Flights, setting: Setting, columns: Sequence[Column]
+) -> tuple[Array, Array, Array, Array]:
+    """Return of each column (columns,) its prior's precision, its value, and by how much this may
+    fall and rise.
+    """
     size = np.array([typical(c, flights.vehicle) for c in columns])
-    value = np.array([flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns])
+    value = np.array(
+        [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
+    )
     low, high = np.empty(len(columns)), np.empty(len(columns))
     for i, c in enumerate(columns):
         if not c[0]:
@@ -147,7 +173,10 @@ def room(flights: Flights, setting: Setting, columns: Sequence[Column]) -> tuple
         elif c[1].startswith(START):
             low[i], high[i] = 0.0, PRIOR
         else:
-            low[i], high[i] = coefficient(c).minimum, min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf))
+            low[i], high[i] = (
+                coefficient(c).minimum,
+                min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf)),
+            )
             if c[0] == "mass":
                 low[i] = max(low[i], -_MOST_MISSING * flights.vehicle.mass)
     prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))

@@ -1,9 +1,11 @@
-"""Whether what seems to explain a residual acts on the vehicle, or is the flight loop's answer to gusts.
+"""Whether what seems to explain a residual acts on the vehicle, or is the flight loop's answer to
+gusts.
 
-A flight loop works against every gust, so rotors, attitude and velocity follow it, and a law of one of these seems to explain
-it. Looked at from the past alone it does not: what no past pose foretells of the next one, the innovation of a filter that
-knows how gusts last, no answer can have followed yet. So a change of the model is asked how much of itself the innovations
-confirm: all of it if it is a law, nothing if it is an answer, unknown as the loop is. (With a model of the noise, prediction
+A flight loop works against every gust, so rotors, attitude and velocity follow it, and a law of one
+of these seems to explain it. Looked at from the past alone it does not: what no past pose foretells
+of the next one, the innovation of a filter that knows how gusts last, no answer can have followed
+yet. So a change of the model is asked how much of itself the innovations confirm: all of it if it
+is a law, nothing if it is an answer, unknown as the loop is. (With a model of the noise, prediction
 errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
 """
 
@@ -27,8 +29,13 @@ from .regression import SHIFT, Column, Flights, Piece, Setting, coefficient, typ
 Array = NDArray[np.float64]
 
 _SHARE = 0.65  # laws have 0.8 to 1.4, answers -5 to 0.2, one had 0.53
-LEAST_ENERGY = 20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
-_AT_ODDS, _SURELY = 0.1, 2.0  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
+LEAST_ENERGY = (
+    20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
+)
+_AT_ODDS, _SURELY = (
+    0.1,
+    2.0,
+)  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
 _SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
 _NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
 _STEP = 0.1  # typical sizes, over which slopes are taken
@@ -57,18 +64,31 @@ class Innovations:
         self._count = sum(int(np.count_nonzero(x)) for x in self._counts)
 
     def confirm(self, after: Setting, least: float = LEAST_ENERGY) -> bool:
-        """Return whether innovations confirm the change to the effects ``after``, with an energy of at least ``least``."""
+        """Return whether innovations confirm the change to the effects ``after``, with an energy of
+        at least ``least``.
+        """
         return _confirmed(*self.share(after), least)
 
     def share(self, after: Setting) -> tuple[float, float]:
-        """Return the share of that change which makes the innovations least, and the energy that it then explains."""
-        return self._share([new - old for old, new in zip(self._motions, self._seen(self._timed(after)), strict=True)])
+        """Return the share of that change which makes the innovations least, and the energy that it
+        then explains.
+        """
+        return self._share(
+            [
+                new - old
+                for old, new in zip(self._motions, self._seen(self._timed(after)), strict=True)
+            ]
+        )
 
     def confirm_column(self, column: Array) -> bool:
-        """Return whether they confirm a change of the model's force (N, world) and torque (Nm, body) at the rows (rows, 6)."""
+        """Return whether they confirm a change of the model's force (N, world) and torque (Nm,
+        body) at the rows (rows, 6).
+        """
         changes = []
         parts = np.split(column, np.flatnonzero(self._flights.start)[1:])
-        for motion, piece, part in zip(self._motions, self._flights.pieces(self._setting), parts, strict=True):
+        for motion, piece, part in zip(
+            self._motions, self._flights.pieces(self._setting), parts, strict=True
+        ):
             change = np.zeros_like(motion)
             at = np.arange(motion.shape[1]).clip(piece.rows[0], piece.rows[-1])
             change[1] = self._accelerations(CubicSpline(piece.rows, part)(at))
@@ -76,40 +96,60 @@ class Innovations:
         return _confirmed(*self._share(changes))
 
     def gram(self, columns: Sequence[Column]) -> Gram:
-        """Return the regression of the innovations on coefficients, in one block, each axis by its standard deviation.
+        """Return the regression of the innovations on coefficients, in one block, each axis by its
+        standard deviation.
 
         Gusts are those that suit the innovations as they are.
         """
         slopes = [self._slope(column) for column in columns]
         total = np.zeros((len(columns) + 1, len(columns) + 1))
         for axis in range(6):
-            parts = [np.stack([*(slope[i][..., axis] for slope in slopes), -motion[..., axis]], axis=-1)
-                     for i, motion in enumerate(self._motions)]
+            parts = [
+                np.stack([*(slope[i][..., axis] for slope in slopes), -motion[..., axis]], axis=-1)
+                for i, motion in enumerate(self._motions)
+            ]
             products = self._products([part[..., -1:] for part in parts])
             strength, time = likeliest(lambda *gusts, of=products: float(of(*gusts)[0, 0]))
             sums = self._sums(parts, float(STRENGTHS[strength]), float(TIMES[time]))
             total += sums * self._count / max(sums[-1, -1], _TINY)
-        return Gram(tuple(columns), np.zeros((0, 6, len(total))), np.zeros(1, dtype=np.intp), total[None],
-                    *room(self._flights, self._setting, columns))
+        return Gram(
+            tuple(columns),
+            np.zeros((0, 6, len(total))),
+            np.zeros(1, dtype=np.intp),
+            total[None],
+            *room(self._flights, self._setting, columns),
+        )
 
     def _slope(self, column: Column) -> list[Array]:
         """Return what a unit of a coefficient adds to the motions (2, n, 6)."""
         effect, name = column
         own = self._flights.coefficients(self._setting, effect)
         value, delta = own.get(name, 0.0), _STEP * typical(column, self._flights.vehicle)
-        if effect and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum:
+        if (
+            effect
+            and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum
+        ):
             delta = -delta
         after = {**self._setting, effect: {**own, name: value + delta}}
-        return [(new - old) / delta for new, old in zip(self._seen(self._timed(after)), self._motions, strict=True)]
+        return [
+            (new - old) / delta
+            for new, old in zip(self._seen(self._timed(after)), self._motions, strict=True)
+        ]
 
     def gusts(self) -> list[tuple[float, float]]:
-        """Return the RMS (N in the world, Nm in the body) and the time (s) of the likeliest gusts of each of the six channels.
+        """Return the RMS (N in the world, Nm in the body) and the time (s) of the likeliest gusts
+        of each of the six channels.
 
-        A law that the model lacks counts as gusts too. The steps to which turn rates are rounded look like quick gusts.
+        A law that the model lacks counts as gusts too. The steps to which turn rates are rounded
+        look like quick gusts.
         """
-        inertias = [self._flights.vehicle.mass] * 3 + np.diagonal(self._flights.vehicle.inertia).tolist()
-        return [self._gusts([-motion[..., [axis]] for motion in self._motions], inertia)
-                for axis, inertia in enumerate(inertias)]
+        inertias = [self._flights.vehicle.mass] * 3 + np.diagonal(
+            self._flights.vehicle.inertia
+        ).tolist()
+        return [
+            self._gusts([-motion[..., [axis]] for motion in self._motions], inertia)
+            for axis, inertia in enumerate(inertias)
+        ]
 
     def _gusts(self, motions: Sequence[Array], inertia: float) -> tuple[float, float]:
         period = self._flights.pieces(self._setting)[0].signals.period
@@ -120,39 +160,62 @@ class Innovations:
         def loss(x: Array) -> float:
             return float(np.log(self._sums(motions, *np.exp(x).tolist())[0, 0]))
 
-        best = minimize(loss, begun, method="Nelder-Mead", bounds=[begun[0] + _NEAR, begun[1] + _NEAR],
-                        options={"xatol": 0.05, "fatol": 1.0 / self._count})
+        best = minimize(
+            loss,
+            begun,
+            method="Nelder-Mead",
+            bounds=[begun[0] + _NEAR, begun[1] + _NEAR],
+            options={"xatol": 0.05, "fatol": 1.0 / self._count},
+        )
         strength, time = np.exp(best.x).tolist()
-        return inertia * math.sqrt(strength_of(math.exp(best.fun) / self._count, strength, time, period)), time
+        return inertia * math.sqrt(
+            strength_of(math.exp(best.fun) / self._count, strength, time, period)
+        ), time
 
     def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
-        """Return the share of changes of the motions that makes the innovations least, of all axes together, and its energy.
+        """Return the share of changes of the motions that makes the innovations least, of all axes
+        together, and its energy.
 
-        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration. Their strength and time are those that make its
-        innovations least (maximum likelihood), once together with a share and once without any: the energy is what the share
-        gains over other gusts.
+        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration. Their strength and time
+        are those that make its innovations least (maximum likelihood), once together with a share
+        and once without any: the energy is what the share gains over other gusts.
         """
-        axes = [self._axis([np.stack([-motion[..., axis], change[..., axis]], axis=-1)
-                            for motion, change in zip(self._motions, changes, strict=True)])
-                for axis in range(6) if any(np.any(change[..., axis]) for change in changes)]
+        axes = [
+            self._axis(
+                [
+                    np.stack([-motion[..., axis], change[..., axis]], axis=-1)
+                    for motion, change in zip(self._motions, changes, strict=True)
+                ]
+            )
+            for axis in range(6)
+            if any(np.any(change[..., axis]) for change in changes)
+        ]
         cross, square = (sum(x[row, 1] / _left(x) for x, _ in axes) for row in (0, 1))
         share = float(cross / max(square, _TINY))
         rest = np.array([-1.0, share])
-        energy = self._count * sum(float(np.log(max(y[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for x, y in axes)
+        energy = self._count * sum(
+            float(np.log(max(y[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for x, y in axes
+        )
         return share, energy
 
     def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
-        """Return the sums of products (2, 2) of one axis' innovations and of a change's, of which each piece is (2, n, 2).
+        """Return the sums of products (2, 2) of one axis' innovations and of a change's, of which
+        each piece is (2, n, 2).
 
         Once with the gusts that suit both, once with those that suit the innovations alone.
         """
         products = self._products(both)
-        found = [products(*likeliest(lambda *gusts: _left(products(*gusts)))),
-                 products(*likeliest(lambda *gusts: float(products(*gusts)[0, 0])))]
+        found = [
+            products(*likeliest(lambda *gusts: _left(products(*gusts)))),
+            products(*likeliest(lambda *gusts: float(products(*gusts)[0, 0]))),
+        ]
         return min(found, key=_left), min(found, key=lambda x: float(x[0, 0]))
 
     def _products(self, motions: Sequence[Array]) -> Callable[[int, int], Array]:
-        """Return a function of gusts that gives the sums of products (c, c) of innovations; each piece is (2, n, c)."""
+        """Return a function of gusts that gives the sums of products (c, c) of innovations; each
+        piece is (2, n, c).
+        """
+
         @cache
         def products(strength: int, time: int) -> Array:
             return self._sums(motions, float(STRENGTHS[strength]), float(TIMES[time]))
@@ -161,50 +224,78 @@ class Innovations:
 
     def _sums(self, motions: Sequence[Array], strength: float, time: float) -> Array:
         pieces = self._flights.pieces(self._setting)
-        found = [innovations(pose, drive, strength, time, piece.signals.period)[counted]
-                 for (pose, drive), piece, counted in zip(motions, pieces, self._counts, strict=True)]
+        found = [
+            innovations(pose, drive, strength, time, piece.signals.period)[counted]
+            for (pose, drive), piece, counted in zip(motions, pieces, self._counts, strict=True)
+        ]
         return np.asarray(sum(x.T @ x for x in found))
 
     def _timed(self, after: Setting) -> Setting:
-        """Return ``after`` with a change of the clock made by moving the turn rates: moved poses take their noise along."""
+        """Return ``after`` with a change of the clock made by moving the turn rates: moved poses
+        take their noise along.
+        """
         effect, name = _CLOCK
         if effect not in after:
             return after
         own = self._flights.coefficients(self._setting, effect)
         shifts = dict(after.get(SHIFT[0], {}))
         shifts[SHIFT[1]] = shifts.get(SHIFT[1], 0.0) + after[effect][name] - own.get(name, 0.0)
-        return {**{k: v for k, v in after.items() if k != effect}, SHIFT[0]: shifts, **({effect: own} if own else {})}
+        return {
+            **{k: v for k, v in after.items() if k != effect},
+            SHIFT[0]: shifts,
+            **({effect: own} if own else {}),
+        }
 
     def _seen(self, setting: Setting) -> list[Array]:
-        """Return of each piece (2, n, 6) the pose as measured, and the model's acceleration, linear (world) and angular (body).
+        """Return of each piece (2, n, 6) the pose as measured, and the model's acceleration, linear
+        (world) and angular (body).
 
-        The pose's angle (rad) is what the body rates add up to. The attitude is always the same: a gain of it would make the
-        innovations small by taking their own noise away.
+        The pose's angle (rad) is what the body rates add up to. The attitude is always the same: a
+        gain of it would make the innovations small by taking their own noise away.
         """
         out = []
         pieces = self._flights.pieces(setting)
-        for piece, like, model in zip(pieces, self._flights.pieces(self._setting), self._flights.model(setting), strict=True):
-            pose = np.column_stack([self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]])
+        for piece, like, model in zip(
+            pieces, self._flights.pieces(self._setting), self._flights.model(setting), strict=True
+        ):
+            pose = np.column_stack(
+                [self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]]
+            )
             begun = np.concatenate([like.signals.velocity[0], like.signals.rate[0]])
             fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-            out.append(np.stack([pose - np.outer(piece.signals.t - piece.signals.t[0], begun),
-                                 self._accelerations(model) - fallen]))
+            out.append(
+                np.stack(
+                    [
+                        pose - np.outer(piece.signals.t - piece.signals.t[0], begun),
+                        self._accelerations(model) - fallen,
+                    ]
+                )
+            )
         return out
 
     def _raw(self, setting: Setting, piece: Piece) -> Array:
-        """Return the pose (n, 6) of a piece, from its start, without the low-pass that knows of the future."""
+        """Return the pose (n, 6) of a piece, from its start, without the low-pass that knows of the
+        future.
+        """
         if id(piece) not in self._poses:
             log = undo_log_sensing(self._flights.logs[piece.log], self._flights.amended(setting))
             signals = next(s for s in log_signals(log, np.inf) if s.t[0] == piece.signals.t[0])
             turned = Rotation.from_matrix(signals.rotation)
-            angle = np.vstack([np.zeros(3), np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)])
-            self._poses[id(piece)] = piece, np.column_stack([signals.position - signals.position[0], angle])
+            angle = np.vstack(
+                [np.zeros(3), np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)]
+            )
+            self._poses[id(piece)] = (
+                piece,
+                np.column_stack([signals.position - signals.position[0], angle]),
+            )
         return self._poses[id(piece)][1]
 
     def _accelerations(self, wrench: Array) -> Array:
         """Return the linear and the angular acceleration (n, 6) of a force and a torque (n, 6)."""
         vehicle = self._flights.vehicle
-        return np.column_stack([wrench[:, :3] / vehicle.mass, np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T])
+        return np.column_stack(
+            [wrench[:, :3] / vehicle.mass, np.linalg.solve(vehicle.inertia, wrench[:, 3:].T).T]
+        )
 
 
 def _confirmed(share: float, energy: float, least: float = LEAST_ENERGY) -> bool:
@@ -212,7 +303,8 @@ def _confirmed(share: float, energy: float, least: float = LEAST_ENERGY) -> bool
 
 
 def adds(flights: Flights, before: Setting, after: Setting, least: float = LEAST_ENERGY) -> bool:
-    """Return whether innovations confirm what a fit has beyond a smaller one, with an energy of at least ``least``.
+    """Return whether innovations confirm what a fit has beyond a smaller one, with an energy of at
+    least ``least``.
 
     Both have the shifts of ``after``: gusts bend them, and they are not what is asked.
     """
@@ -221,21 +313,32 @@ def adds(flights: Flights, before: Setting, after: Setting, least: float = LEAST
 
 
 def at_odds(flights: Flights, setting: Setting) -> list[str]:
-    """Return, in words, which effects of a fitted setting are not what the innovations make of them.
+    """Return, in words, which effects of a fitted setting are not what the innovations make of
+    them.
 
-    A law is the same below 5 Hz, from both sides, as it is from the past alone and at all frequencies; what merely stands for
-    another one seldom is. (Two estimates that must agree: J. A. Hausman, Econometrica 46 (1978), 1251-1271.)
+    A law is the same below 5 Hz, from both sides, as it is from the past alone and at all
+    frequencies; what merely stands for another one seldom is. (Two estimates that must agree: J. A.
+    Hausman, Econometrica 46 (1978), 1251-1271.)
     """
     out = []
     for effect in setting:
-        if not effect or get(effect).kind == "sensing":  # of what is seen, not of what acts: bent by its own noise
+        if (
+            not effect or get(effect).kind == "sensing"
+        ):  # of what is seen, not of what acts: bent by its own noise
             continue
-        share, energy = Innovations(flights, {k: v for k, v in setting.items() if k != effect}).share(setting)
+        share, energy = Innovations(
+            flights, {k: v for k, v in setting.items() if k != effect}
+        ).share(setting)
         if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _TINY))):
-            out.append(f"{effect}: what no past pose foretells bears out {share:.0%} of it: another effect may be behind it")
+            out.append(
+                f"{effect}: what no past pose foretells bears out {share:.0%} of it: another "
+                f"effect may be behind it"
+            )
     return out
 
 
 def _left(products: Array) -> float:
-    """Return the energy that the best multiple of a change leaves of innovations, of their sums of products (2, 2)."""
+    """Return the energy that the best multiple of a change leaves of innovations, of their sums of
+    products (2, 2).
+    """
     return max(float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], _TINY)), _TINY)

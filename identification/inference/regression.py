@@ -1,8 +1,9 @@
 """The residual of flights as a regression on the coefficients of effects.
 
-Rows are samples of all flights, low-passed with zero phase and thinned out; the six channels are force in the world frame and
-torque in the body frame. A column is the change of the residual with one coefficient. Residual and columns come from the
-same laws that plant and estimator run, through the same filter.
+Rows are samples of all flights, low-passed with zero phase and thinned out; the six channels are
+force in the world frame and torque in the body frame. A column is the change of the residual with
+one coefficient. Residual and columns come from the same laws that plant and estimator run, through
+the same filter.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -42,23 +43,33 @@ Index = NDArray[np.int64]
 CUTOFF_HZ = 5.0
 _RATE_HZ = 25.0  # of the rows
 _EDGE = 0.6  # s at either end of a piece, where the filters have only half of what they need
-# share of noise in an effect's column that is too much; a gain of the attitude could cancel the attitude's own noise
+# share of noise in an effect's column that is too much; a gain of the attitude could cancel the
+# attitude's own noise
 _DROWNED = {"attitude_gain": 0.01}
 _DROWNED_ELSE = 0.1
-_STEPS = 1.4  # rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its own
+# rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its
+# own
+_STEPS = 1.4
 # effects of which a flight with less than that says nothing: they would explain the rounding
-_QUICK = frozenset({"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"})
+_QUICK = frozenset(
+    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
+)
 TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
 LATE = TIMING | {"motor_lag"}
 DRAGS = frozenset({"rotor_drag", "body_drag"})
 # effects whose force is no sum over their coefficients
 STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
 SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
-_ROOM = 2**28  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
+_ROOM = (
+    2**28
+)  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
 _LATEST = 16  # residuals that are kept: a fit asks several times for that of its setting
 _SAMPLE = 400  # bytes of a piece, a sample
 BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
-_HELD_OUT, _GOLDEN = 4, 0.5 * (5.0**0.5 - 1.0)  # one block of four; which one changes so that no flight keeps step with it
+_HELD_OUT, _GOLDEN = (
+    4,
+    0.5 * (5.0**0.5 - 1.0),
+)  # one block of four; which one changes so that no flight keeps step with it
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
@@ -70,7 +81,8 @@ START = "start "  # a whole effect at coefficients of its own; the column is a m
 SHIFT_RANGE = (-0.006, 0.006)  # s
 SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
 LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
-# s, by which the velocity that a law asks for is behind the position's: a simulator that holds its forces over a step has it
+# s, by which the velocity that a law asks for is behind the position's: a simulator that holds its
+# forces over a step has it
 LAG = ("", "velocity_shift")
 NUISANCES = (SHIFT, LEAN, LAG)
 
@@ -81,7 +93,9 @@ def coefficient(column: Column) -> Coefficient:
 
 
 def typical(column: Column, vehicle: Vehicle) -> float:
-    """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the library's two."""
+    """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
+    library's two.
+    """
     if column in NUISANCES:
         return 0.0025
     if not column[0] and (size := size_of(column[1])) is not None:
@@ -91,7 +105,11 @@ def typical(column: Column, vehicle: Vehicle) -> float:
     c = coefficient(column)
     large, small = (abs(x) for x in c.typical)
     if large == 0 or small == 0:
-        others = [abs(o.typical[0]) for o in get(column[0]).coefficients if o.unit == c.unit and o.typical[0]]
+        others = [
+            abs(o.typical[0])
+            for o in get(column[0]).coefficients
+            if o.unit == c.unit and o.typical[0]
+        ]
         return max(others, default=1.0)
     share = np.clip(np.log(vehicle.mass / 0.03) / np.log(0.45 / 0.03), 0.0, 1.3)
     return float(small * (large / small) ** share)
@@ -118,18 +136,25 @@ class Flights:
     Args:
         logs: of the fit.
         vehicle: as it is declared.
-        test: further logs, which the fit never sees; without any, one block of 3 s of each four is held out.
+        test: further logs, which the fit never sees; without any, one block of 3 s of each four is
+            held out.
     """
 
-    def __init__(self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()) -> None:
+    def __init__(
+        self, logs: Sequence[FlightLog], vehicle: Vehicle, test: Sequence[FlightLog] = ()
+    ) -> None:
         self.vehicle = vehicle
         self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
-        self.commanded = commanded(self.logs)  # torque is left out, and only the time in the air counts
+        self.commanded = commanded(
+            self.logs
+        )  # torque is left out, and only the time in the air counts
         if self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         self.logs = tuple(excerpt(self.logs))
-        self.own = len(logs) if self.commanded else 0  # flights that have a thrust scale and a lean of their own
+        self.own = (
+            len(logs) if self.commanded else 0
+        )  # flights that have a thrust scale and a lean of their own
         self.deviations: tuple[Column, ...] = tuple(deviations(self.own))
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
         self._needs: dict[int, tuple[Piece, Array]] = {}
@@ -147,7 +172,11 @@ class Flights:
             number = ((time - time[0]) // length).astype(np.int64)
             log.append(np.full(len(time), piece.log))
             block.append(number + count)
-            seen = np.full(len(time), piece.log < len(logs)) if test else number % _HELD_OUT != held_out(number)
+            seen = (
+                np.full(len(time), piece.log < len(logs))
+                if test
+                else number % _HELD_OUT != held_out(number)
+            )
             fit.append(seen)
             start.append(np.arange(len(time)) == 0)
             t.append(time)
@@ -159,25 +188,43 @@ class Flights:
         self.t: Array = np.concatenate(t)
         self.period = float(np.median(np.diff(self.t)))
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
-        self.drowned: frozenset[str]  # effects whose columns are noise in good part: these flights do not excite them
+        self.drowned: frozenset[
+            str
+        ]  # effects whose columns are noise in good part: these flights do not excite them
         self.column_noise: dict[Column, Array]  # (rows, 6) a sample of it in each column
-        self.rotor_noise: Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
+        self.rotor_noise: (
+            Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
+        )
         self.sensor_noise, self.drowned, self.column_noise, self.rotor_noise = self._listen()
 
     def _listen(self) -> tuple[Array, frozenset[str], dict[Column, Array], Array]:
         """Add the sensors' noise once more and see what changes.
 
-        An effect whose column is noise in good part is not excited; fitted all the same, it would come out too small, or
-        explain the noise of the residual by taking it out of the pose.
+        An effect whose column is noise in good part is not excited; fitted all the same, it would
+        come out too small, or explain the noise of the residual by taking it out of the pose.
         """
         noisy = copy(self)  # the same rows of louder logs
-        noisy._pieces, noisy._columns, noisy._needs, noisy._moved, noisy._residuals = {}, {}, {}, {}, {}
+        noisy._pieces, noisy._columns, noisy._needs, noisy._moved, noisy._residuals = (
+            {},
+            {},
+            {},
+            {},
+            {},
+        )
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
         drowned = set()
-        own: list[Column] = [(e, c.name) for e in names() if e not in STRANGE for c in get(e).coefficients if c.name != CENTRAL]
-        smooth = own + [(e, MOMENT + n) for e, n in own if any(c.name == CENTRAL for c in get(e).coefficients)]
+        own: list[Column] = [
+            (e, c.name)
+            for e in names()
+            if e not in STRANGE
+            for c in get(e).coefficients
+            if c.name != CENTRAL
+        ]
+        smooth = own + [
+            (e, MOMENT + n) for e, n in own if any(c.name == CENTRAL for c in get(e).coefficients)
+        ]
         quiet, loud = self.columns({}, smooth), noisy.columns({}, smooth)
         for effect in dict.fromkeys(e for e, _ in smooth):
             noise = whole = 0.0
@@ -195,10 +242,18 @@ class Flights:
         return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}, rounded
 
     def rotor_wrench(self, setting: Setting) -> Array:
-        """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body), low-passed."""
+        """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
+        low-passed.
+        """
         vehicle = self.amended(setting)
-        return np.concatenate([low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[p.rows]
-                               for p in self.pieces(setting)])
+        return np.concatenate(
+            [
+                low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[
+                    p.rows
+                ]
+                for p in self.pieces(setting)
+            ]
+        )
 
     @property
     def lively(self) -> bool:
@@ -208,15 +263,25 @@ class Flights:
 
     @property
     def rounded(self) -> frozenset[str]:
-        """The effects that would explain the rounding of turn rates, where these hardly leave its steps."""
+        """The effects that would explain the rounding of turn rates, where these hardly leave its
+        steps.
+        """
         return frozenset() if self.lively else _QUICK
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
         vehicle = self.amended(setting)
-        sensing = tuple((e.name, *sorted(e.coefficients.items())) for e in vehicle.effects if get(e.name).kind == "sensing")
+        sensing = tuple(
+            (e.name, *sorted(e.coefficients.items()))
+            for e in vehicle.effects
+            if get(e.name).kind == "sensing"
+        )
         if sensing not in self._pieces:
-            if len(self._pieces) * max(_SAMPLE * sum(len(p.signals.t) for p in self._first), _ROOM // 40) > _ROOM:
+            if (
+                len(self._pieces)
+                * max(_SAMPLE * sum(len(p.signals.t) for p in self._first), _ROOM // 40)
+                > _ROOM
+            ):
                 self._pieces.clear()
                 self._needs.clear()
                 self._moved.clear()
@@ -224,38 +289,61 @@ class Flights:
         return self._pieces[sensing]
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
-        found = [(i, s) for i, log in enumerate(self.logs) for s in log_signals(undo_log_sensing(log, vehicle))]
+        found = [
+            (i, s)
+            for i, log in enumerate(self.logs)
+            for s in log_signals(undo_log_sensing(log, vehicle))
+        ]
         if self.commanded:
             found = [(i, thinned(s)) for i, s in found]
         if not self._first:
             return [Piece(i, s, _rows(s)) for i, s in found]
-        pieces = []  # a clock offset moves the start of a piece: the rows stay where they are in time
+        # a clock offset moves the start of a piece: the rows stay where they are in time
+        pieces = []
         for first in self._first:
             wanted = first.signals.t[first.rows]
-            s = next(s for i, s in found if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1])
-            pieces.append(Piece(first.log, s, np.rint((wanted - s.t[0]) / s.period).astype(np.int64)))
+            s = next(
+                s
+                for i, s in found
+                if i == first.log and s.t[0] <= wanted[0] and s.t[-1] >= wanted[-1]
+            )
+            pieces.append(
+                Piece(first.log, s, np.rint((wanted - s.t[0]) / s.period).astype(np.int64))
+            )
         return pieces
 
     def amended(self, setting: Setting) -> Vehicle:
         """Return the vehicle with these effects; one that it declares already is replaced."""
-        effects = tuple(EffectSetting(name, dict(values)) for name, values in setting.items() if name)
-        return replace(self.vehicle, effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects))
+        effects = tuple(
+            EffectSetting(name, dict(values)) for name, values in setting.items() if name
+        )
+        return replace(
+            self.vehicle,
+            effects=(*(e for e in self.vehicle.effects if e.name not in setting), *effects),
+        )
 
     def coefficients(self, setting: Setting, effect: str) -> Mapping[str, float]:
-        """Return an effect's coefficients at a setting; of one that it does not have, those that the vehicle declares."""
+        """Return an effect's coefficients at a setting; of one that it does not have, those that
+        the vehicle declares.
+        """
         return setting[effect] if effect in setting else self._declared.get(effect, {})
 
     def residual(self, setting: Setting) -> Array:
         """Return the residual (rows, 6) with these effects.
 
-        It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and all, with the mass; and no
-        noise of differentiation is multiplied by a coefficient.
+        It is an acceleration by the *declared* mass and inertia. A force would vanish, noise and
+        all, with the mass; and no noise of differentiation is multiplied by a coefficient.
         """
         key = tuple((name, *sorted(values.items())) for name, values in setting.items())
         if key not in self._residuals:
             pieces = zip(self.pieces(setting), self.model(setting), strict=True)
-            found = np.concatenate([self._needed(piece) - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
-                                    for piece, model in pieces])
+            found = np.concatenate(
+                [
+                    self._needed(piece)
+                    - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
+                    for piece, model in pieces
+                ]
+            )
             found.setflags(write=False)
             if len(self._residuals) == _LATEST:
                 self._residuals.pop(next(iter(self._residuals)))
@@ -263,15 +351,19 @@ class Flights:
         return self._residuals[key]
 
     def model(self, setting: Setting) -> list[Array]:
-        """Return the force and the torque (n, 6) of each sample of each piece that these effects say act on the vehicle.
+        """Return the force and the torque (n, 6) of each sample of each piece that these effects
+        say act on the vehicle.
 
-        Force is in the world frame, without the weight; both are by the declared mass and inertia, as the residual is.
+        Force is in the world frame, without the weight; both are by the declared mass and inertia,
+        as the residual is.
         """
         vehicle = self.amended(setting)
         shifts = setting.get(SHIFT[0], {})
         out = []
         for piece in self.pieces(setting):
-            scale, *lean = (deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y))
+            scale, *lean = (
+                deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y)
+            )
             s = self._shifted(piece, shifts, scale)
             model, _ = acting_wrench(s, vehicle, self.vehicle)
             model[:, :2] += self.vehicle.weight * np.array(lean)
@@ -281,16 +373,27 @@ class Flights:
         return out
 
     def _needed(self, piece: Piece) -> Array:
-        """Return what the measured motion of a piece needs (rows, 6), by the declared mass and inertia."""
+        """Return what the measured motion of a piece needs (rows, 6), by the declared mass and
+        inertia.
+        """
         if id(piece) not in self._needs:
             needed = needed_wrench(piece.signals, self.vehicle)
             if self.commanded:
                 needed[:, 3:] = 0.0
-            self._needs[id(piece)] = piece, low_pass(needed, CUTOFF_HZ, piece.signals.period)[piece.rows]
+            self._needs[id(piece)] = (
+                piece,
+                low_pass(needed, CUTOFF_HZ, piece.signals.period)[piece.rows],
+            )
         return self._needs[id(piece)][1]
 
     def _shifted(self, piece: Piece, shifts: Mapping[str, float], scale: float) -> Signals:
-        key = (id(piece), shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0), shifts.get(LAG[1], 0.0), scale)
+        key = (
+            id(piece),
+            shifts.get(SHIFT[1], 0.0),
+            shifts.get(LEAN[1], 0.0),
+            shifts.get(LAG[1], 0.0),
+            scale,
+        )
         if key not in self._moved:
             if len(self._moved) > 4 * len(self._first):
                 self._moved.clear()
@@ -298,22 +401,32 @@ class Flights:
         return self._moved[key][1]
 
     def _kept(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of effects that were worked out before and hardly change with this setting.
+        """Return the columns of effects that were worked out before and hardly change with this
+        setting.
 
-        A law asks for the motion and for what the rotors deliver, not for other laws (but for the wind). Shifts of a few
-        milliseconds, and small changes of what the rotors deliver, make no difference to a column that is only tried.
+        A law asks for the motion and for what the rotors deliver, not for other laws (but for the
+        wind). Shifts of a few milliseconds, and small changes of what the rotors deliver, make no
+        difference to a column that is only tried.
         """
-        key = tuple((name, c, round(value / (0.05 * typical((name, c), self.vehicle))))
-                    for name, values in sorted(setting.items()) if name == "wind" or (name and get(name).kind != "wrench")
-                    for c, value in sorted(values.items()))
+        key = tuple(
+            (name, c, round(value / (0.05 * typical((name, c), self.vehicle))))
+            for name, values in sorted(setting.items())
+            if name == "wind" or (name and get(name).kind != "wrench")
+            for c, value in sorted(values.items())
+        )
         if key not in self._columns:
-            if len(self._columns) > 12 or sum(map(len, self._columns.values())) * 48 * len(self.t) > _ROOM:
+            if (
+                len(self._columns) > 12
+                or sum(map(len, self._columns.values())) * 48 * len(self.t) > _ROOM
+            ):
                 self._columns.clear()
             self._columns[key] = {}
         return self._columns[key]
 
     def _slope(self, setting: Setting, column: Column, base: Array, delta: float) -> Array:
-        """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the residual at a setting."""
+        """Return what a unit of a coefficient adds (rows, 6), by a difference of ``delta`` from the
+        residual at a setting.
+        """
         effect, name = column
         own = self.coefficients(setting, effect)
         value = own.get(name, 0.0)
@@ -325,17 +438,27 @@ class Flights:
             c = coefficient(column)
             if c.typical[0] < 0:
                 delta = -delta
-            # what is moved in time takes its noise along: to both sides, or a step to one would seem to lessen the noise
-            if effect in LATE and abs(value) > abs(delta) and c.minimum <= value - delta and value + delta <= c.maximum:
+            # what is moved in time takes its noise along: to both sides, or a step to one would
+            # seem to lessen the noise
+            if (
+                effect in LATE
+                and abs(value) > abs(delta)
+                and c.minimum <= value - delta
+                and value + delta <= c.maximum
+            ):
                 return (at(value - delta) - at(value + delta)) / (2.0 * delta)
             if not c.minimum <= value + delta <= c.maximum:
                 delta = -delta
         return (base - at(value + delta)) / delta
 
-    def columns(self, setting: Setting, wanted: Iterable[Column], step: float = 0.5) -> dict[Column, Array]:
-        """Return what each unit of a coefficient adds to the residual that the model leaves, (rows, 6) each.
+    def columns(
+        self, setting: Setting, wanted: Iterable[Column], step: float = 0.5
+    ) -> dict[Column, Array]:
+        """Return what each unit of a coefficient adds to the residual that the model leaves, (rows,
+        6) each.
 
-        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step`` typical sizes.
+        So ``residual(setting + d) = residual(setting) - column * d``, by a difference of ``step``
+        typical sizes.
         """
         base = self.residual(setting)
         out: dict[Column, Array] = {}
@@ -360,7 +483,9 @@ class Flights:
 
 
 def held_out(number: Index) -> Index:
-    """Return which block of its four is held out, of each block: the last of the first, then as evenly as can be."""
+    """Return which block of its four is held out, of each block: the last of the first, then as
+    evenly as can be.
+    """
     turn = (0.75 + _GOLDEN * (number // _HELD_OUT)) % 1.0
     return np.asarray(_HELD_OUT * turn, dtype=np.int64)
 
@@ -372,7 +497,9 @@ def _rows(signals: Signals) -> Index:
 
 
 def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) -> Signals:
-    """Return the signals with turn rates, velocity and attitude moved to when they act, and thrust scaled by 1 + ``scale``."""
+    """Return the signals with turn rates, velocity and attitude moved to when they act, and thrust
+    scaled by 1 + ``scale``.
+    """
     if scale != 0.0:
         signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
     late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)

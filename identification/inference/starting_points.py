@@ -1,4 +1,6 @@
-"""Where to start with effects whose force is no sum over their coefficients: each start is tried as one fixed shape."""
+"""Where to start with effects whose force is no sum over their coefficients: each start is tried as
+one fixed shape.
+"""
 
 import itertools
 import math
@@ -23,22 +25,34 @@ _STILL = 1e-9  # m/s
 _RINGS = 0.2  # damping ratio of a swing, at most
 
 
-def slung_payload(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
+def slung_payload(
+    flights: Flights, residual: Array, stated: Mapping[str, float]
+) -> list[dict[str, float]]:
     """Return loads of typical mass on cables of several lengths, or of the one that is stated."""
     mass = typical(("slung_payload", "m"), flights.vehicle)
     lengths = (stated["l"],) if "l" in stated else _LENGTHS
-    return [{"m": mass, "l": length, "damping": stated.get("damping", damping)} for length in lengths
-            for damping in ((0.3, 2.0) if "damping" not in stated else (0.0,))]
+    return [
+        {"m": mass, "l": length, "damping": stated.get("damping", damping)}
+        for length in lengths
+        for damping in ((0.3, 2.0) if "damping" not in stated else (0.0,))
+    ]
 
 
 def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) -> bool:
-    """Return whether a fitted load hardly swings: it imitates a drag then, and no load in air is damped like that."""
+    """Return whether a fitted load hardly swings: it imitates a drag then, and no load in air is
+    damped like that.
+    """
     load = setting.get("slung_payload")
-    return load is not None and load["l"] > 0 and load["damping"] > 2.0 * _RINGS * math.sqrt(gravity / load["l"])
+    return (
+        load is not None
+        and load["l"] > 0
+        and load["damping"] > 2.0 * _RINGS * math.sqrt(gravity / load["l"])
+    )
 
 
 def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return winds along the mean force, and along what of the force goes with a slow wind's part of a drag.
+    """Return winds along the mean force, and along what of the force goes with a slow wind's part
+    of a drag.
 
     That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may be.
     """
@@ -48,14 +62,31 @@ def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[flights.fit]
     v = np.linalg.norm(velocity, axis=1) + _STILL
     steady = np.tile(np.eye(2), (len(v), 1))
-    with_wind = v[:, None, None] * np.eye(2) + velocity[:, :2, None] * velocity[:, None, :2] / v[:, None, None]
-    slope = np.linalg.lstsq(np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None)[0][:2]
-    return [{"wx": scale * speed * math.cos(heading), "wy": scale * speed * math.sin(heading), "wz": 0.0, "cd": drag}
-            for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope)) for scale in (0.5, 1.0, 2.0)]
+    with_wind = (
+        v[:, None, None] * np.eye(2)
+        + velocity[:, :2, None] * velocity[:, None, :2] / v[:, None, None]
+    )
+    slope = np.linalg.lstsq(
+        np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
+    )[0][:2]
+    return [
+        {
+            "wx": scale * speed * math.cos(heading),
+            "wy": scale * speed * math.sin(heading),
+            "wz": 0.0,
+            "cd": drag,
+        }
+        for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope))
+        for scale in (0.5, 1.0, 2.0)
+    ]
 
 
-def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the fans around the flight whose jets' maps of force resemble the residual the most."""
+def fan_jet(
+    flights: Flights, residual: Array, stated: Mapping[str, float]
+) -> list[dict[str, float]]:
+    """Return the fans around the flight whose jets' maps of force resemble the
+    residual the most.
+    """
     thin, wanted = [], []
     row = 0
     for piece in flights.pieces({}):
@@ -63,8 +94,20 @@ def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> l
         at = piece.rows[:: max(1, _THINNED // max(1, int(piece.rows[1] - piece.rows[0])))]
         wanted.append(row + np.searchsorted(piece.rows, at))
         row += len(piece.rows)
-        thin.append(Signals(s.t[at], s.period, s.position[at], s.rotation[at], s.velocity[at], s.acceleration[at], s.rate[at],
-                            s.angular_acceleration[at], s.rotor_speeds[at], None if s.voltage is None else s.voltage[at]))
+        thin.append(
+            Signals(
+                s.t[at],
+                s.period,
+                s.position[at],
+                s.rotation[at],
+                s.velocity[at],
+                s.acceleration[at],
+                s.rate[at],
+                s.angular_acceleration[at],
+                s.rotor_speeds[at],
+                None if s.voltage is None else s.voltage[at],
+            )
+        )
     rows = np.concatenate(wanted)
     seen = flights.fit[rows]
     target = residual[rows][seen]
@@ -74,19 +117,38 @@ def fan_jet(flights: Flights, residual: Array, stated: Mapping[str, float]) -> l
     centre = np.concatenate([s.position for s in thin]).mean(axis=0)
     speed, kd, area = (typical(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area"))
     found: list[tuple[float, int, dict[str, float]]] = []
-    for heading, distance, across in itertools.product(_HEADINGS, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)):
+    for heading, distance, across in itertools.product(
+        _HEADINGS, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
+    ):
         along = np.array([math.cos(heading), math.sin(heading)])
         x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
-        start = {"u0": speed, "x": float(x), "y": float(y), "z": float(centre[2]), "heading": heading, "kd": kd, "area": area}
+        start = {
+            "u0": speed,
+            "x": float(x),
+            "y": float(y),
+            "z": float(centre[2]),
+            "heading": heading,
+            "kd": kd,
+            "area": area,
+        }
         vehicle = bare.with_effects(EffectSetting("fan_jet", start))
-        shape = np.concatenate([b - residual_wrench(s, vehicle) for b, s in zip(base, thin, strict=True)])[seen] * scale
+        shape = (
+            np.concatenate(
+                [b - residual_wrench(s, vehicle) for b, s in zip(base, thin, strict=True)]
+            )[seen]
+            * scale
+        )
         size = float(np.sum(shape * shape))
         if size > 0:
-            found.append((float(np.sum(shape * target * scale)) / math.sqrt(size), len(found), start))
+            found.append(
+                (float(np.sum(shape * target * scale)) / math.sqrt(size), len(found), start)
+            )
     found.sort(reverse=True)
     return [start for _, _, start in found[:_KEPT]]
 
 
 STARTS: dict[str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]] = {
-    "slung_payload": slung_payload, "wind": wind, "fan_jet": fan_jet,
+    "slung_payload": slung_payload,
+    "wind": wind,
+    "fan_jet": fan_jet,
 }

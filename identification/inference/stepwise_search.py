@@ -1,6 +1,8 @@
-"""The moves of the search for what a model lacks: whole effects are added, removed, and swapped for others.
+"""The moves of the search for what a model lacks: whole effects are added, removed, and swapped for
+others.
 
-Each is judged on blocks of the fit that are left out in turn; nothing here looks at the held-out rows.
+Each is judged on blocks of the fit that are left out in turn; nothing here looks at the held-out
+rows.
 """
 
 import itertools
@@ -30,20 +32,29 @@ PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
 LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
 SWAP_GAIN = 12.0
 MOST_EFFECTS = 4
-LEAST_OF_COMMANDS = 25.0, 0.018  # gain and share; effects that cannot be there explain up to 25, and 0.01, of real flights
+LEAST_OF_COMMANDS = (
+    25.0,
+    0.018,
+)  # gain and share; effects that cannot be there explain up to 25, and 0.01, of real flights
 LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
 LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
-MOST_OF_COMMANDS = 8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
+MOST_OF_COMMANDS = (
+    8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
+)
 _ROUNDS = 2  # of adding and pruning: what wanders on stands for a law that the library lacks
 _MOVES = 3  # at a time, which takes seconds each where four effects stand for one
 _SHORTLIST = 2
 _TRIED = 8  # candidates for one place, the best first, that innovations may turn down
 _FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
-_HOPE = 0.2  # share of what effects explain that a fit of its own may still gain over the linear one
+_HOPE = (
+    0.2  # share of what effects explain that a fit of its own may still gain over the linear one
+)
 
 
 def find(search: Search) -> tuple[Fit, list[Gain]]:
-    """Return the effects that are needed, and what each of the library explained at first, alone."""
+    """Return the effects that are needed, and what each of the library explained
+    at first, alone.
+    """
     needed = Fit(search.delay.setting if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
@@ -55,9 +66,14 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
         search.report("asking whether every effect is needed")
         # by the noise as it is known by now
         needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
-        if search.flights.commanded or needed.effects == fit.effects or set(needed.effects) in asked:
+        if (
+            search.flights.commanded
+            or needed.effects == fit.effects
+            or set(needed.effects) in asked
+        ):
             break
-        # one in place of two leaves room, and what was small beside a wrong effect may be plain beside a right one
+        # one in place of two leaves room, and what was small beside a wrong effect may be plain
+        # beside a right one
         asked.append(set(needed.effects))
     return _borne_out(search, needed), first
 
@@ -78,8 +94,13 @@ def _is_borne_out(search: Search, fit: Fit, effect: str) -> bool:
 
 
 def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
-    """Return ``fit`` with the effects that are worth adding one after the other, and what each explained at first."""
-    commanded, most = search.flights.commanded, MOST_OF_COMMANDS if search.flights.commanded else MOST_EFFECTS
+    """Return ``fit`` with the effects that are worth adding one after the other, and what each
+    explained at first.
+    """
+    commanded, most = (
+        search.flights.commanded,
+        MOST_OF_COMMANDS if search.flights.commanded else MOST_EFFECTS,
+    )
     first: list[Gain] = []
     for count in range(len([e for e in fit.effects if not search.held(e)]), most + 1):
         regression = search.linearise(fit)
@@ -90,7 +111,9 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
         gains = search.gains(fit, regression, g)
         first = first or gains
         least = _least(search, g.error(g.index(search.base(fit.effects))))
-        better = [x for x in gains if _worth(x, least) and (not commanded or _plausible(search, x, count))]
+        better = [
+            x for x in gains if _worth(x, least) and (not commanded or _plausible(search, x, count))
+        ]
         if not better or count == most:
             break
         for gain in better[:_TRIED]:
@@ -109,14 +132,20 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
 
 
 def _plausible(search: Search, gain: Gain, count: int) -> bool:
-    """Return whether an effect may be named of a flight whose thrust is a guess, as the ``count``-th one."""
+    """Return whether an effect may be named of a flight whose thrust is a guess, as the
+    ``count``-th one.
+    """
     if takes_back(gain.fit.setting, search.flights.vehicle.weight):
         return False
-    return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (gain.effect not in STARTS or gain.share > LEAST_OF_STARTS)
+    return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (
+        gain.effect not in STARTS or gain.share > LEAST_OF_STARTS
+    )
 
 
 def _prune(search: Search, fit: Fit) -> Fit:
-    """Return a fit in which every effect is needed given all others, and none, nor two, would be better replaced."""
+    """Return a fit in which every effect is needed given all others, and none, nor two, would be
+    better replaced.
+    """
     error = search.error(fit)
     failed: dict[frozenset[str], float] = {}
     for _ in range(_MOVES):
@@ -130,10 +159,14 @@ def _prune(search: Search, fit: Fit) -> Fit:
     return fit
 
 
-def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]) -> tuple[Fit, float] | None:
-    """Return a better fit and its error: with an effect less, one in place of two or one, or two in place of one or of many.
+def _best_move(
+    search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]
+) -> tuple[Fit, float] | None:
+    """Return a better fit and its error: with an effect less, one in place of two or one, or two in
+    place of one or of many.
 
-    ``failed`` keeps which effects no other one could bring down to which error, so that it is tried no second time.
+    ``failed`` keeps which effects no other one could bring down to which error, so that it is tried
+    no second time.
     """
     least = _least(search, error)
     for effect in fit.effects:
@@ -141,7 +174,9 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
             search.report(f"{effect} is not needed")
             less = search.refit(fit.without(effect))
             return less, search.error(less)
-    if search.flights.commanded:  # whose effects are far apart: no two of those that are alike are ever named
+    if (
+        search.flights.commanded
+    ):  # whose effects are far apart: no two of those that are alike are ever named
         return None
     few = len(fit.effects) <= _FEW
     if not few:  # what stands for two effects with three or four is left by no small step
@@ -164,7 +199,9 @@ def _best_move(search: Search, fit: Fit, error: float, failed: dict[frozenset[st
             if better := _swapped(search, _singles(rivals, error, allowed, bar), fit, group):
                 return better
             if few and size == 1:
-                others = [e for e in search.library if e not in group]  # one that only joins has been asked already
+                others = [
+                    e for e in search.library if e not in group
+                ]  # one that only joins has been asked already
                 couple = _couple(search, less, regression, g, others, error - least + spared)
                 if better := _swapped(search, couple, fit, group):
                     return better
@@ -180,8 +217,11 @@ class Swap:
     limit: float  # whitened energy that it must come below
 
 
-def _swapped(search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]) -> tuple[Fit, float] | None:
-    """Return the first of the swaps for a group of a fit's effects that keeps what it promises, refitted, and its error.
+def _swapped(
+    search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]
+) -> tuple[Fit, float] | None:
+    """Return the first of the swaps for a group of a fit's effects that keeps what it promises,
+    refitted, and its error.
 
     What it gains by less noise of the sensors does not count.
     """
@@ -190,7 +230,9 @@ def _swapped(search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[st
         fit = search.refit(swap.fit, swap.limit)
         limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
         better = search.energy(fit.setting) < limit and (error := search.error(fit)) < limit
-        if better and (len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)):
+        if better and (
+            len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)
+        ):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error
     return None
@@ -205,13 +247,19 @@ def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -
             yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
 
 
-def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float) -> Iterator[Swap]:
-    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than ``bar``, less what they cost.
+def _couple(
+    search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float
+) -> Iterator[Swap]:
+    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than
+    ``bar``, less what they cost.
 
-    What takes two to replace it is passed on the way to neither of them. Two together are nearly linear.
+    What takes two to replace it is passed on the way to neither of them. Two together are nearly
+    linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
-    for both in itertools.combinations([e for e in library if e not in search.begun and e not in fit.effects], 2):
+    for both in itertools.combinations(
+        [e for e in library if e not in search.begun and e not in fit.effects], 2
+    ):
         wanted = search.base(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
@@ -219,15 +267,23 @@ def _couple(search: Search, fit: Fit, regression: Regression, g: Gram, library: 
         if (left := g.error(g.index(wanted)) + cost) >= least:
             continue
         change = g.solve(total, g.index(wanted))
-        if not any(search.drowned(g, total, wanted, change, e) or search.size(wanted, change, e) <= _least_size(e)
-                   for e in both):
-            least, best = left, Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost)
+        if not any(
+            search.drowned(g, total, wanted, change, e)
+            or search.size(wanted, change, e) <= _least_size(e)
+            for e in both
+        ):
+            least, best = (
+                left,
+                Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost),
+            )
     if best:
         yield best
 
 
 def _least(search: Search, error: float) -> float:
-    """Return the energy that an effect must explain of flights of which so much is left unexplained."""
+    """Return the energy that an effect must explain of flights of which so much is left
+    unexplained.
+    """
     gain, share = LEAST_OF_COMMANDS if search.flights.commanded else (LEAST_GAIN, LEAST_SHARE)
     return max(gain, share * error)
 

@@ -1,7 +1,9 @@
-"""Pushes: what a model leaves now and then, for a fraction of a second or a few, and not in between.
+"""Pushes: what a model leaves now and then, for a fraction of a second or a few, and not in
+between.
 
-Gusts, taken for noise of one strength, hide a push that comes seldom: spread over a minute it is weak. But noise of one
-strength, however quick, has peaks of some four standard deviations in a minute, and a push has more, of the median's.
+Gusts, taken for noise of one strength, hide a push that comes seldom: spread over a minute it is
+weak. But noise of one strength, however quick, has peaks of some four standard deviations in a
+minute, and a push has more, of the median's.
 """
 
 import numpy as np
@@ -14,29 +16,43 @@ from .regression import Flights, Setting
 Array = NDArray[np.float64]
 
 _CUTOFFS_HZ = 1.5, 3.0  # as long as pushes last, sensors' noise is weakest below these
-_LEAST = 10.0  # standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up to 4.6
+# standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up to
+# 4.6
+_LEAST = 10.0
 _LEAST_SIZE = 0.01  # of the weight, or of the weight times the arm
 _EDGE = 1.0  # s at either end of a piece, where the filters have only half of what they need
 
 
 def pushes(flights: Flights, setting: Setting) -> list[Push]:
-    """Return the largest push of each channel in which a model with these effects leaves any, the plainest first."""
+    """Return the largest push of each channel in which a model with these effects leaves any, the
+    plainest first.
+    """
     residual, starts = flights.residual(setting), np.flatnonzero(flights.start)[1:]
     edge = round(_EDGE / flights.period)
-    inner = np.concatenate([rows[edge : len(rows) - edge] for rows in np.split(np.arange(len(residual)), starts)])
+    inner = np.concatenate(
+        [rows[edge : len(rows) - edge] for rows in np.split(np.arange(len(residual)), starts)]
+    )
     if not inner.size:
         return []
     weight = flights.vehicle.weight
     least = _LEAST_SIZE * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
     found: dict[str, tuple[float, Push]] = {}
     for cutoff in _CUTOFFS_HZ:
-        slow = np.concatenate([low_pass(x, cutoff, flights.period) for x in np.split(residual, starts)])
+        slow = np.concatenate(
+            [low_pass(x, cutoff, flights.period) for x in np.split(residual, starts)]
+        )
         size = np.abs(slow[inner])
         std = np.median(size, axis=0) / 0.6745  # of a normal distribution, whatever comes seldom
         for i, channel in enumerate(CHANNELS):
             row = inner[np.argmax(size[:, i])]
             peak = float(slow[row, i])
             above = abs(peak) / max(float(std[i]), 1e-30)
-            if above > max(_LEAST, found[channel][0] if channel in found else 0.0) and abs(peak) > least[i]:
-                found[channel] = above, Push(channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak)
+            if (
+                above > max(_LEAST, found[channel][0] if channel in found else 0.0)
+                and abs(peak) > least[i]
+            ):
+                found[channel] = (
+                    above,
+                    Push(channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak),
+                )
     return [push for _, push in sorted(found.values(), key=lambda x: -x[0])]

@@ -1,13 +1,14 @@
 """The delay between commands and what the rotors do, from how the vehicle turns.
 
-In closed loop thrust and vertical acceleration cause each other, and the delay that fits them best is as much the loop's as
-the motors'. Roll and pitch are driven far harder: between 1 and 8 Hz the commanded moments show in the angular acceleration
-of the pose, and by how much they come late there is the delay. How much of them shows (inertia, the law of thrust) is left
-free for each axis of each flight; it may not be negative. What else moves the vehicle, and the pose's noise, may have any
+In closed loop thrust and vertical acceleration cause each other, and the delay that fits them best
+is as much the loop's as the motors'. Roll and pitch are driven far harder: between 1 and 8 Hz the
+commanded moments show in the angular acceleration of the pose, and by how much they come late there
+is the delay. How much of them shows (inertia, the law of thrust) is left free for each axis of each
+flight; it may not be negative. What else moves the vehicle, and the pose's noise, may have any
 spectrum: the likelihood is Whittle's with an unknown noise at each frequency.
 
-It is a latency that is fitted. A lag also takes gain away at high frequencies, but so does a loop that is closed over a noisy
-pose: a lag of that delay is always as good.
+It is a latency that is fitted. A lag also takes gain away at high frequencies, but so does a loop
+that is closed over a noisy pose: a lag of that delay is always as good.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,11 +25,13 @@ from ..motion.signals import Signals
 Array = NDArray[np.float64]
 
 BAND_HZ = (1.0, 8.0)
-LEAST_EVIDENCE = 40.0  # twice the log likelihood over moments that do not show, which have one number less an axis
+# twice the log likelihood over moments that do not show, which have one number less an axis
+LEAST_EVIDENCE = 40.0
 _SEGMENT = 2.0  # s, of a spectrum
 _LONGEST = 0.12  # s
 EFFECT, COEFFICIENT = "latency", "d"
-# a lag delays slow changes as much, and a log whose clock is off looks like one whose commands are late
+# a lag delays slow changes as much, and a log whose clock is off looks like one whose commands are
+# late
 ALIKE = ("motor_lag", "clock_offset")
 
 
@@ -48,7 +51,9 @@ class Delay:
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """Spectra (frequencies in the band,) of a moment and of what turns with it, from so many segments."""
+    """Spectra (frequencies in the band,) of a moment and of what turns with it, from so many
+    segments.
+    """
 
     omega: Array  # rad/s
     moment: Array
@@ -58,7 +63,10 @@ class _Spectra:
 
     def misfit(self, response: NDArray[np.complex128]) -> float:
         """Return minus twice the log likelihood, up to a constant, at the gain that fits best."""
-        along, power = np.real(np.conj(response) * self.cross), np.square(np.abs(response)) * self.moment
+        along, power = (
+            np.real(np.conj(response) * self.cross),
+            np.square(np.abs(response)) * self.moment,
+        )
         # the gain changes the noise that it is weighed with
         gain = 0.0
         for _ in range(6):
@@ -69,7 +77,8 @@ class _Spectra:
 
 
 def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
-    """Return the delay of the rotors' moments behind the commands; None where turning does not show one.
+    """Return the delay of the rotors' moments behind the commands; None where turning does not show
+    one.
 
     Args:
         pieces: unbroken flight, with turn rates worked out from commands.
@@ -98,7 +107,9 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
         yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
         band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
-            out.append(_Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length))
+            out.append(
+                _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
+            )
     return out
 
 
@@ -107,7 +118,11 @@ def _least(misfit: Callable[[float], float]) -> tuple[float, float, float]:
     step = 0.005
     grid = np.arange(0.0, _LONGEST + step, step)
     at = float(grid[int(np.argmin([misfit(float(x)) for x in grid]))])
-    best = minimize_scalar(misfit, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5})
+    best = minimize_scalar(
+        misfit, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
+    )
     seconds, least = float(best.x), float(best.fun)
-    bend = (misfit(seconds + 0.1 * step) - 2.0 * least + misfit(seconds - 0.1 * step)) / (0.1 * step) ** 2
+    bend = (misfit(seconds + 0.1 * step) - 2.0 * least + misfit(seconds - 0.1 * step)) / (
+        0.1 * step
+    ) ** 2
     return seconds, float(np.sqrt(2.0 / max(bend, 1e-6))), least

@@ -1,8 +1,9 @@
 """A filter that makes the noise of a residual white, so that least squares weigh it as it deserves.
 
-The noise has two parts: what the sensors leave, known from the log itself, and gusts, of which only the strength is not known:
-their spectrum is flat up to a corner and falls beyond it. Whatever else is in a remainder is no noise but something that no
-effect explains, and must not be taken for noise: a filter free to follow the remainder would hide it.
+The noise has two parts: what the sensors leave, known from the log itself, and gusts, of which only
+the strength is not known: their spectrum is flat up to a corner and falls beyond it. Whatever else
+is in a remainder is no noise but something that no effect explains, and must not be taken for
+noise: a filter free to follow the remainder would hide it.
 """
 
 import numpy as np
@@ -14,7 +15,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _ORDER = 8  # of the autoregression
-_LOADING = 1e-3  # share of the variance added as white noise, so that what the low-pass took away is not blown up
+# share of the variance added as white noise, so that what the low-pass took away is not blown up
+_LOADING = 1e-3
 _SEGMENT = 256  # rows of a spectrum's segment
 _GUST_HZ = 0.6  # corner: a correlation time of a quarter of a second
 _GUST_BAND = (0.3, 1.5)  # Hz, where their strength is read
@@ -25,36 +27,55 @@ class Whitener:
     """A filter for each channel after which the noise is white with variance one.
 
     Args:
-        remainder: (rows, 6), what no effect explains; its level in the gusts' band gives their strength.
+        remainder: (rows, 6), what no effect explains; its level in the gusts' band gives their
+            strength.
         sensors: (rows, 6), a sample of what sensors alone make.
         start: (rows,) first rows of unbroken pieces.
         fit: (rows,) the rows of the remainder that may be looked at.
         period: s, from row to row.
-        free: of flights whose rotors are known from commands alone: take all of the remainder for noise, nowhere less than
-            its mean in this band (Hz).
+        free: of flights whose rotors are known from commands alone: take all of the remainder for
+            noise, nowhere less than its mean in this band (Hz).
     """
 
-    def __init__(self, remainder: Array, sensors: Array, start: Mask, fit: Mask, period: float,
-                 free: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        remainder: Array,
+        sensors: Array,
+        start: Mask,
+        fit: Mask,
+        period: float,
+        free: tuple[float, float] | None = None,
+    ) -> None:
         # blocks apart in time are pieces apart
         begins = start | np.concatenate([[True], fit[1:] != fit[:-1]])
         self._filters: list[tuple[Array, float]] = []
         for i in range(remainder.shape[1]):
             frequency, own = _spectrum(sensors[:, i], start, period)
             # a mean that nothing explains is no noise: it would make an offset count for little
-            _, whole = _spectrum(remainder[fit, i], begins[fit], period, "constant" if free is not None else False)
+            _, whole = _spectrum(
+                remainder[fit, i], begins[fit], period, "constant" if free is not None else False
+            )
             if free is not None:
-                noise = np.maximum(np.maximum(whole, own), whole[(frequency >= free[0]) & (frequency <= free[1])].mean())
+                noise = np.maximum(
+                    np.maximum(whole, own),
+                    whole[(frequency >= free[0]) & (frequency <= free[1])].mean(),
+                )
             else:
                 shape = 1.0 / (1.0 + np.square(frequency / _GUST_HZ))
                 band = (frequency >= _GUST_BAND[0]) & (frequency <= _GUST_BAND[1])
-                noise = _SPARE * own + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
+                noise = (
+                    _SPARE * own + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
+                )
             self._filters.append(_predictor(noise))
         ends = np.flatnonzero(start)
-        self._lost = np.unique(np.concatenate([np.arange(int(k), min(int(k) + _ORDER, len(start))) for k in ends]))
+        self._lost = np.unique(
+            np.concatenate([np.arange(int(k), min(int(k) + _ORDER, len(start))) for k in ends])
+        )
 
     def __call__(self, x: Array) -> Array:
-        """Return ``x`` (rows, 6) or (rows, 6, columns) whitened; the first rows of each piece become zero."""
+        """Return ``x`` (rows, 6) or (rows, 6, columns) whitened; the first rows of each piece
+        become zero.
+        """
         out = np.empty_like(x)
         for i, (a, deviation) in enumerate(self._filters):
             out[:, i] = lfilter(np.concatenate([[1.0], -a]) / deviation, [1.0], x[:, i], axis=0)
@@ -62,14 +83,20 @@ class Whitener:
         return out
 
 
-def _spectrum(x: Array, start: Mask, period: float, detrend: str | bool = False) -> tuple[Array, Array]:
-    """Return frequencies (Hz) and the power at each, averaged over unbroken pieces; it sums to the variance."""
+def _spectrum(
+    x: Array, start: Mask, period: float, detrend: str | bool = False
+) -> tuple[Array, Array]:
+    """Return frequencies (Hz) and the power at each, averaged over unbroken pieces; it sums to the
+    variance.
+    """
     total, weight = np.zeros(_SEGMENT // 2 + 1), 0
     frequency = np.fft.rfftfreq(_SEGMENT, period)
     for part in np.split(x, np.flatnonzero(start)[1:]):
         if len(part) >= 2 * _ORDER:
             length = min(_SEGMENT, len(part))
-            at, power = welch(part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=detrend)
+            at, power = welch(
+                part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=detrend
+            )
             total += len(part) * np.interp(frequency, at, power)
             weight += len(part)
     total *= frequency[1] / max(weight, 1)
@@ -77,7 +104,9 @@ def _spectrum(x: Array, start: Mask, period: float, detrend: str | bool = False)
 
 
 def _predictor(power: Array) -> tuple[Array, float]:
-    """Return the prediction filter (p,) of noise with this spectrum, and the standard deviation of its innovation."""
+    """Return the prediction filter (p,) of noise with this spectrum, and the standard deviation of
+    its innovation.
+    """
     two_sided = power.copy()
     two_sided[1:-1] *= 0.5
     lags = np.fft.irfft(two_sided, _SEGMENT)[: _ORDER + 1] * _SEGMENT

@@ -1,12 +1,15 @@
-"""Which conventions a log follows, told from its physics: frames, quaternion order, units, order of rotors, clocks.
+"""Which conventions a log follows, told from its physics: frames, quaternion order, units, order of
+rotors, clocks.
 
-Two balances hold in any flight, whatever small effects a vehicle's model lacks. The specific force points along the
-thrust axis, ``a + g e3 = R e3 T / m``; and the rotors turn the body, ``J alpha + omega x J omega = tau``. Each balance is
-tried as the log declares itself and again under every other reading of its columns that is in common use; the share of
-variance that a reading leaves unexplained, low-passed at 3 Hz, says how well it fits. Undeclared effects change these
+Two balances hold in any flight, whatever small effects a vehicle's model lacks. The specific force
+points along the thrust axis, ``a + g e3 = R e3 T / m``; and the rotors turn the body,
+``J alpha + omega x J omega = tau``. Each balance is tried as the log declares itself and again
+under every other reading of its columns that is in common use; the share of variance that a reading
+leaves unexplained, low-passed at 3 Hz, says how well it fits. Undeclared effects change these
 shares by parts, a wrong convention turns a sign or an axis and leaves more than there was.
 
-A reading is recognised only where it wins clearly and the log as declared fits badly; a hover decides nothing.
+A reading is recognised only where it wins clearly and the log as declared fits badly; a hover
+decides nothing.
 """
 
 from collections.abc import Sequence
@@ -41,7 +44,8 @@ _GOOD_FORCE, _GOOD = 0.5, 0.4  # shares of force and of torque up to which anoth
 _CLEAR = 0.5  # of the share as declared: leaving less is a clear win
 _WORSE = 0.15  # share by which another reading may be worse in the other balance
 _WORST = 2.0  # a share beyond says no more
-_SAYS_NOTHING = 0.8  # a share as declared beyond it cannot be made worse: turn rates from commands leave such torques
+# a share as declared beyond it cannot be made worse: turn rates from commands leave such torques
+_SAYS_NOTHING = 0.8
 _UPSIDE_DOWN = 1.0  # share of the vertical force alone: more than there was
 _TIE = 1.25, 0.05  # factor and share within which two readings fit alike
 
@@ -51,8 +55,12 @@ _SHIFT_CLEAR = 0.12  # s, a shift that they do not explain
 _SHIFT_BAD = 0.15  # share left within that, from which another shift is worth a word
 
 _I = np.eye(3)
-_DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up <-> forward, right, down; north, west, up <-> north, east, down
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # of a frame whose y points up
+_DOWN = np.diag(
+    [1.0, -1.0, -1.0]
+)  # forward, left, up <-> forward, right, down; north, west, up <-> north, east, down
+_Y_UP = np.array(
+    [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+)  # of a frame whose y points up
 _SWAP_YZ = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 _SWAP_XY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -65,60 +73,164 @@ class Reading:
     says: str  # what the log looks like, and what to do
     scalar_last: bool = False
     conjugate: bool = False
-    position: Array = field(default_factory=lambda: _I)  # (3, 3) from the log's world to z up, for positions
+    position: Array = field(
+        default_factory=lambda: _I
+    )  # (3, 3) from the log's world to z up, for positions
     world: Array = field(default_factory=lambda: _I)  # (3, 3) the same for the attitude
-    body: Array = field(default_factory=lambda: _I)  # (3, 3) from the body frame x forward, y left, z up to the log's
+    body: Array = field(
+        default_factory=lambda: _I
+    )  # (3, 3) from the body frame x forward, y left, z up to the log's
     scale: float = 1.0  # of positions
     order: tuple[int, ...] = (0, 1, 2, 3)  # rotors, counted from 0, that the columns hold
     mirrored: bool = False  # rotors turn against the declared spin
 
 
-_Z_DOWN = "expected z up: turn py, pz, qy and qz over (their signs) if the body axes are forward, right, down"
+_Z_DOWN = (
+    "expected z up: turn py, pz, qy and qz over (their signs) if the body axes are forward, right, "
+    "down"
+)
 _ROTATE = "expected z up: p = (px, -pz, py)"
-_SCALAR_LAST = "expected scalar first: qx, qy, qz, qw stand in the columns qw, qx, qy, qz; reorder the columns"
+_SCALAR_LAST = (
+    "expected scalar first: qx, qy, qz, qw stand in the columns qw, qx, qy, qz; reorder the columns"
+)
 _CONJUGATE = "expected body to world: negate qx, qy and qz"
 
 POSE_READINGS = (
     Reading("scalar last", f"the quaternion is scalar last; {_SCALAR_LAST}", scalar_last=True),
     Reading("conjugate", f"the quaternion is world to body; {_CONJUGATE}", conjugate=True),
-    Reading("scalar last, conjugate", f"the quaternion is scalar last and world to body; {_SCALAR_LAST}, then "
-            f"{_CONJUGATE}", scalar_last=True, conjugate=True),
-    Reading("NED", f"the world is z down (north, east, down) and the body z down (forward, right, down); {_Z_DOWN}",
-            position=_DOWN, world=_DOWN, body=_DOWN),
-    Reading("z down", "the world is z down while the body axes are forward, left, up; expected z up: negate py and pz, and "
-            "take (-qx, qw, -qz, qy) as the quaternion (qw, qx, qy, qz)", position=_DOWN, world=_DOWN),
-    Reading("FRD body", "the body axes are forward, right, down in a world that is z up; expected forward, left, up: take "
-            "(-qx, qw, qz, -qy) as the quaternion (qw, qx, qy, qz)", body=_DOWN),
-    Reading("NED position", "the position is z down (north, east, down) but the attitude z up; expected z up: negate py and "
-            "pz", position=_DOWN),
-    Reading("NED attitude", "the attitude is z down (north, east, down; forward, right, down) but the position z up; "
-            "expected z up: negate qy and qz", world=_DOWN, body=_DOWN),
-    Reading("pz negated", "the position's z points down; expected z up: negate pz", position=np.diag([1.0, 1.0, -1.0])),
-    Reading("y up", f"the world is y up, as motion capture often is, with body axes forward, left, up; {_ROTATE}, and the "
-            "attitude turned by 90 degrees about x likewise", position=_Y_UP, world=_Y_UP),
-    Reading("y up", f"the world and the body are y up, as motion capture often is; {_ROTATE} and the quaternion "
-            "(qw, qx, -qz, qy)", position=_Y_UP, world=_Y_UP, body=_Y_UP.T),
-    Reading("y and z swapped", "py and pz are swapped, the attitude is not; expected z up: swap the columns",
-            position=_SWAP_YZ),
-    Reading("y and z swapped", "y and z are swapped, in position and quaternion; expected z up: swap py and pz, and "
-            "qy and qz", conjugate=True, position=_SWAP_YZ, world=_SWAP_YZ, body=_SWAP_YZ),
-    Reading("y up position", f"the position is y up but the attitude z up; {_ROTATE}", position=_Y_UP),
-    Reading("x and y swapped", "px and py are swapped against the attitude; expected both in one world frame: swap the "
-            "columns", position=_SWAP_XY),
-    Reading("conjugate, NED", f"the world is z down (north, east, down) and the quaternion world to body; {_CONJUGATE}; "
-            f"{_Z_DOWN}", conjugate=True, position=_DOWN, world=_DOWN, body=_DOWN),
-    Reading("scalar last, NED", f"the quaternion is scalar last and the world z down (north, east, down); {_SCALAR_LAST}; "
-            f"{_Z_DOWN}", scalar_last=True, position=_DOWN, world=_DOWN, body=_DOWN),
-    Reading("scalar last, y up", f"the quaternion is scalar last and the world y up, with body axes forward, left, up; "
-            f"{_SCALAR_LAST}; {_ROTATE}, and the attitude turned by 90 degrees about x likewise", scalar_last=True,
-            position=_Y_UP, world=_Y_UP),
-    Reading("scalar last, y up", f"the quaternion is scalar last, the world and the body y up; {_SCALAR_LAST}; {_ROTATE} "
-            "and the quaternion (qw, qx, -qz, qy)", scalar_last=True, position=_Y_UP, world=_Y_UP, body=_Y_UP.T),
-    Reading("mm", "px, py, pz look like millimetres; expected metres: divide them by 1000", scale=1e-3),
-    Reading("cm", "px, py, pz look like centimetres; expected metres: divide them by 100", scale=1e-2),
+    Reading(
+        "scalar last, conjugate",
+        f"the quaternion is scalar last and world to body; {_SCALAR_LAST}, then {_CONJUGATE}",
+        scalar_last=True,
+        conjugate=True,
+    ),
+    Reading(
+        "NED",
+        f"the world is z down (north, east, down) and the body z down (forward, right, down); "
+        f"{_Z_DOWN}",
+        position=_DOWN,
+        world=_DOWN,
+        body=_DOWN,
+    ),
+    Reading(
+        "z down",
+        "the world is z down while the body axes are forward, left, up; expected z up: negate py "
+        "and pz, and "
+        "take (-qx, qw, -qz, qy) as the quaternion (qw, qx, qy, qz)",
+        position=_DOWN,
+        world=_DOWN,
+    ),
+    Reading(
+        "FRD body",
+        "the body axes are forward, right, down in a world that is z up; expected forward, left, "
+        "up: take "
+        "(-qx, qw, qz, -qy) as the quaternion (qw, qx, qy, qz)",
+        body=_DOWN,
+    ),
+    Reading(
+        "NED position",
+        "the position is z down (north, east, down) but the attitude z up; expected z up: negate "
+        "py and "
+        "pz",
+        position=_DOWN,
+    ),
+    Reading(
+        "NED attitude",
+        "the attitude is z down (north, east, down; forward, right, down) but the position z up; "
+        "expected z up: negate qy and qz",
+        world=_DOWN,
+        body=_DOWN,
+    ),
+    Reading(
+        "pz negated",
+        "the position's z points down; expected z up: negate pz",
+        position=np.diag([1.0, 1.0, -1.0]),
+    ),
+    Reading(
+        "y up",
+        f"the world is y up, as motion capture often is, with body axes forward, left, up; "
+        f"{_ROTATE}, and the "
+        "attitude turned by 90 degrees about x likewise",
+        position=_Y_UP,
+        world=_Y_UP,
+    ),
+    Reading(
+        "y up",
+        f"the world and the body are y up, as motion capture often is; {_ROTATE} and the "
+        f"quaternion "
+        "(qw, qx, -qz, qy)",
+        position=_Y_UP,
+        world=_Y_UP,
+        body=_Y_UP.T,
+    ),
+    Reading(
+        "y and z swapped",
+        "py and pz are swapped, the attitude is not; expected z up: swap the columns",
+        position=_SWAP_YZ,
+    ),
+    Reading(
+        "y and z swapped",
+        "y and z are swapped, in position and quaternion; expected z up: swap py and pz, and "
+        "qy and qz",
+        conjugate=True,
+        position=_SWAP_YZ,
+        world=_SWAP_YZ,
+        body=_SWAP_YZ,
+    ),
+    Reading(
+        "y up position", f"the position is y up but the attitude z up; {_ROTATE}", position=_Y_UP
+    ),
+    Reading(
+        "x and y swapped",
+        "px and py are swapped against the attitude; expected both in one world frame: swap the "
+        "columns",
+        position=_SWAP_XY,
+    ),
+    Reading(
+        "conjugate, NED",
+        f"the world is z down (north, east, down) and the quaternion world to body; {_CONJUGATE}; "
+        f"{_Z_DOWN}",
+        conjugate=True,
+        position=_DOWN,
+        world=_DOWN,
+        body=_DOWN,
+    ),
+    Reading(
+        "scalar last, NED",
+        f"the quaternion is scalar last and the world z down (north, east, down); {_SCALAR_LAST}; "
+        f"{_Z_DOWN}",
+        scalar_last=True,
+        position=_DOWN,
+        world=_DOWN,
+        body=_DOWN,
+    ),
+    Reading(
+        "scalar last, y up",
+        f"the quaternion is scalar last and the world y up, with body axes forward, left, up; "
+        f"{_SCALAR_LAST}; {_ROTATE}, and the attitude turned by 90 degrees about x likewise",
+        scalar_last=True,
+        position=_Y_UP,
+        world=_Y_UP,
+    ),
+    Reading(
+        "scalar last, y up",
+        f"the quaternion is scalar last, the world and the body y up; {_SCALAR_LAST}; {_ROTATE} "
+        "and the quaternion (qw, qx, -qz, qy)",
+        scalar_last=True,
+        position=_Y_UP,
+        world=_Y_UP,
+        body=_Y_UP.T,
+    ),
+    Reading(
+        "mm", "px, py, pz look like millimetres; expected metres: divide them by 1000", scale=1e-3
+    ),
+    Reading(
+        "cm", "px, py, pz look like centimetres; expected metres: divide them by 100", scale=1e-2
+    ),
 )
 
-# rotors (1 front-left, 2 rear-left, 3 rear-right, 4 front-right) in the order in which others count them
+# rotors (1 front-left, 2 rear-left, 3 rear-right, 4 front-right) in the order in which others count
+# them
 _KNOWN_ORDERS = {
     (3, 4, 2, 1): "Betaflight's order",
     (4, 2, 1, 3): "the order of PX4 and ArduPilot, quad x",
@@ -133,26 +245,43 @@ def _rotor_reading(order: tuple[int, ...], mirrored: bool) -> Reading:
     if order != (0, 1, 2, 3):
         numbers = tuple(i + 1 for i in order)
         known = f" ({_KNOWN_ORDERS[numbers]})" if numbers in _KNOWN_ORDERS else ""
-        says.append(f"the rotors look permuted: omega1..omega4 are rotors {','.join(map(str, numbers))} of this vehicle"
-                    f"{known}; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder the columns")
+        says.append(
+            f"the rotors look permuted: omega1..omega4 are rotors {','.join(map(str, numbers))} of "
+            f"this vehicle"
+            f"{known}; expected 1 front-left, 2 rear-left, 3 rear-right, 4 front-right: reorder "
+            f"the columns"
+        )
     if mirrored:
         says.append("the rotors turn against the declared spin: mirror spin in the vehicle file")
     if order == (2, 3, 0, 1) and not mirrored:
-        says.append("body axes that point backward and right instead of forward and left look the same")
-    return Reading("mirrored spin" if order == (0, 1, 2, 3) else "swapped rotors", "; ".join(says), order=order,
-                   mirrored=mirrored)
+        says.append(
+            "body axes that point backward and right instead of forward and left look the same"
+        )
+    return Reading(
+        "mirrored spin" if order == (0, 1, 2, 3) else "swapped rotors",
+        "; ".join(says),
+        order=order,
+        mirrored=mirrored,
+    )
 
 
-ROTOR_READINGS = tuple(_rotor_reading(order, mirrored) for mirrored in (False, True)
-                       for order in permutations(range(4)))[1:]
+ROTOR_READINGS = tuple(
+    _rotor_reading(order, mirrored)
+    for mirrored in (False, True)
+    for order in permutations(range(4))
+)[1:]
 
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """What is compared (n samples in flight), low-passed; of the columns as they stand, one quaternion order."""
+    """What is compared (n samples in flight), low-passed; of the columns as they stand, one
+    quaternion order.
+    """
 
     acceleration: Array  # (n, 3) m/s2
-    thrust_frame: Array  # (n, 3, 3) body to world times specific thrust, m/s2, its median scaled to gravity
+    thrust_frame: (
+        Array  # (n, 3, 3) body to world times specific thrust, m/s2, its median scaled to gravity
+    )
     rate: Array  # (n, 3) rad/s, body
     angular_acceleration: Array  # (n, 3) rad/s2, body
     inverse_rate: Array  # (n, 3) the same two of the inverse attitude
@@ -161,21 +290,33 @@ class _Motion:
 
 @dataclass(frozen=True, eq=False)
 class _Rotors:
-    """Squared turn rates (n, 4), low-passed, at the compared times less a delay; NaN outside their piece."""
+    """Squared turn rates (n, 4), low-passed, at the compared times less a delay; NaN outside their
+    piece.
+    """
 
-    pieces: Sequence[tuple[Array, Array, Array]]  # per piece its times, low-passed squares (m, 4) and the compared times
+    pieces: Sequence[
+        tuple[Array, Array, Array]
+    ]  # per piece its times, low-passed squares (m, 4) and the compared times
 
     def at(self, delay: float) -> Array:
         out = []
         for t, squares, chosen in self.pieces:
-            out.append(np.column_stack([np.interp(chosen - delay, t, column, left=np.nan, right=np.nan)
-                                        for column in squares.T]))
+            out.append(
+                np.column_stack(
+                    [
+                        np.interp(chosen - delay, t, column, left=np.nan, right=np.nan)
+                        for column in squares.T
+                    ]
+                )
+            )
         return np.concatenate(out)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How well a reading explains a log: shares of variance left unexplained, and whether it flies upright."""
+    """How well a reading explains a log: shares of variance left unexplained, and whether it flies
+    upright.
+    """
 
     force: float
     vertical: float  # of the force's vertical component alone
@@ -205,12 +346,26 @@ class Balances:
         signals = log_signals(log)
         self._masks = _flying(signals, vehicle)
         self._motion = {False: _motion(signals, self._masks, vehicle)}
-        self._rotors = _Rotors([(s.t, low_pass(np.square(s.rotor_speeds), CUTOFF_HZ, s.period), s.t[mask])
-                                for s, mask in zip(signals, self._masks, strict=True)])
+        self._rotors = _Rotors(
+            [
+                (s.t, low_pass(np.square(s.rotor_speeds), CUTOFF_HZ, s.period), s.t[mask])
+                for s, mask in zip(signals, self._masks, strict=True)
+            ]
+        )
         self._delayed = [self._rotors.at(delay) for delay in _DELAYS]
-        height = np.concatenate([s.position[mask, 2] for s, mask in zip(signals, self._masks, strict=True)])
-        self._turned = np.concatenate([low_pass(np.unwrap(np.arctan2(s.rotation[:, 1, 0], s.rotation[:, 0, 0])), CUTOFF_HZ,
-                                                s.period)[mask] for s, mask in zip(signals, self._masks, strict=True)])
+        height = np.concatenate(
+            [s.position[mask, 2] for s, mask in zip(signals, self._masks, strict=True)]
+        )
+        self._turned = np.concatenate(
+            [
+                low_pass(
+                    np.unwrap(np.arctan2(s.rotation[:, 1, 0], s.rotation[:, 0, 0])),
+                    CUTOFF_HZ,
+                    s.period,
+                )[mask]
+                for s, mask in zip(signals, self._masks, strict=True)
+            ]
+        )
         self.height = float(np.median(height)) if height.size else 0.0  # m, as the log has it
 
     @property
@@ -221,7 +376,9 @@ class Balances:
     def motion(self, scalar_last: bool) -> _Motion:
         """Return the motion by the quaternion as it stands, or read as scalar last."""
         if scalar_last not in self._motion:
-            signals = log_signals(replace(self._log, quaternion=self._log.quaternion[:, [3, 0, 1, 2]]))
+            signals = log_signals(
+                replace(self._log, quaternion=self._log.quaternion[:, [3, 0, 1, 2]])
+            )
             self._motion[scalar_last] = _motion(signals, self._masks, self._vehicle)
         return self._motion[scalar_last]
 
@@ -234,14 +391,21 @@ class Balances:
         thrust = np.einsum("ij,njk,k->ni", reading.world, frame, reading.body[:, 2])
         mean = thrust.mean(axis=0)
         upright = float(mean[2] / max(float(np.linalg.norm(mean)), 1e-9))
-        return Fit(_share(force, thrust, _FORCE_GAIN), _share(force[:, 2:], thrust[:, 2:], _FORCE_GAIN),
-                   self.torques(self.needed_torque(reading), reading), upright)
+        return Fit(
+            _share(force, thrust, _FORCE_GAIN),
+            _share(force[:, 2:], thrust[:, 2:], _FORCE_GAIN),
+            self.torques(self.needed_torque(reading), reading),
+            upright,
+        )
 
     def needed_torque(self, reading: Reading) -> Array:
         """Return the torque (n, 3) in Nm, body, that the motion needs."""
         motion = self.motion(reading.scalar_last)
-        pair = ((motion.inverse_rate, motion.inverse_angular_acceleration) if reading.conjugate
-                else (motion.rate, motion.angular_acceleration))
+        pair = (
+            (motion.inverse_rate, motion.inverse_angular_acceleration)
+            if reading.conjugate
+            else (motion.rate, motion.angular_acceleration)
+        )
         # a turn rate is a pseudovector: a mirrored body frame turns its sign as well
         turn = reading.body * np.linalg.det(reading.body)
         rate, alpha = pair[0] @ turn, pair[1] @ turn
@@ -250,7 +414,9 @@ class Balances:
         return torque
 
     def torques(self, needed: Array, reading: Reading) -> tuple[float, float, float]:
-        """Return the shares of the torques ``needed`` (n, 3) that the rotors leave, at the delay that suits them best."""
+        """Return the shares of the torques ``needed`` (n, 3) that the rotors leave, at the delay
+        that suits them best.
+        """
         best = (_WORST, _WORST, _WORST)
         for squares in self._delayed:
             shares = self._shares(needed, squares, reading)
@@ -258,39 +424,57 @@ class Balances:
                 best = shares
         return best
 
-    def _shares(self, needed: Array, squares: Array, reading: Reading) -> tuple[float, float, float]:
+    def _shares(
+        self, needed: Array, squares: Array, reading: Reading
+    ) -> tuple[float, float, float]:
         there = np.isfinite(squares[:, 0])
         given = squares[there][:, np.argsort(reading.order)] @ self._vehicle.mixing[1:].T
         if reading.mirrored:
             given[:, 2] *= -1.0
-        x, y, z = (_share(needed[there, i : i + 1], given[:, i : i + 1], _TORQUE_GAIN) for i in range(3))
+        x, y, z = (
+            _share(needed[there, i : i + 1], given[:, i : i + 1], _TORQUE_GAIN) for i in range(3)
+        )
         return x, y, z
 
     def pulled_back(self, needed: Array) -> float:
-        """Return the share of the yaw torque of ``needed`` (n, 3) that rotors as declared leave beside a pull on the heading.
+        """Return the share of the yaw torque of ``needed`` (n, 3) that rotors as declared leave
+        beside a pull on the heading.
 
         Rotors that work against what turns the nose back give the opposite of what slow turns need.
         """
         best = _WORST
         for squares in self._delayed:
             there = np.isfinite(squares[:, 0])
-            yaw = np.column_stack([squares[there] @ self._vehicle.mixing[3], -self._turned[there], needed[there, 2]])
+            yaw = np.column_stack(
+                [squares[there] @ self._vehicle.mixing[3], -self._turned[there], needed[there, 2]]
+            )
             yaw -= yaw.mean(axis=0)
             given, back, wanted = (yaw / np.maximum(yaw.std(axis=0), 1e-30)).T
-            least, most = np.array(_TORQUE_GAIN) * max(float(yaw[:, 0].std()), 1e-30) / max(float(yaw[:, 2].std()), 1e-30)
-            found = lsq_linear(np.column_stack([given, back]), wanted, bounds=([least, 0.0], [most, np.inf]))
+            least, most = (
+                np.array(_TORQUE_GAIN)
+                * max(float(yaw[:, 0].std()), 1e-30)
+                / max(float(yaw[:, 2].std()), 1e-30)
+            )
+            found = lsq_linear(
+                np.column_stack([given, back]), wanted, bounds=([least, 0.0], [most, np.inf])
+            )
             best = min(best, 2.0 * float(found.cost) / len(wanted))
         return best
 
     def shift(self) -> tuple[float, float, float]:
-        """Return the shift of rotors against pose (s, positive: rotors late) that fits best, its share and that within 0.1 s.
+        """Return the shift of rotors against pose (s, positive: rotors late) that fits best, its
+        share and that within 0.1 s.
 
         The share is the mean of the three torques' and that of the thrust along its own axis.
         """
         needed = self.needed_torque(Reading("", ""))
         motion = self.motion(False)
-        axis = motion.thrust_frame[:, :, 2] / np.linalg.norm(motion.thrust_frame[:, :, 2], axis=1, keepdims=True)
-        along = np.sum(axis * (motion.acceleration + np.array([0.0, 0.0, self._vehicle.gravity])), axis=1)[:, None]
+        axis = motion.thrust_frame[:, :, 2] / np.linalg.norm(
+            motion.thrust_frame[:, :, 2], axis=1, keepdims=True
+        )
+        along = np.sum(
+            axis * (motion.acceleration + np.array([0.0, 0.0, self._vehicle.gravity])), axis=1
+        )[:, None]
         shifts = np.arange(-_LONGEST_SHIFT, _LONGEST_SHIFT + 0.5 * _SHIFT_STEP, _SHIFT_STEP)
         shares = []
         for shift in shifts:
@@ -301,16 +485,27 @@ class Balances:
                 continue
             thrust = squares[there] @ self._vehicle.k[:, None]
             thrust *= self._vehicle.gravity / float(np.median(thrust))
-            parts = (*self._shares(needed, squares, Reading("", "")), _share(along[there], thrust, _FORCE_GAIN))
+            parts = (
+                *self._shares(needed, squares, Reading("", "")),
+                _share(along[there], thrust, _FORCE_GAIN),
+            )
             shares.append(float(np.mean(parts)))
         left = np.array(shares)
         best = int(np.argmin(left))
-        return float(shifts[best]), float(left[best]), float(left[np.abs(shifts) <= _SHIFT + 1e-9].min())
+        return (
+            float(shifts[best]),
+            float(left[best]),
+            float(left[np.abs(shifts) <= _SHIFT + 1e-9].min()),
+        )
 
 
 def _flying(signals: Sequence[Signals], vehicle: Vehicle) -> list[NDArray[np.intp]]:
-    """Return for each piece the indices to compare: in flight, away from the ends, about 20 a second."""
-    thrusts = [low_pass(np.square(s.rotor_speeds) @ vehicle.k, CUTOFF_HZ, s.period) for s in signals]
+    """Return for each piece the indices to compare: in flight, away from the ends, about 20 a
+    second.
+    """
+    thrusts = [
+        low_pass(np.square(s.rotor_speeds) @ vehicle.k, CUTOFF_HZ, s.period) for s in signals
+    ]
     every = np.concatenate(thrusts)
     turning = every[every > 0.1 * float(np.quantile(every, 0.9))]
     least = _FLYING * float(np.median(turning)) if turning.size else np.inf
@@ -322,13 +517,25 @@ def _flying(signals: Sequence[Signals], vehicle: Vehicle) -> list[NDArray[np.int
     return out
 
 
-def _motion(signals: Sequence[Signals], masks: Sequence[NDArray[np.intp]], vehicle: Vehicle) -> _Motion:
+def _motion(
+    signals: Sequence[Signals], masks: Sequence[NDArray[np.intp]], vehicle: Vehicle
+) -> _Motion:
     columns: list[list[Array]] = [[] for _ in range(6)]
     for s, mask in zip(signals, masks, strict=True):
         thrust = np.square(s.rotor_speeds) @ vehicle.k
         inverse = -np.einsum("nij,nj->ni", s.rotation, s.rate)
-        for column, x in zip(columns, (s.acceleration, s.rotation * thrust[:, None, None], s.rate, s.angular_acceleration,
-                                       inverse, np.gradient(inverse, s.period, axis=0)), strict=True):
+        for column, x in zip(
+            columns,
+            (
+                s.acceleration,
+                s.rotation * thrust[:, None, None],
+                s.rate,
+                s.angular_acceleration,
+                inverse,
+                np.gradient(inverse, s.period, axis=0),
+            ),
+            strict=True,
+        ):
             column.append(low_pass(x, CUTOFF_HZ, s.period)[mask])
     acceleration, frame, *turning = (np.concatenate(column) for column in columns)
     level = float(np.median(np.linalg.norm(frame[:, :, 2], axis=1))) if len(frame) else 1.0
@@ -336,7 +543,9 @@ def _motion(signals: Sequence[Signals], masks: Sequence[NDArray[np.intp]], vehic
 
 
 def _share(needed: Array, given: Array, gain: tuple[float, float]) -> float:
-    """Return the share of the variance of ``needed`` (n, m) that ``given`` (n, m), times a gain in range, leaves."""
+    """Return the share of the variance of ``needed`` (n, m) that ``given`` (n, m), times a gain in
+    range, leaves.
+    """
     needed, given = needed - needed.mean(axis=0), given - given.mean(axis=0)
     total, power = float(np.sum(needed * needed)), float(np.sum(given * given))
     if total <= 0.0 or power <= 0.0:
@@ -346,17 +555,26 @@ def _share(needed: Array, given: Array, gain: tuple[float, float]) -> float:
 
 
 def recognise(balances: Balances) -> tuple[Reading, ...]:
-    """Return the readings that explain a log where the log as declared does not: none, one, or several that fit alike."""
+    """Return the readings that explain a log where the log as declared does not: none, one, or
+    several that fit alike.
+    """
     if balances.samples < _LEAST_SAMPLES:
         return ()
     declared = balances.fit(Reading("", ""))
     needed = balances.needed_torque(Reading("", ""))
     fits = [(reading, balances.fit(reading)) for reading in POSE_READINGS]
-    fits += [(reading, replace(declared, torques=balances.torques(needed, reading))) for reading in ROTOR_READINGS]
+    fits += [
+        (reading, replace(declared, torques=balances.torques(needed, reading)))
+        for reading in ROTOR_READINGS
+    ]
     winners = [(reading, fit) for reading, fit in fits if _wins(fit, declared)]
     if any(_only_mirrored(reading) for reading, _ in winners):
         pulled = balances.pulled_back(needed)
-        winners = [(reading, fit) for reading, fit in winners if not _only_mirrored(reading) or fit.torques[2] < pulled]
+        winners = [
+            (reading, fit)
+            for reading, fit in winners
+            if not _only_mirrored(reading) or fit.torques[2] < pulled
+        ]
     if not winners:
         return ()
 
@@ -383,15 +601,21 @@ def _wins(fit: Fit, declared: Fit) -> bool:
     by_force = declared.force >= _BAD and fit.force <= min(_GOOD_FORCE, _CLEAR * declared.force)
     by_height = declared.vertical >= _UPSIDE_DOWN and fit.vertical <= _GOOD
     contradicted = declared.torque >= _BAD or max(declared.torques) >= _CONTRADICTS
-    by_torque = (contradicted and fit.torque <= min(_GOOD, _CLEAR * declared.torque)
-                 and max(fit.torques) <= 1.5 * _GOOD)
-    loses = any(new > old + _WORSE and old <= _SAYS_NOTHING
-                for new, old in ((fit.force, declared.force), (fit.torque, declared.torque)))
+    by_torque = (
+        contradicted
+        and fit.torque <= min(_GOOD, _CLEAR * declared.torque)
+        and max(fit.torques) <= 1.5 * _GOOD
+    )
+    loses = any(
+        new > old + _WORSE and old <= _SAYS_NOTHING
+        for new, old in ((fit.force, declared.force), (fit.torque, declared.torque))
+    )
     return (by_force or by_height or by_torque) and not loses
 
 
 def time_shift(balances: Balances) -> float | None:
-    """Return by how many s the turn rates come late (negative: early) against the pose, where it is clearly over 0.1 s.
+    """Return by how many s the turn rates come late (negative: early) against the pose, where it is
+    clearly over 0.1 s.
 
     Motor lag, latency and radio make turn rates early by less.
     """

@@ -13,7 +13,7 @@ One row a sample, time strictly increasing. Columns of the file:
 =============================  =======  ==========================================================================
 
 A row whose seven pose fields are all empty is one in which motion capture lost the vehicle. Other columns are ignored.
-"""
+"""  # noqa: E501
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -50,10 +50,17 @@ class FlightLog:
     torque: Array | None = None  # (N, 3) Nm, world, truth
     name: str = ""
     source: str = ""  # the file and the reader
-    notes: tuple[str, ...] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
-    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))  # (N,) the pose is there
-    extra: Mapping[str, Array] = field(default_factory=dict)  # (N,) or (N, ...) SI; what a reader found besides
-    commanded: bool = False  # turn rates are worked out from commands: scale of thrust unknown, moments not to be trusted
+    notes: tuple[
+        str, ...
+    ] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
+    valid: Mask = field(
+        default_factory=lambda: np.empty(0, dtype=np.bool_)
+    )  # (N,) the pose is there
+    extra: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # (N,) or (N, ...) SI; what a reader found besides
+    # turn rates are worked out from commands: scale of thrust unknown, moments not to be trusted
+    commanded: bool = False
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
@@ -71,13 +78,22 @@ def log_name(path: Path) -> str:
 
 
 def check_finite(table: Table, name: str, column: Array, where: Mask | None = None) -> None:
-    """Raise InputError at the first number of a column (N,) that is not finite; ``where`` limits the rows."""
+    """Raise InputError at the first number of a column (N,) that is not finite; ``where`` limits
+    the rows.
+    """
     bad = ~np.isfinite(column) if where is None else ~np.isfinite(column) & where
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         found = "empty or NaN" if np.isnan(column[i]) else "infinite"
-        more = "; only all seven pose columns together may be empty (pose lost)" if name in POSE else ""
-        raise InputError(f"{table.path}: column {name}, {table.row(i)} is {found}; expected a finite number{more}")
+        more = (
+            "; only all seven pose columns together may be empty (pose lost)"
+            if name in POSE
+            else ""
+        )
+        raise InputError(
+            f"{table.path}: column {name}, {table.row(i)} is {found}; expected a finite "
+            f"number{more}"
+        )
 
 
 def check_times(table: Table, t: Array) -> None:
@@ -88,12 +104,16 @@ def check_times(table: Table, t: Array) -> None:
     if back.size:
         i = int(back[0]) + 1
         what = "repeats the time" if t[i] == t[i - 1] else "goes back from"
-        raise InputError(f"{table.path}: column t, {table.row(i)}: {t[i]:.9g} s {what} {t[i - 1]:.9g} s of the row "
-                         "before; expected strictly increasing times")
+        raise InputError(
+            f"{table.path}: column t, {table.row(i)}: {t[i]:.9g} s {what} {t[i - 1]:.9g} s of the "
+            f"row "
+            "before; expected strictly increasing times"
+        )
 
 
 def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str) -> Array:
-    """Return quaternions (N, 4) at length 1, after checking that they nearly were in the rows ``where`` (N,).
+    """Return quaternions (N, 4) at length 1, after checking that they nearly were in the rows
+    ``where`` (N,).
 
     Raises:
         InputError: a length differs from 1 by more than 0.02.
@@ -101,8 +121,10 @@ def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str
     length = np.linalg.norm(quaternions, axis=1)
     bad = np.flatnonzero(where & ~(np.abs(length - 1.0) <= _NORM_TOLERANCE))
     if bad.size:
-        raise InputError(f"{table.path}: columns {columns}, {table.row(bad[0])}: a quaternion of length "
-                         f"{length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}")
+        raise InputError(
+            f"{table.path}: columns {columns}, {table.row(bad[0])}: a quaternion of length "
+            f"{length[bad[0]]:.4g}; expected 1 within {_NORM_TOLERANCE:g}"
+        )
     unit: Array = quaternions / length[:, None]
     return unit
 
@@ -114,25 +136,40 @@ def time_notes(t: Array) -> tuple[str, ...]:
     if not gaps.size:
         return ()
     longest = gaps[np.argmax(step[gaps])]
-    return (f"{gaps.size} gap(s) in time; the longest is {step[longest]:.3g} s, at t = {t[longest]:.6g} s "
-            f"(median step {np.median(step):.4g} s)",)
+    return (
+        f"{gaps.size} gap(s) in time; the longest is {step[longest]:.3g} s, at t = "
+        f"{t[longest]:.6g} s "
+        f"(median step {np.median(step):.4g} s)",
+    )
 
 
 def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
-    """Return a log with the rows (N,) that are to be kept alone; the log itself where that is all of them."""
+    """Return a log with the rows (N,) that are to be kept alone; the log itself where that is all
+    of them.
+    """
     if keep.all():
         return log
 
     def cut(x: Array | None) -> Array | None:
         return None if x is None else x[keep]
 
-    return replace(log, t=log.t[keep], position=log.position[keep], quaternion=log.quaternion[keep],
-                   rotor_speeds=log.rotor_speeds[keep], voltage=cut(log.voltage), force=cut(log.force), torque=cut(log.torque),
-                   valid=log.valid[keep], extra={name: x[keep] for name, x in log.extra.items()})
+    return replace(
+        log,
+        t=log.t[keep],
+        position=log.position[keep],
+        quaternion=log.quaternion[keep],
+        rotor_speeds=log.rotor_speeds[keep],
+        voltage=cut(log.voltage),
+        force=cut(log.force),
+        torque=cut(log.torque),
+        valid=log.valid[keep],
+        extra={name: x[keep] for name, x in log.extra.items()},
+    )
 
 
 def write_log(log: FlightLog, path: str | Path) -> None:
-    """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or not at all.
+    """Write a log in the kit's own form to a ``.csv``, ``.csv.gz`` or ``.parquet`` file, whole or
+    not at all.
 
     Raises:
         InputError: the name's ending is unknown or the file cannot be written.

@@ -1,4 +1,6 @@
-"""The phases of a flight, told from its rotors and height: on the ground, take-off, flight and landing."""
+"""The phases of a flight, told from its rotors and height: on the ground, take-off, flight and
+landing.
+"""
 
 from typing import NamedTuple
 
@@ -29,8 +31,9 @@ class Phase(NamedTuple):
 def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle) -> list[Phase]:
     """Return the phases of a flight in order of time; together they cover it.
 
-    A log that begins (or ends) with its rotors turning begins (or ends) in flight. Take-off lasts from leaving the
-    ground until the first climb ends, landing from the start of the last descent until touching the ground.
+    A log that begins (or ends) with its rotors turning begins (or ends) in flight. Take-off lasts
+    from leaving the ground until the first climb ends, landing from the start of the last descent
+    until touching the ground.
 
     Args:
         t: (N,) s.
@@ -60,7 +63,9 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         lift_off = up - _run(clear[up::-1]) + 1
         cruise = up + _run(climb[up:] > _CLIMB)
     if lands:
-        down = last - int(np.argmax((clear & (height >= after + _WELL_ABOVE * (typical - after)))[::-1]))
+        down = last - int(
+            np.argmax((clear & (height >= after + _WELL_ABOVE * (typical - after)))[::-1])
+        )
         touch_down = down + _run(clear[down:]) - 1
         descent = down - _run(climb[down::-1] < -_CLIMB)
     cruise, descent = min(cruise, touch_down), max(descent, lift_off)
@@ -68,7 +73,11 @@ def flight_phases(t: Array, height: Array, rotor_speeds: Array, vehicle: Vehicle
         cruise = descent = (cruise + descent) // 2
     edges = [0, lift_off, cruise, descent, touch_down, last]
     names = [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
-    return [Phase(name, float(t[a]), float(t[b])) for name, a, b in zip(names, edges, edges[1:], strict=False) if b > a]
+    return [
+        Phase(name, float(t[a]), float(t[b]))
+        for name, a, b in zip(names, edges, edges[1:], strict=False)
+        if b > a
+    ]
 
 
 def _climb_rate(t: Array, height: Array) -> Array:

@@ -26,40 +26,58 @@ from .readers import READERS, find_reader
 from .tables import Table, open_table
 
 
-def read_log(path: str | Path, reader: str | None = None, vehicle: Vehicle | None = None) -> FlightLog:
+def read_log(
+    path: str | Path, reader: str | None = None, vehicle: Vehicle | None = None
+) -> FlightLog:
     """Read a flight log.
 
     Args:
         path: ``.csv``, ``.csv.gz`` or ``.parquet``.
-        reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with that reader's option
-            behind a colon where it takes one (``rosbag:topics.yaml``); None for the kit's own.
-        vehicle: the vehicle that flew, for checking units and, in a reader, for turning thrust into turn rates.
+        reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with
+            that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
+            for the kit's own.
+        vehicle: the vehicle that flew, for checking units and, in a reader, for turning thrust into
+            turn rates.
 
     Raises:
-        InputError: the file cannot be read or breaks a rule of the form; the message says where and what was expected.
+        InputError: the file cannot be read or breaks a rule of the form; the message says where and
+            what was expected.
 
     Warns:
-        UserWarning: numbers look as if they were in other units. The same text is in the log's notes.
+        UserWarning: numbers look as if they were in other units. The same text is in the log's
+            notes.
     """
     path = Path(path)
     if reader is not None:
-        with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for what they are
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # absurd numbers are refused for what they are
             log = find_reader(reader).read(path, vehicle)
     else:
         for other in READERS.values():
             if path.name.lower().endswith(other.suffixes):
-                raise InputError(f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file of this kind")
+                raise InputError(
+                    f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file "
+                    f"of this kind"
+                )
         if path.is_dir():
-            raise InputError(f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a ROS 2 bag")
+            raise InputError(
+                f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a "
+                f"ROS 2 bag"
+            )
         table = open_table(path)
         missing = [name for name in REQUIRED if name not in table.header]
         if missing:
             for other in READERS.values():
                 if other.signature and set(other.signature) <= set(table.header):
-                    raise InputError(f"{path}: this is a {other.name} log; expected --reader {other.name} "
-                                     f"(reader={other.name!r}) with it")
-            raise InputError(f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "
-                             f"found {', '.join(table.header[:20])}")
+                    raise InputError(
+                        f"{path}: this is a {other.name} log; expected --reader {other.name} "
+                        f"(reader={other.name!r}) with it"
+                    )
+            raise InputError(
+                f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "
+                f"found {', '.join(table.header[:20])}"
+            )
         with np.errstate(over="ignore", invalid="ignore"):
             log = _canonical(table)
     return _with_doubts(log, vehicle)
@@ -70,7 +88,10 @@ def _canonical(table: Table) -> FlightLog:
     truth = [name for name in TRUTH if name in table.header]
     if truth and len(truth) < len(TRUTH):
         absent = [name for name in TRUTH if name not in truth]
-        raise InputError(f"{path}: missing column(s) {', '.join(absent)}; expected all of {', '.join(TRUTH)} or none")
+        raise InputError(
+            f"{path}: missing column(s) {', '.join(absent)}; expected all of {', '.join(TRUTH)} or "
+            f"none"
+        )
     names = [*REQUIRED, *(["vbat"] if "vbat" in table.header else []), *truth]
     columns = table.read(names)
 
@@ -84,9 +105,16 @@ def _canonical(table: Table) -> FlightLog:
     for name in (*ROTORS, *(["vbat"] if "vbat" in names else [])):
         low = np.flatnonzero(columns[name] < 0)
         if low.size:
-            expected = "a voltage of" if name == "vbat" else "a turn rate (its sense is the vehicle's spin) of"
-            raise InputError(f"{path}: column {name}, {table.row(low[0])}: {columns[name][low[0]]:g} is negative; "
-                             f"expected {expected} at least 0")
+            expected = (
+                "a voltage of"
+                if name == "vbat"
+                else "a turn rate (its sense is the vehicle's spin) of"
+            )
+            raise InputError(
+                f"{path}: column {name}, {table.row(low[0])}: {columns[name][low[0]]:g} is "
+                f"negative; "
+                f"expected {expected} at least 0"
+            )
     return FlightLog(
         t=columns["t"],
         position=pose[:, :3].copy(),
@@ -105,30 +133,44 @@ def _canonical(table: Table) -> FlightLog:
 def _pose_notes(t: Array, lost: Mask) -> tuple[str, ...]:
     if not lost.any():
         return ()
-    return (f"{int(lost.sum())} of {len(t)} rows without a pose (motion capture lost the vehicle), the first at "
-            f"t = {t[np.flatnonzero(lost)[0]]:.6g} s",)
+    return (
+        f"{int(lost.sum())} of {len(t)} rows without a pose (motion capture lost the vehicle), the "
+        f"first at "
+        f"t = {t[np.flatnonzero(lost)[0]]:.6g} s",
+    )
 
 
 def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     """Warn where numbers look as if they were in other units, and add the warnings to the notes."""
     doubts = []
     if log.period > 0.5:
-        doubts.append(f"the median time step is {log.period:g} s: is t in milliseconds? Expected seconds")
+        doubts.append(
+            f"the median time step is {log.period:g} s: is t in milliseconds? Expected seconds"
+        )
     if log.valid.any():
         spread = float(np.max(np.ptp(log.position[log.valid], axis=0)))
         if spread > 300.0:
-            doubts.append(f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected metres")
+            doubts.append(
+                f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
+                f"metres"
+            )
     if vehicle is not None:
         with np.errstate(over="ignore"):
             thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
         turning = thrust[log.rotor_speeds.max(axis=1) > 0.0]
         ratio = float(np.median(turning)) if turning.size else 1.0
         if ratio > 10.0:
-            doubts.append(f"the turn rates make a median thrust of {ratio:.0f} times the weight of {vehicle.name}: "
-                          "are omega1..omega4 in rpm? Expected rad/s")
+            doubts.append(
+                f"the turn rates make a median thrust of {ratio:.0f} times the weight of "
+                f"{vehicle.name}: "
+                "are omega1..omega4 in rpm? Expected rad/s"
+            )
         elif ratio < 0.1:
-            doubts.append(f"the turn rates make a median thrust of {ratio:.2g} times the weight of {vehicle.name}: "
-                          "are omega1..omega4 in revolutions per second? Expected rad/s")
+            doubts.append(
+                f"the turn rates make a median thrust of {ratio:.2g} times the weight of "
+                f"{vehicle.name}: "
+                "are omega1..omega4 in revolutions per second? Expected rad/s"
+            )
     if not doubts:
         return log
     for doubt in doubts:

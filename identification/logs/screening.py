@@ -1,7 +1,9 @@
-"""Is a flight log what it claims to be? Asked before it is diagnosed, so that no effect is found where a column is wrong.
+"""Is a flight log what it claims to be? Asked before it is diagnosed, so that no effect is found
+where a column is wrong.
 
-A log that is too short, too slow, torn, from a clock that jumps, or in other units or conventions is refused with a message
-that says what it looks like and what to do. Whatever a quadrotor may do under effects that its model lacks passes.
+A log that is too short, too slow, torn, from a clock that jumps, or in other units or conventions
+is refused with a message that says what it looks like and what to do. Whatever a quadrotor may do
+under effects that its model lacks passes.
 """
 
 from dataclasses import replace
@@ -26,8 +28,11 @@ _AT_REST = 0.003  # of the weight: thrust below is no turning rotor, in whatever
 _CARRIES = 0.2, 5.0  # median thrust by weight between which it is this vehicle's
 _DOUBTFUL = 0.5, 2.0  # outside it is a note
 _UNIT_SLACK = 1.8  # factor that mass and thrust curve may make of a unit's thrust
-_RATE_UNITS = {"degrees per second": 180.0 / np.pi, "revolutions per minute": 30.0 / np.pi,
-               "revolutions per second": 0.5 / np.pi}  # of 1 rad/s
+_RATE_UNITS = {
+    "degrees per second": 180.0 / np.pi,
+    "revolutions per minute": 30.0 / np.pi,
+    "revolutions per second": 0.5 / np.pi,
+}  # of 1 rad/s
 _TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 _PERIODS = 3e-4, 0.022  # s, of a pose once its unit is right
 
@@ -41,22 +46,24 @@ _SAME = 0.25  # of the way that the speed would have taken it in half the step
 _LOST_SHARE = 0.1  # of the rows in flight: losing more is a note
 
 
-def screen_log(log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SECONDS) -> tuple[str, ...]:
+def screen_log(
+    log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SECONDS
+) -> tuple[str, ...]:
     """Return doubts about a log, or refuse it.
 
     Args:
         log: the flight as it was read.
         vehicle: as declared.
-        least_seconds: of unbroken pose in flight that the log must have; several short logs of one vehicle may make up
-            for one another.
+        least_seconds: of unbroken pose in flight that the log must have; several short logs of one
+            vehicle may make up for one another.
 
     Returns:
         Notes: what is doubtful, but does not spoil a diagnosis.
 
     Raises:
-        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock jumps, its pose leaps,
-            nothing flew, or it follows another convention than it declares; the message names the file, what was found
-            and what to do.
+        InputError: the log is too short, sampled too slowly, its pose lost too often, its clock
+            jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
+            the message names the file, what was found and what to do.
     """
     where = log.source or log.name or "log"
     if not log.valid.any():
@@ -69,8 +76,11 @@ def screen_log(log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SE
     pieces = _pieces(log)
     if not pieces:
         longest = max(float(log.t[run[-1]] - log.t[run[0]]) for run in _runs(log))
-        raise InputError(f"{where}: {_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; expected at "
-                         f"least {least_seconds:g} s in flight, in runs of more than {_LEAST_PIECE:g} s")
+        raise InputError(
+            f"{where}: {_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; "
+            f"expected at "
+            f"least {least_seconds:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
+        )
     balances = Balances(log, vehicle)
     _check_conventions(balances, where)
     _check_leaps(log, where)
@@ -79,8 +89,11 @@ def screen_log(log: FlightLog, vehicle: Vehicle, least_seconds: float = LEAST_SE
     shift = time_shift(balances)
     if shift is not None:
         late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
-        raise InputError(f"{where}: the turn rates come {abs(shift):.2f} s too {late} against the pose; expected both on one "
-                         f"clock: put omega1..omega4 {abs(shift):.2f} s {sooner}")
+        raise InputError(
+            f"{where}: the turn rates come {abs(shift):.2f} s too {late} against the pose; "
+            f"expected both on one "
+            f"clock: put omega1..omega4 {abs(shift):.2f} s {sooner}"
+        )
     return notes
 
 
@@ -90,25 +103,40 @@ def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ..
         thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
     most = float(np.quantile(thrust, 0.95))
     if most < _AT_REST:
-        raise InputError(f"{where}: omega1..omega4 are at rest all the time, so nothing flew; expected turn rates in rad/s "
-                         f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)")
+        raise InputError(
+            f"{where}: omega1..omega4 are at rest all the time, so nothing flew; expected turn "
+            f"rates in rad/s "
+            f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
+        )
     turning = thrust > 0.3 * most
     for i, column in enumerate(log.rotor_speeds[turning].T):
         if float(np.max(column)) <= 0.0:
-            raise InputError(f"{where}: omega{i + 1} is 0 while the other rotors turn; expected the turn rates of all four")
+            raise InputError(
+                f"{where}: omega{i + 1} is 0 while the other rotors turn; expected the turn rates "
+                f"of all four"
+            )
     ratio = float(np.median(thrust[turning]))
     if _CARRIES[0] <= ratio <= _CARRIES[1]:
         if _DOUBTFUL[0] <= ratio <= _DOUBTFUL[1]:
             return ()
-        return (f"the turn rates make a median thrust of {ratio:.2g} times the weight of {vehicle.name}: is it this "
-                "vehicle, and did it fly?",)
+        return (
+            f"the turn rates make a median thrust of {ratio:.2g} times the weight of "
+            f"{vehicle.name}: is it this "
+            "vehicle, and did it fly?",
+        )
     for unit, factor in _RATE_UNITS.items():
         if 1.0 / _UNIT_SLACK <= ratio / factor**2 <= _UNIT_SLACK:
             what = f"multiply by {1 / factor:.4g}" if factor < 1 else f"divide by {factor:.4g}"
-            raise InputError(f"{where}: omega1..omega4 look like {unit}: read as rad/s they make {ratio:.3g} times the weight "
-                             f"of {vehicle.name}; expected rad/s: {what}")
-    raise InputError(f"{where}: the turn rates make a median thrust of {ratio:.3g} times the weight of {vehicle.name}; "
-                     f"expected about 1: omega1..omega4 in rad/s, and the vehicle that flew")
+            raise InputError(
+                f"{where}: omega1..omega4 look like {unit}: read as rad/s they make {ratio:.3g} "
+                f"times the weight "
+                f"of {vehicle.name}; expected rad/s: {what}"
+            )
+    raise InputError(
+        f"{where}: the turn rates make a median thrust of {ratio:.3g} times the weight of "
+        f"{vehicle.name}; "
+        f"expected about 1: omega1..omega4 in rad/s, and the vehicle that flew"
+    )
 
 
 def _check_time_unit(log: FlightLog, where: str) -> None:
@@ -121,8 +149,11 @@ def _check_time_unit(log: FlightLog, where: str) -> None:
         rescaled = replace(log, t=(log.t - log.t[0]) / factor)
         if not max((len(piece) for piece in _pieces(rescaled)), default=0):
             continue
-        raise InputError(f"{where}: t looks like {unit}: its median step is {period:.4g}; expected seconds: divide t by "
-                         f"{factor:g}")
+        raise InputError(
+            f"{where}: t looks like {unit}: its median step is {period:.4g}; expected seconds: "
+            f"divide t by "
+            f"{factor:g}"
+        )
 
 
 def _check_steps(log: FlightLog, where: str) -> tuple[str, ...]:
@@ -130,16 +161,25 @@ def _check_steps(log: FlightLog, where: str) -> tuple[str, ...]:
     median = float(np.median(step))
     uneven = float(np.mean((step < _UNEVEN[0] * median) | (step > _UNEVEN[1] * median)))
     if uneven > _UNEVEN_SHARE:
-        raise InputError(f"{where}: column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} s, "
-                         f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s; expected the times at which the "
-                         "poses were taken, not those at which they arrived")
+        raise InputError(
+            f"{where}: column t: time steps vary wildly, from {step.min():.3g} to {step.max():.3g} "
+            f"s, "
+            f"{100 * uneven:.0f} % of them far from the median of {median:.3g} s; expected the "
+            f"times at which the "
+            "poses were taken, not those at which they arrived"
+        )
     if uneven > _UNEVEN_NOTE:
-        return (f"time steps are uneven: {100 * uneven:.0f} % are far from the median of {median:.3g} s",)
+        return (
+            f"time steps are uneven: {100 * uneven:.0f} % are far from the median of {median:.3g} "
+            f"s",
+        )
     return ()
 
 
 def _without_repeats(log: FlightLog) -> FlightLog:
-    """Return the log with only new poses valid: one that repeats the one before to the last digit was held."""
+    """Return the log with only new poses valid: one that repeats the one before to the last digit
+    was held.
+    """
     seen = np.flatnonzero(log.valid)
     pose = np.column_stack([log.position, log.quaternion])[seen]
     held = seen[1:][np.all(pose[1:] == pose[:-1], axis=1)]
@@ -154,9 +194,13 @@ def _check_pose_rate(log: FlightLog, where: str) -> None:
     seen = log.t[log.valid]
     period = float(np.median(np.diff(seen))) if len(seen) > 1 else np.inf
     if period * _LEAST_RATE_HZ > _SLACK:
-        raise InputError(f"{where}: {1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: accelerations "
-                         "come from differences of poses that are low-passed at 15 Hz, and a quadrotor turns within a tenth "
-                         "of a second")
+        raise InputError(
+            f"{where}: {1 / period:.3g} new poses a second; expected at least {_LEAST_RATE_HZ:g}: "
+            f"accelerations "
+            "come from differences of poses that are low-passed at 15 Hz, and a quadrotor turns "
+            "within a tenth "
+            "of a second"
+        )
 
 
 def _runs(log: FlightLog) -> list[NDArray[np.intp]]:
@@ -168,20 +212,28 @@ def _runs(log: FlightLog) -> list[NDArray[np.intp]]:
 
 def _pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     """Return the rows of each unbroken run of poses that is long enough to say something."""
-    return [run for run in _runs(log) if len(run) > 8 and log.t[run[-1]] - log.t[run[0]] > _LEAST_PIECE]
+    return [
+        run for run in _runs(log) if len(run) > 8 and log.t[run[-1]] - log.t[run[0]] > _LEAST_PIECE
+    ]
 
 
 def _lost_words(log: FlightLog) -> str:
     lost = ~log.valid
     runs = int(np.sum(lost[1:] & ~lost[:-1])) + int(lost[0])
-    return f"the pose is lost in {runs} run(s), {int(lost.sum())} of {len(lost)} rows; " if runs else ""
+    return (
+        f"the pose is lost in {runs} run(s), {int(lost.sum())} of {len(lost)} rows; "
+        if runs
+        else ""
+    )
 
 
 def _check_conventions(balances: Balances, where: str) -> None:
     readings = recognise(balances)
     if readings:
         says = "; or ".join(dict.fromkeys(reading.says for reading in readings[:3]))
-        raise InputError(f"{where}: {says}. As it stands the motion contradicts the rotors and gravity")
+        raise InputError(
+            f"{where}: {says}. As it stands the motion contradicts the rotors and gravity"
+        )
 
 
 def _check_leaps(log: FlightLog, where: str) -> None:
@@ -197,13 +249,19 @@ def _check_leaps(log: FlightLog, where: str) -> None:
     i = int(np.argmax(far | turned))
     what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
     units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""
-    raise InputError(f"{where}: the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} s, which no "
-                     f"quadrotor flies ({int(np.sum(far | turned))} such step(s)){units}; expected poses of one vehicle on one "
-                     "clock: leave the bad rows' pose empty, or cut the log there")
+    raise InputError(
+        f"{where}: the pose leaps by {what} within {step[i]:.3g} s at t = {log.t[seen[i + 1]]:.6g} "
+        f"s, which no "
+        f"quadrotor flies ({int(np.sum(far | turned))} such step(s)){units}; expected poses of one "
+        f"vehicle on one "
+        "clock: leave the bad rows' pose empty, or cut the log there"
+    )
 
 
 def _check_clock(log: FlightLog, where: str) -> None:
-    """Check that no long step in time lies between two poses that follow one another as if no time had passed."""
+    """Check that no long step in time lies between two poses that follow one another as if no time
+    had passed.
+    """
     seen = np.flatnonzero(log.valid)
     t, position = log.t[seen], log.position[seen]
     step = np.diff(t)
@@ -217,24 +275,51 @@ def _check_clock(log: FlightLog, where: str) -> None:
         speed = min(float(np.linalg.norm(before)), float(np.linalg.norm(after)))
         moved = float(np.linalg.norm(position[i + 1] - position[i]))
         alike = float(np.linalg.norm(after - before)) < 0.15 * speed + 0.05
-        turned = 2.0 * np.arccos(min(1.0, abs(float(log.quaternion[seen[i]] @ log.quaternion[seen[i + 1]]))))
-        if speed > _MOVING and alike and turned < 0.05 and moved < _SAME * speed * 0.5 * float(step[i]):
-            raise InputError(f"{where}: column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose goes on from where "
-                             f"it was ({1e3 * moved:.0f} mm on at {speed:.2g} m/s); expected one clock for the whole log: set "
-                             "the clock's jump back, or cut the log there")
+        turned = 2.0 * np.arccos(
+            min(1.0, abs(float(log.quaternion[seen[i]] @ log.quaternion[seen[i + 1]])))
+        )
+        if (
+            speed > _MOVING
+            and alike
+            and turned < 0.05
+            and moved < _SAME * speed * 0.5 * float(step[i])
+        ):
+            raise InputError(
+                f"{where}: column t jumps by {step[i]:.3g} s at t = {t[i]:.6g} s, but the pose "
+                f"goes on from where "
+                f"it was ({1e3 * moved:.0f} mm on at {speed:.2g} m/s); expected one clock for the "
+                f"whole log: set "
+                "the clock's jump back, or cut the log there"
+            )
 
 
-def _check_length(log: FlightLog, vehicle: Vehicle, pieces: list[NDArray[np.intp]], least: float,
-                  where: str) -> tuple[str, ...]:
+def _check_length(
+    log: FlightLog, vehicle: Vehicle, pieces: list[NDArray[np.intp]], least: float, where: str
+) -> tuple[str, ...]:
     """Check that enough is left in unbroken runs in flight, and note where much is not."""
-    thrust = low_pass(np.square(log.rotor_speeds) @ vehicle.k, 1.0, log.period) if len(log.t) > 30 else np.zeros(len(log.t))
-    flying = thrust > 0.5 * float(np.median(thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))]))
+    thrust = (
+        low_pass(np.square(log.rotor_speeds) @ vehicle.k, 1.0, log.period)
+        if len(log.t) > 30
+        else np.zeros(len(log.t))
+    )
+    flying = thrust > 0.5 * float(
+        np.median(thrust[thrust > 0.3 * float(np.quantile(thrust, 0.95))])
+    )
     step = np.minimum(np.diff(log.t, append=log.t[-1] + log.period), max(0.1, 3.5 * log.period))
-    left = sum(float(step[piece[0] : piece[-1] + 1][flying[piece[0] : piece[-1] + 1]].sum()) for piece in pieces)
+    left = sum(
+        float(step[piece[0] : piece[-1] + 1][flying[piece[0] : piece[-1] + 1]].sum())
+        for piece in pieces
+    )
     whole = float(step[flying].sum())
     if left < least - 1e-9:
-        raise InputError(f"{where}: {_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; expected at least "
-                         f"{least:g} s, in runs of more than {_LEAST_PIECE:g} s")
+        raise InputError(
+            f"{where}: {_lost_words(log)}{left:.3g} s of flight in unbroken runs of poses; "
+            f"expected at least "
+            f"{least:g} s, in runs of more than {_LEAST_PIECE:g} s"
+        )
     if left < (1.0 - _LOST_SHARE) * whole:
-        return (f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses long enough to use",)
+        return (
+            f"{_lost_words(log)}{left:.3g} of {whole:.3g} s of flight lie in runs of poses long "
+            f"enough to use",
+        )
     return ()

@@ -1,1 +1,3 @@
-"""The motion that a log shows: smoothed and differentiated once, its residual wrench, its sensors' noise."""
+"""The motion that a log shows: smoothed and differentiated once, its residual wrench, its sensors'
+noise.
+"""

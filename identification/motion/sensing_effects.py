@@ -1,7 +1,8 @@
-"""A log as it would be without the sensing effects that its vehicle declares: poses and turn rates brought back to truth.
+"""A log as it would be without the sensing effects that its vehicle declares: poses and turn rates
+brought back to truth.
 
-Everything in this folder that compares a log's motion with a model takes the corrected log; only the filter, which undoes
-these effects by itself, takes the log as it is.
+Everything in this folder that compares a log's motion with a model takes the corrected log; only
+the filter, which undoes these effects by itself, takes the log as it is.
 """
 
 from dataclasses import replace
@@ -20,7 +21,9 @@ _BREAK = 0.1  # s without a pose, over which nothing is interpolated
 
 @compiled
 def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
-    """Bring ``samples`` (n, 11), turn rates and pose, back to the truth in place; ``seen`` (n,) says where a pose is."""
+    """Bring ``samples`` (n, 11), turn rates and pose, back to the truth in place; ``seen`` (n,)
+    says where a pose is.
+    """
     f = models[0]
     f.sample[7] = 1.0
     for k in range(len(t)):
@@ -35,11 +38,13 @@ def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
 
 
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return the log with the vehicle's declared sensing effects taken out of its poses and turn rates.
+    """Return the log with the vehicle's declared sensing effects taken out of its poses and turn
+    rates.
 
-    It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows tell the flight of abs(dt)
-    ago, as the filter's estimate does, and the first abs(dt) s after a break of more than 0.1 s have no pose; the voltage,
-    which is of the row's own instant, is that of then, and the truth stays as it is.
+    It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows
+    tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s after a
+    break of more than 0.1 s have no pose; the voltage, which is of the row's own instant, is that
+    of then, and the truth stays as it is.
     """
     if not any(get(setting.name).kind == "sensing" for setting in vehicle.effects):
         return log
@@ -47,18 +52,30 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     load_model(models[0], vehicle)
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
     _undo(models, np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid), samples)
-    delay = sum(abs(s.coefficients.get("dt", 0.0)) for s in vehicle.effects if s.name == "clock_offset")
+    delay = sum(
+        abs(s.coefficients.get("dt", 0.0)) for s in vehicle.effects if s.name == "clock_offset"
+    )
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan
     voltage = None if log.voltage is None else np.interp(log.t - delay, log.t, log.voltage)
-    return replace(log, rotor_speeds=samples[:, :4].copy(), position=samples[:, 4:7].copy(),
-                   quaternion=samples[:, 7:].copy(), voltage=voltage, valid=valid)
+    return replace(
+        log,
+        rotor_speeds=samples[:, :4].copy(),
+        position=samples[:, 4:7].copy(),
+        quaternion=samples[:, 7:].copy(),
+        voltage=voltage,
+        valid=valid,
+    )
 
 
 def _settled(log: FlightLog, delay: float) -> np.ndarray:
-    """Return where (n,) the last ``delay`` s had no break, so that what was delayed by it is no longer made up."""
+    """Return where (n,) the last ``delay`` s had no break, so that what was delayed by it is no
+    longer made up.
+    """
     seen = np.flatnonzero(log.valid)
-    starts = seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > _BREAK)] if seen.size else seen
+    starts = (
+        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > _BREAK)] if seen.size else seen
+    )
     last = np.searchsorted(starts, np.arange(len(log.t)), side="right") - 1
     began = np.where(last >= 0, log.t[starts[last]] if starts.size else np.inf, np.inf)
     settled: np.ndarray = log.t >= began + delay - 1e-9

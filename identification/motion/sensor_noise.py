@@ -1,4 +1,6 @@
-"""The noise of a log's sensors, estimated from the log itself, and the residual that it alone would leave."""
+"""The noise of a log's sensors, estimated from the log itself, and the residual that it alone would
+leave.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +15,9 @@ from ..logs.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
-_ABOVE = 0.25  # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
+_ABOVE = (
+    0.25  # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
+)
 
 
 @dataclass(frozen=True)
@@ -26,18 +30,24 @@ class SensorNoise:
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
-    """Return the noise of a log: of its pose what lies above a quarter of the sampling rate, taken as white.
+    """Return the noise of a log: of its pose what lies above a quarter of the sampling rate, taken
+    as white.
 
-    The turn rates' is the step to which they are rounded, as the log shows it (no more than the vehicle's file says).
+    The turn rates' is the step to which they are rounded, as the log shows it (no more than the
+    vehicle's file says).
     """
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
     position = _high(log.position[seen])[whole]
     turned = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
-    angle = (turned[:-1].inv() * turned[1:]).as_rotvec()  # white noise differenced: twice its power, and a known shape
+    angle = (
+        turned[:-1].inv() * turned[1:]
+    ).as_rotvec()  # white noise differenced: twice its power, and a known shape
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
-    return SensorNoise(_level(position), _level(_high(np.cumsum(angle, axis=0))), step / np.sqrt(12.0))
+    return SensorNoise(
+        _level(position), _level(_high(np.cumsum(angle, axis=0))), step / np.sqrt(12.0)
+    )
 
 
 def _high(x: Array) -> Array:
@@ -57,13 +67,20 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
     n = len(log.t)
     turn = Rotation.from_rotvec(noise.attitude * rng.standard_normal((n, 3)))
     quaternion = log.quaternion.copy()
-    quaternion[log.valid] = (Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
-                             * turn[log.valid]).as_quat(scalar_first=True)
-    return replace(log, position=log.position + noise.position * rng.standard_normal((n, 3)), quaternion=quaternion,
-                   rotor_speeds=log.rotor_speeds + noise.rate * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5))
+    quaternion[log.valid] = (
+        Rotation.from_quat(log.quaternion[log.valid], scalar_first=True) * turn[log.valid]
+    ).as_quat(scalar_first=True)
+    return replace(
+        log,
+        position=log.position + noise.position * rng.standard_normal((n, 3)),
+        quaternion=quaternion,
+        rotor_speeds=log.rotor_speeds + noise.rate * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
+    )
 
 
 def noisy_logs(logs: Sequence[FlightLog], vehicle: Vehicle, seed: int = 0) -> list[FlightLog]:
-    """Return logs with their own noise added once more, so that the change of whatever is made of them is what noise makes."""
+    """Return logs with their own noise added once more, so that the change of whatever is made of
+    them is what noise makes.
+    """
     rng = np.random.default_rng(seed)
     return [with_noise(log, sensor_noise(log, vehicle), rng) for log in logs]

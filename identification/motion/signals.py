@@ -1,8 +1,10 @@
-"""What a flight log says about motion, without a filter's delay: velocity, acceleration, body rate and its derivative.
+"""What a flight log says about motion, without a filter's delay: velocity, acceleration, body rate
+and its derivative.
 
-A zero-phase low-pass (a Butterworth filter run forwards and backwards) smooths the pose before it is differentiated, wide
-enough (15 Hz) to leave a quadrotor's motion alone. Whatever is compared with these signals must pass the same narrower
-filter afterwards, ``low_pass``: a causal filter's output against unfiltered regressors biases drag by a quarter.
+A zero-phase low-pass (a Butterworth filter run forwards and backwards) smooths the pose before it
+is differentiated, wide enough (15 Hz) to leave a quadrotor's motion alone. Whatever is compared
+with these signals must pass the same narrower filter afterwards, ``low_pass``: a causal filter's
+output against unfiltered regressors biases drag by a quarter.
 """
 
 from dataclasses import dataclass
@@ -43,7 +45,9 @@ def low_pass(x: Array, cutoff_hz: float, period: float) -> Array:
     if cutoff_hz >= 0.49 / period:
         return x
     rows = np.ascontiguousarray(np.moveaxis(x, 0, -1))  # which the filter runs along faster
-    return np.moveaxis(np.asarray(sosfiltfilt(_sections(2.0 * cutoff_hz * period), rows), dtype=np.float64), -1, 0)
+    return np.moveaxis(
+        np.asarray(sosfiltfilt(_sections(2.0 * cutoff_hz * period), rows), dtype=np.float64), -1, 0
+    )
 
 
 @lru_cache(maxsize=64)
@@ -54,7 +58,8 @@ def _sections(share_of_nyquist: float) -> Array:
 def log_signals(log: FlightLog, wide_hz: float = WIDE_HZ) -> list[Signals]:
     """Return the motion over each unbroken piece of a log that is long enough to say something.
 
-    Uneven time steps and single lost poses are bridged by interpolation; a gap of more than 0.1 s ends a piece.
+    Uneven time steps and single lost poses are bridged by interpolation; a gap of more than 0.1 s
+    ends a piece.
 
     Raises:
         InputError: no piece is longer than 3 s.
@@ -62,7 +67,11 @@ def log_signals(log: FlightLog, wide_hz: float = WIDE_HZ) -> list[Signals]:
     seen = np.flatnonzero(log.valid)
     breaks = np.flatnonzero(np.diff(log.t[seen]) > max(0.1, 3.5 * log.period)) + 1
     pieces = [piece for piece in np.split(seen, breaks) if len(piece) > 8]
-    out = [_piece(log, piece, wide_hz) for piece in pieces if log.t[piece[-1]] - log.t[piece[0]] > _SHORTEST]
+    out = [
+        _piece(log, piece, wide_hz)
+        for piece in pieces
+        if log.t[piece[-1]] - log.t[piece[0]] > _SHORTEST
+    ]
     if not out:
         raise InputError(f"{log.name}: no unbroken piece of pose is longer than {_SHORTEST:g} s")
     return out
@@ -77,10 +86,13 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
         return np.column_stack([np.interp(t, log.t[rows], column) for column in x[rows].T])
 
     q = log.quaternion[rows]
-    # a quaternion and its negative are one attitude: make the sequence continuous before it is smoothed
+    # a quaternion and its negative are one attitude: make the sequence continuous before it is
+    # smoothed
     signs = np.sign(np.sum(q[1:] * q[:-1], axis=1))
     q = q * np.concatenate([[1.0], np.cumprod(np.where(signs == 0, 1.0, signs))])[:, None]
-    q = low_pass(np.column_stack([np.interp(t, log.t[rows], column) for column in q.T]), wide_hz, period)
+    q = low_pass(
+        np.column_stack([np.interp(t, log.t[rows], column) for column in q.T]), wide_hz, period
+    )
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     dq = _derivative(q, period)
     w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
@@ -88,14 +100,26 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
     position = low_pass(even(log.position), wide_hz, period)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     speeds = np.column_stack([np.interp(t, log.t, column) for column in log.rotor_speeds.T])
-    return Signals(t, period, position, Rotation.from_quat(q, scalar_first=True).as_matrix(), _derivative(position, period),
-                   _derivative(position, period, 2), rate, _derivative(rate, period), speeds, voltage)
+    return Signals(
+        t,
+        period,
+        position,
+        Rotation.from_quat(q, scalar_first=True).as_matrix(),
+        _derivative(position, period),
+        _derivative(position, period, 2),
+        rate,
+        _derivative(rate, period),
+        speeds,
+        voltage,
+    )
 
 
 def _derivative(x: Array, period: float, order: int = 1) -> Array:
-    """Return a derivative of ``x`` (n, k) along its first axis, true to the fourth power of the period.
+    """Return a derivative of ``x`` (n, k) along its first axis, true to the fourth power of the
+    period.
 
-    Central differences, applied twice, take a third of (omega period)^2 from an acceleration. The direction of thrust loses
-    nothing, and the difference, 0.08 mm times the angular acceleration at 200 Hz, would be a centre of mass that is off.
+    Central differences, applied twice, take a third of (omega period)^2 from an acceleration. The
+    direction of thrust loses nothing, and the difference, 0.08 mm times the angular acceleration at
+    200 Hz, would be a centre of mass that is off.
     """
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))

@@ -1,4 +1,6 @@
-"""The report of a diagnosis: its numbers (JSON), the amended vehicle (YAML) and a page for people (HTML)."""
+"""The report of a diagnosis: its numbers (JSON), the amended vehicle (YAML) and a page for people
+(HTML).
+"""
 
 import json
 import math
@@ -17,14 +19,17 @@ from ..findings import Diagnosis, Errors
 from .page import report_page
 
 
-def write_report(diagnosis: Diagnosis, folder: str | Path, command: str | None = None) -> list[Path]:
-    """Write ``report.json``, ``report.html`` and ``vehicle.yaml`` into a folder, each whole or not at all.
+def write_report(
+    diagnosis: Diagnosis, folder: str | Path, command: str | None = None
+) -> list[Path]:
+    """Write ``report.json``, ``report.html`` and ``vehicle.yaml`` into a folder, each whole or not
+    at all.
 
     Args:
         diagnosis: what was found.
         folder: it is made if need be.
-        command: the command line that made the diagnosis, for the page; default: put together from the names of the logs
-            and the vehicle, which lack their folders and the reader.
+        command: the command line that made the diagnosis, for the page; default: put together from
+            the names of the logs and the vehicle, which lack their folders and the reader.
 
     Returns:
         the three paths.
@@ -45,13 +50,18 @@ def write_report(diagnosis: Diagnosis, folder: str | Path, command: str | None =
 
 
 def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return what ``report.json`` holds: plain Python values, six significant digits, None for what is not finite."""
+    """Return what ``report.json`` holds: plain Python values, six significant digits, None for what
+    is not finite.
+    """
     segments = [[start, end] for _, start, end in diagnosis.held_out_segments]
     error: dict[str, Any] = {
         "held_out_segments": segments,
         "before": _errors(diagnosis.before),
         "after": _errors(diagnosis.after),
-        "floor": {"force_rms_N": diagnosis.floor_force_rms, "torque_rms_Nm": diagnosis.floor_torque_rms},
+        "floor": {
+            "force_rms_N": diagnosis.floor_force_rms,
+            "torque_rms_Nm": diagnosis.floor_torque_rms,
+        },
     }
     if len(diagnosis.logs) + len(diagnosis.test_logs) > 1:
         by_log: dict[str, list[list[float]]] = {}
@@ -68,7 +78,10 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
-        "pushes": [{"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak} for p in diagnosis.pushes],
+        "pushes": [
+            {"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak}
+            for p in diagnosis.pushes
+        ],
         "logs": diagnosis.logs,
         "test_logs": diagnosis.test_logs,
         "seconds": diagnosis.seconds,
@@ -81,9 +94,12 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _errors(errors: Errors) -> dict[str, float]:
-    return {"force_rms_N": errors.force_rms, "torque_rms_Nm": errors.torque_rms,
-            "nis_without_wrench_state": errors.nis_without_wrench_state,
-            "rollout_1s_position_rms_m": errors.rollout_1s_position_rms}
+    return {
+        "force_rms_N": errors.force_rms,
+        "torque_rms_Nm": errors.torque_rms,
+        "nis_without_wrench_state": errors.nis_without_wrench_state,
+        "rollout_1s_position_rms_m": errors.rollout_1s_position_rms,
+    }
 
 
 def _plain(value: Any) -> Any:
@@ -114,11 +130,23 @@ def _printable_names(diagnosis: Diagnosis) -> Diagnosis:
         notes=tuple(map(_printable, diagnosis.notes)),
         traces=tuple(replace(trace, log=_printable(trace.log)) for trace in diagnosis.traces),
         pushes=tuple(replace(push, log=_printable(push.log)) for push in diagnosis.pushes),
-        held_out_segments=tuple((_printable(log), start, end) for log, start, end in diagnosis.held_out_segments),
+        held_out_segments=tuple(
+            (_printable(log), start, end) for log, start, end in diagnosis.held_out_segments
+        ),
     )
 
 
 def _command(diagnosis: Diagnosis, folder: Path) -> str:
     tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
-    return shlex.join(["windwrench", "diagnose", *diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name,
-                       "--out", str(folder)])
+    return shlex.join(
+        [
+            "windwrench",
+            "diagnose",
+            *diagnosis.logs,
+            *tests,
+            "--vehicle",
+            diagnosis.declared.name,
+            "--out",
+            str(folder),
+        ]
+    )

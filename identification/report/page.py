@@ -33,27 +33,54 @@ from .words import (
 if TYPE_CHECKING:
     from jinja2 import Template
 
-_TONES = {"explained": "good", "nothing to explain": "good", "partly explained": "warn", "unexplained": "bad"}
+_TONES = {
+    "explained": "good",
+    "nothing to explain": "good",
+    "partly explained": "warn",
+    "unexplained": "bad",
+}
 
 
 def report_page(diagnosis: Diagnosis, command: str) -> str:
-    """Return the page (HTML); ``command`` is what made it. Every text is escaped: names of files come from users."""
+    """Return the page (HTML); ``command`` is what made it. Every text is escaped: names of files
+    come from users.
+    """
     shown = shown_candidates(diagnosis)
     return _template().render(
-        headline=headline(diagnosis), errors=error_sentences(diagnosis), remainder=remainder_sentence(diagnosis),
-        doubts=doubt_sentences(diagnosis), verdict=diagnosis.verdict, tone=_TONES.get(diagnosis.verdict, "warn"),
-        vehicle=diagnosis.declared.name, logs=diagnosis.logs, test_logs=diagnosis.test_logs,
-        seconds=duration(diagnosis.seconds), cutoff=f"{diagnosis.cutoff_hz:.3g} Hz",
-        effects=[_effect(effect) for effect in diagnosis.effects], table=error_table(diagnosis),
+        headline=headline(diagnosis),
+        errors=error_sentences(diagnosis),
+        remainder=remainder_sentence(diagnosis),
+        doubts=doubt_sentences(diagnosis),
+        verdict=diagnosis.verdict,
+        tone=_TONES.get(diagnosis.verdict, "warn"),
+        vehicle=diagnosis.declared.name,
+        logs=diagnosis.logs,
+        test_logs=diagnosis.test_logs,
+        seconds=duration(diagnosis.seconds),
+        cutoff=f"{diagnosis.cutoff_hz:.3g} Hz",
+        effects=[_effect(effect) for effect in diagnosis.effects],
+        table=error_table(diagnosis),
         missing=any(MISSING in (row["before"], row["after"]) for row in error_table(diagnosis)),
-        held_out=_held_out(diagnosis), held_out_sum=_held_out_sum(diagnosis),
-        over_time=draw_over_time(diagnosis), over_frequency=draw_over_frequency(diagnosis),
-        pieces=[f"{trace.log}, {trace.t[0]:.1f} to {trace.t[-1]:.1f} s" for trace in diagnosis.traces],
-        signatures=draw_signatures(diagnosis), candidates=draw_candidates(diagnosis),
-        more_candidates=[f"{c.name} {percent(c.gain)}" for c in diagnosis.candidates if c not in shown],
-        structure=[{"where": s.where, "test": s.test, "gain": percent(s.gain)} for s in diagnosis.structure],
+        held_out=_held_out(diagnosis),
+        held_out_sum=_held_out_sum(diagnosis),
+        over_time=draw_over_time(diagnosis),
+        over_frequency=draw_over_frequency(diagnosis),
+        pieces=[
+            f"{trace.log}, {trace.t[0]:.1f} to {trace.t[-1]:.1f} s" for trace in diagnosis.traces
+        ],
+        signatures=draw_signatures(diagnosis),
+        candidates=draw_candidates(diagnosis),
+        more_candidates=[
+            f"{c.name} {percent(c.gain)}" for c in diagnosis.candidates if c not in shown
+        ],
+        structure=[
+            {"where": s.where, "test": s.test, "gain": percent(s.gain)} for s in diagnosis.structure
+        ],
         alike=[confusion(effect) for effect in diagnosis.effects if effect.indistinguishable_from],
-        advice=diagnosis.advice, notes=diagnosis.notes, command=command, version=__version__,
+        advice=diagnosis.advice,
+        notes=diagnosis.notes,
+        command=command,
+        version=__version__,
     )
 
 
@@ -62,18 +89,33 @@ def _template() -> "Template":
     from jinja2 import Environment, StrictUndefined
 
     source = resources.files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
-    return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True).from_string(source)
+    return Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    ).from_string(source)
 
 
 def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """Return the rows of the error before, after and at the floor: what, unit and three rounded numbers."""
+    """Return the rows of the error before, after and at the floor: what, unit and three rounded
+    numbers.
+    """
     before, after, unknown = diagnosis.before, diagnosis.after, math.nan
     rows = [
         ("Force, rms", "N", before.force_rms, after.force_rms, diagnosis.floor_force_rms),
         ("Torque, rms", "Nm", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms),
-        ("Position after 1 s of prediction, rms", "m", before.rollout_1s_position_rms, after.rollout_1s_position_rms, unknown),
-        ("NIS of a filter without wrench states, mean", "", before.nis_without_wrench_state, after.nis_without_wrench_state,
-         6.0),
+        (
+            "Position after 1 s of prediction, rms",
+            "m",
+            before.rollout_1s_position_rms,
+            after.rollout_1s_position_rms,
+            unknown,
+        ),
+        (
+            "NIS of a filter without wrench states, mean",
+            "",
+            before.nis_without_wrench_state,
+            after.nis_without_wrench_state,
+            6.0,
+        ),
     ]
     table = []
     for what, unit, *numbers in rows:
@@ -81,8 +123,15 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
         texts = [rounded(factor * number) for number in numbers]
         if not unit:
             texts[2] = "6"
-        table.append({"what": what, "unit": unit, "before": texts[0], "after": texts[1],
-                      "floor": "" if math.isnan(numbers[2]) else texts[2]})
+        table.append(
+            {
+                "what": what,
+                "unit": unit,
+                "before": texts[0],
+                "after": texts[1],
+                "floor": "" if math.isnan(numbers[2]) else texts[2],
+            }
+        )
     return table
 
 
@@ -90,12 +139,25 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
     rows = []
     for name, value in effect.coefficients.items():
         unit = effect.units.get(name, "")
-        rows.append({"name": name, "value": with_std(value, effect.std.get(name, math.nan)),
-                     "unit": "" if unit == "1" else unit, "meaning": coefficient_meaning(effect.name, name)})
-    evidence = ", ".join(f"{key.replace('_', ' ')} {percent(value) if 'share' in key else rounded(value)}"
-                         for key, value in effect.evidence.items())
-    return {"name": effect.name, "tentative": effect.tentative, "summary": effect_summary(effect.name), "evidence": evidence,
-            "rows": rows}
+        rows.append(
+            {
+                "name": name,
+                "value": with_std(value, effect.std.get(name, math.nan)),
+                "unit": "" if unit == "1" else unit,
+                "meaning": coefficient_meaning(effect.name, name),
+            }
+        )
+    evidence = ", ".join(
+        f"{key.replace('_', ' ')} {percent(value) if 'share' in key else rounded(value)}"
+        for key, value in effect.evidence.items()
+    )
+    return {
+        "name": effect.name,
+        "tentative": effect.tentative,
+        "summary": effect_summary(effect.name),
+        "evidence": evidence,
+        "rows": rows,
+    }
 
 
 def _held_out(diagnosis: Diagnosis) -> list[str]:

@@ -1,7 +1,8 @@
-"""The pictures of a diagnosis's report: small vector drawings for one column of a telephone or three of a wide window.
+"""The pictures of a diagnosis's report: small vector drawings for one column of a telephone or
+three of a wide window.
 
-Each is an SVG element that stands in the page itself. Its colours are the page's CSS variables, so it follows the light or
-dark scheme, and its text is text.
+Each is an SVG element that stands in the page itself. Its colours are the page's CSS variables, so
+it follows the light or dark scheme, and its text is text.
 """
 
 import io
@@ -29,12 +30,21 @@ Array = NDArray[np.float64]
 SYMBOLS = dict(zip(CHANNELS, ("Fx", "Fy", "Fz", "τx", "τy", "τz"), strict=True))
 _UNITS = ("N", "N", "N", "Nm", "Nm", "Nm")
 # drawn in these, written as the variables
-_COLOURS = {"ink": "#1c2430", "muted": "#6b7483", "grid": "#dfe3e8", "bar": "#b4bcc7", "before": "#d55e00", "after": "#0072b2",
-            "held": "#e6edda"}
+_COLOURS = {
+    "ink": "#1c2430",
+    "muted": "#6b7483",
+    "grid": "#dfe3e8",
+    "bar": "#b4bcc7",
+    "before": "#d55e00",
+    "after": "#0072b2",
+    "held": "#e6edda",
+}
 _BINS = 320  # columns that a line over time is thinned to: its lowest and highest point in each
 _POINTS = 600  # of a signature
 _LABEL = 46  # letters in a line below a signature
-_FEW_DECADES = 100.0  # between the ends of an axis, whose powers of ten are too few to read a number off
+_FEW_DECADES = (
+    100.0  # between the ends of an axis, whose powers of ten are too few to read a number off
+)
 _BARS = 14  # candidates that are drawn, besides the named ones
 _SVG = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
@@ -54,18 +64,27 @@ def _style() -> Iterator[None]:
     """Set matplotlib's fonts and SVG for the pictures within, and only for them."""
     import matplotlib  # takes half a second, and most of the kit never draws
 
-    # users' names may hold what mathematical text would choke on; points are thinned here, not by the renderer
+    # users' names may hold what mathematical text would choke on; points are thinned here, not by
+    # the renderer
     style: dict[Any, Any] = {
-        "svg.fonttype": "none", "svg.hashsalt": "windwrench", "path.simplify": False, "text.parse_math": False,
-        "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 7.5, "axes.labelsize": 7.5,
-        "axes.formatter.useoffset": False}
+        "svg.fonttype": "none",
+        "svg.hashsalt": "windwrench",
+        "path.simplify": False,
+        "text.parse_math": False,
+        "font.family": "sans-serif",
+        "font.sans-serif": ["DejaVu Sans"],
+        "font.size": 7.5,
+        "axes.labelsize": 7.5,
+        "axes.formatter.useoffset": False,
+    }
     with matplotlib.rc_context(style):
         yield
 
 
 @_style()
 def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
-    """Draw the residual before and after over time, a picture a channel; held-out blocks are shaded.
+    """Draw the residual before and after over time, a picture a channel; held-out blocks are
+    shaded.
 
     Pieces of flight stand side by side, with their numbers above where there are several.
     """
@@ -76,7 +95,11 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
     pictures = []
     for i, channel in enumerate(CHANNELS):
         group = slice(0, 3) if i < 3 else slice(3, 6)
-        largest = max(float(np.abs(x[:, group]).max(initial=0.0)) for trace in traces for x in (trace.before, trace.after))
+        largest = max(
+            float(np.abs(x[:, group]).max(initial=0.0))
+            for trace in traces
+            for x in (trace.before, trace.after)
+        )
         factor, unit = scale_of([largest], _UNITS[i])
         figure, panel = _panel(3.4, 1.75)
         for number, (trace, start) in enumerate(zip(traces, starts, strict=True), 1):
@@ -87,22 +110,40 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
             if len(traces) > 1:
                 panel.axvline(start, color=_COLOURS["muted"], lw=0.5)
             if 1 < len(traces) <= 12:
-                panel.text(t.mean(), 0.97, str(number), transform=panel.get_xaxis_transform(), ha="center", va="top",
-                           color=_COLOURS["muted"])
-        before, after = (_rms([x[:, i] for x in side]) for side in ([t.before for t in traces], [t.after for t in traces]))
+                panel.text(
+                    t.mean(),
+                    0.97,
+                    str(number),
+                    transform=panel.get_xaxis_transform(),
+                    ha="center",
+                    va="top",
+                    color=_COLOURS["muted"],
+                )
+        before, after = (
+            _rms([x[:, i] for x in side])
+            for side in ([t.before for t in traces], [t.after for t in traces])
+        )
         change = f"rms {rounded(factor * before, 2)} → {rounded(factor * after, 2)}"
         panel.set_ylim(-1.08 * factor * largest or -1.0, 1.08 * factor * largest or 1.0)
         panel.set_xlim(starts[0], starts[-1] + traces[-1].t[-1] - traces[-1].t[0])
         _title(panel, f"{SYMBOLS[channel]} ({unit})", change)
         panel.set_xlabel("time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)")
-        pictures.append(_picture(figure, f"time-{channel}", f"Residual {SYMBOLS[channel]} in {unit} over time, before and "
-                                 f"after: {change}. Held-out blocks are shaded."))
+        pictures.append(
+            _picture(
+                figure,
+                f"time-{channel}",
+                f"Residual {SYMBOLS[channel]} in {unit} over time, before and "
+                f"after: {change}. Held-out blocks are shaded.",
+            )
+        )
     return pictures
 
 
 @_style()
 def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
-    """Draw amplitude spectra of force and torque (root of the sum over three axes, mean removed), before and after."""
+    """Draw amplitude spectra of force and torque (root of the sum over three axes, mean removed),
+    before and after.
+    """
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     traces = [trace for trace in diagnosis.traces if len(trace.t) >= 16]
@@ -121,28 +162,46 @@ def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
         panel.yaxis.set_major_formatter("{x:g}")
         low, high = panel.get_ylim()
         panel.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
-        panel.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}") if high < _FEW_DECADES * low else NullFormatter())
+        panel.yaxis.set_minor_formatter(
+            StrMethodFormatter("{x:g}") if high < _FEW_DECADES * low else NullFormatter()
+        )
         panel.set_xlim(0.0, grid[-1])
         _title(panel, f"{what} ({unit}/√Hz)")
         panel.set_xlabel("frequency (Hz)")
         peak = grid[int(np.argmax(sides[0]))]
-        pictures.append(_picture(figure, f"frequency-{what}", f"Amplitude spectrum of the residual {what} in {unit} per root "
-                                 f"hertz, before and after; before, it is largest at {rounded(peak, 2)} Hz."))
+        pictures.append(
+            _picture(
+                figure,
+                f"frequency-{what}",
+                f"Amplitude spectrum of the residual {what} in {unit} per root "
+                f"hertz, before and after; before, it is largest at {rounded(peak, 2)} Hz.",
+            )
+        )
     return pictures
 
 
 @_style()
 def draw_signatures(diagnosis: Diagnosis) -> list[Picture]:
-    """Draw the residual against what drives each named effect, with the effect's own share of it."""
-    return [_draw_signature(signature, number) for number, signature in enumerate(diagnosis.signatures)]
+    """Draw the residual against what drives each named effect, with the effect's
+    own share of it.
+    """
+    return [
+        _draw_signature(signature, number) for number, signature in enumerate(diagnosis.signatures)
+    ]
 
 
 def _draw_signature(signature: Signature, number: int) -> Picture:
     channel = CHANNELS.index(signature.channel)
-    good = np.isfinite(signature.x) & np.isfinite(signature.residual) & np.isfinite(signature.fitted)
+    good = (
+        np.isfinite(signature.x) & np.isfinite(signature.residual) & np.isfinite(signature.fitted)
+    )
     x, residual, fitted = signature.x[good], signature.residual[good], signature.fitted[good]
     factor, unit = scale_of(np.abs(np.concatenate([residual, fitted])), _UNITS[channel])
-    keep = np.unique(np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int)) if len(x) else np.zeros(0, dtype=int)
+    keep = (
+        np.unique(np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int))
+        if len(x)
+        else np.zeros(0, dtype=int)
+    )
     label = textwrap.wrap(signature.regressor, _LABEL) or [""]
     figure, panel = _panel(3.4, 2.4, lines=len(label))
     _dots(panel, x[keep], factor * residual[keep], "before", 2.5, 0.6)
@@ -151,17 +210,27 @@ def _draw_signature(signature: Signature, number: int) -> Picture:
     panel.plot(middle, mean, color=_COLOURS["ink"], lw=1.4)
     _title(panel, f"{SYMBOLS[signature.channel]} ({unit})")
     panel.set_xlabel("\n".join(label))
-    fit = float(np.corrcoef(residual, fitted)[0, 1]) if len(x) > 2 and residual.std() > 0 and fitted.std() > 0 else np.nan
+    fit = (
+        float(np.corrcoef(residual, fitted)[0, 1])
+        if len(x) > 2 and residual.std() > 0 and fitted.std() > 0
+        else np.nan
+    )
     alike = f"; correlation {rounded(fit, 2)}" if np.isfinite(fit) else ""
     symbol = SYMBOLS[signature.channel]
-    return _picture(figure, f"signature-{number}", f"Residual {symbol} in {unit} without {signature.effect} against "
-                    f" {signature.regressor}, its mean, and the fitted values of {signature.effect}{alike}.",
-                    signature.effect)
+    return _picture(
+        figure,
+        f"signature-{number}",
+        f"Residual {symbol} in {unit} without {signature.effect} against "
+        f" {signature.regressor}, its mean, and the fitted values of {signature.effect}{alike}.",
+        signature.effect,
+    )
 
 
 @_style()
 def draw_candidates(diagnosis: Diagnosis) -> Picture | None:
-    """Draw the ranking of the effects that were tried: what each explains alone, the named ones in colour."""
+    """Draw the ranking of the effects that were tried: what each explains alone, the named ones in
+    colour.
+    """
     shown = shown_candidates(diagnosis)
     if not shown:
         return None
@@ -173,8 +242,13 @@ def draw_candidates(diagnosis: Diagnosis) -> Picture | None:
     colours = [_COLOURS["after" if candidate.named else "bar"] for candidate in shown]
     panel.barh(rows, 100.0 * np.maximum(finite, low), height=0.68, color=colours, lw=0)
     for row, gain in zip(rows, gains, strict=True):
-        panel.text(100.0 * max(float(np.nan_to_num(gain)), 0.0) + 1.5 * high, row, percent(gain), va="center",
-                   color=_COLOURS["ink"])
+        panel.text(
+            100.0 * max(float(np.nan_to_num(gain)), 0.0) + 1.5 * high,
+            row,
+            percent(gain),
+            va="center",
+            color=_COLOURS["ink"],
+        )
     panel.set_xlim(100.0 * low, 125.0 * high)
     panel.set_ylim(-0.6, len(shown) - 0.4)
     panel.set_yticks(rows, [candidate.name for candidate in shown])
@@ -185,17 +259,28 @@ def draw_candidates(diagnosis: Diagnosis) -> Picture | None:
     panel.set_xlabel("share of the residual that it alone explains (%)", x=0.32)
     best = ", ".join(f"{candidate.name} {percent(candidate.gain)}" for candidate in shown[:3])
     named = ", ".join(candidate.name for candidate in shown if candidate.named) or "none"
-    return _picture(figure, "candidates", f"Share of the residual that each effect explains alone; best: {best}. "
-                    f"Named: {named}.")
+    return _picture(
+        figure,
+        "candidates",
+        f"Share of the residual that each effect explains alone; best: {best}. Named: {named}.",
+    )
 
 
 def shown_candidates(diagnosis: Diagnosis) -> list[Candidate]:
     """Return the candidates that are drawn: the best, and whichever else was named."""
-    return [candidate for i, candidate in enumerate(diagnosis.candidates) if i < _BARS or candidate.named]
+    return [
+        candidate
+        for i, candidate in enumerate(diagnosis.candidates)
+        if i < _BARS or candidate.named
+    ]
 
 
-def _panel(width: float, height: float, left: float = 0.135, lines: int = 1) -> "tuple[Figure, Axes]":
-    """Return a figure (inches) with one frame and room for a label of so many lines; fixed margins keep neighbours in line."""
+def _panel(
+    width: float, height: float, left: float = 0.135, lines: int = 1
+) -> "tuple[Figure, Axes]":
+    """Return a figure (inches) with one frame and room for a label of so many lines; fixed margins
+    keep neighbours in line.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height))
@@ -207,7 +292,9 @@ def _panel(width: float, height: float, left: float = 0.135, lines: int = 1) -> 
     panel.spines[["left", "bottom"]].set_color(_COLOURS["muted"])
     panel.grid(color=_COLOURS["grid"], lw=0.6)
     panel.set_axisbelow(True)
-    panel.tick_params(which="both", colors=_COLOURS["muted"], labelsize=7.5, length=2.0, width=0.6, pad=2.0)
+    panel.tick_params(
+        which="both", colors=_COLOURS["muted"], labelsize=7.5, length=2.0, width=0.6, pad=2.0
+    )
     panel.xaxis.label.set_color(_COLOURS["muted"])
     panel.locator_params(axis="both", nbins=5)
     panel.xaxis.labelpad = 1.5
@@ -215,13 +302,22 @@ def _panel(width: float, height: float, left: float = 0.135, lines: int = 1) -> 
 
 
 def _title(panel: "Axes", left: str, right: str = "") -> None:
-    panel.set_title(left, loc="left", x=-0.13 if panel.get_position().x0 > 0.1 else 0.0, fontsize=8.5, pad=4.0,
-                    color=_COLOURS["ink"], fontweight="bold")
+    panel.set_title(
+        left,
+        loc="left",
+        x=-0.13 if panel.get_position().x0 > 0.1 else 0.0,
+        fontsize=8.5,
+        pad=4.0,
+        color=_COLOURS["ink"],
+        fontweight="bold",
+    )
     panel.set_title(right, loc="right", fontsize=8.0, pad=4.0, color=_COLOURS["muted"])
 
 
 def _starts(traces: Sequence[Trace]) -> list[float]:
-    """Return where each piece begins on a common axis: its own time if there is one, side by side if there are several."""
+    """Return where each piece begins on a common axis: its own time if there is one, side by side
+    if there are several.
+    """
     if len(traces) == 1:
         return [float(traces[0].t[0])]
     lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
@@ -234,11 +330,20 @@ def _shade(panel: "Axes", t: Array, trace: Trace) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], trace.held_out, [False]]).astype(int)))
     runs = [(t[a], t[min(b, len(t) - 1)] - t[a]) for a, b in edges.reshape(-1, 2)]
     if runs:
-        panel.broken_barh(runs, (0.0, 1.0), transform=panel.get_xaxis_transform(), facecolors=_COLOURS["held"], lw=0, zorder=0)
+        panel.broken_barh(
+            runs,
+            (0.0, 1.0),
+            transform=panel.get_xaxis_transform(),
+            facecolors=_COLOURS["held"],
+            lw=0,
+            zorder=0,
+        )
 
 
 def _thin(t: Array, x: Array) -> tuple[Array, Array]:
-    """Return a line (n,) by its lowest and highest point in each of ``_BINS`` columns, in their order."""
+    """Return a line (n,) by its lowest and highest point in each of ``_BINS`` columns, in their
+    order.
+    """
     if len(t) <= 2 * _BINS:
         return t, x
     columns = np.array_split(np.arange(len(t)), _BINS)
@@ -256,10 +361,18 @@ def _binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
 
 
 def _dots(panel: "Axes", x: Array, y: Array, colour: str, size: float, alpha: float) -> None:
-    """Draw points as one path of zero length strokes: a fifth of the text that a marker each would take."""
+    """Draw points as one path of zero length strokes: a fifth of the text that a marker each would
+    take.
+    """
     nothing = np.full(len(x), np.nan)
-    panel.plot(np.column_stack([x, x, nothing]).ravel(), np.column_stack([y, y, nothing]).ravel(), color=_COLOURS[colour],
-               lw=size, alpha=alpha, solid_capstyle="round")
+    panel.plot(
+        np.column_stack([x, x, nothing]).ravel(),
+        np.column_stack([y, y, nothing]).ravel(),
+        color=_COLOURS[colour],
+        lw=size,
+        alpha=alpha,
+        solid_capstyle="round",
+    )
 
 
 def _rms(parts: Sequence[Array]) -> float:
@@ -267,11 +380,15 @@ def _rms(parts: Sequence[Array]) -> float:
 
 
 def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> Array:
-    """Return the amplitude (f,) per root hertz of all pieces together, the longer counting for more."""
+    """Return the amplitude (f,) per root hertz of all pieces together, the longer counting for
+    more.
+    """
     total, weight = np.zeros(len(grid)), 0.0
     for trace in traces:
         x = getattr(trace, side)[:, group]
-        f, power = welch(x, 1.0 / trace.period, nperseg=min(len(x), round(8.0 / trace.period)), axis=0)
+        f, power = welch(
+            x, 1.0 / trace.period, nperseg=min(len(x), round(8.0 / trace.period)), axis=0
+        )
         total += len(x) * trace.period * np.interp(grid, f, power.sum(axis=1))
         weight += len(x) * trace.period
     return np.asarray(np.sqrt(total / weight), dtype=np.float64)
@@ -280,7 +397,9 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
 def _picture(figure: "Figure", key: str, alt: str, caption: str = "") -> Picture:
     """Return a figure as an SVG element for the page, small and with names of its own (``key``)."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    figure.savefig(
+        buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
+    )
     ElementTree.register_namespace("", _SVG)
     ElementTree.register_namespace("xlink", _XLINK)
     root = ElementTree.fromstring(buffer.getvalue())
@@ -296,13 +415,19 @@ def _picture(figure: "Figure", key: str, alt: str, caption: str = "") -> Picture
             element.attrib.pop("id", None)
         for name, value in element.attrib.items():
             if name == "d":
-                value = re.sub(r"\s*([A-Za-z])\s*", r"\1", re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.4g}", value)).strip()
+                value = re.sub(
+                    r"\s*([A-Za-z])\s*",
+                    r"\1",
+                    re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.4g}", value),
+                ).strip()
             elif name == "style":
                 value = re.sub(r"(font: (?:bold )?[\d.]+px)[^;]*", r"\1 var(--sans)", value)
                 for variable, colour in _COLOURS.items():
                     value = value.replace(colour, f"var(--{variable})")
             elif name != "id":
-                value = re.sub(r"#([\w-]+)", lambda m: f"#{key}-{m[1]}" if m[1] in used else m[0], value)
+                value = re.sub(
+                    r"#([\w-]+)", lambda m: f"#{key}-{m[1]}" if m[1] in used else m[0], value
+                )
             element.set(name, value)
     for name in ("width", "height", "version"):
         root.attrib.pop(name, None)

@@ -13,7 +13,9 @@ _TELLING = 1.3  # times the floor, from which an error is worth a word in the fi
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """Return a number with so many significant digits and no exponent; a dash if it is not finite."""
+    """Return a number with so many significant digits and no exponent; a dash if
+    it is not finite.
+    """
     if not math.isfinite(value):
         return MISSING
     value = float(f"{value:.{digits - 1}e}")
@@ -22,7 +24,9 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def with_std(value: float, std: float) -> str:
-    """Return ``value ± std``: the deviation with two significant digits, the value as precise, one power of ten for both."""
+    """Return ``value ± std``: the deviation with two significant digits, the value as precise, one
+    power of ten for both.
+    """
     if not math.isfinite(value):
         return MISSING
     known = math.isfinite(std) and std > 0
@@ -43,14 +47,22 @@ def with_std(value: float, std: float) -> str:
 
 
 def scale_of(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """Return the factor and the unit, plain or milli, in which numbers (in ``unit``) that are compared read best."""
+    """Return the factor and the unit, plain or milli, in which numbers (in ``unit``) that are
+    compared read best.
+    """
     largest = max((abs(v) for v in values if math.isfinite(v)), default=math.inf)
     return (1e3, f"m{unit}") if largest < 0.1 else (1.0, unit)
 
 
 def in_words(names: Sequence[str], last: str = "and") -> str:
     """Return ``a, b and c``."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}" if names else ""
+    return (
+        names[0]
+        if len(names) == 1
+        else f"{', '.join(names[:-1])} {last} {names[-1]}"
+        if names
+        else ""
+    )
 
 
 def percent(share: float) -> str:
@@ -58,7 +70,9 @@ def percent(share: float) -> str:
     if not math.isfinite(share):
         return MISSING
     number = f"{100.0 * share:.{0 if abs(share) >= 0.0995 or abs(share) < 0.0005 else 1}f}"
-    return f"{number.replace('-0', '0') if abs(share) < 0.0005 else number.replace('-', '−')}{_SPACE}%"
+    return (
+        f"{number.replace('-0', '0') if abs(share) < 0.0005 else number.replace('-', '−')}{_SPACE}%"
+    )
 
 
 def duration(seconds: float) -> str:
@@ -92,30 +106,54 @@ def headline(diagnosis: Diagnosis) -> str:
         if diagnosis.remainder == "random":
             return "The model errs, but at random: no effect in the library explains it."
         return "The model is wrong in a way that no effect in the library explains."
-    lacked = (f"The model {_lacked(diagnosis, sure)}" + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
-              if sure else f"The model perhaps {_lacked(diagnosis, unsure)}")
-    return f"{lacked}, but that is not all." if diagnosis.verdict == "partly explained" else f"{lacked}."
+    lacked = (
+        f"The model {_lacked(diagnosis, sure)}"
+        + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
+        if sure
+        else f"The model perhaps {_lacked(diagnosis, unsure)}"
+    )
+    return (
+        f"{lacked}, but that is not all."
+        if diagnosis.verdict == "partly explained"
+        else f"{lacked}."
+    )
 
 
-def _lacked(diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()) -> str:
-    """Return what effects are to the model, in words: new to it, or declared with other coefficients.
+def _lacked(
+    diagnosis: Diagnosis, effects: Sequence[NamedEffect], before: Sequence[NamedEffect] = ()
+) -> str:
+    """Return what effects are to the model, in words: new to it, or declared with other
+    coefficients.
 
     After effects ``before`` that are all new as these are, the verb is not said again.
     """
     declared = {e.name: set(e.coefficients) for e in diagnosis.declared.effects}
-    changed = [e.name for e in (*before, *effects) if e.name in declared and e.coefficients.keys() <= declared[e.name]]
+    changed = [
+        e.name
+        for e in (*before, *effects)
+        if e.name in declared and e.coefficients.keys() <= declared[e.name]
+    ]
     if before and not changed:
         return in_words([e.name for e in effects])
     lacked = in_words([e.name for e in effects if e.name not in changed])
     other = in_words([e.name for e in effects if e.name in changed])
-    return in_words([*([f"lacked {lacked}"] if lacked else []), *([f"has {other} other than declared"] if other else [])])
+    return in_words(
+        [
+            *([f"lacked {lacked}"] if lacked else []),
+            *([f"has {other} other than declared"] if other else []),
+        ]
+    )
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return how the error on data that the fit never saw changes: force and torque, those that stand out from the floor."""
+    """Return how the error on data that the fit never saw changes: force and torque, those that
+    stand out from the floor.
+    """
     before, after = diagnosis.before, diagnosis.after
-    rows = [("force", before.force_rms, after.force_rms, diagnosis.floor_force_rms, "N"),
-            ("torque", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms, "Nm")]
+    rows = [
+        ("force", before.force_rms, after.force_rms, diagnosis.floor_force_rms, "N"),
+        ("torque", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms, "Nm"),
+    ]
     known = [row for row in rows if math.isfinite(row[1]) and math.isfinite(row[2])]
     if not known:
         return ["The error on data the fit never saw could not be worked out."]
@@ -128,7 +166,11 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
         change = f"falls from {start} to {end}" if new < 0.98 * old else f"is {end}"
         if new > 1.02 * old:
             change = f"rises from {start} to {end}"
-        told.append(f"{where} {change}; the floor is {least}." if math.isfinite(floor) else f"{where} {change}.")
+        told.append(
+            f"{where} {change}; the floor is {least}."
+            if math.isfinite(floor)
+            else f"{where} {change}."
+        )
     return told
 
 
@@ -138,13 +180,22 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
         return f"What is left is the sensors' noise{_gusts(diagnosis)}."
     if diagnosis.remainder == "random":
         if diagnosis.pushes:
-            return f"What is left comes now and then, as pushes do: {_push(diagnosis)}. No test found a law in it."
-        return f"What is left looks random, as turbulence does{_gusts(diagnosis)}: no test found a law in it."
+            return (
+                f"What is left comes now and then, as pushes do: {_push(diagnosis)}. "
+                "No test found a law in it."
+            )
+        return (
+            f"What is left looks random, as turbulence does{_gusts(diagnosis)}: "
+            "no test found a law in it."
+        )
     if not diagnosis.structure:
         return "What is left still follows a law."
     strongest = diagnosis.structure[0]
-    return (f"What is left still follows a law that the model lacks; the strongest sign is in {strongest.where} "
-            f"({percent(strongest.gain)} of what is left).")
+    return (
+        f"What is left still follows a law that the model lacks; the strongest sign is in "
+        f"{strongest.where} "
+        f"({percent(strongest.gain)} of what is left)."
+    )
 
 
 def _gusts(diagnosis: Diagnosis) -> str:
@@ -155,7 +206,10 @@ def _gusts(diagnosis: Diagnosis) -> str:
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
             factor, unit = scale_of([largest.rms], unit)
-            found.append(f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} that last {rounded(largest.time, 2)}{_SPACE}s")
+            found.append(
+                f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} that last "
+                f"{rounded(largest.time, 2)}{_SPACE}s"
+            )
     return f", with gusts of up to {in_words(found)}" if found else ""
 
 
@@ -164,20 +218,29 @@ def _push(diagnosis: Diagnosis) -> str:
     push = diagnosis.pushes[0]
     factor, unit = scale_of([push.peak], "Nm" if push.channel.startswith("tau") else "N")
     where = f" of {push.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    return f"{rounded(factor * push.peak, 2)}{_SPACE}{unit} in {push.channel} at {rounded(push.t)}{_SPACE}s{where}"
+    size = f"{rounded(factor * push.peak, 2)}{_SPACE}{unit}"
+    return f"{size} in {push.channel} at {rounded(push.t)}{_SPACE}s{where}"
 
 
 def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return what a name does not settle: effects that these logs cannot tell apart, and tentative ones."""
+    """Return what a name does not settle: effects that these logs cannot tell apart, and tentative
+    ones.
+    """
     told = [confusion(effect) for effect in diagnosis.effects if effect.indistinguishable_from]
     unsure = [effect.name for effect in diagnosis.effects if effect.tentative]
     if unsure:
-        told.append(f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: what "
-                    f"{'it explains' if len(unsure) == 1 else 'they explain'} may come from something that the library lacks.")
+        told.append(
+            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: what "
+            f"{'it explains' if len(unsure) == 1 else 'they explain'} may come from something that "
+            f"the library lacks."
+        )
     return told
 
 
 def confusion(effect: NamedEffect) -> str:
     """Return which other effects would explain these logs as well as this one."""
-    return (f"These logs cannot tell {effect.name} from {in_words(effect.indistinguishable_from, 'or')}, which would explain "
-            "them as well.")
+    return (
+        f"These logs cannot tell {effect.name} from "
+        f"{in_words(effect.indistinguishable_from, 'or')}, which would explain "
+        "them as well."
+    )

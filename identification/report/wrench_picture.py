@@ -1,4 +1,6 @@
-"""The picture of an estimated wrench: height, force and torque over time, with the flight's phases shaded."""
+"""The picture of an estimated wrench: height, force and torque over time, with the flight's phases
+shaded.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +27,8 @@ _LASTING = 0.1  # s without a pose that is worth hatching
 
 
 def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
-    """Draw height, force and torque with their 2-sigma bands, and the truth where the log has it, into a PNG.
+    """Draw height, force and torque with their 2-sigma bands, and the truth where the log has it,
+    into a PNG.
 
     Args:
         series: the estimate.
@@ -52,11 +55,15 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
     force.set_ylabel("external force (N)")
     if any(phase.name == GROUND for phase in phases):
-        force.axhline(vehicle.weight, color="black", lw=0.8, ls=":", label=f"weight {vehicle.weight:.3g} N")
+        force.axhline(
+            vehicle.weight, color="black", lw=0.8, ls=":", label=f"weight {vehicle.weight:.3g} N"
+        )
     in_milli = float(np.percentile(np.abs(series.torque), 99)) < 0.1
     scale, unit = (1e3, "mNm") if in_milli else (1.0, "Nm")
     truth = None if log.torque is None else scale * log.torque
-    _draw_vectors(torque, series.t, scale * series.torque, scale * series.std_torque, truth, "τ", unit)
+    _draw_vectors(
+        torque, series.t, scale * series.torque, scale * series.std_torque, truth, "τ", unit
+    )
     torque.set_ylabel(f"external torque ({unit})")
     torque.set_xlabel("time (s)")
     for panel in (height, force, torque):
@@ -64,9 +71,13 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
         panel.margins(x=0.0)
         _shade(backdrop if panel is height else panel, phases, log)
     for panel in (force, torque):
-        panel.legend(loc="upper center", ncols=4 if log.force is None else 3, fontsize=9, framealpha=0.9)
+        panel.legend(
+            loc="upper center", ncols=4 if log.force is None else 3, fontsize=9, framealpha=0.9
+        )
         low, high = panel.get_ylim()
-        panel.set_ylim(low, high + (0.14 if log.force is None else 0.26) * (high - low))  # room for the legend
+        panel.set_ylim(
+            low, high + (0.14 if log.force is None else 0.26) * (high - low)
+        )  # room for the legend
     _name_phases(height, phases)
     with replaced(path) as temporary:
         figure.savefig(temporary, format="png")
@@ -74,9 +85,17 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
 
 
 def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "Axes":
-    """Draw what the rotors are taken to lift, in weights, behind the height; return the axes behind."""
+    """Draw what the rotors are taken to lift, in weights, behind the height; return the axes
+    behind.
+    """
     thrust = panel.twinx()
-    thrust.plot(t, np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight, color="#a35db5", lw=0.6, alpha=0.6)
+    thrust.plot(
+        t,
+        np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight,
+        color="#a35db5",
+        lw=0.6,
+        alpha=0.6,
+    )
     thrust.set_ylabel("rotor thrust / weight", color="#7d3c8c")
     thrust.tick_params(axis="y", labelcolor="#7d3c8c")
     thrust.set_ylim(bottom=0.0)
@@ -85,18 +104,30 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
     return thrust
 
 
-def _draw_vectors(panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, symbol: str,
-                  unit: str) -> None:
-    """Draw three components (N, 3) with their 2-sigma bands, and the truth dashed with its RMSE in the legend."""
+def _draw_vectors(
+    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, symbol: str, unit: str
+) -> None:
+    """Draw three components (N, 3) with their 2-sigma bands, and the truth dashed with its RMSE in
+    the legend.
+    """
     for i, (axis, colour) in enumerate(_AXES):
         name = f"{symbol}$_{axis}$"
         if truth is not None:
             rmse = float(np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i]))))
             name += f" (RMSE {rmse:.3g} {unit})"
-        panel.fill_between(t, mean[:, i] - 2 * std[:, i], mean[:, i] + 2 * std[:, i], color=colour, alpha=0.18, lw=0)
+        panel.fill_between(
+            t,
+            mean[:, i] - 2 * std[:, i],
+            mean[:, i] + 2 * std[:, i],
+            color=colour,
+            alpha=0.18,
+            lw=0,
+        )
         panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
         if truth is not None:
-            panel.plot(t, truth[:, i], color=colour, lw=1.0, ls="--", label=f"true {symbol}$_{axis}$")
+            panel.plot(
+                t, truth[:, i], color=colour, lw=1.0, ls="--", label=f"true {symbol}$_{axis}$"
+            )
     # the wide band of the filter's first moments must not set the scale
     low = min(float(np.percentile(mean - 2 * std, 1, axis=0).min()), float(mean.min()))
     high = max(float(np.percentile(mean + 2 * std, 99, axis=0).max()), float(mean.max()))
@@ -104,21 +135,42 @@ def _draw_vectors(panel: "Axes", t: Array, mean: Array, std: Array, truth: Array
 
 
 def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
-    """Shade the phases, and hatch the stretches without a pose that last; a pose slower than the log is none of them."""
+    """Shade the phases, and hatch the stretches without a pose that last; a pose slower than the
+    log is none of them.
+    """
     for phase in phases:
         if phase.name != FLIGHT:
             panel.axvspan(phase.start, phase.end, color=_SHADES[phase.name], zorder=0, lw=0)
     seen = np.concatenate([[-np.inf], log.t[log.valid], [np.inf]])
-    gap = seen[np.searchsorted(seen, log.t, "left")] - seen[np.searchsorted(seen, log.t, "right") - 1]
+    gap = (
+        seen[np.searchsorted(seen, log.t, "left")] - seen[np.searchsorted(seen, log.t, "right") - 1]
+    )
     lost = gap > _LASTING
     if lost.any():
         lost[1:] |= lost[:-1]  # up to the next pose
-        panel.fill_between(log.t, 0.0, 1.0, where=lost, transform=panel.get_xaxis_transform(), facecolor="none",
-                           edgecolor="#999999", hatch="///", zorder=0, lw=0)
+        panel.fill_between(
+            log.t,
+            0.0,
+            1.0,
+            where=lost,
+            transform=panel.get_xaxis_transform(),
+            facecolor="none",
+            edgecolor="#999999",
+            hatch="///",
+            zorder=0,
+            lw=0,
+        )
 
 
 def _name_phases(panel: "Axes", phases: Sequence[Phase]) -> None:
     """Write each phase's name above its stretch of the panel."""
     for phase in phases:
-        panel.text(0.5 * (phase.start + phase.end), 1.03, phase.name, transform=panel.get_xaxis_transform(),
-                   ha="center", va="bottom", fontsize=9)
+        panel.text(
+            0.5 * (phase.start + phase.end),
+            1.03,
+            phase.name,
+            transform=panel.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            fontsize=9,
+        )

@@ -1,9 +1,11 @@
-"""The loop closed in flight: an effect that nobody declared is flown, named, declared, and the fan followed once more.
+"""The loop closed in flight: an effect that nobody declared is flown, named, declared, and the fan
+followed once more.
 
-For each effect: a vehicle that has it flies a trajectory in which it shows; its log is diagnosed against the declared
-vehicle; the named effects go into the model of filter and flight loop; and the fan-tracking benchmark is flown with the
-declared model, with the amended one and, as a bound, with the exact one. The true vehicle has the effect each time, and the
-episodes are paired: the same seeds, so the same fan, gusts, disturbance and sensor noise.
+For each effect: a vehicle that has it flies a trajectory in which it shows; its log is diagnosed
+against the declared vehicle; the named effects go into the model of filter and flight loop; and the
+fan-tracking benchmark is flown with the declared model, with the amended one and, as a bound, with
+the exact one. The true vehicle has the effect each time, and the episodes are paired: the same
+seeds, so the same fan, gusts, disturbance and sensor noise.
 """
 
 import hashlib
@@ -36,8 +38,18 @@ from windwrench.studies.trials.practice_flights import fly_practice, shown_in
 
 Array = NDArray[np.float64]
 
-DEFAULT_EFFECTS = ("com_offset", "mass", "rotor_drag", "inflow_thrust", "battery_sag", "rotor_efficiency", "motor_lag",
-                   "thrust_axis_tilt", "world_tilt", "constant_torque")
+DEFAULT_EFFECTS = (
+    "com_offset",
+    "mass",
+    "rotor_drag",
+    "inflow_thrust",
+    "battery_sag",
+    "rotor_efficiency",
+    "motor_lag",
+    "thrust_axis_tilt",
+    "world_tilt",
+    "constant_torque",
+)
 SECONDS = 60.0  # of the flight that is diagnosed
 CONTROLLER, SCENARIO = "admittance", "base"
 MODELS = ("declared", "amended", "exact")  # what filter and flight loop know
@@ -77,51 +89,82 @@ class Request:
 
     @property
     def name(self) -> str:
-        """Name of its result file: the effect, and its coefficients where they are not the library's typical ones."""
+        """Name of its result file: the effect, and its coefficients where they are not the
+        library's typical ones.
+        """
         size = 1 if self.vehicle.mass < 0.1 else 0
         given = dict(self.effect.coefficients)
         if given == {c.name: c.typical[size] for c in get(self.effect.name).coefficients}:
             return self.effect.name
-        return re.sub(r"[^\w.,=+-]", "_", f"{self.effect.name}_" + ",".join(f"{k}={v:g}" for k, v in given.items()))
+        return re.sub(
+            r"[^\w.,=+-]",
+            "_",
+            f"{self.effect.name}_" + ",".join(f"{k}={v:g}" for k, v in given.items()),
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return it as JSON: a result that was kept answers the same request or is made anew."""
         digest = hashlib.sha256(dump_vehicle(self.vehicle).encode()).hexdigest()[:16]
-        return {"effect": self.effect.name, "coefficients": dict(self.effect.coefficients), "vehicle": self.vehicle.name,
-                "vehicle_digest": digest, "episodes": self.episodes, "seed": self.seed, "seconds": self.seconds,
-                "controller": CONTROLLER, "scenario": SCENARIO, "version": __version__,
-                "code": code_stamp("closed_loop/closed_loop", "trials/practice_flights")}
+        return {
+            "effect": self.effect.name,
+            "coefficients": dict(self.effect.coefficients),
+            "vehicle": self.vehicle.name,
+            "vehicle_digest": digest,
+            "episodes": self.episodes,
+            "seed": self.seed,
+            "seconds": self.seconds,
+            "controller": CONTROLLER,
+            "scenario": SCENARIO,
+            "version": __version__,
+            "code": code_stamp("closed_loop/closed_loop", "trials/practice_flights"),
+        }
 
 
 def check_requests(requests: Sequence[Request]) -> None:
     """Check what ``close_loops`` is asked for, before anything is flown.
 
     Raises:
-        InputError: no episodes, a seed out of range, the same effect twice, or one that its vehicle declares or cannot show.
+        InputError: no episodes, a seed out of range, the same effect twice, or one that its vehicle
+            declares or cannot show.
     """
     if len({r.name for r in requests}) < len(requests):
-        raise InputError("close-loop: --effect: the same effect with the same coefficients is given twice")
+        raise InputError(
+            "close-loop: --effect: the same effect with the same coefficients is given twice"
+        )
     for r in requests:
         if r.episodes < 1:
             raise InputError(f"close-loop: --episodes must be at least 1, got {r.episodes}")
         if not 0 <= r.seed < 100_000:
             raise InputError(f"close-loop: --seed must lie between 0 and 99999, got {r.seed}")
         if any(e.name == r.effect.name for e in r.vehicle.effects):
-            raise InputError(f"close-loop: --effect {r.effect.name}: {r.vehicle.name} declares it already; expected an effect "
-                             "that nobody declared")
+            raise InputError(
+                f"close-loop: --effect {r.effect.name}: {r.vehicle.name} declares it already; "
+                f"expected an effect "
+                "that nobody declared"
+            )
         if r.effect.name == "ceiling_effect" and not np.isfinite(r.vehicle.ceiling_z):
-            raise InputError(f"close-loop: --effect ceiling_effect: {r.vehicle.name} states no ceiling; expected ceiling_z in "
-                             "the vehicle's file")
+            raise InputError(
+                f"close-loop: --effect ceiling_effect: {r.vehicle.name} states no ceiling; "
+                f"expected ceiling_z in "
+                "the vehicle's file"
+            )
 
 
-def fly_episodes(model: Vehicle, truth: Vehicle, effect: EffectSetting, seeds: Sequence[int],
-                 each: Callable[[], None] = lambda: None) -> dict[str, list[Any]]:
-    """Fly the benchmark's episodes with a model of the vehicle; return tracking and wrench errors, a number an episode.
+def fly_episodes(
+    model: Vehicle,
+    truth: Vehicle,
+    effect: EffectSetting,
+    seeds: Sequence[int],
+    each: Callable[[], None] = lambda: None,
+) -> dict[str, list[Any]]:
+    """Fly the benchmark's episodes with a model of the vehicle; return tracking and wrench errors,
+    a number an episode.
 
-    The true wrench that an estimate is held against is the jet's and that of the unmodelled disturbance of the actuators. The
-    share of the vehicle's own effects is no part of it, whatever the model: what of it is in the estimate is error.
-    Root-mean-square over the three axes (yaw torque: the world's vertical alone) and over the decisions that were flown. Force
-    is in the world frame; torque too, about the true centre of mass.
+    The true wrench that an estimate is held against is the jet's and that of the unmodelled
+    disturbance of the actuators. The share of the vehicle's own effects is no part of it, whatever
+    the model: what of it is in the estimate is error. Root-mean-square over the three axes (yaw
+    torque: the world's vertical alone) and over the decisions that were flown. Force is in the
+    world frame; torque too, about the true centre of mass.
 
     Args:
         model: what filter and flight loop know.
@@ -132,7 +175,9 @@ def fly_episodes(model: Vehicle, truth: Vehicle, effect: EffectSetting, seeds: S
     """
     env = FanTrackingEnv(SCENARIO, vehicle=model, truth=truth, effects=(effect,))
     controller = make_controller(CONTROLLER)
-    out: dict[str, list[Any]] = {key: [] for key in (*(m.key for m in MEASURES), "mean_offset_m", "lost")}
+    out: dict[str, list[Any]] = {
+        key: [] for key in (*(m.key for m in MEASURES), "mean_offset_m", "lost")
+    }
     for seed in seeds:
         errors: list[Array] = []
 
@@ -144,7 +189,9 @@ def fly_episodes(model: Vehicle, truth: Vehicle, effect: EffectSetting, seeds: S
 
         episode = fly_episode(env, controller, seed, keep)
         error = np.array(errors)
-        error = error[np.isfinite(error).all(axis=1)]  # a filter that has lost the vehicle ends its episode so
+        error = error[
+            np.isfinite(error).all(axis=1)
+        ]  # a filter that has lost the vehicle ends its episode so
         for measure in MEASURES[:3]:
             out[measure.key].append(float(np.sqrt(np.mean(np.square(error[:, measure.axes])))))
         out["tracking_m"].append(episode.rmse)
@@ -162,8 +209,12 @@ def interval_of_mean(values: Sequence[float]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def ratio_of_means(before: Sequence[float], after: Sequence[float]) -> tuple[float, tuple[float, float]]:
-    """Return mean after by mean before over paired episodes, and its 95 % percentile bootstrap interval."""
+def ratio_of_means(
+    before: Sequence[float], after: Sequence[float]
+) -> tuple[float, tuple[float, float]]:
+    """Return mean after by mean before over paired episodes, and its 95 % percentile bootstrap
+    interval.
+    """
     b, a = np.asarray(before), np.asarray(after)
     rows = _resampled(len(b))
     low, high = np.quantile(a[rows].mean(axis=1) / b[rows].mean(axis=1), [0.025, 0.975])
@@ -175,8 +226,16 @@ def _resampled(count: int) -> NDArray[np.intp]:
 
 
 def verdict(interval: Sequence[float]) -> str:
-    """Return what the interval of a ratio says: ``falls`` or ``rises`` by at least 1 %, or ``unchanged``."""
-    return "falls" if interval[1] < 1.0 - MARGIN else "rises" if interval[0] > 1.0 + MARGIN else "unchanged"
+    """Return what the interval of a ratio says: ``falls`` or ``rises`` by at least 1 %, or
+    ``unchanged``.
+    """
+    return (
+        "falls"
+        if interval[1] < 1.0 - MARGIN
+        else "rises"
+        if interval[0] > 1.0 + MARGIN
+        else "unchanged"
+    )
 
 
 def close_loop(request: Request, progress: Progress = lambda share: None) -> dict[str, Any]:
@@ -208,35 +267,63 @@ def close_loop(request: Request, progress: Progress = lambda share: None) -> dic
         flown += 1
         progress(_DIAGNOSIS + (1.0 - _DIAGNOSIS) * flown / (len(MODELS) * len(seeds)))
 
-    episodes = {name: fly_episodes(model, vehicle, effect, seeds, each)
-                for name, model in zip(MODELS, (vehicle, found.amended, exact), strict=True)}
-    result: dict[str, Any] = _plain({
-        "name": request.name,
-        "request": request.as_json(),
-        "trajectory": trajectory,
-        "diagnosis": {
-            "verdict": found.verdict, "remainder": found.remainder,
-            "effects": [{"name": e.name, "coefficients": e.coefficients, "std": e.std, "units": e.units,
-                         "tentative": e.tentative, "indistinguishable_from": e.indistinguishable_from} for e in found.effects],
-        },
-        "summary": {m.key: _summary({name: flights[m.key] for name, flights in episodes.items()}) for m in MEASURES},
-        "mean_offset_m": {name: float(np.mean(flights["mean_offset_m"])) for name, flights in episodes.items()},
-        "lost": {name: sum(flights["lost"]) for name, flights in episodes.items()},
-        "seeds": seeds,
-        "episodes": episodes,
-    })
+    episodes = {
+        name: fly_episodes(model, vehicle, effect, seeds, each)
+        for name, model in zip(MODELS, (vehicle, found.amended, exact), strict=True)
+    }
+    result: dict[str, Any] = _plain(
+        {
+            "name": request.name,
+            "request": request.as_json(),
+            "trajectory": trajectory,
+            "diagnosis": {
+                "verdict": found.verdict,
+                "remainder": found.remainder,
+                "effects": [
+                    {
+                        "name": e.name,
+                        "coefficients": e.coefficients,
+                        "std": e.std,
+                        "units": e.units,
+                        "tentative": e.tentative,
+                        "indistinguishable_from": e.indistinguishable_from,
+                    }
+                    for e in found.effects
+                ],
+            },
+            "summary": {
+                m.key: _summary({name: flights[m.key] for name, flights in episodes.items()})
+                for m in MEASURES
+            },
+            "mean_offset_m": {
+                name: float(np.mean(flights["mean_offset_m"])) for name, flights in episodes.items()
+            },
+            "lost": {name: sum(flights["lost"]) for name, flights in episodes.items()},
+            "seeds": seeds,
+            "episodes": episodes,
+        }
+    )
     return result
 
 
 def _summary(values: Mapping[str, Sequence[float]]) -> dict[str, Any]:
     """Return means with their intervals, and the ratio of amended to declared."""
     ratio, interval = ratio_of_means(values["declared"], values["amended"])
-    return {**{name: {"mean": float(np.mean(some)), "ci95": interval_of_mean(some)} for name, some in values.items()},
-            "ratio": ratio, "ratio_ci95": interval, "verdict": verdict(interval)}
+    return {
+        **{
+            name: {"mean": float(np.mean(some)), "ci95": interval_of_mean(some)}
+            for name, some in values.items()
+        },
+        "ratio": ratio,
+        "ratio_ci95": interval,
+        "verdict": verdict(interval),
+    }
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON, with numbers to eight digits: the last bits depend on a machine's libraries."""
+    """Return a value as JSON, with numbers to eight digits: the last bits depend on a machine's
+    libraries.
+    """
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -252,10 +339,12 @@ def close_loops(
     jobs: int | None = None,
     report: Callable[[Mapping[str, float]], None] = lambda shares: None,
 ) -> list[dict[str, Any]]:
-    """Close the loop for every effect, side by side; keep each result as ``NAME.json`` in the folder as soon as it is there.
+    """Close the loop for every effect, side by side; keep each result as ``NAME.json`` in the
+    folder as soon as it is there.
 
-    An effect whose result of the same request, by the same code, lies there already is not flown again, so that an interrupted
-    run goes on where it stopped. The results do not depend on ``jobs``.
+    An effect whose result of the same request, by the same code, lies there already is not flown
+    again, so that an interrupted run goes on where it stopped. The results do not depend on
+    ``jobs``.
 
     Args:
         requests: one an effect.
@@ -274,6 +363,7 @@ def close_loops(
     report(shares)
     if jobs == 1:
         for request in pending:
+
             def progress(share: float, name: str = request.name) -> None:
                 shares[name] = share
                 report(shares)
@@ -286,10 +376,17 @@ def close_loops(
     return [result for result in results if result is not None]
 
 
-def _side_by_side(pending: Sequence[Request], folder: Path, jobs: int, shares: dict[str, float],
-                  report: Callable[[Mapping[str, float]], None]) -> None:
+def _side_by_side(
+    pending: Sequence[Request],
+    folder: Path,
+    jobs: int,
+    shares: dict[str, float],
+    report: Callable[[Mapping[str, float]], None],
+) -> None:
     with shared_dict(shares) as shared, workers(jobs) as pool:
-        waiting: set[Future[None]] = {pool.submit(_close_and_share, request, folder, shared) for request in pending}
+        waiting: set[Future[None]] = {
+            pool.submit(_close_and_share, request, folder, shared) for request in pending
+        }
         while waiting:
             done, waiting = wait(waiting, timeout=0.3, return_when=FIRST_COMPLETED)
             report(dict(shared))
@@ -312,4 +409,8 @@ def _kept(request: Request, folder: Path) -> dict[str, Any] | None:
         kept = json.loads((folder / f"{request.name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return kept if isinstance(kept, dict) and kept.get("request") == _plain(request.as_json()) else None
+    return (
+        kept
+        if isinstance(kept, dict) and kept.get("request") == _plain(request.as_json())
+        else None
+    )

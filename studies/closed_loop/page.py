@@ -1,4 +1,6 @@
-"""The page of the loop closed in flight: every number from the results, and sentences that say what they are worth."""
+"""The page of the loop closed in flight: every number from the results, and sentences that say what
+they are worth.
+"""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -14,10 +16,16 @@ Result = Mapping[str, Any]  # as ``close_loop`` returns it
 _SHIFT = 0.01  # m: a mean offset that grows by more is said to
 
 
-def coefficients_text(coefficients: Mapping[str, float], std: Mapping[str, float] | None = None) -> str:
-    """Return coefficients as text, those that are nothing left out, with their standard deviation where it is known."""
+def coefficients_text(
+    coefficients: Mapping[str, float], std: Mapping[str, float] | None = None
+) -> str:
+    """Return coefficients as text, those that are nothing left out, with their standard deviation
+    where it is known.
+    """
     some = {k: v for k, v in coefficients.items() if v != 0.0} or coefficients
-    return ", ".join(f"{k} {v:.4g}" + (f" ± {std[k]:.2g}" if std and std.get(k) else "") for k, v in some.items())
+    return ", ".join(
+        f"{k} {v:.4g}" + (f" ± {std[k]:.2g}" if std and std.get(k) else "") for k, v in some.items()
+    )
 
 
 def found_text(result: Result) -> str:
@@ -26,8 +34,13 @@ def found_text(result: Result) -> str:
     if not effects:
         return "nothing"
     return "; ".join(
-        e["name"] + ": " + coefficients_text(e["coefficients"], e["std"]) + (", tentative" if e["tentative"] else "")
-        + (f" (or {', '.join(e['indistinguishable_from'])})" if e["indistinguishable_from"] else "") for e in effects)
+        e["name"]
+        + ": "
+        + coefficients_text(e["coefficients"], e["std"])
+        + (", tentative" if e["tentative"] else "")
+        + (f" (or {', '.join(e['indistinguishable_from'])})" if e["indistinguishable_from"] else "")
+        for e in effects
+    )
 
 
 def shown(value: float, measure: Measure) -> str:
@@ -43,7 +56,9 @@ def cell(summary: Mapping[str, Any], measure: Measure) -> str:
 
 
 def conclusions(results: Sequence[Result]) -> list[str]:
-    """Return, as sentences, where declaring the named effects helps, where it makes no difference, and where it hurts."""
+    """Return, as sentences, where declaring the named effects helps, where it makes no difference,
+    and where it hurts.
+    """
     out = [_in_short(results)]
     for measure in MEASURES:
         groups: dict[str, list[str]] = {"falls": [], "unchanged": [], "rises": []}
@@ -52,32 +67,60 @@ def conclusions(results: Sequence[Result]) -> list[str]:
             text = f"x{summary['ratio']:.2f}"
             if summary["verdict"] == "rises":
                 # whether the diagnosis is to blame, or the effect's own law
-                text += f", with the exact coefficients x{summary['exact']['mean'] / summary['declared']['mean']:.2f}"
+                exact = summary["exact"]["mean"] / summary["declared"]["mean"]
+                text += f", with the exact coefficients x{exact:.2f}"
             groups[summary["verdict"]].append(f"{result['name']} ({text})")
-        words = {"falls": "falls with", "unchanged": f"does not change by a resolved {100 * MARGIN:g} % with",
-                 "rises": "rises with"}
-        out.append(f"**{measure.title[0].upper()}{measure.title[1:]}** "
-                   + "; it ".join(f"{words[k]} {', '.join(names)}" for k, names in groups.items() if names) + ".")
-    shifted = [r for r in results
-               if abs(r["mean_offset_m"]["amended"]) > abs(r["mean_offset_m"]["declared"]) + _SHIFT]
+        words = {
+            "falls": "falls with",
+            "unchanged": f"does not change by a resolved {100 * MARGIN:g} % with",
+            "rises": "rises with",
+        }
+        out.append(
+            f"**{measure.title[0].upper()}{measure.title[1:]}** "
+            + "; it ".join(f"{words[k]} {', '.join(names)}" for k, names in groups.items() if names)
+            + "."
+        )
+    shifted = [
+        r
+        for r in results
+        if abs(r["mean_offset_m"]["amended"]) > abs(r["mean_offset_m"]["declared"]) + _SHIFT
+    ]
     for r in shifted:
         offset = r["mean_offset_m"]
-        text = (f"With {r['name']} declared the vehicle flies {offset['amended']:+.3f} m beside the fan's axis in the mean, "
-                f"with the effect undeclared {offset['declared']:+.3f} m.")
+        text = (
+            f"With {r['name']} declared the vehicle flies {offset['amended']:+.3f} m beside the "
+            f"fan's axis in the mean, "
+            f"with the effect undeclared {offset['declared']:+.3f} m."
+        )
         if r["request"]["effect"] == "com_offset":
-            text += (" The filter now gives the torque about the true centre of mass, where the jet's force has an arm; the "
-                     "admittance law steers to where that torque vanishes, and that is no longer the axis. A better estimate "
-                     "is not a better command here, because the law reads torque as offset.")
+            text += (
+                " The filter now gives the torque about the true centre of mass, where the jet's "
+                "force has an arm; the "
+                "admittance law steers to where that torque vanishes, and that is no longer the "
+                "axis. A better estimate "
+                "is not a better command here, because the law reads torque as offset."
+            )
         out.append(text)
-    wrong = [r["name"] for r in results if [e["name"] for e in r["diagnosis"]["effects"]] != [r["request"]["effect"]]]
+    wrong = [
+        r["name"]
+        for r in results
+        if [e["name"] for e in r["diagnosis"]["effects"]] != [r["request"]["effect"]]
+    ]
     if not wrong:
         out.append("The diagnosis named each effect that was added, and no other beside it.")
     else:
-        out.append(f"The diagnosis did not name exactly the effect that was added for: {', '.join(wrong)}.")
+        out.append(
+            f"The diagnosis did not name exactly the effect that was added for: {', '.join(wrong)}."
+        )
     lost = {r["name"]: r["lost"] for r in results if any(r["lost"].values())}
     if lost:
-        out.append("Lost episodes (declared, amended, exact): "
-                   + "; ".join(f"{name} {n['declared']}, {n['amended']}, {n['exact']}" for name, n in lost.items()) + ".")
+        out.append(
+            "Lost episodes (declared, amended, exact): "
+            + "; ".join(
+                f"{name} {n['declared']}, {n['amended']}, {n['exact']}" for name, n in lost.items()
+            )
+            + "."
+        )
     return out
 
 
@@ -87,23 +130,39 @@ def _in_short(results: Sequence[Result]) -> str:
 
     wrench, tracking = ("force_error_N", "torque_error_Nm"), ("tracking_m",)
     much = sum(any(r["summary"][key]["ratio_ci95"][1] < 0.9 for key in wrench) for r in results)
-    return (f"Of {len(results)} effects, declaring what the diagnosis named lowers the wrench error (force or torque) with "
-            f"{count(wrench, 'falls')}, by more than a tenth with {much}, and raises one of the two with "
-            f"{count(wrench, 'rises')}; it improves tracking with {count(tracking, 'falls')} and makes it worse with "
-            f"{count(tracking, 'rises')}. The admittance law reads the yaw torque alone: what an undeclared effect adds to the "
-            "other five components of the estimate does not reach its command.")
+    return (
+        f"Of {len(results)} effects, declaring what the diagnosis named lowers the wrench error "
+        f"(force or torque) with "
+        f"{count(wrench, 'falls')}, by more than a tenth with {much}, and raises one of the two "
+        f"with "
+        f"{count(wrench, 'rises')}; it improves tracking with {count(tracking, 'falls')} and makes "
+        f"it worse with "
+        f"{count(tracking, 'rises')}. The admittance law reads the yaw torque alone: what an "
+        f"undeclared effect adds to the "
+        "other five components of the estimate does not reach its command."
+    )
 
 
 def command(results: Sequence[Result]) -> str:
     """Return the command line that gives these results."""
     request = results[0]["request"]
     names = [r["name"] for r in results]
-    effects = "" if tuple(names) == DEFAULT_EFFECTS else "".join(
-        f" --effect {r['request']['effect']}"
-        + ("" if r["name"] == r["request"]["effect"] else
-           ":" + ",".join(f"{k}={v:g}" for k, v in r["request"]["coefficients"].items())) for r in results)
+    effects = (
+        ""
+        if tuple(names) == DEFAULT_EFFECTS
+        else "".join(
+            f" --effect {r['request']['effect']}"
+            + (
+                ""
+                if r["name"] == r["request"]["effect"]
+                else ":" + ",".join(f"{k}={v:g}" for k, v in r["request"]["coefficients"].items())
+            )
+            for r in results
+        )
+    )
     vehicle = "" if request["vehicle"] == "ardrone2" else f" --vehicle {request['vehicle']}"
-    return f"windwrench close-loop{effects}{vehicle} --episodes {request['episodes']} --seed {request['seed']}"
+    options = f"--episodes {request['episodes']} --seed {request['seed']}"
+    return f"windwrench close-loop{effects}{vehicle} {options}"
 
 
 def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
@@ -116,11 +175,23 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
         raise InputError(f"{page}: there are no results to write; expected at least one effect")
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     out, markdown = (Path(os.path.relpath(path)).as_posix() for path in (folder, page))
-    lines = ["# The loop closed in flight", "", f"`{command(results)} --out {out} --markdown {markdown}`", "",
-             *_what_was_done(results[0]["request"]),
-             f"![Wrench error and tracking before and after]({where}/close_loop.png)", "",
-             *_what_is_measured(results[0]["request"]), *_errors_table(results), *_exact_table(results),
-             "## What the diagnosis named", "", *_findings_table(results, where), "## What it is worth", ""]
+    lines = [
+        "# The loop closed in flight",
+        "",
+        f"`{command(results)} --out {out} --markdown {markdown}`",
+        "",
+        *_what_was_done(results[0]["request"]),
+        f"![Wrench error and tracking before and after]({where}/close_loop.png)",
+        "",
+        *_what_is_measured(results[0]["request"]),
+        *_errors_table(results),
+        *_exact_table(results),
+        "## What the diagnosis named",
+        "",
+        *_findings_table(results, where),
+        "## What it is worth",
+        "",
+    ]
     for sentence in conclusions(results):
         lines += [sentence, ""]
     lines += [f"[Picture as SVG]({where}/close_loop.svg)", ""]
@@ -130,56 +201,104 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
 
 def _what_was_done(request: Mapping[str, Any]) -> list[str]:
     return [
-        "Every number and picture on this page was written by this command. For each effect:", "",
-        f"1. A vehicle ({request['vehicle']}) that has the effect and does not declare it flies {request['seconds']:g} s in "
+        "Every number and picture on this page was written by this command. For each effect:",
+        "",
+        f"1. A vehicle ({request['vehicle']}) that has the effect and does not declare it flies "
+        f"{request['seconds']:g} s in "
         "MuJoCo, on a trajectory in which the effect shows.",
         "2. Its log is diagnosed against the declared vehicle (`windwrench diagnose`).",
-        "3. The named effects, with the fitted coefficients, go into the model of the wrench filter; those of the body (mass, "
+        "3. The named effects, with the fitted coefficients, go into the model of the wrench "
+        "filter; those of the body (mass, "
         "inertia, centre of mass) into the flight loop's, too.",
-        f"4. The fan-tracking benchmark (scenario `{request['scenario']}`, controller `{request['controller']}`) is flown with "
-        "the declared model and with the amended one. The true vehicle has the effect both times, and the episodes are paired: "
-        "fan, gusts, unmodelled disturbance and sensor noise are the same. In a third flight the effect's exact coefficients "
-        "are declared: the bound for any diagnosis.", "",
+        f"4. The fan-tracking benchmark (scenario `{request['scenario']}`, controller "
+        f"`{request['controller']}`) is flown with "
+        "the declared model and with the amended one. The true vehicle has the effect both times, "
+        "and the episodes are paired: "
+        "fan, gusts, unmodelled disturbance and sensor noise are the same. In a third flight the "
+        "effect's exact coefficients "
+        "are declared: the bound for any diagnosis.",
+        "",
     ]
 
 
 def _what_is_measured(request: Mapping[str, Any]) -> list[str]:
     return [
-        "The wrench error is the difference between the estimate and the true wrench of the jet together with the actuators' "
-        "unmodelled disturbance, in the world frame, about the true centre of mass. The effect's own share is no part of this "
-        "truth in either case, so what of it is left in the estimate counts as error. RMS over the three axes (yaw torque: the "
-        "vertical one, the only one that the admittance law reads) and an episode, then the mean over episodes. What is left "
-        "even with the exact model is mostly the filter's rise time: gusts and disturbance change faster than it follows. "
-        "Tracking is the RMS offset from the fan's axis over 20 s.", "",
-        f"x: mean after by mean before, with the 95 % bootstrap interval over {request['episodes']} paired episodes. In words, "
-        f"a change counts only where the whole interval lies more than {100 * MARGIN:g} % from one. One interval in twenty "
-        "misses its ratio by chance.", "",
+        "The wrench error is the difference between the estimate and the true wrench of the jet "
+        "together with the actuators' "
+        "unmodelled disturbance, in the world frame, about the true centre of mass. The effect's "
+        "own share is no part of this "
+        "truth in either case, so what of it is left in the estimate counts as error. RMS over the "
+        "three axes (yaw torque: the "
+        "vertical one, the only one that the admittance law reads) and an episode, then the mean "
+        "over episodes. What is left "
+        "even with the exact model is mostly the filter's rise time: gusts and disturbance change "
+        "faster than it follows. "
+        "Tracking is the RMS offset from the fan's axis over 20 s.",
+        "",
+        f"x: mean after by mean before, with the 95 % bootstrap interval over "
+        f"{request['episodes']} paired episodes. In words, "
+        f"a change counts only where the whole interval lies more than {100 * MARGIN:g} % from "
+        f"one. One interval in twenty "
+        "misses its ratio by chance.",
+        "",
     ]
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    return [f"| {' | '.join(header)} |", f"|{' --- |' * len(header)}", *(f"| {' | '.join(row)} |" for row in rows), ""]
+    return [
+        f"| {' | '.join(header)} |",
+        f"|{' --- |' * len(header)}",
+        *(f"| {' | '.join(row)} |" for row in rows),
+        "",
+    ]
 
 
 def _errors_table(results: Sequence[Result]) -> list[str]:
     rows = []
     for r in results:
         offset = r["mean_offset_m"]
-        rows.append([r["name"], *(cell(r["summary"][m.key], m) for m in MEASURES),
-                     f"{offset['declared']:+.3f} to {offset['amended']:+.3f}"])
+        rows.append(
+            [
+                r["name"],
+                *(cell(r["summary"][m.key], m) for m in MEASURES),
+                f"{offset['declared']:+.3f} to {offset['amended']:+.3f}",
+            ]
+        )
     return _table(["effect", *(f"{m.title} ({m.unit})" for m in MEASURES), "mean offset (m)"], rows)
 
 
 def _exact_table(results: Sequence[Result]) -> list[str]:
-    rows = [[r["name"], *(shown(r["summary"][m.key]["exact"]["mean"], m) for m in MEASURES)] for r in results]
-    return ["With the exact coefficients declared, means:", "",
-            *_table(["effect", *(f"{m.title} ({m.unit})" for m in MEASURES)], rows)]
+    rows = [
+        [r["name"], *(shown(r["summary"][m.key]["exact"]["mean"], m) for m in MEASURES)]
+        for r in results
+    ]
+    return [
+        "With the exact coefficients declared, means:",
+        "",
+        *_table(["effect", *(f"{m.title} ({m.unit})" for m in MEASURES)], rows),
+    ]
 
 
 def _findings_table(results: Sequence[Result], where: str) -> list[str]:
     rows = []
     for r in results:
         added = r["request"]
-        rows.append([f"{added['effect']}: {coefficients_text(added['coefficients'])}", r["trajectory"], found_text(r),
-                     r["diagnosis"]["verdict"], f"[{r['name']}.json]({where}/{r['name']}.json)"])
-    return _table(["added", "trajectory of the diagnosed flight", "named, ± one standard deviation", "verdict", "result"], rows)
+        rows.append(
+            [
+                f"{added['effect']}: {coefficients_text(added['coefficients'])}",
+                r["trajectory"],
+                found_text(r),
+                r["diagnosis"]["verdict"],
+                f"[{r['name']}.json]({where}/{r['name']}.json)",
+            ]
+        )
+    return _table(
+        [
+            "added",
+            "trajectory of the diagnosed flight",
+            "named, ± one standard deviation",
+            "verdict",
+            "result",
+        ],
+        rows,
+    )

@@ -21,7 +21,9 @@ __all__ = ["rows_of", "write_page"]
 _MAIN = ("base", "fast")
 
 
-def write_page(results: Sequence[Result], plan: Mapping[str, Any], places: Places, path: Path) -> list[Path]:
+def write_page(
+    results: Sequence[Result], plan: Mapping[str, Any], places: Places, path: Path
+) -> list[Path]:
     """Write the page and its pictures, in a folder of its name beside it; return the paths.
 
     Raises:
@@ -29,20 +31,33 @@ def write_page(results: Sequence[Result], plan: Mapping[str, Any], places: Place
     """
     lines, rows = lines_of(results, plan), rows_of(results, plan)
     if not rows:
-        raise InputError(f"{places.results}: holds no scores of hover, oracle, admittance and ratio; "
-                         "windwrench leaderboard --train --only designed makes them")
+        raise InputError(
+            f"{places.results}: holds no scores of hover, oracle, admittance and ratio; "
+            "windwrench leaderboard --train --only designed makes them"
+        )
     worlds = list(dict.fromkeys(row.world for row in rows))
     scenarios = [w for w in worlds if plan["worlds"][w] == {"scenario": w}]
     folder = path.with_suffix("")
-    policies = {name: file for name in plan["learned"] if (file := _middle_policy(rows, name, places)) is not None}
+    policies = {
+        name: file
+        for name in plan["learned"]
+        if (file := _middle_policy(rows, name, places)) is not None
+    }
     pictures = [folder / f"{name}.png" for name in ("curves", "intervals", "profiles", "tracking")]
     draw_curves(results, lines, pictures[0])
     draw_intervals([row for row in rows if row.world in _MAIN], pictures[1])
     draw_profiles(lines, scenarios, pictures[2])
     draw_tracking(policies, pictures[3])
     parts = [
-        _head(plan), _answers(rows, lines), _tables(rows), _overview(rows, lines, plan), _aggregates(lines, scenarios),
-        _losses(rows), _pictures(folder.name), _ablations(results, plan), _training(results, lines),
+        _head(plan),
+        _answers(rows, lines),
+        _tables(rows),
+        _overview(rows, lines, plan),
+        _aggregates(lines, scenarios),
+        _losses(rows),
+        _pictures(folder.name),
+        _ablations(results, plan),
+        _training(results, lines),
         _how(plan, results, places),
     ]
     with replaced(path) as partial:
@@ -98,52 +113,100 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
             if not learner:
                 asked.append(lost)
                 continue
-            asked.append((f"{who}: {target:.0%} or more below the best admittance, interval clear of zero",
-                          row.change <= -target and row.change_interval[1] < 0,
-                          f"{_percent(row.change)} ({_between(row.change_interval)}), {row.seeds} seeds"))
-            asked.append((f"{who}: wins at least 80 % of the paired episodes", row.wins >= 0.8, f"{row.wins:.0%}"))
+            asked.append(
+                (
+                    f"{who}: {target:.0%} or more below the best admittance, interval clear of "
+                    f"zero",
+                    row.change <= -target and row.change_interval[1] < 0,
+                    f"{_percent(row.change)} ({_between(row.change_interval)}), {row.seeds} seeds",
+                )
+            )
+            asked.append(
+                (
+                    f"{who}: wins at least 80 % of the paired episodes",
+                    row.wins >= 0.8,
+                    f"{row.wins:.0%}",
+                )
+            )
             if world == "fast":
-                asked.append((f"{who}: better than the best ratio law, interval clear of zero", row.ratio_interval[1] < 0,
-                              f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})"))
+                asked.append(
+                    (
+                        f"{who}: better than the best ratio law, interval clear of zero",
+                        row.ratio_interval[1] < 0,
+                        f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})",
+                    )
+                )
             if world == "base" or line.name != "sac":
                 asked.append(lost)
     if not asked:
         return ""
     table = ["| asked | holds | measured |", "| ----- | ----- | -------- |"]
-    table += [f"| {what} | {'yes' if holds else '**no**'} | {measured} |" for what, holds, measured in asked]
+    table += [
+        f"| {what} | {'yes' if holds else '**no**'} | {measured} |"
+        for what, holds, measured in asked
+    ]
     return "## What was asked\n\nIn parentheses: what it was trained on.\n\n" + "\n".join(table)
 
 
 def _tables(rows: Sequence[Row]) -> str:
-    parts = ["## Base and fast", "Change: of the mean RMSE against the admittance law with the gain that is best in that "
-             "very world (chosen on the test episodes, which favours the law), likewise against the best ratio law; interval: "
-             "paired bootstrap over episodes and seeds. Wins: paired episodes with a smaller RMSE than that admittance. P: "
-             "probability of improvement over it."]
+    parts = [
+        "## Base and fast",
+        "Change: of the mean RMSE against the admittance law with the gain that is best in that "
+        "very world (chosen on the test episodes, which favours the law), likewise against the "
+        "best ratio law; interval: "
+        "paired bootstrap over episodes and seeds. Wins: paired episodes with a smaller RMSE than "
+        "that admittance. P: "
+        "probability of improvement over it.",
+    ]
     for world in _MAIN:
         some = [row for row in rows if row.world == world]
         if not some:
             continue
-        parts.append(f"### {world}\n\n"
-                     f"| controller | seeds | RMSE (m), 95 % | median | lost | score | against {some[0].rival} | wins | P "
-                     f"| against {some[0].ratio_rival} |\n| - | - | - | - | - | - | - | - | - | - |\n" + "\n".join(
-                         f"| {r.name} | {r.seeds if r.group != 'designed' else '-'} "
-                         f"| {r.rmse_m:.3f} ({r.interval[0]:.3f}-{r.interval[1]:.3f}) | {r.median_m:.3f} "
-                         f"| {r.lost_fraction:.1%} | {r.score:.2f} | {_percent(r.change)} ({_between(r.change_interval)}) "
-                         f"| {r.wins:.0%} | {r.improvement:.2f} | {_percent(r.ratio_change)} ({_between(r.ratio_interval)}) |"
-                         for r in some))
+        parts.append(
+            f"### {world}\n\n"
+            f"| controller | seeds | RMSE (m), 95 % | median | lost | score | against "
+            f"{some[0].rival} | wins | P "
+            f"| against {some[0].ratio_rival} |\n| - | - | - | - | - | - | - | - | - | - |\n"
+            + "\n".join(
+                f"| {r.name} | {r.seeds if r.group != 'designed' else '-'} "
+                f"| {r.rmse_m:.3f} ({r.interval[0]:.3f}-{r.interval[1]:.3f}) | {r.median_m:.3f} "
+                f"| {r.lost_fraction:.1%} | {r.score:.2f} | {_percent(r.change)} "
+                f"({_between(r.change_interval)}) "
+                f"| {r.wins:.0%} | {r.improvement:.2f} | {_percent(r.ratio_change)} "
+                f"({_between(r.ratio_interval)}) |"
+                for r in some
+            )
+        )
     return "\n\n".join(parts)
 
 
 def _overview(rows: Sequence[Row], lines: Sequence[Line], plan: Mapping[str, Any]) -> str:
     worlds = list(dict.fromkeys(row.world for row in rows))
-    unseen = [f"{w} ({'; '.join(plan['worlds'][w]['effects'])})" for w in worlds if "effects" in plan["worlds"][w]]
+    unseen = [
+        f"{w} ({'; '.join(plan['worlds'][w]['effects'])})"
+        for w in worlds
+        if "effects" in plan["worlds"][w]
+    ]
     other = [w for w in worlds if "estimator" in plan["worlds"][w]]
-    notes = (f" No training saw the effects of the true vehicle in {', '.join(unseen)}, and the filter does not know them."
-             if unseen else "")
-    notes += "".join(f" {w} is {plan['worlds'][w]['scenario']} felt through the {plan['worlds'][w]['estimator']} filter."
-                     for w in other)
-    table = ["| controller | trained on | " + " | ".join(worlds) + " |", "| - | - |" + " - |" * len(worlds)]
-    best = {w: min((r.rmse_m for r in rows if r.world == w and r.name != "oracle"), default=0.0) for w in worlds}
+    notes = (
+        f" No training saw the effects of the true vehicle in {', '.join(unseen)}, and the filter "
+        f"does not know them."
+        if unseen
+        else ""
+    )
+    notes += "".join(
+        f" {w} is {plan['worlds'][w]['scenario']} felt through the "
+        f"{plan['worlds'][w]['estimator']} filter."
+        for w in other
+    )
+    table = [
+        "| controller | trained on | " + " | ".join(worlds) + " |",
+        "| - | - |" + " - |" * len(worlds),
+    ]
+    best = {
+        w: min((r.rmse_m for r in rows if r.world == w and r.name != "oracle"), default=0.0)
+        for w in worlds
+    }
     for line in lines:
         if line.group == "ablation":
             continue
@@ -152,24 +215,40 @@ def _overview(rows: Sequence[Row], lines: Sequence[Line], plan: Mapping[str, Any
             row = _get(rows, line.name, world)
             text = "-" if row is None else f"{row.rmse_m:.3f}"
             text = f"**{text}**" if row is not None and row.rmse_m == best[world] else text
-            cells.append(text + (f" ({row.lost_fraction:.1%} lost)" if row is not None and row.lost_fraction > 0 else ""))
+            cells.append(
+                text
+                + (
+                    f" ({row.lost_fraction:.1%} lost)"
+                    if row is not None and row.lost_fraction > 0
+                    else ""
+                )
+            )
         table.append(f"| {line.name} | {line.trained_on or '-'} | " + " | ".join(cells) + " |")
-    return f"""## All worlds
+    return (
+        f"""## All worlds
 
 Mean RMSE in m; the best but for the oracle is bold. A policy trained on base flies all other worlds unprepared; wide mixes
 {", ".join(dict.fromkeys(TIERS["wide"]))}.{notes}
 
-""" + "\n".join(table) + "".join(_same_elsewhere(lines, w, plan["worlds"][w]["scenario"]) for w in other)
+"""
+        + "\n".join(table)
+        + "".join(_same_elsewhere(lines, w, plan["worlds"][w]["scenario"]) for w in other)
+    )
 
 
 def _same_elsewhere(lines: Sequence[Line], world: str, scenario: str) -> str:
-    """Say by how much the mean RMSE changes between two worlds, over all controllers that flew both."""
+    """Say by how much the mean RMSE changes between two worlds, over all controllers that flew
+    both.
+    """
     both = [x for x in lines if x.group != "ablation" and world in x.rmse and scenario in x.rmse]
     if not both:
         return ""
     changes = sorted(float(x.rmse[world].mean() / x.rmse[scenario].mean() - 1) for x in both)
-    return (f"\n\nFrom {scenario} to {world} the mean RMSE of these {len(both)} controllers changes by {100 * changes[0]:+.1f} "
-            f"to {100 * changes[-1]:+.1f} %.")
+    return (
+        f"\n\nFrom {scenario} to {world} the mean RMSE of these {len(both)} controllers changes by "
+        f"{100 * changes[0]:+.1f} "
+        f"to {100 * changes[-1]:+.1f} %."
+    )
 
 
 def _aggregates(lines: Sequence[Line], worlds: Sequence[str]) -> str:
@@ -183,7 +262,9 @@ bootstrap interval (Agarwal and others, 2021); for laws that were designed the i
 
 | controller | IQM | 95 % |
 | - | - | - |
-""" + "\n".join(f"| {name} | {iqm:.3f} | {low:.3f}-{high:.3f} |" for name, iqm, (low, high) in found)
+""" + "\n".join(
+        f"| {name} | {iqm:.3f} | {low:.3f}-{high:.3f} |" for name, iqm, (low, high) in found
+    )
 
 
 def _losses(rows: Sequence[Row]) -> str:
@@ -195,18 +276,27 @@ def _losses(rows: Sequence[Row]) -> str:
         worse = []
         if row.change_interval[1] >= 0:
             kind = "worse than" if row.change_interval[0] > 0 else "no clear gain over"
-            worse.append(f"{kind} {row.rival}: {_percent(row.change)} ({_between(row.change_interval)})")
+            worse.append(
+                f"{kind} {row.rival}: {_percent(row.change)} ({_between(row.change_interval)})"
+            )
         if row.ratio_interval[1] >= 0:
             kind = "worse than" if row.ratio_interval[0] > 0 else "no clear gain over"
-            worse.append(f"{kind} {row.ratio_rival}: {_percent(row.ratio_change)} ({_between(row.ratio_interval)})")
+            worse.append(
+                f"{kind} {row.ratio_rival}: {_percent(row.ratio_change)} "
+                f"({_between(row.ratio_interval)})"
+            )
         if row.lost_fraction > 0:
             worse.append(f"loses {row.lost_fraction:.1%} of the episodes")
         if worse:
             items.append(f"| {row.world} | {row.name} | {'; '.join(worse)} |")
     if not items:
         return "## Where learning does not win\n\nNowhere in these worlds."
-    return ("## Where learning does not win\n\nEvery world in which a learned policy is not clearly better than both laws with "
-            "their best gains, or loses a vehicle.\n\n| world | policy | |\n| - | - | - |\n" + "\n".join(items))
+    return (
+        "## Where learning does not win\n\nEvery world in which a learned policy is not clearly "
+        "better than both laws with "
+        "their best gains, or loses a vehicle.\n\n| world | policy | |\n| - | - | - |\n"
+        + "\n".join(items)
+    )
 
 
 def _pictures(folder: str) -> str:
@@ -228,8 +318,10 @@ def _ablations(results: Sequence[Result], plan: Mapping[str, Any]) -> str:
         return ""
     first = {row.world: row for row in rows if row.name == ablation["reference"]}
     worlds = ablation["worlds"]
-    table = ["| changed | seeds | " + " | ".join(f"RMSE on {w} (m), 95 %" for w in worlds) + " |",
-             "| - | - |" + " - |" * len(worlds)]
+    table = [
+        "| changed | seeds | " + " | ".join(f"RMSE on {w} (m), 95 %" for w in worlds) + " |",
+        "| - | - |" + " - |" * len(worlds),
+    ]
     for name in [ablation["reference"], *ablation["changes"]]:
         cells, seeds = [], "-"
         for world in worlds:
@@ -243,26 +335,41 @@ def _ablations(results: Sequence[Result], plan: Mapping[str, Any]) -> str:
                 gap = f", {_percent(row.rmse_m / first[world].rmse_m - 1)}"
             cells.append(f"{row.rmse_m:.3f} ({row.interval[0]:.3f}-{row.interval[1]:.3f}){gap}")
         table.append(f"| {name} | {seeds} | " + " | ".join(cells) + " |")
-    return (f"## What matters\n\nOne thing changed at a time in {ablation['algorithm']} on {ablation['scenario']} "
-            f"({', '.join(ablation['set'])}); the percentage is against the first row. All are scored with the full filter, "
-            "and by what each sees.\n\n" + "\n".join(table))
+    return (
+        f"## What matters\n\nOne thing changed at a time in {ablation['algorithm']} on "
+        f"{ablation['scenario']} "
+        f"({', '.join(ablation['set'])}); the percentage is against the first row. All are scored "
+        f"with the full filter, "
+        "and by what each sees.\n\n" + "\n".join(table)
+    )
 
 
 def _training(results: Sequence[Result], lines: Sequence[Line]) -> str:
-    table = ["| policy | trained on | seeds | decisions | minutes a seed | RMSE on fast by seed (m) |",
-             "| - | - | - | - | - | - |"]
+    table = [
+        "| policy | trained on | seeds | decisions | minutes a seed | RMSE on fast by seed (m) |",
+        "| - | - | - | - | - | - |",
+    ]
     for line in lines:
         runs = [r["training"] for r in results if r["name"] == line.name and "training" in r]
         if line.group != "learned" or not runs:
             continue
         minutes = sorted(t["seconds"] / 60 for t in runs)
-        seeds = ", ".join(f"{v:.3f}" for v in line.rmse["fast"].mean(axis=1)) if "fast" in line.rmse else "-"
-        table.append(f"| {line.name} | {line.trained_on} | {len(runs)} | {runs[0]['steps'][-1]} "
-                     f"| {minutes[0]:.1f}-{minutes[-1]:.1f} | {seeds} |")
+        seeds = (
+            ", ".join(f"{v:.3f}" for v in line.rmse["fast"].mean(axis=1))
+            if "fast" in line.rmse
+            else "-"
+        )
+        table.append(
+            f"| {line.name} | {line.trained_on} | {len(runs)} | {runs[0]['steps'][-1]} "
+            f"| {minutes[0]:.1f}-{minutes[-1]:.1f} | {seeds} |"
+        )
     if len(table) == 2:
         return ""
-    return ("## Training\n\nMinutes: of one process on a machine that did other work beside it, validation included. One "
-            "decision is 80 ms of flight.\n\n" + "\n".join(table))
+    return (
+        "## Training\n\nMinutes: of one process on a machine that did other work beside it, "
+        "validation included. One "
+        "decision is 80 ms of flight.\n\n" + "\n".join(table)
+    )
 
 
 def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> str:
@@ -281,5 +388,6 @@ def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> 
         some = [f"{name} ({sum(e.name == name for e in missing)} seeds)" for name in names]
         ablations = sum(e.group == "ablation" for e in missing)
         some += [f"{ablations} runs of the ablations"] if ablations else []
-        text += f"\n\nNot finished: {', '.join(some)}. `windwrench leaderboard --train` goes on with it."
+        text += f"\n\nNot finished: {', '.join(some)}. "
+        text += "`windwrench leaderboard --train` goes on with it."
     return text

@@ -1,6 +1,8 @@
-"""The study behind the leaderboard: policies trained, everything scored on the same test episodes, step by step.
+"""The study behind the leaderboard: policies trained, everything scored on the same test episodes,
+step by step.
 
-Each step leaves a file, and a step whose file is there is not done again: a study that was stopped goes on where it was.
+Each step leaves a file, and a step whose file is there is not done again: a study that was stopped
+goes on where it was.
 """
 
 import json
@@ -28,7 +30,9 @@ Advance = Callable[[str, float], None]  # what is being done, and the share of i
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of the study: a policy of one seed, or a hand-designed controller (``seed`` None)."""
+    """One line of the study: a policy of one seed, or a hand-designed controller
+    (``seed`` None).
+    """
 
     name: str
     group: str  # designed, learned or ablation
@@ -66,7 +70,9 @@ def load_plan(file: Path | None = None) -> dict[str, Any]:
         plan = yaml.safe_load(source.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise InputError(f"{source}: cannot be read as a study's plan: {error}") from error
-    missing = {"worlds", "episodes", "designed", "learned", "ablation"} - set(plan if isinstance(plan, dict) else ())
+    missing = {"worlds", "episodes", "designed", "learned", "ablation"} - set(
+        plan if isinstance(plan, dict) else ()
+    )
     if missing:
         raise InputError(f"{source}: a study's plan needs {', '.join(sorted(missing))} as well")
     return dict(plan)
@@ -85,14 +91,37 @@ def entries_of(plan: Mapping[str, Any], only: Sequence[str] = ()) -> list[Entry]
     worlds = tuple(plan["worlds"])
     entries = [Entry(name, "designed", worlds) for name in plan["designed"]]
     for name, one in plan["learned"].items():
-        entries += [Entry(name, "learned", worlds, seed, one["algorithm"], one["scenario"], tuple(one.get("set", ())),
-                          bool(one.get("ship"))) for seed in range(one["seeds"])]
+        entries += [
+            Entry(
+                name,
+                "learned",
+                worlds,
+                seed,
+                one["algorithm"],
+                one["scenario"],
+                tuple(one.get("set", ())),
+                bool(one.get("ship")),
+            )
+            for seed in range(one["seeds"])
+        ]
     ablation = plan["ablation"]
     changes = {ablation["reference"]: [], **ablation["changes"]} if ablation else {}
     for name, extra in changes.items():
-        entries += [Entry(name, "ablation", tuple(ablation["worlds"]), seed, ablation["algorithm"], ablation["scenario"],
-                          (*ablation["set"], *extra)) for seed in range(ablation["seeds"])]
-    known = {e.name for e in entries} | {e.file for e in entries} | {"designed", "learned", "ablation"}
+        entries += [
+            Entry(
+                name,
+                "ablation",
+                tuple(ablation["worlds"]),
+                seed,
+                ablation["algorithm"],
+                ablation["scenario"],
+                (*ablation["set"], *extra),
+            )
+            for seed in range(ablation["seeds"])
+        ]
+    known = (
+        {e.name for e in entries} | {e.file for e in entries} | {"designed", "learned", "ablation"}
+    )
     for name in only:
         if name not in known:
             raise unknown_name("part of the study", name, known, "--only")
@@ -110,11 +139,18 @@ def is_done(entry: Entry, plan: Mapping[str, Any], places: Places) -> bool:
     if not path.exists():
         return False
     kept = json.loads(path.read_text(encoding="utf-8"))
-    return all(len(kept["scores"].get(world, {}).get("rmse_m", ())) >= plan["episodes"] for world in entry.worlds)
+    return all(
+        len(kept["scores"].get(world, {}).get("rmse_m", ())) >= plan["episodes"]
+        for world in entry.worlds
+    )
 
 
-def train_entry(entry: Entry, places: Places, advance: Advance = lambda text, share: None) -> tuple[Path, Progress]:
-    """Train an entry's policy, or take up its training where it was left; return the best policy and how it went."""
+def train_entry(
+    entry: Entry, places: Places, advance: Advance = lambda text, share: None
+) -> tuple[Path, Progress]:
+    """Train an entry's policy, or take up its training where it was left; return the best policy
+    and how it went.
+    """
     assert entry.seed is not None
     folder = places.runs / entry.file
     config = load_config(entry.algorithm, entry.overrides)
@@ -124,29 +160,55 @@ def train_entry(entry: Entry, places: Places, advance: Advance = lambda text, sh
         from windwrench.training.train import train
 
         work = imitate if entry.algorithm == "imitation" else train
-        work(config, entry.scenario, entry.seed, folder,
-             advance=lambda steps: advance(f"{entry.file}: training", min(steps / config["steps"], 1.0)))
+        work(
+            config,
+            entry.scenario,
+            entry.seed,
+            folder,
+            advance=lambda steps: advance(
+                f"{entry.file}: training", min(steps / config["steps"], 1.0)
+            ),
+        )
         done = read_progress(folder)
     assert done is not None
     return folder / "best.npz", done
 
 
-def fly_world(pilot: Any, world: Mapping[str, Any], seeds: Sequence[int]) -> Iterator[tuple[float, bool]]:
-    """Yield RMSE (m) of the offset and whether the vehicle was lost, for each seed in a world of the plan."""
+def fly_world(
+    pilot: Any, world: Mapping[str, Any], seeds: Sequence[int]
+) -> Iterator[tuple[float, bool]]:
+    """Yield RMSE (m) of the offset and whether the vehicle was lost, for each seed in a world of
+    the plan.
+    """
     effects = [parse_setting(text) for text in world.get("effects", ())]
     if effects or "estimator" in world:
-        env = FanTrackingEnv(world["scenario"], effects=effects, estimator=world.get("estimator", "ukf"))
+        env = FanTrackingEnv(
+            world["scenario"], effects=effects, estimator=world.get("estimator", "ukf")
+        )
     else:
-        env = scenario_env(world["scenario"], pilot.features.sources if isinstance(pilot, TrainedPolicy) else frozenset())
+        env = scenario_env(
+            world["scenario"],
+            pilot.features.sources if isinstance(pilot, TrainedPolicy) else frozenset(),
+        )
     for seed in seeds:
         episode = fly_episode(env, pilot, seed)
         yield episode.rmse, episode.lost
 
 
-def do_entry(entry: Entry, plan: Mapping[str, Any], places: Places, advance: Advance = lambda text, share: None) -> None:
+def do_entry(
+    entry: Entry,
+    plan: Mapping[str, Any],
+    places: Places,
+    advance: Advance = lambda text, share: None,
+) -> None:
     """Train and score one entry, as far as that is not done; its result grows world by world."""
     path = result_path(entry, places)
-    result: dict[str, Any] = {"name": entry.name, "group": entry.group, "seed": entry.seed, "scores": {}}
+    result: dict[str, Any] = {
+        "name": entry.name,
+        "group": entry.group,
+        "seed": entry.seed,
+        "scores": {},
+    }
     if entry.seed is None:
         pilot = make_pilot(entry.name)
     else:
@@ -157,36 +219,61 @@ def do_entry(entry: Entry, plan: Mapping[str, Any], places: Places, advance: Adv
             best, progress = train_entry(entry, places, advance)
             pilot = load_policy(best)
             if entry.ship:
-                save_policy({k: v for k, v in pilot.card.items() if k != "sha256"}, pilot.weights, shipped)
-            result["training"] = {"steps": progress.steps, "rmse_m": progress.rmse_m, "lost": progress.lost,
-                                  "best": progress.best, "seconds": round(progress.seconds, 1)}
-        result |= {"algorithm": entry.algorithm, "scenario": entry.scenario, "overrides": list(entry.overrides),
-                   "sha256": pilot.card["sha256"]}
+                save_policy(
+                    {k: v for k, v in pilot.card.items() if k != "sha256"}, pilot.weights, shipped
+                )
+            result["training"] = {
+                "steps": progress.steps,
+                "rmse_m": progress.rmse_m,
+                "lost": progress.lost,
+                "best": progress.best,
+                "seconds": round(progress.seconds, 1),
+            }
+        result |= {
+            "algorithm": entry.algorithm,
+            "scenario": entry.scenario,
+            "overrides": list(entry.overrides),
+            "sha256": pilot.card["sha256"],
+        }
     if path.exists():
         kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept.get("sha256") == result.get("sha256"):  # else the scores are those of another policy
+        if kept.get("sha256") == result.get(
+            "sha256"
+        ):  # else the scores are those of another policy
             result = {**kept, **result, "scores": kept["scores"]}
     for done, name in enumerate(entry.worlds):
         if len(result["scores"].get(name, {}).get("rmse_m", ())) >= plan["episodes"]:
             continue
         rmse, lost = [], []
-        for value, gone in fly_world(pilot, plan["worlds"][name], benchmark_seeds(0, plan["episodes"])):
+        for value, gone in fly_world(
+            pilot, plan["worlds"][name], benchmark_seeds(0, plan["episodes"])
+        ):
             rmse.append(round(value, 6))
             lost.append(int(gone))
-            advance(f"{entry.file}: {name}", (done + len(rmse) / plan["episodes"]) / len(entry.worlds))
+            advance(
+                f"{entry.file}: {name}", (done + len(rmse) / plan["episodes"]) / len(entry.worlds)
+            )
         result["scores"][name] = {"rmse_m": rmse, "lost": lost}
         write_json(result, path)
 
 
 def read_results(places: Places) -> list[dict[str, Any]]:
     """Return all results that there are."""
-    found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(places.results.glob("*.json"))]
+    found = [
+        json.loads(p.read_text(encoding="utf-8")) for p in sorted(places.results.glob("*.json"))
+    ]
     return [r for r in found if isinstance(r, dict) and "scores" in r]
 
 
-def run_study(entries: Sequence[Entry], plan: Mapping[str, Any], places: Places, jobs: int,
-              report: Callable[[dict[str, tuple[str, float]], int], None] = lambda shares, done: None) -> int:
-    """Train and score what is not done yet, in ``jobs`` processes; return how many entries that were.
+def run_study(
+    entries: Sequence[Entry],
+    plan: Mapping[str, Any],
+    places: Places,
+    jobs: int,
+    report: Callable[[dict[str, tuple[str, float]], int], None] = lambda shares, done: None,
+) -> int:
+    """Train and score what is not done yet, in ``jobs`` processes; return how many entries that
+    were.
 
     Args:
         entries: of ``entries_of``.
@@ -210,7 +297,9 @@ def run_study(entries: Sequence[Entry], plan: Mapping[str, Any], places: Places,
     return len(waiting)
 
 
-def _work(entry: Entry, plan: Mapping[str, Any], places: Places, shares: MutableMapping[str, Any]) -> None:
+def _work(
+    entry: Entry, plan: Mapping[str, Any], places: Places, shares: MutableMapping[str, Any]
+) -> None:
     last = ("", -1.0)
 
     def advance(text: str, share: float) -> None:

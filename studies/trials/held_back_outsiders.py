@@ -1,7 +1,9 @@
-"""Disturbances that most thresholds of the diagnosis were not tuned on, and those of ``unseen_outsiders``.
+"""Disturbances that most thresholds of the diagnosis were not tuned on, and those of
+``unseen_outsiders``.
 
-They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the same, and failing_cell,
-high_hull, loose_gimbal, winding_cord and passing_wash led to rules of their own; the unseen ones did not.
+They are of other kinds than ``outsiders.OUTSIDERS``. Over many trials they came to be known all the
+same, and failing_cell, high_hull, loose_gimbal, winding_cord and passing_wash led to rules of their
+own; the unseen ones did not.
 """
 
 import math
@@ -30,7 +32,9 @@ def _wrench(force: Array, torque: Array) -> Array:
 
 
 def wind_shear(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A wind that grows with height, by 1.2 m/s a metre from the lowest point on, on a linear drag of 0.05 weights at 1 m/s."""
+    """A wind that grows with height, by 1.2 m/s a metre from the lowest point on, on a linear drag
+    of 0.05 weights at 1 m/s.
+    """
     low, heading = float(path[:, 2].min()), rng.uniform(-math.pi, math.pi)
     along = np.array([math.cos(heading), math.sin(heading), 0.0])
 
@@ -42,20 +46,33 @@ def wind_shear(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def lifted_cable(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A supply cable hangs from the tail: 0.1 weights for each metre off the floor, and it drags, 0.04 weights at 1 m/s."""
+    """A supply cable hangs from the tail: 0.1 weights for each metre off the floor, and it drags,
+    0.04 weights at 1 m/s.
+    """
     tail = np.array([-0.5, 0.0, -0.2]) * vehicle.arm_l
 
     def law(m: Moment) -> Array:
-        force = -0.04 * vehicle.weight * m.velocity - [0.0, 0.0, 0.1 * vehicle.weight * max(m.position[2], 0.0)]
+        force = -0.04 * vehicle.weight * m.velocity - [
+            0.0,
+            0.0,
+            0.1 * vehicle.weight * max(m.position[2], 0.0),
+        ]
         return _wrench(force, np.cross(m.rotation @ tail, force))
 
     return law
 
 
 def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A magnet on board in a strong field: it turns the nose into one direction of the room, 0.03 weights times the arm."""
+    """A magnet on board in a strong field: it turns the nose into one direction of the room, 0.03
+    weights times the arm.
+    """
     heading = rng.uniform(-math.pi, math.pi)
-    field = 0.03 * vehicle.weight * vehicle.arm_l * np.array([math.cos(heading), math.sin(heading), -0.5])
+    field = (
+        0.03
+        * vehicle.weight
+        * vehicle.arm_l
+        * np.array([math.cos(heading), math.sin(heading), -0.5])
+    )
 
     def law(m: Moment) -> Array:
         return _wrench(np.zeros(3), np.cross(m.rotation[:, 0], field))
@@ -64,7 +81,9 @@ def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A battery cell fails and comes back: every rotor loses 6 % of its thrust for 2 to 6 s, several times."""
+    """A battery cell fails and comes back: every rotor loses 6 % of its thrust for 2 to 6 s,
+    several times.
+    """
     change, weak = 0.0, False
 
     def law(m: Moment) -> Array:
@@ -81,7 +100,10 @@ def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
 
 
 def high_hull(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A tall hull: quadratic drag, 0.03 weights at 1 m/s, 0.25 weights at most, that acts half an arm above the centre."""
+    """A tall hull: quadratic drag, 0.03 weights at 1 m/s, 0.25 weights at most, that acts half an
+    arm above the centre.
+    """
+
     def law(m: Moment) -> Array:
         speed = math.sqrt(m.velocity @ m.velocity)
         force = -vehicle.weight * min(0.03 * speed, 0.25 / max(speed, 1e-6)) * m.velocity
@@ -91,7 +113,9 @@ def high_hull(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """One arm twists under its rotor's load: that thrust leans aside by 0.08 rad at hover, in proportion to itself."""
+    """One arm twists under its rotor's load: that thrust leans aside by 0.08 rad at hover, in
+    proportion to itself.
+    """
     rotor = int(rng.integers(4))
     arm = vehicle.positions[rotor] - vehicle.com
     aside = np.cross([0.0, 0.0, 1.0], arm) / np.linalg.norm(arm[:2])
@@ -105,10 +129,11 @@ def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A camera turns about the pitch axis on a soft mount of 2 Hz; it adds 0.3 of the vehicle's inertia there.
+    """A camera turns about the pitch axis on a soft mount of 2 Hz; it adds 0.3 of the vehicle's
+    inertia there.
 
-    With s its angle to the body and a the body's angular acceleration, s'' = -a - w^2 s - 2 zeta w s', and the body feels
-    the mount's torque, inertia (w^2 s + 2 zeta w s'); zeta is 0.05.
+    With s its angle to the body and a the body's angular acceleration, s'' = -a - w^2 s - 2 zeta w
+    s', and the body feels the mount's torque, inertia (w^2 s + 2 zeta w s'); zeta is 0.05.
     """
     inertia, w, zeta = 0.3 * float(vehicle.inertia[1, 1]), 2.0 * math.pi * 2.0, 0.05
     angle, speed, last = 0.0, 0.0, 0.0
@@ -125,7 +150,9 @@ def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
 
 
 def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A cord winds up as the nose turns, and turns it back: 0.02 weights times the arm for each radian from the start."""
+    """A cord winds up as the nose turns, and turns it back: 0.02 weights times the arm for each
+    radian from the start.
+    """
     turned, last = 0.0, math.nan
 
     def law(m: Moment) -> Array:
@@ -134,15 +161,19 @@ def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
         if not math.isnan(last):
             turned += math.remainder(heading - last, 2.0 * math.pi)
         last = heading
-        return _wrench(np.zeros(3), np.array([0.0, 0.0, -0.02 * vehicle.weight * vehicle.arm_l * turned]))
+        return _wrench(
+            np.zeros(3), np.array([0.0, 0.0, -0.02 * vehicle.weight * vehicle.arm_l * turned])
+        )
 
     return law
 
 
 def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Another vehicle crosses above, every 6 s in the mean, at 1 m/s: its wash, 0.3 m in radius, weighs up to 0.15 weights.
+    """Another vehicle crosses above, every 6 s in the mean, at 1 m/s: its wash, 0.3 m in radius,
+    weighs up to 0.15 weights.
 
-    Each rotor is in a draught of its own. The other one passes within 0.3 m of where this one ought to be by then.
+    Each rotor is in a draught of its own. The other one passes within 0.3 m of where this one ought
+    to be by then.
     """
     rotors, speed = vehicle.positions - vehicle.com, 1.0
     when, through, along = -10.0, np.zeros(2), np.array([1.0, 0.0])
@@ -165,13 +196,26 @@ def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
 
 
 HELD_BACK: dict[str, Maker] = {
-    law.__name__: law for law in (wind_shear, lifted_cable, compass_torque, failing_cell, high_hull, soft_arm, loose_gimbal,
-                                  winding_cord, passing_wash)
+    law.__name__: law
+    for law in (
+        wind_shear,
+        lifted_cable,
+        compass_torque,
+        failing_cell,
+        high_hull,
+        soft_arm,
+        loose_gimbal,
+        winding_cord,
+        passing_wash,
+    )
 } | UNSEEN
 
 
-def practise_held_back(vehicle: Vehicle, name: str, size: str = "typical", seed: int = 0, seconds: float = 60.0) -> Practice:
-    """Fly one practice flight, as ``practice_flights.practise`` does, with a disturbance of ``HELD_BACK``.
+def practise_held_back(
+    vehicle: Vehicle, name: str, size: str = "typical", seed: int = 0, seconds: float = 60.0
+) -> Practice:
+    """Fly one practice flight, as ``practice_flights.practise`` does, with a disturbance of
+    ``HELD_BACK``.
 
     Args:
         vehicle: as declared; without a ceiling it gets one at 2.6 m.
@@ -192,12 +236,29 @@ def practise_held_back(vehicle: Vehicle, name: str, size: str = "typical", seed:
     trajectory = str(rng.choice(["excite", "fast"]))
     turbulence, sensor = float(rng.integers(2)), float(rng.choice([0.5, 1.0, 2.0]))
     noise = vehicle.mocap
-    flown = replace(vehicle, mocap=replace(noise, sigma_pos_m=sensor * noise.sigma_pos_m,
-                                           sigma_att_rad=sensor * noise.sigma_att_rad))
+    flown = replace(
+        vehicle,
+        mocap=replace(
+            noise,
+            sigma_pos_m=sensor * noise.sigma_pos_m,
+            sigma_att_rad=sensor * noise.sigma_att_rad,
+        ),
+    )
     t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
     path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
     push = pushing(HELD_BACK[name](vehicle, rng, path), SIZES[size])
     c = record_flight(flown, (), trajectory, seconds, seed, background(vehicle, turbulence), push)
-    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), c["force"], c["torque"],
-                    name=f"held_back_{name}_{size}_{trajectory}_{seed}", source="flown in MuJoCo by practise_held_back")
-    return Practice(log.name, "outsider", size, trajectory, seed, (), name, turbulence, sensor, log, vehicle)
+    log = FlightLog(
+        c["t"],
+        c["position"],
+        c["quaternion"],
+        c["rotor_speeds"],
+        c.get("voltage"),
+        c["force"],
+        c["torque"],
+        name=f"held_back_{name}_{size}_{trajectory}_{seed}",
+        source="flown in MuJoCo by practise_held_back",
+    )
+    return Practice(
+        log.name, "outsider", size, trajectory, seed, (), name, turbulence, sensor, log, vehicle
+    )

@@ -1,8 +1,9 @@
 """Disturbances outside the effect library: what a diagnosis must not blame on a named effect.
 
-Each is a small law of time, state and rotors that gives a force and a torque. Sizes are in proportion to the vehicle: a
-force in its weight, a torque in its weight times the arm. Where a law has a place (a wall, a column of rising air), the
-place is chosen from the set points of the flight, so that the vehicle comes there.
+Each is a small law of time, state and rotors that gives a force and a torque. Sizes are in
+proportion to the vehicle: a force in its weight, a torque in its weight times the arm. Where a law
+has a place (a wall, a column of rising air), the place is chosen from the set points of the flight,
+so that the vehicle comes there.
 """
 
 import math
@@ -38,7 +39,9 @@ Maker = Callable[[Vehicle, np.random.Generator, Array], Law]
 
 
 def _at(force: Array, arm: Array) -> Array:
-    """Return the wrench (6,) of a force (3,) at ``arm`` (3,) m from the centre of mass, both in the world frame."""
+    """Return the wrench (6,) of a force (3,) at ``arm`` (3,) m from the centre of mass, both in the
+    world frame.
+    """
     (fx, fy, fz), (x, y, z) = force.tolist(), arm.tolist()
     return np.array([fx, fy, fz, y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
 
@@ -51,14 +54,24 @@ def _force(force: Array) -> Array:
 
 
 def _thrust_change(vehicle: Vehicle, m: Moment, change: Array) -> Array:
-    """Return the wrench (6,) of rotors whose thrust changes by ``change`` (4,) N, and their drag torque in proportion."""
+    """Return the wrench (6,) of rotors whose thrust changes by ``change`` (4,) N, and their drag
+    torque in proportion.
+    """
     arms = vehicle.positions - vehicle.com
-    torque = np.array([arms[:, 1] @ change, -arms[:, 0] @ change, -(vehicle.spin * vehicle.p / vehicle.k) @ change])
+    torque = np.array(
+        [
+            arms[:, 1] @ change,
+            -arms[:, 0] @ change,
+            -(vehicle.spin * vehicle.p / vehicle.k) @ change,
+        ]
+    )
     return np.concatenate([m.rotation[:, 2] * change.sum(), m.rotation @ torque])
 
 
 def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Irregular pushes of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in the mean, anywhere on the hull."""
+    """Irregular pushes of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in the mean,
+    anywhere on the hull.
+    """
     start, end, force, point = 0.0, 0.0, np.zeros(3), np.zeros(3)
 
     def law(m: Moment) -> Array:
@@ -75,7 +88,9 @@ def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """An elastic tether from a point on the floor to a leg: slack up to a length, then 0.25 weights a metre, 0.25 at most."""
+    """An elastic tether from a point on the floor to a leg: slack up to a length, then 0.25 weights
+    a metre, 0.25 at most.
+    """
     anchor = np.array([*path[:, :2].mean(axis=0), 0.0])
     slack = float(np.quantile(np.linalg.norm(path - anchor, axis=1), 0.3))
     leg = np.array([-0.3, 0.3, 0.0]) * vehicle.arm_l
@@ -90,26 +105,40 @@ def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def wall_attraction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A wall across x just beyond the flight draws the vehicle on with 0.02 weights m2 / d^2, as from d = 0.4 m within it."""
+    """A wall across x just beyond the flight draws the vehicle on with 0.02 weights m2 / d^2, as
+    from d = 0.4 m within it.
+    """
     wall = float(path[:, 0].max()) + 0.4
 
     def law(m: Moment) -> Array:
         away = wall - m.position[0]
-        return _force(np.array([math.copysign(0.02 * vehicle.weight / max(abs(away), 0.4) ** 2, away), 0.0, 0.0]))
+        return _force(
+            np.array(
+                [math.copysign(0.02 * vehicle.weight / max(abs(away), 0.4) ** 2, away), 0.0, 0.0]
+            )
+        )
 
     return law
 
 
 def dry_friction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A force of 0.04 weights against the direction of travel, whatever the speed; it fades in up to 5 cm/s."""
+    """A force of 0.04 weights against the direction of travel, whatever the speed; it fades in up
+    to 5 cm/s.
+    """
+
     def law(m: Moment) -> Array:
-        return _force(-0.04 * vehicle.weight / math.sqrt(m.velocity @ m.velocity + 0.05**2) * m.velocity)
+        return _force(
+            -0.04 * vehicle.weight / math.sqrt(m.velocity @ m.velocity + 0.05**2) * m.velocity
+        )
 
     return law
 
 
 def cubic_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A drag that grows with the cube of the speed: 0.006 weights at 1 m/s, a quarter of the weight at most."""
+    """A drag that grows with the cube of the speed: 0.006 weights at 1 m/s, a quarter of the weight
+    at most.
+    """
+
     def law(m: Moment) -> Array:
         square = float(m.velocity @ m.velocity)
         scale = min(0.006 * square, 0.25 / max(math.sqrt(square), 1e-6))
@@ -119,7 +148,10 @@ def cubic_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def magnus_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A side force on a body that turns in yaw as it moves: 0.02 weights at 1 rad/s and 1 m/s, along yaw rate x velocity."""
+    """A side force on a body that turns in yaw as it moves: 0.02 weights at 1 rad/s and 1 m/s,
+    along yaw rate x velocity.
+    """
+
     def law(m: Moment) -> Array:
         turn = 0.02 * vehicle.weight * float(m.rotation[2] @ m.rate)
         return _force(np.array([-turn * m.velocity[1], turn * m.velocity[0], 0.0]))
@@ -128,19 +160,27 @@ def magnus_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
 
 
 def patchy_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A linear drag in one half of the room only, and most with the nose along one wall: 0.08 weights at 1 m/s at most."""
+    """A linear drag in one half of the room only, and most with the nose along one wall: 0.08
+    weights at 1 m/s at most.
+    """
     middle, heading = float(np.median(path[:, 0])), rng.uniform(-math.pi, math.pi)
 
     def law(m: Moment) -> Array:
         yaw = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
-        share = 0.25 * (1.0 + math.cos(yaw - heading)) * (1.0 + math.tanh((m.position[0] - middle) / 0.2))
+        share = (
+            0.25
+            * (1.0 + math.cos(yaw - heading))
+            * (1.0 + math.tanh((m.position[0] - middle) / 0.2))
+        )
         return _force(-0.08 * vehicle.weight * share * m.velocity)
 
     return law
 
 
 def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A column of rising air, 0.35 m in radius (one sigma), lifts with up to 0.12 weights, each rotor in its own draught."""
+    """A column of rising air, 0.35 m in radius (one sigma), lifts with up to 0.12 weights, each
+    rotor in its own draught.
+    """
     centre, rotors = path[rng.integers(len(path)), :2], vehicle.positions - vehicle.com
 
     def law(m: Moment) -> Array:
@@ -153,7 +193,9 @@ def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A flywheel about body z: the torque -omega x h of its precession, 0.015 weights times the arm at 1 rad/s of roll."""
+    """A flywheel about body z: the torque -omega x h of its precession, 0.015 weights times the arm
+    at 1 rad/s of roll.
+    """
     spin = 0.015 * vehicle.weight * vehicle.arm_l * rng.choice([-1.0, 1.0])
 
     def law(m: Moment) -> Array:
@@ -164,10 +206,12 @@ def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 
 def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A long level tank along the nose holds a tenth of the mass in liquid, already weighed, that sloshes at 1.2 Hz.
+    """A long level tank along the nose holds a tenth of the mass in liquid, already weighed, that
+    sloshes at 1.2 Hz.
 
-    With s where the liquid is in the tank and a the vehicle's acceleration along it, s'' = -a - w^2 s - 2 zeta w s' and the
-    tank feels m (w^2 s + 2 zeta w s') along itself, a third of an arm below the centre; zeta is 0.05.
+    With s where the liquid is in the tank and a the vehicle's acceleration along it, s'' = -a - w^2
+    s - 2 zeta w s' and the tank feels m (w^2 s + 2 zeta w s') along itself, a third of an arm below
+    the centre; zeta is 0.05.
     """
     mass, w, zeta = 0.1 * vehicle.mass, 2.0 * math.pi * 1.2, 0.05
     place, speed, last = 0.0, 0.0, np.zeros(3)
@@ -195,13 +239,17 @@ def rotor_dropouts(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
             start = m.t + rng.exponential(0.8)
         if m.t < start:
             return np.zeros(6)
-        return _thrust_change(vehicle, m, np.array([0.0, -0.1 * vehicle.k[1] * m.speeds[1] ** 2, 0.0, 0.0]))
+        return _thrust_change(
+            vehicle, m, np.array([0.0, -0.1 * vehicle.k[1] * m.speeds[1] ** 2, 0.0, 0.0])
+        )
 
     return law
 
 
 def vortex_ring(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """A descent faster than 0.3 m/s into the own wash costs thrust, 15 % for each m/s beyond, up to 10 %, and buffets."""
+    """A descent faster than 0.3 m/s into the own wash costs thrust, 15 % for each m/s beyond, up to
+    10 %, and buffets.
+    """
     buffet = np.zeros(4)
     keep = math.exp(-TICK / 0.1)
 
@@ -226,7 +274,9 @@ def periodic_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its turn rate promises."""
+    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its turn rate
+    promises.
+    """
     knee = 1.1 * vehicle.weight / 4.0
 
     def law(m: Moment) -> Array:
@@ -236,8 +286,12 @@ def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -
 
 
 def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """The trim walks at random as things warm up: in 20 s by 0.02 weights times the arm in roll and pitch, a third in yaw."""
-    step = 0.02 * vehicle.weight * vehicle.arm_l * math.sqrt(TICK / 20.0) * np.array([1.0, 1.0, 0.3])
+    """The trim walks at random as things warm up: in 20 s by 0.02 weights times the arm in roll and
+    pitch, a third in yaw.
+    """
+    step = (
+        0.02 * vehicle.weight * vehicle.arm_l * math.sqrt(TICK / 20.0) * np.array([1.0, 1.0, 0.3])
+    )
     torque = np.zeros(3)
 
     def law(m: Moment) -> Array:
@@ -249,14 +303,30 @@ def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
 
 
 OUTSIDERS: dict[str, Maker] = {
-    law.__name__: law for law in (
-        contact_pushes, tether, wall_attraction, dry_friction, cubic_drag, magnus_force, patchy_drag, thermal_column,
-        flywheel, sloshing, rotor_dropouts, vortex_ring, periodic_force, thrust_saturation, torque_drift)
+    law.__name__: law
+    for law in (
+        contact_pushes,
+        tether,
+        wall_attraction,
+        dry_friction,
+        cubic_drag,
+        magnus_force,
+        patchy_drag,
+        thermal_column,
+        flywheel,
+        sloshing,
+        rotor_dropouts,
+        vortex_ring,
+        periodic_force,
+        thrust_saturation,
+        torque_drift,
+    )
 }
 
 
-def outside_push(name: str, vehicle: Vehicle, rng: np.random.Generator, path: Array,
-                 size: float = 1.0) -> Callable[[ClosedLoop], Array]:
+def outside_push(
+    name: str, vehicle: Vehicle, rng: np.random.Generator, path: Array, size: float = 1.0
+) -> Callable[[ClosedLoop], Array]:
     """Return what gives a loop its wrench (6,) of a disturbance at each tick.
 
     Args:
@@ -276,8 +346,17 @@ def outside_push(name: str, vehicle: Vehicle, rng: np.random.Generator, path: Ar
 
 def pushing(law: Law, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
     """Return what gives a loop its wrench (6,) of a law at each tick, times ``size``."""
+
     def push(loop: ClosedLoop) -> Array:
-        return size * law(Moment(loop.time, loop.position, loop.velocity.copy(), matrix_of(loop.quaternion),
-                                 loop.data.qvel[3:6], loop.record[0]["plant"]["speeds"]))
+        return size * law(
+            Moment(
+                loop.time,
+                loop.position,
+                loop.velocity.copy(),
+                matrix_of(loop.quaternion),
+                loop.data.qvel[3:6],
+                loop.record[0]["plant"]["speeds"],
+            )
+        )
 
     return push

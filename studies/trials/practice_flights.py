@@ -1,7 +1,8 @@
-"""Flights for a diagnosis to practise on: what was added to the vehicle is known, and nothing of it is declared.
+"""Flights for a diagnosis to practise on: what was added to the vehicle is known, and nothing of it
+is declared.
 
-Five kinds: nothing added, one effect, two effects, a hover (in which many an effect cannot be told from another), and a
-disturbance outside the library. All are flown in MuJoCo and kept in memory.
+Five kinds: nothing added, one effect, two effects, a hover (in which many an effect cannot be told
+from another), and a disturbance outside the library. All are flown in MuJoCo and kept in memory.
 """
 
 import zlib
@@ -26,36 +27,80 @@ KINDS = ("nothing", "effect", "pair", "hover", "outsider")
 _CEILING = 2.6  # m, of the room where the vehicle does not say
 
 _FREE = ("excite", "vertical", "fast", "yaw", "circle", "gentle")
-# Flights in which an effect shows; elsewhere any of _FREE. In the first the coefficient that is known worst is known about as
-# well as in any: on the AR.Drone with noise and turbulence of once what is declared rate_damping, for one, to 0.7 %, in the
-# yawing flight to 7 %; body_drag to 13 % on the fast one, to 18 % on excite; com_offset to 1.5 % on shake, to 4 % on excite,
-# marker_offset to 0.8 and to 2.5 %.
+# Flights in which an effect shows; elsewhere any of _FREE. In the first the coefficient that is
+# known worst is known about as well as in any: on the AR.Drone with noise and turbulence of once
+# what is declared rate_damping, for one, to 0.7 %, in the yawing flight to 7 %; body_drag to 13 %
+# on the fast one, to 18 % on excite; com_offset to 1.5 % on shake, to 4 % on excite, marker_offset
+# to 0.8 and to 2.5 %.
 _SHOWN: Mapping[str, tuple[str, ...]] = {
-    "com_offset": ("shake", *_FREE), "ground_effect": ("ground",), "ceiling_effect": ("ceiling",), "fan_jet": ("jet",),
-    "rotor_drag": ("excite", "fast", "circle"), "body_drag": ("fast", "excite", "circle"), "wind": ("excite", "fast"),
-    "flapping_moment": ("excite", "fast"), "translational_lift": ("fast", "excite"), "inflow_thrust": ("excite", "vertical"),
-    "rate_damping": ("excite", "yaw"), "attitude_gain": ("excite", "fast"), "world_tilt": ("yaw", "excite"),
-    "thrust_axis_tilt": ("yaw", "excite"), "inertia": ("excite", "fast"), "motor_lag": ("excite", "vertical"),
-    "latency": ("excite", "vertical"), "clock_offset": ("excite", "fast"), "rotor_inertia": ("excite", "fast"),
-    "marker_offset": ("shake", "excite", "yaw"), "thrust_curvature": ("excite", "vertical"),
-    "thrust_scale": ("vertical", "excite"), "mass": ("vertical", "excite", "gentle"),
-    "cubic_drag": ("excite", "fast"), "patchy_drag": ("excite", "fast"), "magnus_force": ("excite", "yaw"),
-    "vortex_ring": ("vertical",), "thrust_saturation": ("vertical", "excite"), "thermal_column": ("gentle", "excite", "jet"),
-    "wall_attraction": ("gentle", "circle", "jet"), "flywheel": ("excite", "fast"), "sloshing": ("excite", "fast"),
+    "com_offset": ("shake", *_FREE),
+    "ground_effect": ("ground",),
+    "ceiling_effect": ("ceiling",),
+    "fan_jet": ("jet",),
+    "rotor_drag": ("excite", "fast", "circle"),
+    "body_drag": ("fast", "excite", "circle"),
+    "wind": ("excite", "fast"),
+    "flapping_moment": ("excite", "fast"),
+    "translational_lift": ("fast", "excite"),
+    "inflow_thrust": ("excite", "vertical"),
+    "rate_damping": ("excite", "yaw"),
+    "attitude_gain": ("excite", "fast"),
+    "world_tilt": ("yaw", "excite"),
+    "thrust_axis_tilt": ("yaw", "excite"),
+    "inertia": ("excite", "fast"),
+    "motor_lag": ("excite", "vertical"),
+    "latency": ("excite", "vertical"),
+    "clock_offset": ("excite", "fast"),
+    "rotor_inertia": ("excite", "fast"),
+    "marker_offset": ("shake", "excite", "yaw"),
+    "thrust_curvature": ("excite", "vertical"),
+    "thrust_scale": ("vertical", "excite"),
+    "mass": ("vertical", "excite", "gentle"),
+    "cubic_drag": ("excite", "fast"),
+    "patchy_drag": ("excite", "fast"),
+    "magnus_force": ("excite", "yaw"),
+    "vortex_ring": ("vertical",),
+    "thrust_saturation": ("vertical", "excite"),
+    "thermal_column": ("gentle", "excite", "jet"),
+    "wall_attraction": ("gentle", "circle", "jet"),
+    "flywheel": ("excite", "fast"),
+    "sloshing": ("excite", "fast"),
     "tether": ("excite", "gentle"),
 }
 # coefficients that say where and of what kind a thing is, not how strong
 _NOT_SIZES: Mapping[str, tuple[str, ...]] = {
-    "fan_jet": ("x", "y", "z", "heading", "kd", "area"), "slung_payload": ("l", "damping"), "wind": ("cd",),
+    "fan_jet": ("x", "y", "z", "heading", "kd", "area"),
+    "slung_payload": ("l", "damping"),
+    "wind": ("cd",),
 }
 # s: with the motors' own lag, the flight loop falls over a delay of 42 ms
 _MOST: Mapping[str, float] = {"latency": 0.038, "clock_offset": 0.038}
 # effects whose coefficients may have either sign
-_SIGNED = ("clock_offset", "com_offset", "constant_force", "constant_torque", "inertia", "marker_offset", "mass",
-           "thrust_axis_tilt", "thrust_curvature", "thrust_scale", "wind", "world_tilt")
+_SIGNED = (
+    "clock_offset",
+    "com_offset",
+    "constant_force",
+    "constant_torque",
+    "inertia",
+    "marker_offset",
+    "mass",
+    "thrust_axis_tilt",
+    "thrust_curvature",
+    "thrust_scale",
+    "wind",
+    "world_tilt",
+)
 # what a hover shows and cannot tell apart
-_HOVERING = ("mass", "thrust_scale", "constant_force", "com_offset", "constant_torque", "rotor_efficiency", "world_tilt",
-             "thrust_axis_tilt")
+_HOVERING = (
+    "mass",
+    "thrust_scale",
+    "constant_force",
+    "com_offset",
+    "constant_torque",
+    "rotor_efficiency",
+    "world_tilt",
+    "thrust_axis_tilt",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +136,8 @@ def fly_practice(
     sensor: float = 1.0,
     outsider_size: float = 1.0,
 ) -> FlightLog:
-    """Fly a vehicle with effects that it does not declare and with a disturbance; return the log, with the true wrench.
+    """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
+    with the true wrench.
 
     Args:
         vehicle: as declared.
@@ -109,10 +155,18 @@ def fly_practice(
     """
     for what, value in (("turbulence", turbulence), ("sensor", sensor)):
         if not 0.0 <= value < np.inf:
-            raise InputError(f"fly_practice: {what} must be a finite number of at least 0, got {value}")
+            raise InputError(
+                f"fly_practice: {what} must be a finite number of at least 0, got {value}"
+            )
     noise = vehicle.mocap
-    flown = replace(vehicle, mocap=replace(noise, sigma_pos_m=sensor * noise.sigma_pos_m,
-                                           sigma_att_rad=sensor * noise.sigma_att_rad))
+    flown = replace(
+        vehicle,
+        mocap=replace(
+            noise,
+            sigma_pos_m=sensor * noise.sigma_pos_m,
+            sigma_att_rad=sensor * noise.sigma_att_rad,
+        ),
+    )
     if sensor == 0.0:
         # the filter that flies cannot believe in a perfect pose
         flown = vehicle
@@ -121,20 +175,34 @@ def fly_practice(
     if outsider is not None:
         t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
         path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
-        push = outside_push(outsider, vehicle, np.random.default_rng((seed, 1)), path, outsider_size)
+        push = outside_push(
+            outsider, vehicle, np.random.default_rng((seed, 1)), path, outsider_size
+        )
     c = record_flight(flown, effects, trajectory, seconds, seed, settings, push)
     added = "+".join([*(e.name for e in effects), *([outsider] if outsider else [])]) or "nothing"
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), c["force"], c["torque"],
-                     name=f"{added}_{trajectory}_{seed}", source="flown in MuJoCo by fly_practice")
+    return FlightLog(
+        c["t"],
+        c["position"],
+        c["quaternion"],
+        c["rotor_speeds"],
+        c.get("voltage"),
+        c["force"],
+        c["torque"],
+        name=f"{added}_{trajectory}_{seed}",
+        source="flown in MuJoCo by fly_practice",
+    )
 
 
 def shown_in(name: str) -> tuple[str, ...]:
-    """Return the trajectories in which an effect, or a disturbance outside the library, shows; the first shows it best."""
+    """Return the trajectories in which an effect, or a disturbance outside the library, shows; the
+    first shows it best.
+    """
     return _SHOWN.get(name, _FREE)
 
 
 def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator) -> EffectSetting:
-    """Return an effect near the library's typical size for the vehicle, with signs and a factor of 0.8 to 1.25 at random.
+    """Return an effect near the library's typical size for the vehicle, with signs and a factor of
+    0.8 to 1.25 at random.
 
     An inertia that no body has is drawn anew.
 
@@ -154,7 +222,9 @@ def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator
         if c.name not in _NOT_SIZES.get(name, ()):
             sign = float(rng.choice([-1.0, 1.0])) if name in _SIGNED else 1.0
             most = _MOST.get(name, np.inf)
-            coefficients[c.name] = min(max(sign * factor * coefficients[c.name], c.minimum, -most), c.maximum, most)
+            coefficients[c.name] = min(
+                max(sign * factor * coefficients[c.name], c.minimum, -most), c.maximum, most
+            )
     amend = get(name).amend
     if amend and is_a_body(vehicle.inertia) and not is_a_body(amend(vehicle, coefficients).inertia):
         return draw_effect(name, vehicle, size, rng)
@@ -176,7 +246,8 @@ def practise(
     Args:
         vehicle: as declared; without a ceiling it gets one at 2.6 m.
         kind: one of ``KINDS``.
-        added: names of effects, or one of ``OUTSIDERS``; more is drawn from ``seed`` where a kind asks for more.
+        added: names of effects, or one of ``OUTSIDERS``; more is drawn from ``seed`` where a kind
+            asks for more.
         size: one of ``SIZES``, of the effects and of the disturbance.
         trajectory: default: one in which what was added shows.
         seed: of everything random.
@@ -194,7 +265,13 @@ def practise(
     # equal seeds of different flights must not draw equal signs and sizes
     rng = np.random.default_rng((seed, zlib.crc32("+".join((kind, *added, size)).encode())))
     wanted = {"nothing": 0, "effect": 1, "pair": 2, "hover": 1, "outsider": 1}[kind]
-    pool = tuple(OUTSIDERS) if kind == "outsider" else _HOVERING if kind == "hover" else _in_the_open(names())
+    pool = (
+        tuple(OUTSIDERS)
+        if kind == "outsider"
+        else _HOVERING
+        if kind == "hover"
+        else _in_the_open(names())
+    )
     while len(added) < wanted:
         added = (*added, str(rng.choice([name for name in pool if name not in added])))
     outsider = added[0] if kind == "outsider" else None
@@ -205,18 +282,37 @@ def practise(
         trajectory = "hover" if kind == "hover" else str(rng.choice(both or ["excite"]))
     turbulence = float(rng.integers(2)) if turbulence is None else turbulence
     sensor = float(rng.choice([0.5, 1.0, 2.0]))
-    log = fly_practice(vehicle, effects, trajectory, seconds, seed, outsider, turbulence, sensor, SIZES[size])
+    log = fly_practice(
+        vehicle, effects, trajectory, seconds, seed, outsider, turbulence, sensor, SIZES[size]
+    )
     name = "_".join((kind, *added, size, trajectory, str(seed)))
-    return Practice(name, kind, size, trajectory, seed, effects, outsider, turbulence, sensor, replace(log, name=name),
-                    vehicle)
+    return Practice(
+        name,
+        kind,
+        size,
+        trajectory,
+        seed,
+        effects,
+        outsider,
+        turbulence,
+        sensor,
+        replace(log, name=name),
+        vehicle,
+    )
 
 
-def practice_set(vehicle: Vehicle, kinds: tuple[str, ...] = KINDS, sizes: tuple[str, ...] = tuple(SIZES), seed: int = 0,
-                 seconds: float = 60.0, pairs: int = 12) -> Iterator[Practice]:
+def practice_set(
+    vehicle: Vehicle,
+    kinds: tuple[str, ...] = KINDS,
+    sizes: tuple[str, ...] = tuple(SIZES),
+    seed: int = 0,
+    seconds: float = 60.0,
+    pairs: int = 12,
+) -> Iterator[Practice]:
     """Yield practice flights, each flown when it is asked for.
 
-    Nothing on every trajectory; every effect and every disturbance at every size; ``pairs`` pairs of effects drawn at
-    random; every effect that a hover shows, hovering.
+    Nothing on every trajectory; every effect and every disturbance at every size; ``pairs`` pairs
+    of effects drawn at random; every effect that a hover shows, hovering.
     """
     for kind in kinds:
         if kind not in KINDS:

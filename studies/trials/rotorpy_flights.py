@@ -20,7 +20,7 @@ RotorPy     its law                                     ours
 There is no factor or sign between them: its centre of mass is the geometric centre, world z is up, and attitude is body to
 world. Only orders differ: its quaternion has the scalar last, and its rotors go clockwise from the front left (1 front-left,
 2 front-right, 3 rear-right, 4 rear-left), ours counter-clockwise.
-"""
+"""  # noqa: E501
 
 import functools
 import math
@@ -57,7 +57,9 @@ def _parameters() -> dict[str, Any]:
         InputError: RotorPy is not installed.
     """
     if not available():
-        raise InputError("RotorPy is not installed; expected pip install rotorpy, or windwrench[compare]")
+        raise InputError(
+            "RotorPy is not installed; expected pip install rotorpy, or windwrench[compare]"
+        )
     from rotorpy.vehicles.hummingbird_params import quad_params
 
     return dict(quad_params)
@@ -73,7 +75,13 @@ def hummingbird_vehicle(eight_bit: bool = False) -> Vehicle:
     """
     c = _parameters()
     positions = np.array(list(c["rotor_pos"].values()), dtype=np.float64)[_ORDER]
-    inertia = np.array([[c["Ixx"], c["Ixy"], c["Ixz"]], [c["Ixy"], c["Iyy"], c["Iyz"]], [c["Ixz"], c["Iyz"], c["Izz"]]])
+    inertia = np.array(
+        [
+            [c["Ixx"], c["Ixy"], c["Ixz"]],
+            [c["Ixy"], c["Iyy"], c["Iyz"]],
+            [c["Ixz"], c["Iyz"], c["Izz"]],
+        ]
+    )
     return Vehicle(
         name="rotorpy_hummingbird",
         mass=c["mass"],
@@ -92,7 +100,8 @@ def hummingbird_vehicle(eight_bit: bool = False) -> Vehicle:
 
 
 def hummingbird_aero() -> dict[str, dict[str, float]]:
-    """Return RotorPy's aerodynamics of the Hummingbird as effects of our library: their coefficients by name.
+    """Return RotorPy's aerodynamics of the Hummingbird as effects of our library: their
+    coefficients by name.
 
     Raises:
         InputError: RotorPy is not installed.
@@ -122,7 +131,8 @@ def rotorpy_flight(
     eight_bit: bool = False,
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> FlightLog:
-    """Fly RotorPy's Hummingbird with RotorPy's controller, which sees the truth, at 200 Hz; return the log.
+    """Fly RotorPy's Hummingbird with RotorPy's controller, which sees the truth, at 200 Hz; return
+    the log.
 
     Args:
         trajectory: one of ``envs.recording.TRAJECTORIES``.
@@ -134,15 +144,20 @@ def rotorpy_flight(
         wind: m/s, steady, world; it blows only where ``aero`` is on.
 
     Returns:
-        The log. Pose, the true turn rates, and force and torque beyond rotors and weight are all those at the instant of
+        The log. Pose, the true turn rates, and force and torque beyond rotors and weight are all
+            those at the instant of
         the sample.
 
     Raises:
-        InputError: RotorPy is not installed, the trajectory is unknown, a length is out of range, or it crashed.
+        InputError: RotorPy is not installed, the trajectory is unknown, a length is out of range,
+            or it crashed.
     """
     if not TICK * 20 <= seconds <= 7200 or not 0.0 <= noise < math.inf:
-        raise InputError(f"rotorpy_flight: seconds must lie between {TICK * 20:g} and 7200 and noise be at least 0, got "
-                         f"{seconds:g} and {noise:g}")
+        raise InputError(
+            f"rotorpy_flight: seconds must lie between {TICK * 20:g} and 7200 and noise be at "
+            f"least 0, got "
+            f"{seconds:g} and {noise:g}"
+        )
     parameters, vehicle = _parameters(), hummingbird_vehicle(eight_bit)
     from rotorpy.controllers.quadrotor_control import SE3Control
     from rotorpy.vehicles.multirotor import Multirotor
@@ -152,32 +167,54 @@ def rotorpy_flight(
     setpoints = draw_trajectory(trajectory, rng, t, vehicle.ceiling_z)
     heading = Rotation.from_euler("z", setpoints[0, 9]).as_quat()
     state: dict[str, Any] = {
-        "x": setpoints[0, :3].copy(), "v": np.zeros(3), "q": heading, "w": np.zeros(3), "wind": np.array(wind, float),
+        "x": setpoints[0, :3].copy(),
+        "v": np.zeros(3),
+        "q": heading,
+        "w": np.zeros(3),
+        "wind": np.array(wind, float),
         "rotor_speeds": np.full(4, vehicle.hover_rate),
     }
     # RotorPy's integrator, spared the search for its first step
     simulator = Multirotor(parameters, state, aero=aero, integrator_kwargs={"first_step": TICK})
     controller = SE3Control(parameters)
-    position, quaternion, speeds = np.empty((len(t), 3)), np.empty((len(t), 4)), np.empty((len(t), 4))
+    position, quaternion, speeds = (
+        np.empty((len(t), 3)),
+        np.empty((len(t), 4)),
+        np.empty((len(t), 4)),
+    )
     wrench = np.zeros((len(t), 6))
     for k, s in enumerate(setpoints):
         if k > 0:
-            wanted = {"x": setpoints[k - 1, :3], "x_dot": setpoints[k - 1, 3:6], "x_ddot": setpoints[k - 1, 6:9],
-                      "yaw": setpoints[k - 1, 9], "yaw_dot": setpoints[k - 1, 10]}
+            wanted = {
+                "x": setpoints[k - 1, :3],
+                "x_dot": setpoints[k - 1, 3:6],
+                "x_ddot": setpoints[k - 1, 6:9],
+                "yaw": setpoints[k - 1, 9],
+                "yaw_dot": setpoints[k - 1, 10],
+            }
             command = controller.update(t[k - 1], state, wanted)
             state = simulator.step(state, command, TICK)
         position[k], quaternion[k], speeds[k] = state["x"], state["q"], state["rotor_speeds"]
         if not np.linalg.norm(position[k] - s[:3]) < 10.0:
-            raise InputError(f"rotorpy_flight: the Hummingbird left its path after {t[k]:.1f} s of {trajectory}")
+            raise InputError(
+                f"rotorpy_flight: the Hummingbird left its path after {t[k]:.1f} s of {trajectory}"
+            )
         if aero:
             wrench[k] = _beyond_rotors(simulator, vehicle, state)
     if eight_bit:
         speeds = vehicle.omega_lsb * np.round(speeds / vehicle.omega_lsb)
     error = Rotation.from_rotvec(noise * SIGMA_ATTITUDE * rng.standard_normal((len(t), 3)))
     seen = (error * Rotation.from_quat(quaternion)).as_quat(scalar_first=True, canonical=True)
-    return FlightLog(t, position + noise * SIGMA_POSITION * rng.standard_normal((len(t), 3)), seen, speeds[:, _ORDER],
-                     force=wrench[:, :3], torque=wrench[:, 3:],
-                     name=f"rotorpy_{'aero' if aero else 'plain'}_{trajectory}_{seed}", source="flown in RotorPy")
+    return FlightLog(
+        t,
+        position + noise * SIGMA_POSITION * rng.standard_normal((len(t), 3)),
+        seen,
+        speeds[:, _ORDER],
+        force=wrench[:, :3],
+        torque=wrench[:, 3:],
+        name=f"rotorpy_{'aero' if aero else 'plain'}_{trajectory}_{seed}",
+        source="flown in RotorPy",
+    )
 
 
 def _beyond_rotors(simulator: Any, vehicle: Vehicle, state: dict[str, Any]) -> Array:
@@ -186,4 +223,6 @@ def _beyond_rotors(simulator: Any, vehicle: Vehicle, state: dict[str, Any]) -> A
     airspeed = rotation.T @ (state["v"] - state["wind"])
     force, torque = simulator.compute_body_wrench(state["w"], state["rotor_speeds"], airspeed)
     bare = vehicle.rotor_wrench(state["rotor_speeds"][_ORDER])
-    return np.concatenate([rotation @ (force - [0.0, 0.0, bare[0]]), rotation @ (torque - bare[1:])])
+    return np.concatenate(
+        [rotation @ (force - [0.0, 0.0, bare[0]]), rotation @ (torque - bare[1:])]
+    )

@@ -1,8 +1,10 @@
-"""What the outcomes of ``trials`` are worth: one judgement a diagnosis, and the rules that they are held to.
+"""What the outcomes of ``trials`` are worth: one judgement a diagnosis, and the rules that they are
+held to.
 
-A name is *true* where the effect was added, and stands for the truth where the diagnosis says that its flights cannot tell it
-from an added effect. A name is *confidently wrong* where it is neither of these and not marked as tentative. A diagnosis is
-*right* where every added effect has its name and there is no other.
+A name is *true* where the effect was added, and stands for the truth where the diagnosis says that
+its flights cannot tell it from an added effect. A name is *confidently wrong* where it is neither
+of these and not marked as tentative. A diagnosis is *right* where every added effect has its name
+and there is no other.
 """
 
 import itertools
@@ -16,7 +18,12 @@ import numpy as np
 from windwrench.studies.trials.trials import EQUIVALENTS
 from windwrench.studies.trials.unseen_outsiders import UNSEEN
 
-RIGHT, RIGHT_TENTATIVE, TENTATIVE, WRONG = "right", "right, tentative", "tentative", "confidently wrong"
+RIGHT, RIGHT_TENTATIVE, TENTATIVE, WRONG = (
+    "right",
+    "right, tentative",
+    "tentative",
+    "confidently wrong",
+)
 PARTIAL, UNEXPLAINED, SILENT, FAILED = "partial", "unexplained", "silent", "failed"
 OUTCOMES: Mapping[str, str] = {
     RIGHT: "every added effect has its name, no other, no doubt; with nothing added, nothing named",
@@ -47,14 +54,20 @@ class Judgement:
     without: tuple[str, ...]  # taken out of the library
     truth: tuple[str, ...]  # effects that were added
     outcome: str  # one of OUTCOMES
-    named: tuple[str, ...]  # a question mark behind tentative ones, and what they cannot be told from
+    named: tuple[
+        str, ...
+    ]  # a question mark behind tentative ones, and what they cannot be told from
     exact: bool  # right by the very names, not only up to what flights cannot tell
     classes: tuple[str, ...]  # all that is named, or that flights cannot tell from what is named
     all_tentative: bool  # every name is
-    errors: Mapping[str, tuple[float, float]]  # coefficient: relative error, and error in its own standard deviations
+    errors: Mapping[
+        str, tuple[float, float]
+    ]  # coefficient: relative error, and error in its own standard deviations
     verdict: str
     remainder: str
-    floor_ratio: float  # largest of force's and torque's residual after, over what the sensors leave
+    floor_ratio: (
+        float  # largest of force's and torque's residual after, over what the sensors leave
+    )
     rollout_ratio: float  # one-second prediction error after over before
     rollout_of_truth: float  # that of the true model over before, on the same blocks
     gusts: float  # in force, found over flown; NaN in still air
@@ -83,7 +96,9 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
     wrong = [e["name"] for e in effects if not e["tentative"] and not (_stands_for(e) & set(truth))]
     pairs = match(effects, list(truth))
     right = pairs is not None and not flown["outsider"]
-    tentative = any(e["tentative"] for e in effects) or (not effects and found.get("remainder") == "structured")
+    tentative = any(e["tentative"] for e in effects) or (
+        not effects and found.get("remainder") == "structured"
+    )
     if failed:
         verdict = FAILED
     elif right:
@@ -99,20 +114,40 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
     size = "" if trial["group"] in ("nothing", "strong turbulence") else f", {trial['size']}"
     structure = found.get("structure", [])
     return Judgement(
-        key=outcome["key"], group=trial["group"], cause=flown["outsider"] or " + ".join(truth) or "nothing",
-        size=trial["size"], vehicle=trial["vehicle"],
-        flight=f"{flown['trajectory']}{size}, noise x{flown['sensor']:g}, turbulence x{flown['turbulence']:g}",
-        without=tuple(found["without"]), truth=tuple(truth), outcome=verdict, named=tuple(_word(e) for e in effects),
-        exact=not failed and {e["name"] for e in effects} == set(truth), classes=tuple(sorted(behind)),
+        key=outcome["key"],
+        group=trial["group"],
+        cause=flown["outsider"] or " + ".join(truth) or "nothing",
+        size=trial["size"],
+        vehicle=trial["vehicle"],
+        flight=f"{flown['trajectory']}{size}, noise x{flown['sensor']:g}, turbulence "
+        f"x{flown['turbulence']:g}",
+        without=tuple(found["without"]),
+        truth=tuple(truth),
+        outcome=verdict,
+        named=tuple(_word(e) for e in effects),
+        exact=not failed and {e["name"] for e in effects} == set(truth),
+        classes=tuple(sorted(behind)),
         all_tentative=all(e["tentative"] for e in effects),
-        errors=coefficient_errors(effects, truth, pairs or [(e["name"], e["name"]) for e in effects if e["name"] in truth]),
-        verdict=found.get("verdict", ""), remainder=found.get("remainder", ""),
-        floor_ratio=max((_ratio(after.get(k), floor.get(k)) for k in ("force_rms", "torque_rms")), default=np.nan),
-        rollout_ratio=_ratio(after.get("rollout_1s_position_rms"), found.get("before", {}).get("rollout_1s_position_rms")),
+        errors=coefficient_errors(
+            effects, truth, pairs or [(e["name"], e["name"]) for e in effects if e["name"] in truth]
+        ),
+        verdict=found.get("verdict", ""),
+        remainder=found.get("remainder", ""),
+        floor_ratio=max(
+            (_ratio(after.get(k), floor.get(k)) for k in ("force_rms", "torque_rms")),
+            default=np.nan,
+        ),
+        rollout_ratio=_ratio(
+            after.get("rollout_1s_position_rms"),
+            found.get("before", {}).get("rollout_1s_position_rms"),
+        ),
         rollout_of_truth=_number(flown.get("rollout_of_truth")),
-        gusts=_ratio(float(np.mean(found["gusts"][:3])), flown.get("gusts")) if found.get("gusts") else np.nan,
+        gusts=_ratio(float(np.mean(found["gusts"][:3])), flown.get("gusts"))
+        if found.get("gusts")
+        else np.nan,
         gave_away=f"{structure[0]['test']}: {structure[0]['where']}" if structure else "",
-        problem=found.get("error", ""), seconds=found["seconds"],
+        problem=found.get("error", ""),
+        seconds=found["seconds"],
     )
 
 
@@ -122,7 +157,9 @@ def _stands_for(effect: Mapping[str, Any]) -> set[str]:
 
 def _word(effect: Mapping[str, Any]) -> str:
     others = ", ".join(effect["indistinguishable_from"])
-    return f"{effect['name']}{'?' if effect['tentative'] else ''}" + (f" (or {others})" if others else "")
+    return f"{effect['name']}{'?' if effect['tentative'] else ''}" + (
+        f" (or {others})" if others else ""
+    )
 
 
 def _number(value: float | None) -> float:
@@ -133,8 +170,12 @@ def _ratio(after: float | None, before: float | None) -> float:
     return float(after / before) if after is not None and before else float("nan")
 
 
-def match(effects: Sequence[Mapping[str, Any]], truth: Sequence[str]) -> list[tuple[str, str]] | None:
-    """Return pairs (name, added effect) if names and added effects stand for each other one by one, else None."""
+def match(
+    effects: Sequence[Mapping[str, Any]], truth: Sequence[str]
+) -> list[tuple[str, str]] | None:
+    """Return pairs (name, added effect) if names and added effects stand for each other one by one,
+    else None.
+    """
     if len(effects) != len(truth):
         return None
     best: list[tuple[str, str]] | None = None
@@ -146,18 +187,27 @@ def match(effects: Sequence[Mapping[str, Any]], truth: Sequence[str]) -> list[tu
     return best
 
 
-def coefficient_errors(effects: Sequence[Mapping[str, Any]], truth: Mapping[str, Mapping[str, float]],
-                       pairs: Sequence[tuple[str, str]]) -> dict[str, tuple[float, float]]:
-    """Return, for each coefficient that is not zero in the truth, its relative error and that in standard deviations.
+def coefficient_errors(
+    effects: Sequence[Mapping[str, Any]],
+    truth: Mapping[str, Mapping[str, float]],
+    pairs: Sequence[tuple[str, str]],
+) -> dict[str, tuple[float, float]]:
+    """Return, for each coefficient that is not zero in the truth, its relative error and that in
+    standard deviations.
 
-    Only names that are the added effect's own are compared, and a latency with a clock offset, which is the same number.
+    Only names that are the added effect's own are compared, and a latency with a clock offset,
+    which is the same number.
     """
     by_name = {e["name"]: e for e in effects}
     out = {}
     for name, added in pairs:
         true, e = truth[added], by_name[name]
         if name != added:
-            if name not in EQUIVALENTS.get(added, ()) or len(true) != 1 or len(e["coefficients"]) != 1:
+            if (
+                name not in EQUIVALENTS.get(added, ())
+                or len(true) != 1
+                or len(e["coefficients"]) != 1
+            ):
                 continue
             e = {k: dict(zip(true, e[k].values(), strict=True)) for k in ("coefficients", "std")}
         for c, value in true.items():
@@ -191,35 +241,104 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
     alone = [j for j in typical if j.right]
     known = [j for j in typical + third + presets + nothing if j.right]
     out = [
-        _share("1. one effect of typical size: right name, no other", typical, lambda j: j.right, 0.95),
-        _share("1. the same with the presets hummingbird and crazyflie, in part", presets, lambda j: j.right, 0.95),
-        _coefficients("1. every coefficient that is not zero within 5 %, where the names are right", alone),
+        _share(
+            "1. one effect of typical size: right name, no other", typical, lambda j: j.right, 0.95
+        ),
+        _share(
+            "1. the same with the presets hummingbird and crazyflie, in part",
+            presets,
+            lambda j: j.right,
+            0.95,
+        ),
+        _coefficients(
+            "1. every coefficient that is not zero within 5 %, where the names are right", alone
+        ),
         _coefficients("1. the same with the presets", [j for j in presets if j.right]),
-        _unbiased("1. the same of both, expected of an unbiased fit with the standard deviations that were reported",
-                  [j for j in alone + presets if j.right]),
-        _share("2. one effect of a third of that size: right name, no other", third, lambda j: j.right, 0.90),
+        _unbiased(
+            "1. the same of both, expected of an unbiased fit with the standard deviations that "
+            "were reported",
+            [j for j in alone + presets if j.right],
+        ),
+        _share(
+            "2. one effect of a third of that size: right name, no other",
+            third,
+            lambda j: j.right,
+            0.90,
+        ),
         _share("2. two effects: both right names, no other", pairs, lambda j: j.right, 0.90),
-        _share("3. no effect: nothing named", nothing, lambda j: not j.named and j.outcome != FAILED, 1.0),
-        *(_share(f"3. outside the library, {words}: `unexplained` or `partly explained`, every name tentative",
-                 [j for j in outside if j.size == size], doubts, 1.0)
-          for size, words in (("typical", "typical size"), ("small", "a third of it"))),
-        _share("3. the same, held-back disturbances of both sizes alone", of("held back"), doubts, 1.0),
-        _share("3. the same, the six that no rule has seen alone", [j for j in of("held back") if j.cause in UNSEEN],
-               doubts, 1.0),
+        _share(
+            "3. no effect: nothing named",
+            nothing,
+            lambda j: not j.named and j.outcome != FAILED,
+            1.0,
+        ),
+        *(
+            _share(
+                f"3. outside the library, {words}: `unexplained` or `partly explained`, every name "
+                f"tentative",
+                [j for j in outside if j.size == size],
+                doubts,
+                1.0,
+            )
+            for size, words in (("typical", "typical size"), ("small", "a third of it"))
+        ),
+        _share(
+            "3. the same, held-back disturbances of both sizes alone", of("held back"), doubts, 1.0
+        ),
+        _share(
+            "3. the same, the six that no rule has seen alone",
+            [j for j in of("held back") if j.cause in UNSEEN],
+            doubts,
+            1.0,
+        ),
         _share("4. hover: no name confidently wrong", of("hover"), _not_wrong, 1.0),
-        _share("4. hover: the truth is among what is named and what that cannot be told from", of("hover"),
-               lambda j: set(j.truth) <= set(j.classes), None),
-        _by_kind("5. left out of the library, typical size: not confidently wrong, by kind", left_out(every, "typical"), 0.90),
-        _by_kind("5. left out of the library, a third: not confidently wrong, by kind", left_out(every, "small"), 0.80),
-        _share("5. of those confidently wrong: flights on which the whole library says that it cannot tell",
-               [j for size in ("typical", "small") for j in left_out(every, size) if j.outcome == WRONG],
-               lambda j: undecided(j, full), None),
-        _share("5. right answers, or nothing rightly named, that the search for structure casts doubt on", known,
-               lambda j: j.outcome == RIGHT_TENTATIVE, 0.03, at_most=True),
-        _share("5. right answers with two effects that it casts doubt on", [j for j in pairs if j.right],
-               lambda j: j.outcome == RIGHT_TENTATIVE, 0.10, at_most=True),
-        _floor("6. residual after, over the sensors' floor, where all is `explained`",
-               [j for j in full if j.verdict == "explained"]),
+        _share(
+            "4. hover: the truth is among what is named and what that cannot be told from",
+            of("hover"),
+            lambda j: set(j.truth) <= set(j.classes),
+            None,
+        ),
+        _by_kind(
+            "5. left out of the library, typical size: not confidently wrong, by kind",
+            left_out(every, "typical"),
+            0.90,
+        ),
+        _by_kind(
+            "5. left out of the library, a third: not confidently wrong, by kind",
+            left_out(every, "small"),
+            0.80,
+        ),
+        _share(
+            "5. of those confidently wrong: flights on which the whole library says that it cannot "
+            "tell",
+            [
+                j
+                for size in ("typical", "small")
+                for j in left_out(every, size)
+                if j.outcome == WRONG
+            ],
+            lambda j: undecided(j, full),
+            None,
+        ),
+        _share(
+            "5. right answers, or nothing rightly named, that the search for structure casts doubt "
+            "on",
+            known,
+            lambda j: j.outcome == RIGHT_TENTATIVE,
+            0.03,
+            at_most=True,
+        ),
+        _share(
+            "5. right answers with two effects that it casts doubt on",
+            [j for j in pairs if j.right],
+            lambda j: j.outcome == RIGHT_TENTATIVE,
+            0.10,
+            at_most=True,
+        ),
+        _floor(
+            "6. residual after, over the sensors' floor, where all is `explained`",
+            [j for j in full if j.verdict == "explained"],
+        ),
     ]
     for name, bar in ROLLOUT_BARS.items():
         some = [j for j in typical if j.cause == name and j.exact]
@@ -229,27 +348,47 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
             continue
         worst = max(some, key=lambda j: j.rollout_ratio)
         met = sum(j.rollout_ratio <= bar for j in some)
-        out.append(Rule(rule, f"<= {bar:g}", f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; there "
-                        f"the true model comes to {worst.rollout_of_truth:.2f}", met == len(some), len(some)))
+        out.append(
+            Rule(
+                rule,
+                f"<= {bar:g}",
+                f"{worst.rollout_ratio:.2f} at worst, {met} of {len(some)} within; there "
+                f"the true model comes to {worst.rollout_of_truth:.2f}",
+                met == len(some),
+                len(some),
+            )
+        )
     return [*out, *_rotorpy(of("rotorpy")), _gusts([j for j in full if j.right])]
 
 
 def doubts(j: Judgement) -> bool:
-    """Return whether a diagnosis says that something is left which no effect explains, and is sure of no name."""
+    """Return whether a diagnosis says that something is left which no effect explains, and is sure
+    of no name.
+    """
     return j.verdict in ("unexplained", "partly explained") and j.all_tentative
 
 
 def left_out(judged: Iterable[Judgement], size: str) -> list[Judgement]:
-    """Return the diagnoses whose cause was in no way in the library: effects left out, and held-back disturbances."""
+    """Return the diagnoses whose cause was in no way in the library: effects left out, and
+    held-back disturbances.
+    """
     group = {"typical": "typical", "small": "third"}[size]
-    return [j for j in judged if (j.group == group and set(j.without) == {*j.truth, *_same_as(j.truth)})
-            or (j.group == "held back" and j.size == size)]
+    return [
+        j
+        for j in judged
+        if (j.group == group and set(j.without) == {*j.truth, *_same_as(j.truth)})
+        or (j.group == "held back" and j.size == size)
+    ]
 
 
 def undecided(judged: Judgement, full: Iterable[Judgement]) -> bool:
-    """Return whether the whole library, on the same flight, cannot tell the truth from what is named without it."""
+    """Return whether the whole library, on the same flight, cannot tell the truth from what is
+    named without it.
+    """
     names = {name.split(" ")[0].rstrip("?") for name in judged.named}
-    return any(j.key == judged.key and j.right and names <= set(j.classes) - set(j.truth) for j in full)
+    return any(
+        j.key == judged.key and j.right and names <= set(j.classes) - set(j.truth) for j in full
+    )
 
 
 def _same_as(truth: Iterable[str]) -> set[str]:
@@ -260,7 +399,9 @@ def _not_wrong(j: Judgement) -> bool:
     return j.outcome not in (WRONG, FAILED)
 
 
-def _rule(subject: str, share: float, bar: float | None, count: int, more: str, at_most: bool = False) -> Rule:
+def _rule(
+    subject: str, share: float, bar: float | None, count: int, more: str, at_most: bool = False
+) -> Rule:
     if not count:
         return Rule(subject, _target(bar, at_most), "not flown", None, 0)
     met = None if bar is None else bool(share <= bar if at_most else share >= bar)
@@ -268,20 +409,34 @@ def _rule(subject: str, share: float, bar: float | None, count: int, more: str, 
 
 
 def _target(bar: float | None, at_most: bool = False) -> str:
-    return "-" if bar is None else f"{'<=' if at_most else '>='} {bar:.0%}" if bar < 1.0 else "always"
+    return (
+        "-" if bar is None else f"{'<=' if at_most else '>='} {bar:.0%}" if bar < 1.0 else "always"
+    )
 
 
-def _share(subject: str, some: Sequence[Judgement], good: Callable[[Judgement], bool], bar: float | None,
-           at_most: bool = False) -> Rule:
+def _share(
+    subject: str,
+    some: Sequence[Judgement],
+    good: Callable[[Judgement], bool],
+    bar: float | None,
+    at_most: bool = False,
+) -> Rule:
     count = sum(map(good, some))
-    return _rule(subject, count / max(len(some), 1), bar, len(some), f"({count} of {len(some)})", at_most)
+    return _rule(
+        subject, count / max(len(some), 1), bar, len(some), f"({count} of {len(some)})", at_most
+    )
 
 
 def _by_kind(subject: str, some: Sequence[Judgement], bar: float) -> Rule:
     kinds = sorted({j.cause for j in some})
     shares = [float(np.mean([_not_wrong(j) for j in some if j.cause == kind])) for kind in kinds]
-    return _rule(subject, float(np.mean(shares)) if shares else 0.0, bar, len(some),
-                 f"({round(sum(shares), 1):g} of {len(kinds)} kinds)")
+    return _rule(
+        subject,
+        float(np.mean(shares)) if shares else 0.0,
+        bar,
+        len(some),
+        f"({round(sum(shares), 1):g} of {len(kinds)} kinds)",
+    )
 
 
 def _coefficients(subject: str, some: Sequence[Judgement]) -> Rule:
@@ -292,39 +447,68 @@ def _coefficients(subject: str, some: Sequence[Judgement]) -> Rule:
     within = float(np.mean([e <= COEFFICIENT_BAR for e in worst]))
     every = [pair for j in with_errors for pair in j.errors.values()]
     beyond = [sigmas for e, sigmas in every if e > COEFFICIENT_BAR]
-    measured = (f"{within:.1%} of flights, {len(every) - len(beyond)} of {len(every)} coefficients; the worst of each flight "
-                f"is {np.median(worst):.1%} in the median and {max(worst):.1%} at most")
+    measured = (
+        f"{within:.1%} of flights, {len(every) - len(beyond)} of {len(every)} coefficients; the "
+        f"worst of each flight "
+        f"is {np.median(worst):.1%} in the median and {max(worst):.1%} at most"
+    )
     if beyond:
-        measured += f"; those beyond are off by {max(beyond):.1f} of their own standard deviations at most"
+        measured += (
+            f"; those beyond are off by {max(beyond):.1f} of their own standard deviations at most"
+        )
     return Rule(subject, ">= 95%", measured, within >= 0.95, len(worst))
 
 
 def _unbiased(subject: str, some: Sequence[Judgement]) -> Rule:
-    """Return how many flights a fit would have within the bar whose errors are normal, with mean zero, and as large as said."""
+    """Return how many flights a fit would have within the bar whose errors are normal, with mean
+    zero, and as large as said.
+    """
     shares = []
     for j in some:
         # an error e of s standard deviations: the bar is at s * bar / e of them
-        within = [erf(s * COEFFICIENT_BAR / (e * sqrt(2.0))) for e, s in j.errors.values() if e > 0.0 and np.isfinite(s)]
+        within = [
+            erf(s * COEFFICIENT_BAR / (e * sqrt(2.0)))
+            for e, s in j.errors.values()
+            if e > 0.0 and np.isfinite(s)
+        ]
         if within:
             shares.append(float(np.prod(within)))
     every = [s for j in some for _, s in j.errors.values() if np.isfinite(s)]
-    more = f"of flights; {np.mean([s < 1.0 for s in every]):.0%} of the coefficients are within one such deviation, "\
-           f"{np.mean([s < 2.0 for s in every]):.0%} within two" if every else ""
+    more = (
+        f"of flights; {np.mean([s < 1.0 for s in every]):.0%} of the coefficients are within one "
+        f"such deviation, "
+        f"{np.mean([s < 2.0 for s in every]):.0%} within two"
+        if every
+        else ""
+    )
     return _rule(subject, float(np.mean(shares)) if shares else 0.0, None, len(shares), more)
 
 
 def _floor(subject: str, some: Sequence[Judgement]) -> Rule:
     worst = max((j.floor_ratio for j in some), default=np.nan)
-    return Rule(subject, f"<= {FLOOR_BAR:g}", f"{worst:.2f} at worst" if some else "not flown",
-                bool(worst <= FLOOR_BAR) if some else None, len(some))
+    return Rule(
+        subject,
+        f"<= {FLOOR_BAR:g}",
+        f"{worst:.2f} at worst" if some else "not flown",
+        bool(worst <= FLOOR_BAR) if some else None,
+        len(some),
+    )
 
 
 def _gusts(some: Sequence[Judgement]) -> Rule:
     ratios = [j.gusts for j in some if np.isfinite(j.gusts)]
     low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95]) if ratios else (np.nan,) * 3
-    measured = f"{middle:.2f} times what is flown in the median, {low:.2f} to {high:.2f} on nine flights of ten"
-    return Rule("-. gusts in force as they are found, where names are right and there are any", "-",
-                measured if ratios else "not flown", None, len(ratios))
+    measured = (
+        f"{middle:.2f} times what is flown in the median, {low:.2f} to {high:.2f} on nine flights "
+        "of ten"
+    )
+    return Rule(
+        "-. gusts in force as they are found, where names are right and there are any",
+        "-",
+        measured if ratios else "not flown",
+        None,
+        len(ratios),
+    )
 
 
 def _rotorpy(some: Sequence[Judgement]) -> list[Rule]:
@@ -332,11 +516,33 @@ def _rotorpy(some: Sequence[Judgement]) -> list[Rule]:
     wanted = [f"{name}.{c}" for name, cs in _ROTORPY.items() for c in cs]
     errors = [j.errors.get(c, (np.inf, np.inf))[0] for j in on for c in wanted]
     worst = max(errors, default=np.nan)
-    found = f"{worst:.1%} at worst" if np.isfinite(worst) else "not all named" if on else "not flown: RotorPy is not installed"
+    found = (
+        f"{worst:.1%} at worst"
+        if np.isfinite(worst)
+        else "not all named"
+        if on
+        else "not flown: RotorPy is not installed"
+    )
     return [
-        Rule("7. RotorPy, aerodynamics on: k_d, k_z and k_h within 5 %", "always", found,
-             bool(worst <= COEFFICIENT_BAR) if on else None, len(on)),
-        _share("7. RotorPy, aerodynamics on: nothing named but its own", on,
-               lambda j: j.outcome != FAILED and all(n.split(" ")[0].rstrip("?") in j.truth for n in j.named), 1.0),
-        _share("7. RotorPy, aerodynamics off: nothing named", off, lambda j: not j.named and j.outcome != FAILED, 1.0),
+        Rule(
+            "7. RotorPy, aerodynamics on: k_d, k_z and k_h within 5 %",
+            "always",
+            found,
+            bool(worst <= COEFFICIENT_BAR) if on else None,
+            len(on),
+        ),
+        _share(
+            "7. RotorPy, aerodynamics on: nothing named but its own",
+            on,
+            lambda j: (
+                j.outcome != FAILED and all(n.split(" ")[0].rstrip("?") in j.truth for n in j.named)
+            ),
+            1.0,
+        ),
+        _share(
+            "7. RotorPy, aerodynamics off: nothing named",
+            off,
+            lambda j: not j.named and j.outcome != FAILED,
+            1.0,
+        ),
     ]

@@ -1,8 +1,10 @@
-"""Trials of the diagnosis: flights with a known cause, most of them flown here and now, each diagnosed as a user would.
+"""Trials of the diagnosis: flights with a known cause, most of them flown here and now, each
+diagnosed as a user would.
 
-Every trial is one flight, diagnosed with the whole library and, where it asks for that, with effects left out. Its outcome is
-one line of ``trials.jsonl``: an interrupted run goes on where it stopped, and a line that other code has written is not
-used. What the outcomes are worth is the subject of ``scores``, and their page that of ``page``.
+Every trial is one flight, diagnosed with the whole library and, where it asks for that, with
+effects left out. Its outcome is one line of ``trials.jsonl``: an interrupted run goes on where it
+stopped, and a line that other code has written is not used. What the outcomes are worth is the
+subject of ``scores``, and their page that of ``page``.
 """
 
 import json
@@ -40,18 +42,29 @@ from windwrench.studies.trials.rotorpy_flights import (
     rotorpy_flight,
 )
 
-# Effects that leave the very log that another one leaves, whatever is flown: taken out together. A latency is a positive
-# clock offset; a thrust scale is a rotor efficiency with four equal numbers; and turning the world's frame turns all forces
-# but the weight that the model assumes, which leaves a constant horizontal force.
+# Effects that leave the very log that another one leaves, whatever is flown: taken out together. A
+# latency is a positive clock offset; a thrust scale is a rotor efficiency with four equal numbers;
+# and turning the world's frame turns all forces but the weight that the model assumes, which leaves
+# a constant horizontal force.
 EQUIVALENTS: Mapping[str, tuple[str, ...]] = {
-    "latency": ("clock_offset",), "clock_offset": ("latency",), "thrust_scale": ("rotor_efficiency",),
+    "latency": ("clock_offset",),
+    "clock_offset": ("latency",),
+    "thrust_scale": ("rotor_efficiency",),
     "world_tilt": ("constant_force",),
 }
 _ATTEMPTS = 4  # at a flight that crashes
 _ROTORPY_SECONDS = 40.0  # RotorPy is slow
 STRONG_TURBULENCE = 4.0  # times the background's
-HOVERED = ("mass", "thrust_scale", "constant_force", "com_offset", "constant_torque", "rotor_efficiency", "world_tilt",
-           "thrust_axis_tilt")
+HOVERED = (
+    "mass",
+    "thrust_scale",
+    "constant_force",
+    "com_offset",
+    "constant_torque",
+    "rotor_efficiency",
+    "world_tilt",
+    "thrust_axis_tilt",
+)
 PAIRS = 30  # a seed
 PRESETS = ("hummingbird", "crazyflie")  # flown in part
 _PRESET_EFFECTS = ("rotor_drag", "mass", "com_offset", "motor_lag", "thrust_curvature")
@@ -59,8 +72,16 @@ _QUICK_EFFECTS = ("rotor_drag", "mass", "inflow_thrust", "ground_effect", "com_o
 _QUICK_OUTSIDERS = ("contact_pushes", "sloshing", "cubic_drag")
 _ROTORPY_PATHS = ("excite", "fast")
 _BLAS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_KIND = {"typical": "effect", "third": "effect", "preset": "effect", "pair": "pair", "nothing": "nothing",
-         "strong turbulence": "nothing", "hover": "hover", "outsider": "outsider"}  # of practice flight, by group
+_KIND = {
+    "typical": "effect",
+    "third": "effect",
+    "preset": "effect",
+    "pair": "pair",
+    "nothing": "nothing",
+    "strong turbulence": "nothing",
+    "hover": "hover",
+    "outsider": "outsider",
+}  # of practice flight, by group
 GROUPS = (*_KIND, "held back", "rotorpy")
 
 
@@ -72,7 +93,9 @@ class Trial:
     added: tuple[str, ...] = ()  # effects, or the disturbance; nothing for a pair, which is drawn
     size: str = "typical"
     seed: int = 0
-    libraries: tuple[tuple[str, ...], ...] = ((),)  # effects left out of the library, once for each diagnosis
+    libraries: tuple[tuple[str, ...], ...] = (
+        (),
+    )  # effects left out of the library, once for each diagnosis
     trajectory: str | None = None  # default: drawn
     turbulence: float | None = None  # default: drawn
     vehicle: str = "ardrone2"
@@ -81,7 +104,14 @@ class Trial:
     @property
     def key(self) -> str:
         """What no other trial of a plan is called."""
-        parts = (self.group, "+".join(self.added) or "-", self.size, self.trajectory or "-", self.vehicle, str(self.seed))
+        parts = (
+            self.group,
+            "+".join(self.added) or "-",
+            self.size,
+            self.trajectory or "-",
+            self.vehicle,
+            str(self.seed),
+        )
         return "/".join(parts)
 
     @property
@@ -90,7 +120,9 @@ class Trial:
         return zlib.crc32(self.key.encode())
 
 
-def plan(seeds: int = 1, quick: bool = False, first: int = 0, groups: Sequence[str] = ()) -> list[Trial]:
+def plan(
+    seeds: int = 1, quick: bool = False, first: int = 0, groups: Sequence[str] = ()
+) -> list[Trial]:
     """Return the trials of a run; one effect is flown on the trajectory that shows it best.
 
     Args:
@@ -106,7 +138,9 @@ def plan(seeds: int = 1, quick: bool = False, first: int = 0, groups: Sequence[s
         if group not in GROUPS:
             raise unknown_name("group", group, GROUPS)
     if seeds < 1 or first < 0:
-        raise InputError(f"trials: --seeds must be at least 1 and --seed at least 0, got {seeds} and {first}")
+        raise InputError(
+            f"trials: --seeds must be at least 1 and --seed at least 0, got {seeds} and {first}"
+        )
     effects = _QUICK_EFFECTS if quick else names()
     out: list[Trial] = []
     for seed in range(first, first + seeds):
@@ -117,36 +151,76 @@ def plan(seeds: int = 1, quick: bool = False, first: int = 0, groups: Sequence[s
                 asked = ((), *(less if group == "typical" and not quick else less[-1:]))
                 out.append(Trial(group, (name,), size, seed, asked, shown_in(name)[0]))
         for name in _QUICK_OUTSIDERS if quick else OUTSIDERS:
-            out += [Trial("outsider", (name,), size, seed) for size in (("typical",) if quick else ("typical", "small"))]
+            out += [
+                Trial("outsider", (name,), size, seed)
+                for size in (("typical",) if quick else ("typical", "small"))
+            ]
         for name in list(HELD_BACK)[:2] if quick else HELD_BACK:
-            out += [Trial("held back", (name,), size, seed) for size in (("typical",) if quick else ("typical", "small"))]
+            out += [
+                Trial("held back", (name,), size, seed)
+                for size in (("typical",) if quick else ("typical", "small"))
+            ]
         for path in ("gentle", "excite") if quick else TRAJECTORIES:
             out.append(Trial("nothing", (), seed=seed, trajectory=path))
-            out.append(Trial("strong turbulence", (), seed=seed, trajectory=path, turbulence=STRONG_TURBULENCE))
+            out.append(
+                Trial(
+                    "strong turbulence",
+                    (),
+                    seed=seed,
+                    trajectory=path,
+                    turbulence=STRONG_TURBULENCE,
+                )
+            )
         count = 2 if quick else PAIRS
         out += [Trial("pair", (), seed=count * seed + i) for i in range(count)]
         out += [Trial("hover", (name,), seed=seed) for name in (HOVERED[:2] if quick else HOVERED)]
         if not quick:
             for vehicle in PRESETS:
-                out += [Trial("preset", (name,), seed=seed, trajectory=shown_in(name)[0], vehicle=vehicle)
-                        for name in _PRESET_EFFECTS]
+                out += [
+                    Trial(
+                        "preset", (name,), seed=seed, trajectory=shown_in(name)[0], vehicle=vehicle
+                    )
+                    for name in _PRESET_EFFECTS
+                ]
                 out.append(Trial("nothing", (), seed=seed, trajectory="excite", vehicle=vehicle))
         if available():
             for path in _ROTORPY_PATHS[:1] if quick else _ROTORPY_PATHS:
-                out += [Trial("rotorpy", added, seed=seed, trajectory=path, vehicle="rotorpy", seconds=_ROTORPY_SECONDS)
-                        for added in (("aero",), ())]
+                out += [
+                    Trial(
+                        "rotorpy",
+                        added,
+                        seed=seed,
+                        trajectory=path,
+                        vehicle="rotorpy",
+                        seconds=_ROTORPY_SECONDS,
+                    )
+                    for added in (("aero",), ())
+                ]
     return [trial for trial in out if trial.group in (groups or GROUPS)]
 
 
 def stamp() -> str:
     """Return a digest of the code that flies and diagnoses."""
-    return code_stamp("trials/trials", "trials/held_back_outsiders", "trials/outsiders", "trials/practice_flights",
-                      "trials/rotorpy_flights", "trials/unseen_outsiders")
+    return code_stamp(
+        "trials/trials",
+        "trials/held_back_outsiders",
+        "trials/outsiders",
+        "trials/practice_flights",
+        "trials/rotorpy_flights",
+        "trials/unseen_outsiders",
+    )
 
 
 def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
-    """Return a trial's outcome as JSON: what was flown, and each diagnosis or the error that ended it."""
-    out: dict[str, Any] = {"key": trial.key, "code": stamp(), "trial": _plain(asdict(trial)), "diagnoses": []}
+    """Return a trial's outcome as JSON: what was flown, and each diagnosis or the error that ended
+    it.
+    """
+    out: dict[str, Any] = {
+        "key": trial.key,
+        "code": stamp(),
+        "trial": _plain(asdict(trial)),
+        "diagnoses": [],
+    }
     begun = time.perf_counter()
     for attempt in range(_ATTEMPTS):
         # some draws, of two effects above all, no flight loop can fly
@@ -166,7 +240,12 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
             diagnosis = diagnose([log], vehicle, without=without)
             found = _findings(diagnosis)
             if not without and not flown["outsider"]:
-                truth = _rollout_of_truth(log, vehicle, flown["truth"], [(a, b) for _, a, b in diagnosis.held_out_segments])
+                truth = _rollout_of_truth(
+                    log,
+                    vehicle,
+                    flown["truth"],
+                    [(a, b) for _, a, b in diagnosis.held_out_segments],
+                )
                 out["flown"]["rollout_of_truth"] = _plain(truth)
         except Exception as error:  # a diagnosis that falls over is an outcome too, and a bad one
             found = {"error": f"{type(error).__name__}: {error}"}
@@ -174,16 +253,24 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     return out
 
 
-def _rollout_of_truth(log: FlightLog, vehicle: Vehicle, truth: Mapping[str, Mapping[str, float]],
-                      segments: Sequence[tuple[float, float]]) -> float | None:
-    """Return the one-second prediction error of the true model over that of the declared one, on stretches of a flight (s).
+def _rollout_of_truth(
+    log: FlightLog,
+    vehicle: Vehicle,
+    truth: Mapping[str, Mapping[str, float]],
+    segments: Sequence[tuple[float, float]],
+) -> float | None:
+    """Return the one-second prediction error of the true model over that of the declared one, on
+    stretches of a flight (s).
 
     What turbulence and the noise of the pose leave; no diagnosis can be far below it.
     """
     if not truth:
         return None
     effects = [EffectSetting(name, dict(coefficients)) for name, coefficients in truth.items()]
-    before, after = rollout_error(log, vehicle, segments), rollout_error(log, vehicle.with_effects(*effects), segments)
+    before, after = (
+        rollout_error(log, vehicle, segments),
+        rollout_error(log, vehicle.with_effects(*effects), segments),
+    )
     return after / before if before > 0.0 else None
 
 
@@ -197,26 +284,64 @@ def _fly(trial: Trial, seed: int) -> tuple[FlightLog, Vehicle, dict[str, Any]]:
         on, path = bool(trial.added), trial.trajectory or "excite"
         truth = {s.name: dict(s.coefficients) for s in aero_settings()} if on else {}
         log = rotorpy_flight(path, trial.seconds, seed, on)
-        return log, hummingbird_vehicle(), {"trajectory": path, "turbulence": 0.0, "sensor": 1.0, "truth": truth,
-                                            "outsider": None}
+        return (
+            log,
+            hummingbird_vehicle(),
+            {
+                "trajectory": path,
+                "turbulence": 0.0,
+                "sensor": 1.0,
+                "truth": truth,
+                "outsider": None,
+            },
+        )
     vehicle = load_vehicle(trial.vehicle)
     if trial.group == "held back":
         p = practise_held_back(vehicle, trial.added[0], trial.size, seed, trial.seconds)
     else:
-        p = practise(vehicle, _KIND[trial.group], trial.added, trial.size, trial.trajectory, seed,
-                     trial.seconds, trial.turbulence)
+        p = practise(
+            vehicle,
+            _KIND[trial.group],
+            trial.added,
+            trial.size,
+            trial.trajectory,
+            seed,
+            trial.seconds,
+            trial.turbulence,
+        )
     truth = {e.name: dict(e.coefficients) for e in p.effects}
-    return p.log, p.vehicle, {"trajectory": p.trajectory, "turbulence": p.turbulence, "sensor": p.sensor, "truth": truth,
-                              "outsider": p.outsider, "gusts": background(vehicle, p.turbulence).disturbance_force}
+    return (
+        p.log,
+        p.vehicle,
+        {
+            "trajectory": p.trajectory,
+            "turbulence": p.turbulence,
+            "sensor": p.sensor,
+            "truth": truth,
+            "outsider": p.outsider,
+            "gusts": background(vehicle, p.turbulence).disturbance_force,
+        },
+    )
 
 
 def _findings(found: Diagnosis) -> dict[str, Any]:
     """Return what a score needs of a diagnosis, as JSON."""
     summary = {
-        "verdict": found.verdict, "remainder": found.remainder,
-        "effects": [{"name": e.name, "coefficients": e.coefficients, "std": e.std, "tentative": e.tentative,
-                     "indistinguishable_from": e.indistinguishable_from, "evidence": e.evidence} for e in found.effects],
-        "before": asdict(found.before), "after": asdict(found.after),
+        "verdict": found.verdict,
+        "remainder": found.remainder,
+        "effects": [
+            {
+                "name": e.name,
+                "coefficients": e.coefficients,
+                "std": e.std,
+                "tentative": e.tentative,
+                "indistinguishable_from": e.indistinguishable_from,
+                "evidence": e.evidence,
+            }
+            for e in found.effects
+        ],
+        "before": asdict(found.before),
+        "after": asdict(found.after),
         "floor": {"force_rms": found.floor_force_rms, "torque_rms": found.floor_torque_rms},
         "structure": [asdict(sign) for sign in found.structure[:3]],
         "gusts": [gusts.rms for gusts in found.gusts],
@@ -231,7 +356,8 @@ def run_trials(
     jobs: int | None = None,
     report: Callable[[int], None] = lambda done: None,
 ) -> list[dict[str, Any]]:
-    """Run those trials whose outcomes are not in the folder; return the outcomes of all, in the order of the trials.
+    """Run those trials whose outcomes are not in the folder; return the outcomes of all, in the
+    order of the trials.
 
     Args:
         trials: as ``plan`` makes them.
@@ -244,14 +370,22 @@ def run_trials(
     """
     wanted = {trial.key: trial for trial in trials}
     path = folder / "trials.jsonl"
-    done = {key: kept for key, kept in _read(path) if key in wanted and kept["trial"] == _plain(asdict(wanted[key]))}
+    done = {
+        key: kept
+        for key, kept in _read(path)
+        if key in wanted and kept["trial"] == _plain(asdict(wanted[key]))
+    }
     with replaced(path) as partial:  # drops what a cut-off run or other code has left
         partial.write_text("".join(_line(kept) for kept in done.values()), encoding="utf-8")
     report(len(done))
     pending = [trial for key, trial in wanted.items() if key not in done]
     if pending:
         count = min(jobs or os.cpu_count() or 1, len(pending))
-        with _one_thread_each(), path.open("a", encoding="utf-8") as kept_file, workers(count) as pool:
+        with (
+            _one_thread_each(),
+            path.open("a", encoding="utf-8") as kept_file,
+            workers(count) as pool,
+        ):
             for future in as_completed([pool.submit(fly_and_diagnose, trial) for trial in pending]):
                 outcome = future.result()
                 kept_file.write(_line(outcome))
@@ -277,7 +411,9 @@ def _line(outcome: Mapping[str, Any]) -> str:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Have processes that start in the block run linear algebra on one thread: they fill the cores already."""
+    """Have processes that start in the block run linear algebra on one thread: they fill the cores
+    already.
+    """
     before = {name: os.environ.get(name) for name in _BLAS}
     os.environ.update(dict.fromkeys(_BLAS, "1"))
     try:
@@ -291,7 +427,9 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON knows it: tuples as lists, numbers to six digits, what is not finite as None."""
+    """Return a value as JSON knows it: tuples as lists, numbers to six digits, what is not finite
+    as None.
+    """
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

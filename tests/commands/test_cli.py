@@ -9,17 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.paths import ROOT
 from windwrench.cli import main
 from windwrench.dynamics.effects import names
 
 COMMAND = Path(sys.executable).with_name("windwrench")
 PNG = b"\x89PNG\r\n\x1a\n"
 
-pytestmark = pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+pytestmark = pytest.mark.skipif(
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}"
+)
 
 
 def run(folder, *arguments):
-    return subprocess.run([COMMAND, *map(str, arguments)], cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [COMMAND, *map(str, arguments)], cwd=folder, capture_output=True, text=True, check=False
+    )
 
 
 def succeed(folder, *arguments):
@@ -55,8 +60,18 @@ def fail(tmp_path, monkeypatch, capfd):
 def log(tmp_path_factory):
     """A recorded flight with a constant force of 0.2 N along x."""
     folder = tmp_path_factory.mktemp("log")
-    succeed(folder, "record", "--effect", "constant_force:fx=0.2", "--trajectory", "hover", "--seconds", 8, "--out",
-            "flight.csv")
+    succeed(
+        folder,
+        "record",
+        "--effect",
+        "constant_force:fx=0.2",
+        "--trajectory",
+        "hover",
+        "--seconds",
+        8,
+        "--out",
+        "flight.csv",
+    )
     return folder / "flight.csv"
 
 
@@ -73,20 +88,51 @@ def test_without_a_command_it_prints_its_help(tmp_path):
 
 def test_fly_draws_the_episode(tmp_path):
     out = tmp_path / "a" / "folder"
-    text = succeed(tmp_path, "fly", "--scenario", "static", "--controller", "admittance", "--seed", 3, "--out", out)
+    text = succeed(
+        tmp_path,
+        "fly",
+        "--scenario",
+        "static",
+        "--controller",
+        "admittance",
+        "--seed",
+        3,
+        "--out",
+        out,
+    )
     assert (out / "fly.png").read_bytes().startswith(PNG)
     assert {p.name for p in out.iterdir()} == {"fly.png", "run.json"}
     assert f"wrote {out / 'fly.png'}" in text
 
 
 def test_benchmark_writes_the_leaderboard(tmp_path):
-    succeed(tmp_path, "benchmark", "--controllers", "hover,oracle", "--scenarios", "base", "--episodes", 2, "--jobs", 1,
-            "--seed", 5, "--out", "out")
+    succeed(
+        tmp_path,
+        "benchmark",
+        "--controllers",
+        "hover,oracle",
+        "--scenarios",
+        "base",
+        "--episodes",
+        2,
+        "--jobs",
+        1,
+        "--seed",
+        5,
+        "--out",
+        "out",
+    )
     rows = json.loads((tmp_path / "out" / "leaderboard.json").read_text(encoding="utf-8"))
     assert [(row["controller"], row["scenario"], row["episodes"], row["seed"]) for row in rows] == [
-        ("oracle", "base", 2, 5), ("hover", "base", 2, 5)]
+        ("oracle", "base", 2, 5),
+        ("hover", "base", 2, 5),
+    ]
     assert (tmp_path / "out" / "leaderboard.png").read_bytes().startswith(PNG)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"leaderboard.json", "leaderboard.png", "run.json"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "leaderboard.json",
+        "leaderboard.png",
+        "run.json",
+    }
 
 
 def test_a_recorded_flight_can_be_estimated(log, tmp_path):
@@ -94,16 +140,44 @@ def test_a_recorded_flight_can_be_estimated(log, tmp_path):
     assert "RMSE to truth" in text
     with (tmp_path / "out" / "wrench.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0]) == ["t", "fx", "fy", "fz", "tx", "ty", "tz", "std_fx", "std_fy", "std_fz", "std_tx", "std_ty",
-                             "std_tz", "nis"]
+    assert list(rows[0]) == [
+        "t",
+        "fx",
+        "fy",
+        "fz",
+        "tx",
+        "ty",
+        "tz",
+        "std_fx",
+        "std_fy",
+        "std_fz",
+        "std_tx",
+        "std_ty",
+        "std_tz",
+        "nis",
+    ]
     late = [float(row["fx"]) for row in rows if float(row["t"]) > 5.0]
     assert np.mean(late) == pytest.approx(0.2, abs=0.03)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"wrench.csv", "wrench.png", "run.json"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "wrench.csv",
+        "wrench.png",
+        "run.json",
+    }
 
 
 def test_a_recording_repeats_with_its_seed(log, tmp_path):
-    succeed(tmp_path, "record", "--effect", "constant_force:fx=0.2", "--trajectory", "hover", "--seconds", 8, "--out",
-            "again.csv")
+    succeed(
+        tmp_path,
+        "record",
+        "--effect",
+        "constant_force:fx=0.2",
+        "--trajectory",
+        "hover",
+        "--seconds",
+        8,
+        "--out",
+        "again.csv",
+    )
     assert (tmp_path / "again.csv").read_bytes() == log.read_bytes()
 
 
@@ -115,39 +189,61 @@ def test_effects_are_listed(tmp_path):
 
 def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
     succeed(tmp_path, "effects", "--markdown", "effects.md")
-    committed = Path(__file__).parents[1] / "docs" / "effects.md"
-    assert (tmp_path / "effects.md").read_text(encoding="utf-8") == committed.read_text(encoding="utf-8")
+    committed = ROOT / "docs" / "effects.md"
+    assert (tmp_path / "effects.md").read_text(encoding="utf-8") == committed.read_text(
+        encoding="utf-8"
+    )
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (("effects", "--markdown", "/dev/null/effects.md"), "cannot be written"),
-    (("fly", "--scenario", "bas"), "Did you mean 'base'"),
-    (("fly", "--controller", "admitance"), "Did you mean 'admittance'"),
-    (("fly", "--vehicle", "ardrone"), "Did you mean 'ardrone2'"),
-    (("fly", "--vehicle", "nowhere.yaml"), "nowhere.yaml"),
-    (("fly", "--effect", "rotor_drag:kdx=-1"), "between"),
-    (("fly", "--seed", "-1"), "--seed"),
-    (("fly", "--nothing"), "No such option"),
-    (("flie",), "Did you mean 'fly'"),
-    (("fly", "--sceanrio", "base"), "--scenario"),
-    (("benchmark", "--controllers", "hovre"), "Did you mean 'hover'"),
-    (("benchmark", "--scenarios", "bsae"), "Did you mean 'base'"),
-    (("benchmark", "--scenarios", ","), "--scenarios"),
-    (("benchmark", "--episodes", "0"), "--episodes"),
-    (("benchmark", "--episodes", "many"), "--episodes"),
-    (("benchmark", "--seed", "100000"), "--seed"),
-    (("estimate", "nowhere.csv"), "nowhere.csv"),
-    (("estimate", "nowhere.txt"), ".csv.gz"),
-    (("estimate",), "argument"),
-    (("record", "--out", "out/log.txt"), ".csv.gz"),
-    (("record", "--out", "out/log.csv", "--seconds", "0"), "--seconds"),
-    (("record", "--out", "out/log.csv", "--seconds", "nan"), "--seconds"),
-    (("record", "--out", "out/log.csv", "--trajectory", "spiral"), "unknown trajectory 'spiral'"),
-    (("record", "--out", "out/log.csv", "--effect", "rotor_dragg"), "Did you mean 'rotor_drag'"),
-    (("record", "--out", "out/log.csv", "--effect", "rotor_drag:kdx"), "NAME:coef=value"),
-    (("record", "--out", "out/log.csv", "--effect", "mass:dm=-5"), "dm"),
-    (("record", "--out", "out/log.csv", "--seconds", "5", "--effect", "constant_torque:tx=50"), "crashed"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("effects", "--markdown", "/dev/null/effects.md"), "cannot be written"),
+        (("fly", "--scenario", "bas"), "Did you mean 'base'"),
+        (("fly", "--controller", "admitance"), "Did you mean 'admittance'"),
+        (("fly", "--vehicle", "ardrone"), "Did you mean 'ardrone2'"),
+        (("fly", "--vehicle", "nowhere.yaml"), "nowhere.yaml"),
+        (("fly", "--effect", "rotor_drag:kdx=-1"), "between"),
+        (("fly", "--seed", "-1"), "--seed"),
+        (("fly", "--nothing"), "No such option"),
+        (("flie",), "Did you mean 'fly'"),
+        (("fly", "--sceanrio", "base"), "--scenario"),
+        (("benchmark", "--controllers", "hovre"), "Did you mean 'hover'"),
+        (("benchmark", "--scenarios", "bsae"), "Did you mean 'base'"),
+        (("benchmark", "--scenarios", ","), "--scenarios"),
+        (("benchmark", "--episodes", "0"), "--episodes"),
+        (("benchmark", "--episodes", "many"), "--episodes"),
+        (("benchmark", "--seed", "100000"), "--seed"),
+        (("estimate", "nowhere.csv"), "nowhere.csv"),
+        (("estimate", "nowhere.txt"), ".csv.gz"),
+        (("estimate",), "argument"),
+        (("record", "--out", "out/log.txt"), ".csv.gz"),
+        (("record", "--out", "out/log.csv", "--seconds", "0"), "--seconds"),
+        (("record", "--out", "out/log.csv", "--seconds", "nan"), "--seconds"),
+        (
+            ("record", "--out", "out/log.csv", "--trajectory", "spiral"),
+            "unknown trajectory 'spiral'",
+        ),
+        (
+            ("record", "--out", "out/log.csv", "--effect", "rotor_dragg"),
+            "Did you mean 'rotor_drag'",
+        ),
+        (("record", "--out", "out/log.csv", "--effect", "rotor_drag:kdx"), "NAME:coef=value"),
+        (("record", "--out", "out/log.csv", "--effect", "mass:dm=-5"), "dm"),
+        (
+            (
+                "record",
+                "--out",
+                "out/log.csv",
+                "--seconds",
+                "5",
+                "--effect",
+                "constant_torque:tx=50",
+            ),
+            "crashed",
+        ),
+    ],
+)
 def test_a_mistake_ends_in_one_line_and_leaves_nothing_behind(tmp_path, arguments, words, fail):
     assert words in fail(*arguments)
     assert list(tmp_path.iterdir()) == []
@@ -161,17 +257,25 @@ def test_a_mistake_ends_with_exit_code_2_and_no_traceback(tmp_path):
 
 
 def test_a_bad_vehicle_file_is_named_with_its_field(tmp_path, fail):
-    (tmp_path / "v.yaml").write_text("name: v\nmass: -1\ninertia: [1, 1, 1]\narm_l: 1\nk: [1,1,1,1]\np: [1,1,1,1]\n")
+    (tmp_path / "v.yaml").write_text(
+        "name: v\nmass: -1\ninertia: [1, 1, 1]\narm_l: 1\nk: [1,1,1,1]\np: [1,1,1,1]\n"
+    )
     message = fail("record", "--vehicle", "v.yaml", "--out", "log.csv")
     assert "v.yaml: mass must be a positive number, got -1" in message
     assert [p.name for p in tmp_path.iterdir()] == ["v.yaml"]
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("t,px\n0,1\n", "missing column"),
-    ("", "empty file"),
-    ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n0,0,0,1,1,0,0,0,400,400,400,400\n", "only one row"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t,px\n0,1\n", "missing column"),
+        ("", "empty file"),
+        (
+            "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n0,0,0,1,1,0,0,0,400,400,400,400\n",
+            "only one row",
+        ),
+    ],
+)
 def test_a_bad_log_is_named_and_nothing_is_written(tmp_path, text, words, fail):
     (tmp_path / "log.csv").write_text(text, encoding="utf-8")
     message = fail("estimate", "log.csv", "--out", "out")

@@ -1,4 +1,6 @@
-"""What every command shares: help with an example, --json, --quiet, --dry-run, run.json, completion, exit codes."""
+"""What every command shares: help with an example, --json, --quiet, --dry-run, run.json,
+completion, exit codes.
+"""
 
 import json
 import os
@@ -22,7 +24,9 @@ COMMAND = Path(sys.executable).with_name("windwrench")
 
 @pytest.fixture
 def call(tmp_path, monkeypatch, capfd):
-    """Run a command in ``tmp_path``, in this process to save its start; return exit code, standard output and error."""
+    """Run a command in ``tmp_path``, in this process to save its start; return exit code, standard
+    output and error.
+    """
 
     def run_here(*arguments):
         monkeypatch.chdir(tmp_path)
@@ -61,12 +65,30 @@ def test_help_says_what_exit_codes_mean(call):
 
 
 def test_json_is_one_object_and_nothing_else(call, tmp_path):
-    code, text, _ = call("record", "--seconds", 2, "--trajectory", "hover", "--effect", "mass:dm=0.01", "--out", "log.csv",
-                         "--json")
+    code, text, _ = call(
+        "record",
+        "--seconds",
+        2,
+        "--trajectory",
+        "hover",
+        "--effect",
+        "mass:dm=0.01",
+        "--out",
+        "log.csv",
+        "--json",
+    )
     assert code == 0
     said = json.loads(text)
-    assert said == {"command": "record", "written": ["log.csv", "log.run.json"], "result": {
-        "samples": 401, "vehicle": "ardrone2", "trajectory": "hover", "effects": {"mass": {"dm": 0.01}}}}
+    assert said == {
+        "command": "record",
+        "written": ["log.csv", "log.run.json"],
+        "result": {
+            "samples": 401,
+            "vehicle": "ardrone2",
+            "trajectory": "hover",
+            "effects": {"mass": {"dm": 0.01}},
+        },
+    }
     said = json.loads(call("estimate", "log.csv", "--out", "out", "--json")[1])
     assert said["result"]["samples"] == 401
     assert len(said["result"]["force_rmse_to_truth_N"]) == 3
@@ -85,7 +107,9 @@ def test_quiet_says_nothing_but_errors(call, tmp_path):
     code, out, err = call("record", "--seconds", 2, "--effect", "mas", "-q")
     assert (code, out) == (2, "")
     assert "Did you mean 'mass'" in err
-    assert "wrote" in call("record", "--seconds", 2, "--out", "log.csv")[1]  # the next one speaks again
+    assert (
+        "wrote" in call("record", "--seconds", 2, "--out", "log.csv")[1]
+    )  # the next one speaks again
 
 
 @pytest.mark.parametrize("name", EXPENSIVE)
@@ -107,8 +131,21 @@ def test_a_dry_run_checks_the_request(call):
 
 
 def test_a_run_is_noted_beside_its_results(call, tmp_path):
-    arguments = ("benchmark", "--controllers", "hover", "--scenarios", "static", "--episodes", 1, "--jobs", 1, "--seed", 7,
-                 "--out", "out")
+    arguments = (
+        "benchmark",
+        "--controllers",
+        "hover",
+        "--scenarios",
+        "static",
+        "--episodes",
+        1,
+        "--jobs",
+        1,
+        "--seed",
+        7,
+        "--out",
+        "out",
+    )
     assert call(*arguments)[0] == 0
     path = tmp_path / "out" / "run.json"
     first = path.read_bytes()
@@ -137,7 +174,12 @@ def test_a_broken_note_is_written_anew(tmp_path):
 def test_plain_values_are_strict_json():
     import numpy as np
 
-    value = {"a": np.array([1.0, np.nan]), "b": np.float64(2.0), "c": (Path("x"), None, True), 3: "\udcff"}
+    value = {
+        "a": np.array([1.0, np.nan]),
+        "b": np.float64(2.0),
+        "c": (Path("x"), None, True),
+        3: "\udcff",
+    }
     assert plain(value) == {"a": [1.0, None], "b": 2.0, "c": ["x", None, True], "3": "?"}
 
 
@@ -152,9 +194,15 @@ def test_completion_offers_names():
 @pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
 def test_a_shell_completes_commands_and_names(tmp_path):
     def completed(words):
-        environment = {**os.environ, "_WINDWRENCH_COMPLETE": "complete_bash", "COMP_WORDS": words,
-                       "COMP_CWORD": str(len(words.split(" ")) - 1)}
-        return subprocess.run([COMMAND], env=environment, cwd=tmp_path, capture_output=True, text=True).stdout.split()
+        environment = {
+            **os.environ,
+            "_WINDWRENCH_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split(" ")) - 1),
+        }
+        return subprocess.run(
+            [COMMAND], env=environment, cwd=tmp_path, capture_output=True, text=True
+        ).stdout.split()
 
     assert completed("windwrench diag") == ["diagnose"]
     assert completed("windwrench fly --vehicle ar") == ["ardrone2"]
@@ -166,7 +214,9 @@ def test_a_shell_completes_commands_and_names(tmp_path):
 def test_no_color_is_honoured(tmp_path):
     def error(**more):
         environment = {**{k: v for k, v in os.environ.items() if k != "NO_COLOR"}, **more}
-        return subprocess.run([COMMAND, "flie"], env=environment, cwd=tmp_path, capture_output=True, text=True).stderr
+        return subprocess.run(
+            [COMMAND, "flie"], env=environment, cwd=tmp_path, capture_output=True, text=True
+        ).stderr
 
     assert "\x1b[" in error(FORCE_COLOR="1", TERM="xterm-256color")
     assert "\x1b[3" not in error(FORCE_COLOR="1", TERM="xterm-256color", NO_COLOR="1")
@@ -175,9 +225,15 @@ def test_no_color_is_honoured(tmp_path):
 @pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
 def test_an_interrupted_command_ends_with_130_and_no_traceback(tmp_path):
     # a shell's background processes ignore interrupts, and so would what they start
-    run = subprocess.Popen([COMMAND, "benchmark", "--episodes", "40", "--jobs", "2"], cwd=tmp_path, start_new_session=True,
-                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                           preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    run = subprocess.Popen(
+        [COMMAND, "benchmark", "--episodes", "40", "--jobs", "2"],
+        cwd=tmp_path,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("results/*")) and time.monotonic() < deadline:
         time.sleep(0.1)

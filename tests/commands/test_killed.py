@@ -1,4 +1,6 @@
-"""Commands that are killed (no chance to clean up) leave no half file and no process; run again they give the same result."""
+"""Commands that are killed (no chance to clean up) leave no half file and no process; run again
+they give the same result.
+"""
 
 import json
 import os
@@ -22,12 +24,26 @@ if __name__ == "__main__":
     Path("out").mkdir(exist_ok=True)
     run_trials(trials, Path("out"), jobs=2)
 """
-BENCHMARK = ("benchmark", "--controllers", "hover", "--scenarios", "static", "--episodes", "6", "--jobs", "2", "--out", "out")
+BENCHMARK = (
+    "benchmark",
+    "--controllers",
+    "hover",
+    "--scenarios",
+    "static",
+    "--episodes",
+    "6",
+    "--jobs",
+    "2",
+    "--out",
+    "out",
+)
 DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
 REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
 CLOSE_LOOP = ("close-loop", "--effect", "constant_force", "--episodes", "1", "--out", "out")
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc")
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc"
+)
 
 
 def start(folder, *arguments):
@@ -36,7 +52,13 @@ def start(folder, *arguments):
         words = [sys.executable, "trials.py"]
     else:
         words = [sys.executable, "-c", START, *arguments]
-    return subprocess.Popen(words, cwd=folder, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(
+        words,
+        cwd=folder,
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 def processes_of(session):
@@ -60,7 +82,9 @@ def assert_ends(session, seconds=20.0):
 
 
 def assert_whole(folder):
-    """Every result that is there is whole; a temporary file has a name that no one takes for a result."""
+    """Every result that is there is whole; a temporary file has a name that no one takes for a
+    result.
+    """
     for path in folder.rglob("*"):
         if path.name.startswith("."):
             continue
@@ -93,11 +117,18 @@ def results(folder):
 def flight(tmp_path_factory):
     """The bytes of a short flight log."""
     folder = tmp_path_factory.mktemp("flight")
-    assert start(folder, "record", "--seconds", "12", "--trajectory", "gentle", "--out", "flight.csv").wait() == 0
+    assert (
+        start(
+            folder, "record", "--seconds", "12", "--trajectory", "gentle", "--out", "flight.csv"
+        ).wait()
+        == 0
+    )
     return (folder / "flight.csv").read_bytes()
 
 
-@pytest.mark.parametrize("arguments", [BENCHMARK, DIAGNOSE, REPRODUCE, CLOSE_LOOP, ("trials",)], ids=lambda a: a[0])
+@pytest.mark.parametrize(
+    "arguments", [BENCHMARK, DIAGNOSE, REPRODUCE, CLOSE_LOOP, ("trials",)], ids=lambda a: a[0]
+)
 def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, arguments):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for folder in (whole, cut):
@@ -108,7 +139,9 @@ def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight,
     lasted = time.monotonic() - begun
     run = start(cut, *arguments)
     time.sleep(random.uniform(0.3, 0.95) * lasted)
-    os.kill(run.pid, signal.SIGKILL)  # the command alone: what becomes of its workers is the question
+    os.kill(
+        run.pid, signal.SIGKILL
+    )  # the command alone: what becomes of its workers is the question
     run.wait()
     assert_whole(cut)
     assert_ends(run.pid)
@@ -123,7 +156,11 @@ def test_a_reader_who_goes_away_costs_no_results(tmp_path, flight):
     run = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     run.stdout.close()
     run.wait()
-    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"report.json", "report.html", "vehicle.yaml"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {
+        "report.json",
+        "report.html",
+        "vehicle.yaml",
+    }
     assert_whole(tmp_path / "out")
 
 
@@ -135,5 +172,9 @@ def test_what_a_killed_writer_left_is_swept_away(tmp_path):
     (tmp_path / ".a.json.tmp").write_text("not one of ours")
     with replaced(tmp_path / "a.json") as partial:
         partial.write_text("whole")
-    assert {p.name for p in tmp_path.iterdir()} == {"a.json", f".a.json.{os.getppid()}.tmp", ".a.json.tmp"}
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "a.json",
+        f".a.json.{os.getppid()}.tmp",
+        ".a.json.tmp",
+    }
     assert (tmp_path / "a.json").read_text() == "whole"

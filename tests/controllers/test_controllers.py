@@ -60,7 +60,11 @@ def test_the_ratio_grows_as_the_force_falls_but_not_without_bound():
     controller = Ratio(gain=8.0, least_force=0.1)
     assert controller(observation(0.01, 0.5))[0] == pytest.approx(-0.16)
     assert controller(observation(0.01, 0.25))[0] == pytest.approx(-0.32)
-    assert controller(observation(0.01, 0.001))[0] == controller(observation(0.01, -1.0))[0] == pytest.approx(-0.8)
+    assert (
+        controller(observation(0.01, 0.001))[0]
+        == controller(observation(0.01, -1.0))[0]
+        == pytest.approx(-0.8)
+    )
 
 
 def test_hover_does_nothing():

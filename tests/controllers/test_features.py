@@ -12,8 +12,11 @@ from windwrench.training.seeds import FIRST_VALIDATION_SEED, training_seed, vali
 def test_frames_are_scaled_columns_of_the_observation():
     features = Features(("torque_z", "force_x", "command"), 1, (0.03, 0.5, 1.0))
     observations = np.arange(16.0).reshape(2, 8)
-    np.testing.assert_allclose(features.frames(observations * 0.01, {}), np.array(
-        [[0.05 / 0.03, 0.0, 0.07], [0.13 / 0.03, 0.16, 0.15]]), rtol=1e-6)
+    np.testing.assert_allclose(
+        features.frames(observations * 0.01, {}),
+        np.array([[0.05 / 0.03, 0.0, 0.07], [0.13 / 0.03, 0.16, 0.15]]),
+        rtol=1e-6,
+    )
 
 
 def test_truth_comes_from_info():
@@ -32,21 +35,29 @@ def test_a_history_is_oldest_first_and_starts_with_its_first_frame():
     np.testing.assert_array_equal(history.flat(), [[1, 1, 3], [8, 8, 8]])
 
 
-@pytest.mark.parametrize(("frame", "history", "scale", "words"), [
-    (("torque",), 1, (), "unknown quantity"),
-    ((), 1, (), "must name different"),
-    (("torque_z", "torque_z"), 1, (), "must name different"),
-    (("torque_z",), 0, (), "history must be at least 1"),
-    (("torque_z",), 1, (0.0,), "positive numbers"),
-    (("torque_z",), 1, (1.0, 1.0), "1 positive numbers"),
-])
+@pytest.mark.parametrize(
+    ("frame", "history", "scale", "words"),
+    [
+        (("torque",), 1, (), "unknown quantity"),
+        ((), 1, (), "must name different"),
+        (("torque_z", "torque_z"), 1, (), "must name different"),
+        (("torque_z",), 0, (), "history must be at least 1"),
+        (("torque_z",), 1, (0.0,), "positive numbers"),
+        (("torque_z",), 1, (1.0, 1.0), "1 positive numbers"),
+    ],
+)
 def test_features_that_cannot_be_are_named(frame, history, scale, words):
     with pytest.raises(InputError, match=words):
         Features(frame, history, scale)
 
 
 def test_seeds_of_training_validation_and_test_never_meet():
-    training = [training_seed(run, env, episode) for run in range(40) for env in range(8) for episode in range(40)]
+    training = [
+        training_seed(run, env, episode)
+        for run in range(40)
+        for env in range(8)
+        for episode in range(40)
+    ]
     assert min(training) >= 0
     assert max(training) < FIRST_VALIDATION_SEED
     assert len(set(training)) > 0.98 * len(training)

@@ -12,13 +12,21 @@ from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.benchmark import fly_all, leaderboard
 from windwrench.evaluation.episodes import fly_episode
 
-CARD = {"algorithm": "test", "features": {"frame": ["torque_z"], "history": 1, "scale": [0.03]}, "repeat": 1,
-        "activation": "relu", "squash": False}
+CARD = {
+    "algorithm": "test",
+    "features": {"frame": ["torque_z"], "history": 1, "scale": [0.03]},
+    "repeat": 1,
+    "activation": "relu",
+    "squash": False,
+}
 
 
 def follower(gain=18.0):
     """The admittance law as a policy: one linear layer on the scaled torque."""
-    return {"weight0": np.array([[-gain * 0.03]], dtype=np.float32), "bias0": np.zeros(1, dtype=np.float32)}
+    return {
+        "weight0": np.array([[-gain * 0.03]], dtype=np.float32),
+        "bias0": np.zeros(1, dtype=np.float32),
+    }
 
 
 def test_a_linear_policy_is_the_admittance_law(tmp_path):
@@ -50,9 +58,17 @@ def test_a_held_command_changes_every_other_decision():
 
 def test_a_recurrent_policy_forgets_at_the_start_of_an_episode():
     rng = np.random.default_rng(0)
-    weights = {name: 0.3 * rng.normal(size=shape).astype(np.float32) for name, shape in (
-        ("lstm_input", (16, 1)), ("lstm_hidden", (16, 4)), ("lstm_input_bias", (16,)), ("lstm_hidden_bias", (16,)),
-        ("weight0", (1, 4)), ("bias0", (1,)))}
+    weights = {
+        name: 0.3 * rng.normal(size=shape).astype(np.float32)
+        for name, shape in (
+            ("lstm_input", (16, 1)),
+            ("lstm_hidden", (16, 4)),
+            ("lstm_input_bias", (16,)),
+            ("lstm_hidden_bias", (16,)),
+            ("weight0", (1, 4)),
+            ("bias0", (1,)),
+        )
+    }
     policy = TrainedPolicy(CARD, weights)
     observation = np.full(8, 0.02)
     first = [policy(observation)[0] for _ in range(3)]
@@ -65,8 +81,12 @@ def test_the_lstm_is_torch_s():
     torch = pytest.importorskip("torch")
     torch.manual_seed(0)
     cell = torch.nn.LSTM(5, 7)
-    weights = {"lstm_input": cell.weight_ih_l0, "lstm_hidden": cell.weight_hh_l0,
-               "lstm_input_bias": cell.bias_ih_l0, "lstm_hidden_bias": cell.bias_hh_l0}
+    weights = {
+        "lstm_input": cell.weight_ih_l0,
+        "lstm_hidden": cell.weight_hh_l0,
+        "lstm_input_bias": cell.bias_ih_l0,
+        "lstm_hidden_bias": cell.bias_hh_l0,
+    }
     weights = {name: tensor.detach().numpy() for name, tensor in weights.items()}
     inputs = torch.randn(6, 1, 5)
     with torch.no_grad():
@@ -77,13 +97,16 @@ def test_the_lstm_is_torch_s():
         np.testing.assert_allclose(hidden, h, atol=1e-6)
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    (lambda folder: (folder / "p.json").unlink(), "no such file"),
-    (lambda folder: (folder / "p.npz").unlink(), "no such file"),
-    (lambda folder: (folder / "p.json").write_text("{"), "cannot be read as a policy's card"),
-    (lambda folder: (folder / "p.json").write_text("[]"), "format must be 1"),
-    (lambda folder: (folder / "p.npz").write_bytes(b"else"), "not the weights that its card"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda folder: (folder / "p.json").unlink(), "no such file"),
+        (lambda folder: (folder / "p.npz").unlink(), "no such file"),
+        (lambda folder: (folder / "p.json").write_text("{"), "cannot be read as a policy's card"),
+        (lambda folder: (folder / "p.json").write_text("[]"), "format must be 1"),
+        (lambda folder: (folder / "p.npz").write_bytes(b"else"), "not the weights that its card"),
+    ],
+)
 def test_files_that_do_not_go_together_are_refused(tmp_path, change, words):
     path = save_policy(CARD, follower(), tmp_path / "p.npz")
     change(tmp_path)
@@ -105,14 +128,25 @@ def test_a_file_that_would_run_code_is_refused(tmp_path):
         load_policy(path)
 
 
-@pytest.mark.parametrize(("card", "weights", "words"), [
-    ({"activation": "gelu"}, {}, "activation"),
-    ({"repeat": 0}, {}, "repeat"),
-    ({"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}}, {}, "must take 2 numbers"),
-    ({"features": {}}, {}, "lacks or spoils"),
-    ({}, {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)}, "layer 1 does not fit"),
-    ({}, {"bias0": np.zeros(2, np.float32)}, "layer 0 does not fit"),
-])
+@pytest.mark.parametrize(
+    ("card", "weights", "words"),
+    [
+        ({"activation": "gelu"}, {}, "activation"),
+        ({"repeat": 0}, {}, "repeat"),
+        (
+            {"features": {"frame": ["torque_z"], "history": 2, "scale": [1.0]}},
+            {},
+            "must take 2 numbers",
+        ),
+        ({"features": {}}, {}, "lacks or spoils"),
+        (
+            {},
+            {"weight1": np.zeros((1, 5), np.float32), "bias1": np.zeros(1, np.float32)},
+            "layer 1 does not fit",
+        ),
+        ({}, {"bias0": np.zeros(2, np.float32)}, "layer 0 does not fit"),
+    ],
+)
 def test_cards_and_weights_that_do_not_fit_are_named(card, weights, words):
     with pytest.raises(InputError, match=words):
         TrainedPolicy({**CARD, **card}, {**follower(), **weights})

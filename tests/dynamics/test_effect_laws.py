@@ -32,13 +32,29 @@ V, OMEGA = np.array([1.5, -0.7, 0.4]), np.array([0.5, -1.0, 2.0])
 W = np.array([380.0, 400.0, 420.0, 410.0])
 
 
-def wrench(vehicle, position=(0.0, 0.0, 0.15), wind=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, 0.0, 0.0)):
+def wrench(
+    vehicle, position=(0.0, 0.0, 0.15), wind=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, 0.0, 0.0)
+):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
     bundle = compile_effects(vehicle)
     out, state = np.full(6, np.nan), np.full(STATE_SIZE, np.nan)
-    state[ROTOR_ACCELERATION:ROTOR_ACCELERATION + 4] = acceleration
-    effect_wrench(bundle.wrench_laws, bundle.wrench_coefficients, bundle.constants, body_record(bundle.vehicle)[0],
-                  np.asarray(position, float), R, V, OMEGA, W, np.asarray(wind, float), 11.0, 0.0, state, out)
+    state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
+    effect_wrench(
+        bundle.wrench_laws,
+        bundle.wrench_coefficients,
+        bundle.constants,
+        body_record(bundle.vehicle)[0],
+        np.asarray(position, float),
+        R,
+        V,
+        OMEGA,
+        W,
+        np.asarray(wind, float),
+        11.0,
+        0.0,
+        state,
+        out,
+    )
     return out[:3], out[3:]
 
 
@@ -52,8 +68,15 @@ class Rotors:
     def __call__(self, speeds, voltage=0.0, dt=PERIOD, time=0.0):
         rotors = np.zeros(ROTORS_SIZE)
         rotors[:4], rotors[ROTOR_TIME] = speeds, time
-        deliver(self.bundle.rotor_laws, self.bundle.rotor_coefficients, self.bundle.constants, self.memory, dt, voltage,
-                rotors)
+        deliver(
+            self.bundle.rotor_laws,
+            self.bundle.rotor_coefficients,
+            self.bundle.constants,
+            self.memory,
+            dt,
+            voltage,
+            rotors,
+        )
         return rotors[:4]
 
 
@@ -67,8 +90,16 @@ class Sensing:
     def __call__(self, speeds, position, quaternion, parts=7, dt=PERIOD):
         sample = np.zeros(SAMPLE_SIZE)
         sample[:11] = np.concatenate([speeds, position, quaternion])
-        report(self.bundle.sense_laws, self.bundle.sense_coefficients, self.bundle.constants, self.memory, dt, parts,
-               self.direction, sample)
+        report(
+            self.bundle.sense_laws,
+            self.bundle.sense_coefficients,
+            self.bundle.constants,
+            self.memory,
+            dt,
+            parts,
+            self.direction,
+            sample,
+        )
         return sample[:4], sample[4:7], sample[7:11]
 
 
@@ -79,8 +110,10 @@ def setting(name, **coefficients):
 @pytest.mark.parametrize("com", [(0.0, 0.0, 0.0), (0.01, -0.02, 0.03)])
 def test_rotor_drag_acts_at_each_rotor_in_its_plane(com):
     kd, wind = np.array([1.2e-4, 0.8e-4, 0.0]), np.array([0.5, 2.0, -0.3])
-    vehicle = VEHICLE.with_effects(EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
-                                   EffectSetting("rotor_drag", {"kdx": kd[0], "kdy": kd[1]}))
+    vehicle = VEHICLE.with_effects(
+        EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
+        EffectSetting("rotor_drag", {"kdx": kd[0], "kdy": kd[1]}),
+    )
     force, torque = np.zeros(3), np.zeros(3)
     for r, rate in zip(VEHICLE.positions, W, strict=True):
         F = -rate * kd * (R.T @ (V - wind) + np.cross(OMEGA, r))
@@ -93,8 +126,22 @@ def test_rotor_drag_acts_at_each_rotor_in_its_plane(com):
 def test_rotor_drag_does_nothing_to_a_vehicle_that_drifts_with_the_air():
     still = compile_effects(setting("rotor_drag", kdx=1e-4, kdy=1e-4))
     out = np.full(6, np.nan)
-    effect_wrench(still.wrench_laws, still.wrench_coefficients, still.constants, body_record(VEHICLE)[0], np.zeros(3), R,
-                  V, np.zeros(3), W, V, 0.0, 0.0, np.zeros(STATE_SIZE), out)
+    effect_wrench(
+        still.wrench_laws,
+        still.wrench_coefficients,
+        still.constants,
+        body_record(VEHICLE)[0],
+        np.zeros(3),
+        R,
+        V,
+        np.zeros(3),
+        W,
+        V,
+        0.0,
+        0.0,
+        np.zeros(STATE_SIZE),
+        out,
+    )
     np.testing.assert_allclose(out, 0.0, atol=1e-15)
 
 
@@ -128,33 +175,57 @@ def test_ceiling_effect_is_the_ground_effect_seen_from_above():
     force = np.zeros(3)
     for r, rate, k in zip(VEHICLE.positions, W, VEHICLE.k, strict=True):
         distance = 2.6 - (2.4 + (R @ r)[2])
-        force += R[:, 2] * k * rate**2 * (1 / (1 - 3.0 * (VEHICLE.rotor_radius / (4 * distance)) ** 2) - 1)
+        force += (
+            R[:, 2]
+            * k
+            * rate**2
+            * (1 / (1 - 3.0 * (VEHICLE.rotor_radius / (4 * distance)) ** 2) - 1)
+        )
     ceiling = EffectSetting("ceiling_effect", {"rho": 3.0})
-    np.testing.assert_allclose(wrench(vehicle.with_effects(ceiling), (0, 0, 2.4))[0], force, rtol=1e-12)
-    np.testing.assert_array_equal(wrench(VEHICLE.with_effects(ceiling), (0, 0, 2.4))[0], 0.0)  # no ceiling stated
+    np.testing.assert_allclose(
+        wrench(vehicle.with_effects(ceiling), (0, 0, 2.4))[0], force, rtol=1e-12
+    )
+    np.testing.assert_array_equal(
+        wrench(VEHICLE.with_effects(ceiling), (0, 0, 2.4))[0], 0.0
+    )  # no ceiling stated
     touching = np.linalg.norm(wrench(vehicle.with_effects(ceiling), (0, 0, 2.6))[0])
     assert touching <= np.sum(VEHICLE.k * W**2) * (1 + 1e-12)
 
 
 def rotorpy_wrench(k_d, k_z, k_h, k_flap, c_D, wind):
-    """Force and torque in body axes as RotorPy's ``Multirotor.compute_body_wrench`` has them, less thrust and yaw torque."""
+    """Force and torque in body axes as RotorPy's ``Multirotor.compute_body_wrench`` has them, less
+    thrust and yaw torque.
+    """
     airspeed = R.T @ (V - wind)
     force = -np.linalg.norm(airspeed) * np.asarray(c_D) * airspeed
     torque = np.zeros(3)
     for r, rate in zip(VEHICLE.positions, W, strict=True):
         u = airspeed + np.cross(OMEGA, r)
-        F = -rate * np.array([k_d, k_d, k_z]) * u + [0, 0, k_h * (u[0]**2 + u[1]**2)]
+        F = -rate * np.array([k_d, k_d, k_z]) * u + [0, 0, k_h * (u[0] ** 2 + u[1] ** 2)]
         force, torque = force + F, torque + np.cross(r, F) - k_flap * rate * np.cross(u, [0, 0, 1])
     return force, torque
 
 
 def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
-    k_d, k_z, k_h, k_flap, c_D, wind = 1.19e-4, 2.32e-4, 3.39e-3, 4e-6, (0.5e-2, 0.6e-2, 1e-2), np.array([0.5, 2.0, -0.3])
+    k_d, k_z, k_h, k_flap, c_D, wind = (
+        1.19e-4,
+        2.32e-4,
+        3.39e-3,
+        4e-6,
+        (0.5e-2, 0.6e-2, 1e-2),
+        np.array([0.5, 2.0, -0.3]),
+    )
     force, torque = rotorpy_wrench(k_d, k_z, k_h, k_flap, c_D, wind)
-    got = wrench(VEHICLE.with_effects(
-        EffectSetting("rotor_drag", {"kdx": k_d, "kdy": k_d}), EffectSetting("inflow_thrust", {"kz": k_z}),
-        EffectSetting("translational_lift", {"kh": k_h}), EffectSetting("flapping_moment", {"kflap": k_flap}),
-        EffectSetting("body_drag", dict(zip(("cx", "cy", "cz"), c_D, strict=True)))), wind=wind)
+    got = wrench(
+        VEHICLE.with_effects(
+            EffectSetting("rotor_drag", {"kdx": k_d, "kdy": k_d}),
+            EffectSetting("inflow_thrust", {"kz": k_z}),
+            EffectSetting("translational_lift", {"kh": k_h}),
+            EffectSetting("flapping_moment", {"kflap": k_flap}),
+            EffectSetting("body_drag", dict(zip(("cx", "cy", "cz"), c_D, strict=True))),
+        ),
+        wind=wind,
+    )
     np.testing.assert_allclose(got[0], R @ force, rtol=1e-12)
     np.testing.assert_allclose(got[1], torque, rtol=1e-12)
 
@@ -162,8 +233,12 @@ def test_the_aerodynamics_of_rotorpy_can_be_said_exactly():
 def test_body_drag_has_a_linear_part_and_acts_at_the_geometric_centre():
     com = np.array([0.01, -0.02, 0.03])
     force = -np.array([0.1, 0.2, 0.3]) * (R.T @ V)
-    got = wrench(VEHICLE.with_effects(EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
-                                      EffectSetting("body_drag", {"dx": 0.1, "dy": 0.2, "dz": 0.3})))
+    got = wrench(
+        VEHICLE.with_effects(
+            EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
+            EffectSetting("body_drag", {"dx": 0.1, "dy": 0.2, "dz": 0.3}),
+        )
+    )
     np.testing.assert_allclose(got[0], R @ force, rtol=1e-12)
     np.testing.assert_allclose(got[1], np.cross(-com, force), rtol=1e-12)
 
@@ -177,7 +252,9 @@ def test_rate_damping_opposes_the_body_rate():
 def test_rotor_inertia_is_the_rate_of_change_of_the_rotors_momentum():
     jr, acceleration = 2e-5, np.array([100.0, -50.0, 20.0, 300.0])
     h = jr * np.sum(VEHICLE.spin * W)
-    expected = -jr * np.sum(VEHICLE.spin * acceleration) * np.array([0, 0, 1]) - np.cross(OMEGA, [0, 0, h])
+    expected = -jr * np.sum(VEHICLE.spin * acceleration) * np.array([0, 0, 1]) - np.cross(
+        OMEGA, [0, 0, h]
+    )
     force, torque = wrench(setting("rotor_inertia", jr=jr), acceleration=acceleration)
     np.testing.assert_allclose(torque, expected, rtol=1e-12)
     np.testing.assert_array_equal(force, 0.0)
@@ -195,8 +272,15 @@ def test_a_tilted_frame_of_the_rotors_turns_their_thrust_and_their_torque():
     np.testing.assert_allclose(torque, expected, rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize(("name", "size"), [("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}), ("inflow_thrust", {"kz": 2e-4}),
-                                            ("translational_lift", {"kh": 3e-3}), ("ground_effect", {"rho": 3.0})])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),
+        ("inflow_thrust", {"kz": 2e-4}),
+        ("translational_lift", {"kh": 3e-3}),
+        ("ground_effect", {"rho": 3.0}),
+    ],
+)
 def test_a_central_law_is_that_of_rotors_drawn_into_the_centre(name, size):
     drawn = replace(VEHICLE, rotor_positions=np.zeros((4, 3)))
     vehicle = setting(name, **size)
@@ -208,7 +292,10 @@ def test_a_central_law_is_that_of_rotors_drawn_into_the_centre(name, size):
 
 def test_wind_blows_through_declared_drag_whatever_its_place_in_the_list():
     w = np.array([2.0, -1.0, 0.3])
-    drag, wind = EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}), EffectSetting("wind", {"wx": 2, "wy": -1, "wz": 0.3})
+    drag, wind = (
+        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
+        EffectSetting("wind", {"wx": 2, "wy": -1, "wz": 0.3}),
+    )
     for effects in ((drag, wind), (wind, drag)):
         got = wrench(VEHICLE.with_effects(*effects))
         np.testing.assert_allclose(got, wrench(VEHICLE.with_effects(drag), wind=w), rtol=1e-12)
@@ -218,23 +305,52 @@ def test_the_drag_of_wind_is_its_change_against_still_air():
     w, cd = np.array([2.0, -1.0, 0.3]), 0.04
     u = w - V
     force, torque = wrench(setting("wind", wx=w[0], wy=w[1], wz=w[2], cd=cd))
-    np.testing.assert_allclose(force, cd * (np.linalg.norm(u) * u + np.linalg.norm(V) * V), rtol=1e-12)
+    np.testing.assert_allclose(
+        force, cd * (np.linalg.norm(u) * u + np.linalg.norm(V) * V), rtol=1e-12
+    )
     np.testing.assert_array_equal(torque, 0.0)
     np.testing.assert_allclose(wrench(setting("wind", cd=cd))[0], 0.0, atol=1e-16)
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
-    fan, position, com = Fan(turbulence=0.0), np.array([2.1, 0.3, 1.1]), np.array([0.01, 0.0, -0.02])
+    fan, position, com = (
+        Fan(turbulence=0.0),
+        np.array([2.1, 0.3, 1.1]),
+        np.array([0.01, 0.0, -0.02]),
+    )
     out, turn = np.zeros(6), Rotation.from_euler("z", heading).as_matrix()
     record = fan_record(fan, VEHICLE.positions, PERIOD)
-    jet_wrench(record[0], *jet_table(fan.radius, fan.hub_radius), position, np.ascontiguousarray(turn.T @ R), turn.T @ V,
-               OMEGA, com, np.zeros(3), out)
+    jet_wrench(
+        record[0],
+        *jet_table(fan.radius, fan.hub_radius),
+        position,
+        np.ascontiguousarray(turn.T @ R),
+        turn.T @ V,
+        OMEGA,
+        com,
+        np.zeros(3),
+        out,
+    )
     where = np.array([0.5, -0.4, 0.0])
-    got = wrench(VEHICLE.with_effects(
-        EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
-        EffectSetting("fan_jet", {"u0": fan.speed, "x": where[0], "y": where[1], "z": fan.height, "heading": heading,
-                                  "kd": fan.rotor_drag, "area": fan.hull_area})), turn @ position + where)
+    got = wrench(
+        VEHICLE.with_effects(
+            EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
+            EffectSetting(
+                "fan_jet",
+                {
+                    "u0": fan.speed,
+                    "x": where[0],
+                    "y": where[1],
+                    "z": fan.height,
+                    "heading": heading,
+                    "kd": fan.rotor_drag,
+                    "area": fan.hull_area,
+                },
+            ),
+        ),
+        turn @ position + where,
+    )
     np.testing.assert_allclose(got[0], turn @ out[:3], rtol=1e-10)
     np.testing.assert_allclose(R @ got[1], turn @ out[3:], rtol=1e-10)
     assert np.linalg.norm(out[:3]) > 0.1
@@ -249,8 +365,18 @@ class Pendulum:
         self.state, self.rotors = np.zeros(STATE_SIZE), np.zeros(ROTORS_SIZE)
 
     def step(self, rotation, speeds, dt=1e-3):
-        fill_state(body_record(self.bundle.vehicle)[0], np.zeros(3), rotation, np.zeros(3), np.zeros(3), speeds,
-                   np.zeros(3), 0.0, 0.0, self.state)
+        fill_state(
+            body_record(self.bundle.vehicle)[0],
+            np.zeros(3),
+            rotation,
+            np.zeros(3),
+            np.zeros(3),
+            speeds,
+            np.zeros(3),
+            0.0,
+            0.0,
+            self.state,
+        )
         self.rotors[STEP] = dt
         advance(self.bundle.wrench_hooks, self.row, self.bundle.constants, self.state, self.rotors)
         out = np.zeros(6)
@@ -271,7 +397,9 @@ def test_a_slung_payload_hangs_with_its_weight():
 
 
 def test_a_slung_payload_swings_as_vehicle_and_load_about_their_common_centre():
-    """Against both bodies' equations of motion, integrated with the cable as a constraint in coordinates of their own."""
+    """Against both bodies' equations of motion, integrated with the cable as a constraint in
+    coordinates of their own.
+    """
     from scipy.integrate import solve_ivp
 
     m, length, M, g = 0.05, 0.3, VEHICLE.mass, VEHICLE.gravity
@@ -282,10 +410,20 @@ def test_a_slung_payload_swings_as_vehicle_and_load_about_their_common_centre():
     def motion(t, s):
         # vehicle x, z and angle a of the cable from straight down: Lagrange's equations
         _, _, a, vx, vz, w = s
-        A = np.array([[M + m, 0, m * length * np.cos(a)], [0, M + m, m * length * np.sin(a)],
-                      [m * length * np.cos(a), m * length * np.sin(a), m * length**2]])
-        b = np.array([thrust * np.sin(tilt(t)) + m * length * w**2 * np.sin(a),
-                      thrust * np.cos(tilt(t)) - (M + m) * g - m * length * w**2 * np.cos(a), -m * g * length * np.sin(a)])
+        A = np.array(
+            [
+                [M + m, 0, m * length * np.cos(a)],
+                [0, M + m, m * length * np.sin(a)],
+                [m * length * np.cos(a), m * length * np.sin(a), m * length**2],
+            ]
+        )
+        b = np.array(
+            [
+                thrust * np.sin(tilt(t)) + m * length * w**2 * np.sin(a),
+                thrust * np.cos(tilt(t)) - (M + m) * g - m * length * w**2 * np.cos(a),
+                -m * g * length * np.sin(a),
+            ]
+        )
         return np.concatenate([[vx, vz, w], np.linalg.solve(A, b)])
 
     exact = solve_ivp(motion, (0, 2), np.zeros(6), rtol=1e-9, atol=1e-9).y[2, -1]
@@ -312,7 +450,9 @@ def test_motor_lag_does_not_depend_on_how_a_time_is_cut_up():
     for rotors in (whole, halves):
         rotors([400.0] * 4)
     halves([500.0] * 4, dt=0.002)
-    np.testing.assert_allclose(halves([500.0] * 4, dt=0.008), whole([500.0] * 4, dt=0.010), rtol=1e-12)
+    np.testing.assert_allclose(
+        halves([500.0] * 4, dt=0.008), whole([500.0] * 4, dt=0.010), rtol=1e-12
+    )
 
 
 def test_no_motor_lag_changes_nothing():
@@ -332,11 +472,18 @@ def test_battery_sag_takes_thrust_by_a_power_of_the_voltage():
 
 def test_the_thrusts_that_rotor_effects_leave():
     thrust = lambda vehicle, **more: np.square(Rotors(vehicle)(W, **more) / W)  # noqa: E731
-    np.testing.assert_allclose(thrust(setting("rotor_efficiency", e1=-0.1, e3=0.2)), [0.9, 1.0, 1.2, 1.0], rtol=1e-14)
+    np.testing.assert_allclose(
+        thrust(setting("rotor_efficiency", e1=-0.1, e3=0.2)), [0.9, 1.0, 1.2, 1.0], rtol=1e-14
+    )
     np.testing.assert_allclose(thrust(setting("thrust_scale", s=-0.05)), 0.95, rtol=1e-14)
-    np.testing.assert_allclose(thrust(setting("thrust_curvature", a=0.2)),
-                               1 + 0.2 * ((W / VEHICLE.hover_rate) ** 2 - 1), rtol=1e-14)
-    np.testing.assert_allclose(thrust(setting("thrust_fade", rate=1e-3), time=30.0), 0.97, rtol=1e-14)
+    np.testing.assert_allclose(
+        thrust(setting("thrust_curvature", a=0.2)),
+        1 + 0.2 * ((W / VEHICLE.hover_rate) ** 2 - 1),
+        rtol=1e-14,
+    )
+    np.testing.assert_allclose(
+        thrust(setting("thrust_fade", rate=1e-3), time=30.0), 0.97, rtol=1e-14
+    )
     np.testing.assert_allclose(thrust(setting("thrust_fade", rate=0.1), time=30.0), 0.1, rtol=1e-14)
     still = Rotors(setting("rotor_efficiency", e1=-1.0))(W)
     assert still[0] == 0.0
@@ -349,7 +496,9 @@ def test_latency_is_a_pure_delay_between_samples_too(d, dt):
     for k in range(60):
         t = k * dt
         out = rotors(400.0 + 10.0 * t * np.array([1, -1, 2, 0]), dt=dt)
-        np.testing.assert_allclose(out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12)
+        np.testing.assert_allclose(
+            out, 400.0 + 10.0 * max(t - d, 0.0) * np.array([1, -1, 2, 0]), rtol=1e-12
+        )
 
 
 def test_latency_holds_at_a_rate_that_its_memory_could_not():
@@ -364,7 +513,9 @@ def test_latency_takes_nothing_from_what_falls_between_samples(d):
     rotors, phase = Rotors(setting("latency", d=d)), 2.0 * np.pi * 8.0 * PERIOD * np.arange(80)
     out = np.array([rotors(400.0 + 10.0 * np.sin(x + np.arange(4.0))) for x in phase])
     wanted = 400.0 + 10.0 * np.sin(phase[:, None] - 2.0 * np.pi * 8.0 * d + np.arange(4.0))
-    np.testing.assert_allclose(out[20:], wanted[20:], atol=0.02)  # a line between two samples would be off by up to 0.08
+    np.testing.assert_allclose(
+        out[20:], wanted[20:], atol=0.02
+    )  # a line between two samples would be off by up to 0.08
 
 
 def test_latency_stays_within_the_samples_where_they_leap_or_are_not_even():
@@ -408,10 +559,17 @@ def test_an_attitude_gain_scales_the_tilt_and_nothing_else():
     _, position, q = Sensing(setting("attitude_gain", g=g), 1.0)(W, POSE, Q)
     z = rotation_of(q).as_matrix()[:, 2]
     assert np.arccos(z[2]) == pytest.approx((1 + g) * np.arccos(R[2, 2]), rel=1e-12)
-    np.testing.assert_allclose(z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12)
+    np.testing.assert_allclose(
+        z[:2] / np.linalg.norm(z[:2]), R[:2, 2] / np.linalg.norm(R[:2, 2]), rtol=1e-12
+    )
     # what is left after the tilt is taken off, the turn about the vertical, is the same
-    level = [Rotation.from_rotvec(-np.cross([0, 0, 1], up) / np.linalg.norm(up[:2]) * np.arccos(up[2])).as_matrix() @ A
-             for up, A in ((z, rotation_of(q).as_matrix()), (R[:, 2], R))]
+    level = [
+        Rotation.from_rotvec(
+            -np.cross([0, 0, 1], up) / np.linalg.norm(up[:2]) * np.arccos(up[2])
+        ).as_matrix()
+        @ A
+        for up, A in ((z, rotation_of(q).as_matrix()), (R[:, 2], R))
+    ]
     np.testing.assert_allclose(level[0], level[1], atol=1e-12)
     np.testing.assert_array_equal(position, POSE)
 
@@ -436,21 +594,30 @@ def test_an_estimator_undoes_a_sensing_effect(effects):
 
 @pytest.mark.parametrize("dt", [0.02, -0.02, 0.0125, -0.0125])
 def test_a_clock_offset_delays_pose_or_rates_and_an_estimator_the_other(dt):
-    clock, undo = Sensing(setting("clock_offset", dt=dt), 1.0), Sensing(setting("clock_offset", dt=dt), -1.0)
+    clock, undo = (
+        Sensing(setting("clock_offset", dt=dt), 1.0),
+        Sensing(setting("clock_offset", dt=dt), -1.0),
+    )
     rng = np.random.default_rng(0)
     for k in range(40):
         t = k * PERIOD
         true = 400.0 + t * np.arange(4.0), np.array([t, -t, 1.0]), Rotation.from_euler("z", 3.0 + t)
-        speeds, position, q = clock(true[0], true[1], rng.choice([-1.0, 1.0]) * true[2].as_quat(scalar_first=True))
+        speeds, position, q = clock(
+            true[0], true[1], rng.choice([-1.0, 1.0]) * true[2].as_quat(scalar_first=True)
+        )
         if k > 20:
             np.testing.assert_allclose(speeds, true[0] - max(-dt, 0.0) * np.arange(4.0), rtol=1e-12)
-            np.testing.assert_allclose(position, np.array([t, -t, 1.0]) - max(dt, 0.0) * np.array([1, -1, 0]), atol=1e-12)
+            np.testing.assert_allclose(
+                position, np.array([t, -t, 1.0]) - max(dt, 0.0) * np.array([1, -1, 0]), atol=1e-12
+            )
             yaw = (rotation_of(q) * Rotation.from_euler("z", -3.0 - t)).as_rotvec()
             np.testing.assert_allclose(yaw, [0, 0, -max(dt, 0.0)], atol=1e-5)
         speeds, position, q = undo(speeds, position, q)
         if k > 20:
             np.testing.assert_allclose(speeds, true[0] - abs(dt) * np.arange(4.0), rtol=1e-12)
-            np.testing.assert_allclose(position, np.array([t, -t, 1.0]) - abs(dt) * np.array([1, -1, 0]), atol=1e-12)
+            np.testing.assert_allclose(
+                position, np.array([t, -t, 1.0]) - abs(dt) * np.array([1, -1, 0]), atol=1e-12
+            )
 
 
 def test_a_clock_offset_counts_the_time_through_lost_poses():
@@ -466,7 +633,9 @@ def test_a_clock_offset_counts_the_time_through_lost_poses():
 
 def test_inertia_is_scaled_about_each_axis():
     vehicle = compile_effects(setting("inertia", jx=0.2, jz=-0.1)).vehicle
-    np.testing.assert_allclose(np.diag(vehicle.inertia), np.diag(VEHICLE.inertia) * [1.2, 1.0, 0.9], rtol=1e-15)
+    np.testing.assert_allclose(
+        np.diag(vehicle.inertia), np.diag(VEHICLE.inertia) * [1.2, 1.0, 0.9], rtol=1e-15
+    )
     assert vehicle.mass == VEHICLE.mass
     skew = replace(VEHICLE, inertia=np.array([[2e-3, 9e-4, 0], [9e-4, 2e-3, 0], [0, 0, 4e-3]]))
     with pytest.raises(InputError, match="inertia"):
@@ -474,15 +643,22 @@ def test_inertia_is_scaled_about_each_axis():
 
 
 def test_constant_force_stands_in_the_world_and_constant_torque_in_the_body():
-    force, torque = wrench(VEHICLE.with_effects(EffectSetting("constant_force", {"fx": 0.1, "fz": -0.2}),
-                                                EffectSetting("constant_torque", {"ty": 0.01})))
+    force, torque = wrench(
+        VEHICLE.with_effects(
+            EffectSetting("constant_force", {"fx": 0.1, "fz": -0.2}),
+            EffectSetting("constant_torque", {"ty": 0.01}),
+        )
+    )
     np.testing.assert_array_equal(force, [0.1, 0.0, -0.2])
     np.testing.assert_array_equal(torque, [0.0, 0.01, 0.0])
 
 
 def test_mass_and_centre_of_mass_change_the_body_and_nothing_else():
-    vehicle = compile_effects(VEHICLE.with_effects(EffectSetting("mass", {"dm": 0.05}),
-                                                   EffectSetting("com_offset", {"cx": 0.01}))).vehicle
+    vehicle = compile_effects(
+        VEHICLE.with_effects(
+            EffectSetting("mass", {"dm": 0.05}), EffectSetting("com_offset", {"cx": 0.01})
+        )
+    ).vehicle
     assert vehicle.mass == pytest.approx(VEHICLE.mass + 0.05)
     np.testing.assert_array_equal(vehicle.com, [0.01, 0, 0])
     np.testing.assert_array_equal(vehicle.inertia, VEHICLE.inertia)

@@ -1,4 +1,6 @@
-"""One effect, three uses: every effect of the library is described, flown by the plant and used by the estimator."""
+"""One effect, three uses: every effect of the library is described, flown by the plant and used by
+the estimator.
+"""
 
 import sys
 from dataclasses import replace
@@ -16,8 +18,11 @@ from windwrench.envs.suspended_load import SuspendedLoad
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
 
-# nothing but the effect comes between model and flight: no disturbance, no lag, no quantised turn rates, no noise
-QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False)
+# nothing but the effect comes between model and flight: no disturbance, no lag, no quantised turn
+# rates, no noise
+QUIET = PlantSettings(
+    disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
+)
 VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0, mocap=Mocap(200.0, 1e-4, 5e-4))
 # where an effect shows; "excite" shows most of them
 FLIGHTS = {"ground_effect": "ground"}
@@ -32,15 +37,21 @@ def vehicle_for(name):
 @cache
 def flight(name=None, trajectory=None):
     effects = () if name is None else (parse_setting(name, VEHICLE),)
-    columns = record_flight(vehicle_for(name), effects, trajectory or FLIGHTS.get(name, "excite"), 12.0, 1, QUIET)
+    columns = record_flight(
+        vehicle_for(name), effects, trajectory or FLIGHTS.get(name, "excite"), 12.0, 1, QUIET
+    )
     return FlightLog(**columns)
 
 
 def remaining(log, vehicle):
-    """RMS of the estimated wrench, in parts of weight and of weight times arm, once the filter has settled."""
+    """RMS of the estimated wrench, in parts of weight and of weight times arm, once the filter has
+    settled.
+    """
     series = estimate_log(log, vehicle)
     settled = series.t > 4.0
-    wrench = np.concatenate([series.force / vehicle.weight, series.torque / (vehicle.weight * vehicle.arm_l)], axis=1)
+    wrench = np.concatenate(
+        [series.force / vehicle.weight, series.torque / (vehicle.weight * vehicle.arm_l)], axis=1
+    )
     return np.sqrt(np.mean(np.sum(wrench[settled] ** 2, axis=1)))
 
 
@@ -67,12 +78,21 @@ def test_an_effect_says_what_it_is(name):
 @pytest.mark.parametrize("name", names())
 def test_an_effect_has_the_function_of_its_kind(name):
     effect = get(name)
-    functions = {"rotor input": effect.law, "wrench": effect.law, "body": effect.amend, "sensing": effect.law}
+    functions = {
+        "rotor input": effect.law,
+        "wrench": effect.law,
+        "body": effect.amend,
+        "sensing": effect.law,
+    }
     assert functions[effect.kind] is not None
     if effect.law is not None:
         assert effect.law.address != 0
         bundle = compile_effects(VEHICLE.with_effects(parse_setting(name)))
-        laws = {"wrench": bundle.wrench_laws, "rotor input": bundle.rotor_laws, "sensing": bundle.sense_laws}
+        laws = {
+            "wrench": bundle.wrench_laws,
+            "rotor input": bundle.rotor_laws,
+            "sensing": bundle.sense_laws,
+        }
         assert effect.law.address in laws[effect.kind]
 
 
@@ -93,7 +113,10 @@ def test_the_estimator_explains_an_effect_once_it_is_declared(name):
 
 def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
     """The load and its thread there share nothing with the effect's law."""
-    load, rng = SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03), np.random.default_rng(1)
+    load, rng = (
+        SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03),
+        np.random.default_rng(1),
+    )
     t = TICK * np.arange(2401)
     setpoints, samples = draw_trajectory("excite", rng, t), np.empty((len(t), 11))
     loop = ClosedLoop(VEHICLE, settings=QUIET, load=load)
@@ -105,10 +128,14 @@ def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
         loop.run(rng.standard_normal((1, NOISE)))
         samples[k, 4:] = loop.sample[4:]
     log = FlightLog(t, samples[:, 4:7], samples[:, 7:11], samples[:, :4])
-    swinging = EffectSetting("slung_payload", {"m": load.mass, "l": load.length, "damping": load.drag / load.mass})
+    swinging = EffectSetting(
+        "slung_payload", {"m": load.mass, "l": load.length, "damping": load.drag / load.mass}
+    )
     explained = remaining(log, VEHICLE.with_effects(swinging))
     assert explained < 0.1 * remaining(log, VEHICLE)
-    assert explained < 0.3 * remaining(log, VEHICLE.with_effects(EffectSetting("mass", {"dm": load.mass})))
+    assert explained < 0.3 * remaining(
+        log, VEHICLE.with_effects(EffectSetting("mass", {"dm": load.mass}))
+    )
 
 
 def test_the_same_flight_comes_out_twice():
@@ -120,7 +147,10 @@ def test_the_same_flight_comes_out_twice():
 def test_a_bare_name_takes_the_sizes_of_the_vehicle():
     small = parse_setting("rotor_drag", load_vehicle("crazyflie"))
     assert small.coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[1]
-    assert parse_setting("rotor_drag").coefficients["kdx"] == get("rotor_drag").coefficients[0].typical[0]
+    assert (
+        parse_setting("rotor_drag").coefficients["kdx"]
+        == get("rotor_drag").coefficients[0].typical[0]
+    )
 
 
 def test_coefficients_on_a_command_line():
@@ -128,16 +158,19 @@ def test_coefficients_on_a_command_line():
     assert setting == EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4})
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("rotordrag", "Did you mean 'rotor_drag'"),
-    ("rotor_drag:kd=1", "kdx"),
-    ("rotor_drag:kdx", "coef=value"),
-    ("rotor_drag:kdx=much", "coef=value"),
-    ("rotor_drag:kdx=nan", "finite"),
-    ("rotor_drag:kdx=-1", "between"),
-    ("motor_lag:tau=9", "between 0 and 0.5 s"),
-    ("", "unknown effect"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("rotordrag", "Did you mean 'rotor_drag'"),
+        ("rotor_drag:kd=1", "kdx"),
+        ("rotor_drag:kdx", "coef=value"),
+        ("rotor_drag:kdx=much", "coef=value"),
+        ("rotor_drag:kdx=nan", "finite"),
+        ("rotor_drag:kdx=-1", "between"),
+        ("motor_lag:tau=9", "between 0 and 0.5 s"),
+        ("", "unknown effect"),
+    ],
+)
 def test_a_bad_setting_is_named(text, words):
     with pytest.raises(InputError, match=words):
         parse_setting(text)

@@ -42,7 +42,9 @@ def mrp_of(rotation):
 @drawn(quaternions, quaternions)
 def test_a_product_turns_first_by_the_second_factor(a, b):
     product = call(r.quaternion_multiply, a, b)
-    np.testing.assert_allclose(scipy_of(product).as_matrix(), (scipy_of(a) * scipy_of(b)).as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(
+        scipy_of(product).as_matrix(), (scipy_of(a) * scipy_of(b)).as_matrix(), atol=1e-14
+    )
     assert abs(np.linalg.norm(product) - 1) < 1e-14
 
 
@@ -93,7 +95,12 @@ def test_the_attitude_error_stands_in_the_world_frame(q, reference):
 def test_a_yaw_error_of_a_tilted_vehicle_is_about_the_world_s_vertical():
     reference = Rotation.from_euler("x", 1.0)
     q = Rotation.from_euler("z", 0.2) * reference
-    rho = call(r.attitude_error, q.as_quat(scalar_first=True), reference.as_quat(scalar_first=True), shape=3)
+    rho = call(
+        r.attitude_error,
+        q.as_quat(scalar_first=True),
+        reference.as_quat(scalar_first=True),
+        shape=3,
+    )
     np.testing.assert_allclose(rho, [0, 0, np.tan(0.05)], atol=1e-15)
 
 
@@ -121,5 +128,8 @@ def test_normalising_keeps_the_direction(q, length):
 
 @drawn(st.floats(-10, 10))
 def test_a_yaw_is_a_turn_about_the_vertical(yaw):
-    np.testing.assert_allclose(scipy_of(r.quaternion_of_yaw(yaw)).as_matrix(), Rotation.from_euler("z", yaw).as_matrix(),
-                               atol=1e-14)
+    np.testing.assert_allclose(
+        scipy_of(r.quaternion_of_yaw(yaw)).as_matrix(),
+        Rotation.from_euler("z", yaw).as_matrix(),
+        atol=1e-14,
+    )

@@ -5,14 +5,18 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 import yaml
-from data_paths import data_file
 
+from tests.support.data_paths import data_file
 from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle, preset_names
 from windwrench.dynamics.vehicle_file import parse_vehicle, save_vehicle
 
 GOOD = {
-    "name": "mine", "mass": 0.5, "inertia": [0.002, 0.003, 0.004], "arm_l": 0.12,
-    "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6], "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
+    "name": "mine",
+    "mass": 0.5,
+    "inertia": [0.002, 0.003, 0.004],
+    "arm_l": 0.12,
+    "k": [8e-6, 8.1e-6, 7.9e-6, 8e-6],
+    "p": [2e-7, 2.1e-7, 1.9e-7, 2e-7],
 }
 VEHICLE = load_vehicle("ardrone2")
 
@@ -49,47 +53,68 @@ def test_a_full_inertia_matrix_loads(tmp_path):
     np.testing.assert_array_equal(load_vehicle(saved(tmp_path, inertia=inertia)).inertia, inertia)
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"mass": -0.5}, ["mass", "positive", "-0.5"]),
-    ({"mass": 0}, ["mass", "positive"]),
-    ({"mass": "heavy"}, ["mass", "positive number", "heavy"]),
-    ({"mass": float("nan")}, ["mass", "positive number", "nan"]),
-    ({"mass": float("inf")}, ["mass", "positive number", "inf"]),
-    ({"mass": True}, ["mass", "positive number", "True"]),
-    ({"mass": [0.5]}, ["mass", "positive number"]),
-    ({"arm_l": 0}, ["arm_l", "positive"]),
-    ({"k": [8e-6] * 3}, ["k", "4 finite numbers"]),
-    ({"k": [8e-6] * 3 + [-8e-6]}, ["k", "four positive"]),
-    ({"k": [8e-6] * 3 + [float("nan")]}, ["k", "4 finite numbers"]),
-    ({"p": [2e-7] * 5}, ["p", "4 finite numbers"]),
-    ({"p": 2e-7}, ["p", "4 finite numbers"]),
-    ({"inertia": [0.002, 0.003]}, ["inertia", "3 x 3"]),
-    ({"inertia": [[0.002, 0, 0], [0, 0.003, 0]]}, ["inertia", "3 x 3"]),
-    ({"inertia": [[0.002, 1e-4, 0], [0, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "symmetric"]),
-    ({"inertia": [0.002, -0.003, 0.004]}, ["inertia", "positive definite"]),
-    ({"inertia": [[0.002, 0.01, 0], [0.01, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "positive definite"]),
-    ({"rotor_positions": [[0.1, 0.1, 0]] * 3}, ["rotor_positions", "4 x 3"]),
-    ({"rotor_positions": [[0.1, 0.1]] * 4}, ["rotor_positions", "4 x 3"]),
-    ({"rotor_positions": [[0.1, 0.1, 0]] * 4}, ["rotor_positions", "independently"]),
-    ({"spin": [1, 1, 1, 2]}, ["spin", "1 or -1"]),
-    ({"com": [0, 0]}, ["com", "3 finite numbers"]),
-    ({"omega_lsb": -1.0}, ["omega_lsb", "negative"]),
-    ({"omega_source": "guessed"}, ["omega_source", "measured or commanded", "guessed"]),
-    ({"floor_z": 3.0, "ceiling_z": 1.0}, ["floor_z", "ceiling_z"]),
-    ({"maas": 0.5}, ["maas", "expected one of", "Did you mean 'mass'?"]),
-    ({"mocap": {"rate_hz": -1}}, ["mocap.rate_hz", "positive"]),
-    ({"mocap": {"rate": 100}}, ["mocap", "rate", "Did you mean 'rate_hz'?"]),
-    ({"mocap": 200}, ["mocap", "mapping"]),
-    ({"mass": None}, ["missing", "mass"]),
-    ({"k": None, "inertia": None}, ["missing", "inertia", "k"]),
-    ({"effects": [{"name": "rotor_dragg"}]}, ["effect", "rotor_dragg", "Did you mean 'rotor_drag'?"]),
-    ({"effects": [{"name": "rotor_drag", "coefficients": {"kd": 1e-4}}]}, ["rotor_drag", "coefficient", "kdx"]),
-    ({"effects": [{"name": "rotor_drag", "coefficients": {"kdx": -1}}]}, ["rotor_drag", "kdx", "between"]),
-    ({"effects": [{"name": "rotor_drag", "coefficients": {"kdx": float("nan")}}]}, ["rotor_drag", "kdx", "finite"]),
-    ({"effects": [{"name": "rotor_drag", "coefficients": [1]}]}, ["rotor_drag", "coefficients", "mapping"]),
-    ({"effects": [{"coefficients": {}}]}, ["effects", "name"]),
-    ({"effects": "rotor_drag"}, ["effects", "list"]),
-])
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mass": -0.5}, ["mass", "positive", "-0.5"]),
+        ({"mass": 0}, ["mass", "positive"]),
+        ({"mass": "heavy"}, ["mass", "positive number", "heavy"]),
+        ({"mass": float("nan")}, ["mass", "positive number", "nan"]),
+        ({"mass": float("inf")}, ["mass", "positive number", "inf"]),
+        ({"mass": True}, ["mass", "positive number", "True"]),
+        ({"mass": [0.5]}, ["mass", "positive number"]),
+        ({"arm_l": 0}, ["arm_l", "positive"]),
+        ({"k": [8e-6] * 3}, ["k", "4 finite numbers"]),
+        ({"k": [8e-6] * 3 + [-8e-6]}, ["k", "four positive"]),
+        ({"k": [8e-6] * 3 + [float("nan")]}, ["k", "4 finite numbers"]),
+        ({"p": [2e-7] * 5}, ["p", "4 finite numbers"]),
+        ({"p": 2e-7}, ["p", "4 finite numbers"]),
+        ({"inertia": [0.002, 0.003]}, ["inertia", "3 x 3"]),
+        ({"inertia": [[0.002, 0, 0], [0, 0.003, 0]]}, ["inertia", "3 x 3"]),
+        ({"inertia": [[0.002, 1e-4, 0], [0, 0.003, 0], [0, 0, 0.004]]}, ["inertia", "symmetric"]),
+        ({"inertia": [0.002, -0.003, 0.004]}, ["inertia", "positive definite"]),
+        (
+            {"inertia": [[0.002, 0.01, 0], [0.01, 0.003, 0], [0, 0, 0.004]]},
+            ["inertia", "positive definite"],
+        ),
+        ({"rotor_positions": [[0.1, 0.1, 0]] * 3}, ["rotor_positions", "4 x 3"]),
+        ({"rotor_positions": [[0.1, 0.1]] * 4}, ["rotor_positions", "4 x 3"]),
+        ({"rotor_positions": [[0.1, 0.1, 0]] * 4}, ["rotor_positions", "independently"]),
+        ({"spin": [1, 1, 1, 2]}, ["spin", "1 or -1"]),
+        ({"com": [0, 0]}, ["com", "3 finite numbers"]),
+        ({"omega_lsb": -1.0}, ["omega_lsb", "negative"]),
+        ({"omega_source": "guessed"}, ["omega_source", "measured or commanded", "guessed"]),
+        ({"floor_z": 3.0, "ceiling_z": 1.0}, ["floor_z", "ceiling_z"]),
+        ({"maas": 0.5}, ["maas", "expected one of", "Did you mean 'mass'?"]),
+        ({"mocap": {"rate_hz": -1}}, ["mocap.rate_hz", "positive"]),
+        ({"mocap": {"rate": 100}}, ["mocap", "rate", "Did you mean 'rate_hz'?"]),
+        ({"mocap": 200}, ["mocap", "mapping"]),
+        ({"mass": None}, ["missing", "mass"]),
+        ({"k": None, "inertia": None}, ["missing", "inertia", "k"]),
+        (
+            {"effects": [{"name": "rotor_dragg"}]},
+            ["effect", "rotor_dragg", "Did you mean 'rotor_drag'?"],
+        ),
+        (
+            {"effects": [{"name": "rotor_drag", "coefficients": {"kd": 1e-4}}]},
+            ["rotor_drag", "coefficient", "kdx"],
+        ),
+        (
+            {"effects": [{"name": "rotor_drag", "coefficients": {"kdx": -1}}]},
+            ["rotor_drag", "kdx", "between"],
+        ),
+        (
+            {"effects": [{"name": "rotor_drag", "coefficients": {"kdx": float("nan")}}]},
+            ["rotor_drag", "kdx", "finite"],
+        ),
+        (
+            {"effects": [{"name": "rotor_drag", "coefficients": [1]}]},
+            ["rotor_drag", "coefficients", "mapping"],
+        ),
+        ({"effects": [{"coefficients": {}}]}, ["effects", "name"]),
+        ({"effects": "rotor_drag"}, ["effects", "list"]),
+    ],
+)
 def test_an_error_names_file_field_and_what_was_expected(tmp_path, changes, words):
     path = saved(tmp_path, **changes)
     with pytest.raises(InputError) as caught:
@@ -100,9 +125,16 @@ def test_an_error_names_file_field_and_what_was_expected(tmp_path, changes, word
         assert word in message
 
 
-@pytest.mark.parametrize(("text", "word"), [
-    ("mass: [1, 2", "YAML"), ("- 1\n- 2\n", "mapping"), ("", "mapping"), ("3.5", "mapping"), ("\x00", "YAML"),
-])
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("mass: [1, 2", "YAML"),
+        ("- 1\n- 2\n", "mapping"),
+        ("", "mapping"),
+        ("3.5", "mapping"),
+        ("\x00", "YAML"),
+    ],
+)
 def test_a_file_of_another_form_is_named(tmp_path, text, word):
     path = tmp_path / "bad.yaml"
     path.write_text(text, encoding="utf-8")
@@ -140,10 +172,19 @@ def test_the_measured_flights_vehicle_loads():
 
 def test_a_dumped_vehicle_is_the_vehicle_again(tmp_path):
     given = {
-        **GOOD, "inertia": [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]], "com": [0.01, 0.0, -0.02],
+        **GOOD,
+        "inertia": [[0.002, 1e-4, 0], [1e-4, 0.003, 0], [0, 0, 0.004]],
+        "com": [0.01, 0.0, -0.02],
         "rotor_positions": [[0.1, 0.12, 0.01], [-0.1, 0.12, 0], [-0.1, -0.12, 0], [0.1, -0.12, 0]],
-        "spin": [1, -1, 1, -1], "omega_lsb": 2.5, "omega_source": "commanded", "voltage_ref": 11.1, "floor_z": -0.5,
-        "ceiling_z": 2.5, "gravity": 9.8, "rotor_radius": 0.11, "mocap": {"rate_hz": 100.0, "sigma_pos_m": 0.002},
+        "spin": [1, -1, 1, -1],
+        "omega_lsb": 2.5,
+        "omega_source": "commanded",
+        "voltage_ref": 11.1,
+        "floor_z": -0.5,
+        "ceiling_z": 2.5,
+        "gravity": 9.8,
+        "rotor_radius": 0.11,
+        "mocap": {"rate_hz": 100.0, "sigma_pos_m": 0.002},
         "effects": [{"name": "rotor_drag", "coefficients": {"kdx": 1.0e-4, "kdy": 2.0e-4}}],
     }
     vehicle = parse_vehicle(yaml.safe_dump(given))
@@ -167,8 +208,12 @@ def test_presets_survive_dumping(name):
 
 
 def test_a_saved_vehicle_is_the_vehicle_again(tmp_path):
-    vehicle = replace(load_vehicle("crazyflie"), name="Möwe: 1", mass=np.float64(0.0331)).with_effects(
-        EffectSetting("rotor_drag", {"kdx": np.float64(1 / 3e5), "kdy": 2e-6}), EffectSetting("mass", {"dm": 0.001}))
+    vehicle = replace(
+        load_vehicle("crazyflie"), name="Möwe: 1", mass=np.float64(0.0331)
+    ).with_effects(
+        EffectSetting("rotor_drag", {"kdx": np.float64(1 / 3e5), "kdy": 2e-6}),
+        EffectSetting("mass", {"dm": 0.001}),
+    )
     path = tmp_path / "new" / "vehicle.yaml"
     save_vehicle(vehicle, path)
     again = load_vehicle(path)

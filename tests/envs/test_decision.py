@@ -36,15 +36,21 @@ def test_the_normals_are_numpy_s(kind):
 
 @pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
 def test_a_decision_is_sixteen_ticks_with_numpy_s_normals(estimator):
-    env, twin = FanTrackingEnv("fast", estimator=estimator), FanTrackingEnv("fast", estimator=estimator)
+    env, twin = (
+        FanTrackingEnv("fast", estimator=estimator),
+        FanTrackingEnv("fast", estimator=estimator),
+    )
     env.reset(seed=6)
     twin.reset(seed=6)
     for k in range(5):
         env.step(np.array([0.3], np.float32))
         twin.loop.setpoint[4] = np.float32(0.3)
         twin.loop.run(twin.np_random.standard_normal((16, NOISE)), twin._fan_y, 16 * k)
-        for one, other in zip((env.loop.state, env.loop.covariance, env.loop.external, *env.loop.motion),
-                              (twin.loop.state, twin.loop.covariance, twin.loop.external, *twin.loop.motion), strict=True):
+        for one, other in zip(
+            (env.loop.state, env.loop.covariance, env.loop.external, *env.loop.motion),
+            (twin.loop.state, twin.loop.covariance, twin.loop.external, *twin.loop.motion),
+            strict=True,
+        ):
             np.testing.assert_array_equal(one, other)
         assert env.loop.time == twin.loop.time
     assert env.np_random.uniform() == twin.np_random.uniform()
@@ -54,7 +60,10 @@ def test_watching_every_tick_from_python_changes_nothing():
     env, watched = FanTrackingEnv("gusty"), SensingFanTracking("gusty", observer=True)
     np.testing.assert_array_equal(env.reset(seed=2)[0], watched.reset(seed=2)[0])
     for command in (0.3, -2.0, 0.1):
-        one, other = env.step(np.array([command], np.float32)), watched.step(np.array([command], np.float32))
+        one, other = (
+            env.step(np.array([command], np.float32)),
+            watched.step(np.array([command], np.float32)),
+        )
         np.testing.assert_array_equal(one[0], other[0])
         assert one[1:4] == other[1:4]
         assert one[4]["time"] == other[4]["time"]
@@ -64,7 +73,9 @@ def test_watching_every_tick_from_python_changes_nothing():
 def test_the_reward_is_that_of_c_s_pow_to_the_last_bit():
     env = FanTrackingEnv("static")
     env.reset(seed=0)
-    for y in np.random.default_rng(0).uniform(-2.0, 2.0, 8000):  # a product would round a few of them otherwise
+    for y in np.random.default_rng(0).uniform(
+        -2.0, 2.0, 8000
+    ):  # a product would round a few of them otherwise
         env.loop.position[1] = y
         env._decide(0)
         info = env._info()
@@ -75,7 +86,10 @@ def test_a_generator_that_is_put_in_is_drawn_from():
     env, twin = FanTrackingEnv(), FanTrackingEnv()
     env.reset(seed=1)
     twin.reset(seed=1)
-    env.np_random, other = np.random.Generator(np.random.SFC64(4)), np.random.Generator(np.random.SFC64(4))
+    env.np_random, other = (
+        np.random.Generator(np.random.SFC64(4)),
+        np.random.Generator(np.random.SFC64(4)),
+    )
     env.step(np.zeros(1, np.float32))
     twin.step(np.zeros(1, np.float32))
     assert not np.array_equal(env.loop.state, twin.loop.state)
@@ -133,7 +147,9 @@ def test_another_build_of_numpy_or_mujoco_is_named(monkeypatch):
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
 def test_a_flight_in_progress_is_not_copied(copied):
     env = FanTrackingEnv("static")
-    copy.deepcopy(env).reset(seed=0)  # before its first flight there is nothing that could be shared
+    copy.deepcopy(env).reset(
+        seed=0
+    )  # before its first flight there is nothing that could be shared
     env.reset(seed=0)
     with pytest.raises(InputError, match="cannot be copied or pickled"):
         copied(env)

@@ -30,11 +30,23 @@ def wind(x, y, z, fan=FAN):
     return out
 
 
-def wrench(y, x=DISTANCE, z=FAN.height, yaw=np.pi, fan=FAN, velocity=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0)):
+def wrench(
+    y, x=DISTANCE, z=FAN.height, yaw=np.pi, fan=FAN, velocity=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0)
+):
     """Force and torque (6,), world, on a level vehicle that faces the fan."""
     out = np.full(6, np.nan)
-    jet_wrench(fan_record(fan, VEHICLE.positions, PERIOD)[0], AXIAL, RADIAL, np.array([x, y, z]),
-               Rotation.from_euler("z", yaw).as_matrix(), np.array(velocity), np.zeros(3), np.array(com), np.empty(3), out)
+    jet_wrench(
+        fan_record(fan, VEHICLE.positions, PERIOD)[0],
+        AXIAL,
+        RADIAL,
+        np.array([x, y, z]),
+        Rotation.from_euler("z", yaw).as_matrix(),
+        np.array(velocity),
+        np.zeros(3),
+        np.array(com),
+        np.empty(3),
+        out,
+    )
     return out
 
 
@@ -93,8 +105,10 @@ def test_a_centre_of_mass_off_the_axis_shifts_the_torque():
 
 def test_the_momentum_flux_is_the_same_at_every_distance():
     r = np.linspace(0, 2.9, 2901)
-    flux = [trapezoid(2 * np.pi * r * np.array([wind(x, a, FAN.height)[0] ** 2 for a in r]), r)
-            for x in (0.4, 1.0, 1.7, 2.3, 3.0)]
+    flux = [
+        trapezoid(2 * np.pi * r * np.array([wind(x, a, FAN.height)[0] ** 2 for a in r]), r)
+        for x in (0.4, 1.0, 1.7, 2.3, 3.0)
+    ]
     disc = np.pi * (FAN.radius**2 - FAN.hub_radius**2) * FAN.speed**2
     np.testing.assert_allclose(flux, disc, rtol=0.005)
 
@@ -107,7 +121,9 @@ def test_the_mean_flow_is_free_of_divergence():
             # through a ring of radius r: d/dx of u, and (1/r) d/dr of r v
             along = (wind(x + h, r, FAN.height)[0] - wind(x - h, r, FAN.height)[0]) / (2 * h)
             out, inner = r + 0.02, r - 0.02
-            across = (out * wind(x, out, FAN.height)[1] - inner * wind(x, inner, FAN.height)[1]) / (r * 0.04)
+            across = (out * wind(x, out, FAN.height)[1] - inner * wind(x, inner, FAN.height)[1]) / (
+                r * 0.04
+            )
             slopes.append((along, across))
         along, across = np.array(slopes).T
         assert np.abs(along + across).max() < 0.03 * np.abs(along).max()
@@ -160,7 +176,9 @@ def test_gusts_are_correlated_over_a_quarter_of_a_metre(long_gusts):
     samples, places = long_gusts
     distance = np.linalg.norm(places[:, None] - places[None], axis=2)
     for axis in range(3):
-        np.testing.assert_allclose(np.corrcoef(samples[:, :, axis].T), np.exp(-distance / 0.25), atol=0.09)
+        np.testing.assert_allclose(
+            np.corrcoef(samples[:, :, axis].T), np.exp(-distance / 0.25), atol=0.09
+        )
 
 
 def test_gusts_along_different_axes_are_independent(long_gusts):

@@ -53,10 +53,14 @@ def test_the_name_makes_it_with_a_time_limit():
 
 
 def test_the_name_with_its_module_makes_it_without_an_import_from_any_folder(tmp_path):
-    code = ("import gymnasium as gym, sys\n"
-            "env = gym.make('windwrench:windwrench/FanTracking-v0')\n"
-            "print(env.reset(seed=1)[0].shape)")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    code = (
+        "import gymnasium as gym, sys\n"
+        "env = gym.make('windwrench:windwrench/FanTracking-v0')\n"
+        "print(env.reset(seed=1)[0].shape)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.stdout.strip() == "(8,)", done.stderr
 
 
@@ -100,14 +104,20 @@ def test_an_episode_leaves_numpy_s_global_random_state_alone():
 
 
 def test_another_process_flies_the_same_episode(tmp_path):
-    code = ("import numpy as np, hashlib, windwrench, gymnasium as gym\n"
-            "env = gym.make('windwrench/FanTracking-v0').unwrapped\n"
-            "o, i = env.reset(seed=11); rows = [[*o, 0.0, i['y'], i['fan_y']]]\n"
-            "for a in np.random.default_rng(0).uniform(-0.5, 0.5, (15, 1)).astype(np.float32):\n"
-            "    o, r, _, _, i = env.step(a); rows.append([*o, r, i['y'], i['fan_y']])\n"
-            "print(hashlib.sha256(np.array(rows, dtype=np.float64).tobytes()).hexdigest())")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == hashlib.sha256(fly(FanTrackingEnv(), 11).tobytes()).hexdigest(), done.stderr
+    code = (
+        "import numpy as np, hashlib, windwrench, gymnasium as gym\n"
+        "env = gym.make('windwrench/FanTracking-v0').unwrapped\n"
+        "o, i = env.reset(seed=11); rows = [[*o, 0.0, i['y'], i['fan_y']]]\n"
+        "for a in np.random.default_rng(0).uniform(-0.5, 0.5, (15, 1)).astype(np.float32):\n"
+        "    o, r, _, _, i = env.step(a); rows.append([*o, r, i['y'], i['fan_y']])\n"
+        "print(hashlib.sha256(np.array(rows, dtype=np.float64).tobytes()).hexdigest())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip() == hashlib.sha256(fly(FanTrackingEnv(), 11).tobytes()).hexdigest(), (
+        done.stderr
+    )
 
 
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
@@ -133,7 +143,9 @@ def test_the_reward_is_as_stated():
     for command in (0.4, -0.2, 1.0, 3.0):  # the last is clipped to 1
         _, reward, _, _, info = env.step(np.array([command], np.float32))
         used = min(float(np.float32(command)), 1.0)
-        assert reward == pytest.approx(1 / (1 + (info["offset"] / 0.3) ** 2) - 0.05 * (used - last) ** 2, rel=1e-12)
+        assert reward == pytest.approx(
+            1 / (1 + (info["offset"] / 0.3) ** 2) - 0.05 * (used - last) ** 2, rel=1e-12
+        )
         assert info["offset"] == pytest.approx(info["y"] - info["fan_y"])
         last = used
 
@@ -152,7 +164,9 @@ def test_the_observation_is_the_estimated_wrench_velocity_and_last_command():
 def test_the_estimate_tells_the_side_of_the_axis():
     torques = {}
     for seed in range(8):
-        env = FanTrackingEnv(Scenario("still, half a metre off", motions=("still",), offset=(0.5, 0.5)))
+        env = FanTrackingEnv(
+            Scenario("still, half a metre off", motions=("still",), offset=(0.5, 0.5))
+        )
         _, info = env.reset(seed=seed)
         seen = []
         for _ in range(25):
@@ -163,9 +177,17 @@ def test_the_estimate_tells_the_side_of_the_axis():
     assert np.mean(torques[-1.0]) < -0.015
 
 
-@pytest.mark.parametrize("action", [
-    np.array([np.nan]), np.array([np.inf]), np.zeros(2), np.zeros((1, 1)), 0.3, np.array([]),
-])
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.array([np.nan]),
+        np.array([np.inf]),
+        np.zeros(2),
+        np.zeros((1, 1)),
+        0.3,
+        np.array([]),
+    ],
+)
 def test_a_bad_action_is_named(action):
     env = FanTrackingEnv()
     env.reset(seed=0)
@@ -210,7 +232,9 @@ def test_a_given_fan_path_is_followed():
         assert info["fan_velocity"] == pytest.approx(0.1 * np.cos(k * 0.08), abs=1e-3)
 
 
-@pytest.mark.parametrize("path", [lambda t: 0.0, lambda t: t[:-1], lambda t: np.full_like(t, np.nan)])
+@pytest.mark.parametrize(
+    "path", [lambda t: 0.0, lambda t: t[:-1], lambda t: np.full_like(t, np.nan)]
+)
 def test_a_bad_fan_path_is_named(path):
     with pytest.raises(InputError, match="fan_path must return"):
         FanTrackingEnv(fan_path=path).reset(seed=0)
@@ -244,7 +268,9 @@ def test_a_stronger_fan_pushes_harder():
     for speed in (3.0, 4.5):
         env = FanTrackingEnv("base", fan=Fan(speed=speed))
         env.reset(seed=1)
-        forces.append(np.mean([env.step(np.zeros(1, np.float32))[4]["force"][0] for _ in range(20)]))
+        forces.append(
+            np.mean([env.step(np.zeros(1, np.float32))[4]["force"][0] for _ in range(20)])
+        )
     assert forces[1] > 1.3 * forces[0]
 
 
@@ -257,7 +283,10 @@ def test_an_undeclared_effect_changes_the_flight_and_a_vehicle_may_be_given():
 
 
 def test_the_constant_gain_flies_much_the_same():
-    full, constant = fly(FanTrackingEnv(), 7, 25), fly(FanTrackingEnv(estimator="constant-gain"), 7, 25)
+    full, constant = (
+        fly(FanTrackingEnv(), 7, 25),
+        fly(FanTrackingEnv(estimator="constant-gain"), 7, 25),
+    )
     assert not np.array_equal(full, constant)
     np.testing.assert_allclose(constant[:, :3], full[:, :3], atol=0.02)  # N
     np.testing.assert_allclose(constant[:, 3:6], full[:, 3:6], atol=0.003)  # Nm
@@ -283,7 +312,9 @@ def test_a_state_that_is_no_number_is_lost(what, tmp_path, monkeypatch):
 
 
 def test_what_is_there_to_be_drawn_does_not_change_the_flight():
-    np.testing.assert_array_equal(fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3))
+    np.testing.assert_array_equal(
+        fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3)
+    )
     assert FanTrackingEnv(render_mode="rgb_array").render_mode == "rgb_array"
 
 

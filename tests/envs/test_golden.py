@@ -1,4 +1,6 @@
-"""The physics is the one that the environment's version stands for; processes and threads do not change it."""
+"""The physics is the one that the environment's version stands for; processes and threads do not
+change it.
+"""
 
 import json
 import multiprocessing
@@ -9,16 +11,17 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import gymnasium
 import numpy as np
 import pytest
-from golden_trajectories import GOLDEN, SEED, trajectory
 
 import windwrench  # noqa: F401 - registers the environment
+from tests.support.golden_trajectories import GOLDEN, SEED, trajectory
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 
 KEPT = json.loads(GOLDEN.read_text(encoding="utf-8"))
-# Not bit for bit: compilers of other processors contract and order sums otherwise, and the loop's feedback lets that grow
-# within 3 s, to some 1e-12 on most and, between two that were tried, to 1.5e-8 in the wrench and 4e-10 in y and reward
-# (scenario noisy). Observations are of single precision.
+# Not bit for bit: compilers of other processors contract and order sums otherwise, and the loop's
+# feedback lets that grow within 3 s, to some 1e-12 on most and, between two that were tried, to
+# 1.5e-8 in the wrench and 4e-10 in y and reward (scenario noisy). Observations are of single
+# precision.
 TOLERANCE = {"observation": 1e-6, "wrench": 1e-7, "y": 1e-9, "reward": 1e-9}
 COMMANDS = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 1)).astype(np.float32)
 
@@ -30,7 +33,12 @@ def flown(seed):
     seen = [observation.tobytes()]
     for command in COMMANDS:
         observation, reward, _, _, info = env.step(command)
-        seen.append(observation.tobytes() + np.float64(reward).tobytes() + info["force"].tobytes() + info["torque"].tobytes())
+        seen.append(
+            observation.tobytes()
+            + np.float64(reward).tobytes()
+            + info["force"].tobytes()
+            + info["torque"].tobytes()
+        )
     return b"".join(seen)
 
 
@@ -38,9 +46,18 @@ def flown(seed):
 def test_trajectories_are_those_of_the_environments_version(scenario):
     now, golden = trajectory(scenario), KEPT["scenarios"][scenario]
     for name, tolerance in TOLERANCE.items():
-        np.testing.assert_allclose(now[name], golden[name], rtol=0, atol=tolerance, err_msg=(
-            f"{scenario}: {name} differs from tests/golden. Is a change of physics meant? Then say it in the version history "
-            "in FanTrackingEnv's docstring, bump the version of the environment's name, and run tests/golden_trajectories.py"))
+        np.testing.assert_allclose(
+            now[name],
+            golden[name],
+            rtol=0,
+            atol=tolerance,
+            err_msg=(
+                f"{scenario}: {name} differs from tests/golden. Is a change of physics meant? Then "
+                f"say it in the version history "
+                "in FanTrackingEnv's docstring, bump the version of the environment's name, and "
+                "run python -m tests.support.golden_trajectories"
+            ),
+        )
 
 
 def test_the_golden_trajectories_are_of_this_version():
@@ -48,7 +65,9 @@ def test_the_golden_trajectories_are_of_this_version():
     assert KEPT["version"] == version
     assert KEPT["seed"] == SEED
     assert set(KEPT["scenarios"]) == set(SCENARIOS)
-    history = re.findall(r"^\s+\* (v\d+):", FanTrackingEnv.__doc__.partition("## Version history")[2], re.M)
+    history = re.findall(
+        r"^\s+\* (v\d+):", FanTrackingEnv.__doc__.partition("## Version history")[2], re.M
+    )
     assert version in history
 
 
@@ -72,4 +91,6 @@ def test_sixteen_threads_at_once_fly_the_same_trajectories():
 def test_sixteen_processes_at_once_fly_the_same_trajectories():
     alone = [flown(seed) for seed in range(4)]
     with ProcessPoolExecutor(16, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert list(pool.map(flown, [i % 4 for i in range(16)])) == [alone[i % 4] for i in range(16)]
+        assert list(pool.map(flown, [i % 4 for i in range(16)])) == [
+            alone[i % 4] for i in range(16)
+        ]

@@ -27,7 +27,9 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 
-QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False)
+QUIET = PlantSettings(
+    disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
+)
 VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0)
 HOVER = VEHICLE.hover_rate
 
@@ -35,7 +37,13 @@ HOVER = VEHICLE.hover_rate
 class Bench:
     """A plant driven by turn rates, without filter and flight loop."""
 
-    def __init__(self, vehicle=VEHICLE, settings=QUIET, position=(0.0, 0.0, 5.0), quaternion=(1.0, 0.0, 0.0, 0.0)):
+    def __init__(
+        self,
+        vehicle=VEHICLE,
+        settings=QUIET,
+        position=(0.0, 0.0, 5.0),
+        quaternion=(1.0, 0.0, 0.0, 0.0),
+    ):
         self.record, body = plant_record(vehicle, settings)
         self.plant = self.record[0]
         reset_plant(self.plant, body)
@@ -45,12 +53,22 @@ class Bench:
         self.table = jet_table(0.45, 0.10)
 
     def run(self, command, ticks, noise=None):
-        """Hold turn rates (4,) for some ticks; return position, attitude, velocity and body rate after each (n, 13)."""
+        """Hold turn rates (4,) for some ticks; return position, attitude, velocity and body rate
+        after each (n, 13).
+        """
         rows = np.empty((ticks, 13))
         xfrc = self.data.xfrc_applied[self.model.body("vehicle").id]
         for k in range(ticks):
-            actuate(self.plant, np.asarray(command, float), self.fan[0], *self.table, self.data.qpos, self.data.qvel,
-                    np.zeros(NOISE) if noise is None else noise[k], xfrc)
+            actuate(
+                self.plant,
+                np.asarray(command, float),
+                self.fan[0],
+                *self.table,
+                self.data.qpos,
+                self.data.qvel,
+                np.zeros(NOISE) if noise is None else noise[k],
+                xfrc,
+            )
             mujoco.mj_step(self.model, self.data, SUBSTEPS)
             rows[k] = np.concatenate([self.data.qpos, self.data.qvel])
         return rows
@@ -60,7 +78,9 @@ def test_without_thrust_it_falls_freely():
     rows = Bench().run(np.zeros(4), 100)
     t = TICK * np.arange(1, 101)
     np.testing.assert_allclose(rows[:, 9], -VEHICLE.gravity * t, rtol=1e-9)
-    np.testing.assert_allclose(rows[:, 2], 5.0 - 0.5 * VEHICLE.gravity * t**2, atol=0.5 * VEHICLE.gravity * TICK * t[-1])
+    np.testing.assert_allclose(
+        rows[:, 2], 5.0 - 0.5 * VEHICLE.gravity * t**2, atol=0.5 * VEHICLE.gravity * TICK * t[-1]
+    )
     np.testing.assert_array_equal(rows[:, 3], 1.0)
 
 
@@ -87,7 +107,9 @@ def test_thrust_points_along_the_body_s_own_vertical():
     q = Rotation.from_euler("zyx", [2.0, 0.3, -0.4])
     rows = Bench(quaternion=q.as_quat(scalar_first=True)).run(np.full(4, HOVER), 1)
     acceleration = rows[0, 7:10] / TICK
-    np.testing.assert_allclose(acceleration, VEHICLE.gravity * (q.as_matrix()[:, 2] - [0, 0, 1]), rtol=1e-9)
+    np.testing.assert_allclose(
+        acceleration, VEHICLE.gravity * (q.as_matrix()[:, 2] - [0, 0, 1]), rtol=1e-9
+    )
 
 
 def test_a_free_spin_keeps_energy_and_angular_momentum():
@@ -97,7 +119,9 @@ def test_a_free_spin_keeps_energy_and_angular_momentum():
     rows = bench.run(np.zeros(4), 100)
     omega = rows[:, 10:13]
     momentum = Rotation.from_quat(rows[:, 3:7], scalar_first=True).apply(omega @ inertia)
-    np.testing.assert_allclose(momentum[-1], inertia @ start, atol=0.03 * np.linalg.norm(inertia @ start))
+    np.testing.assert_allclose(
+        momentum[-1], inertia @ start, atol=0.03 * np.linalg.norm(inertia @ start)
+    )
     energy = np.einsum("ni,ij,nj->n", omega, inertia, omega)
     np.testing.assert_allclose(energy, start @ inertia @ start, rtol=0.03)
 
@@ -150,7 +174,6 @@ def test_a_recorded_turn_rate_is_rounded_once():
     # as it is at the pose's instant, between two ticks
     assert np.max(np.abs(log - (0.25 * before + 0.75 * after))) < 2.0 + 1e-9
     assert np.max(np.abs(log / 4.0 - np.round(log / 4.0))) < 1e-9
-
 
 
 def sensed(quaternion, count=400, settings=QUIET, seed=0):
@@ -215,13 +238,18 @@ def test_the_disturbance_has_the_stated_size():
 
 
 def test_the_truth_in_a_log_is_the_wrench_that_was_applied():
-    effects = (EffectSetting("constant_force", {"fx": 0.1}), EffectSetting("constant_torque", {"tz": 0.01}))
+    effects = (
+        EffectSetting("constant_force", {"fx": 0.1}),
+        EffectSetting("constant_torque", {"tz": 0.01}),
+    )
     log = record_flight(VEHICLE, effects, "hover", 3.0, 0, QUIET)
     np.testing.assert_allclose(log["force"][1:], np.tile([0.1, 0, 0], (600, 1)), atol=1e-12)
     np.testing.assert_allclose(log["torque"][1:, 2], 0.01, rtol=1e-3)
 
 
-@pytest.mark.parametrize("inertia", [None, [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]])
+@pytest.mark.parametrize(
+    "inertia", [None, [[0.0022, 3e-4, 0], [3e-4, 0.003, -2e-4], [0, -2e-4, 0.0048]]]
+)
 @pytest.mark.parametrize("com", [(0.01, -0.02, 0.0), (0.0, 0.0, 0.05)])
 def test_a_centre_of_mass_off_the_rotors_moves_as_in_the_filter_s_model(com, inertia):
     vehicle = VEHICLE if inertia is None else replace(VEHICLE, inertia=np.array(inertia))

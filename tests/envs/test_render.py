@@ -1,4 +1,6 @@
-"""Pictures and films of the world; each in a fresh process, because MuJoCo chooses its OpenGL when it is imported."""
+"""Pictures and films of the world; each in a fresh process, because MuJoCo chooses its OpenGL when
+it is imported.
+"""
 
 import ctypes.util
 import json
@@ -16,8 +18,14 @@ from windwrench.envs.replay import Flight, arrow_scales
 from windwrench.envs.rerun_export import write_rrd
 from windwrench.envs.video import Film
 
-BACKEND = next((name for library, name in (("EGL", "egl"), ("OSMesa", "osmesa")) if ctypes.util.find_library(library)),
-               None)
+BACKEND = next(
+    (
+        name
+        for library, name in (("EGL", "egl"), ("OSMesa", "osmesa"))
+        if ctypes.util.find_library(library)
+    ),
+    None,
+)
 
 pytestmark = pytest.mark.skipif(BACKEND is None, reason="neither libEGL nor libOSMesa is installed")
 
@@ -46,7 +54,9 @@ np.savez("pictures.npz", **pictures)
 
 def run(folder, *command, **changes):
     environment = {**os.environ, "MUJOCO_GL": BACKEND, **changes}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.fixture(scope="module")
@@ -146,16 +156,63 @@ def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
 
 def test_commands_write_films_and_replays(tmp_path):
     command = [sys.executable, "-c", "from windwrench.cli import main; main()"]
-    done = run(tmp_path, *command, "fly", "--scenario", "static", "--gif", "--film-seconds", "0.2", "--out", "out")
+    done = run(
+        tmp_path,
+        *command,
+        "fly",
+        "--scenario",
+        "static",
+        "--gif",
+        "--film-seconds",
+        "0.2",
+        "--out",
+        "out",
+    )
     assert done.returncode == 0, done.stderr
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}
-    done = run(tmp_path, *command, "record", "--seconds", "3", "--trajectory", "circle", "--vehicle", "crazyflie", "--effect",
-               "constant_force:fx=0.1", "--out", "log.csv")
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "fly.gif",
+        "fly.png",
+        "fly.scene.png",
+        "run.json",
+    }
+    done = run(
+        tmp_path,
+        *command,
+        "record",
+        "--seconds",
+        "3",
+        "--trajectory",
+        "circle",
+        "--vehicle",
+        "crazyflie",
+        "--effect",
+        "constant_force:fx=0.1",
+        "--out",
+        "log.csv",
+    )
     assert done.returncode == 0, done.stderr
-    done = run(tmp_path, *command, "replay", "log.csv", "--vehicle", "crazyflie", "--from", "2", "--film-seconds", "0.5",
-               "--gif", "--json", "--out", "again")
+    done = run(
+        tmp_path,
+        *command,
+        "replay",
+        "log.csv",
+        "--vehicle",
+        "crazyflie",
+        "--from",
+        "2",
+        "--film-seconds",
+        "0.5",
+        "--gif",
+        "--json",
+        "--out",
+        "again",
+    )
     assert done.returncode == 0, done.stderr
-    assert {p.name for p in (tmp_path / "again").iterdir()} == {"replay.gif", "replay.png", "run.json"}
+    assert {p.name for p in (tmp_path / "again").iterdir()} == {
+        "replay.gif",
+        "replay.png",
+        "run.json",
+    }
     assert json.loads(done.stdout)["result"]["largest_force_N"] > 0.02
     picture = matplotlib.image.imread(tmp_path / "again" / "replay.png")
     red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
@@ -171,7 +228,16 @@ def a_flight(count=20):
     position = np.column_stack([np.sin(t), np.cos(t), 1.0 + 0.0 * t])
     quaternion = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     force = np.tile([0.2, 0.0, 0.0], (count, 1))
-    return Flight(t, position, quaternion, force, 0.01 * force[:, [2, 1, 0]], true_force=force, true_torque=force, fan_y=t)
+    return Flight(
+        t,
+        position,
+        quaternion,
+        force,
+        0.01 * force[:, [2, 1, 0]],
+        true_force=force,
+        true_torque=force,
+        fan_y=t,
+    )
 
 
 def test_arrows_are_as_long_for_small_forces_as_for_large_ones():
@@ -189,8 +255,14 @@ def test_a_rerun_recording_holds_the_flight(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["flight.rrd"]
     kept = path.read_bytes()
     assert kept.startswith(b"RRF")
-    for entity in (b"/world/vehicle", b"/world/force/estimated", b"/world/force/true", b"/world/path", b"/world/fan",
-                   b"/force_x"):
+    for entity in (
+        b"/world/vehicle",
+        b"/world/force/estimated",
+        b"/world/force/true",
+        b"/world/path",
+        b"/world/fan",
+        b"/force_x",
+    ):
         assert entity in kept, entity
 
 
@@ -202,21 +274,25 @@ def test_a_rerun_recording_without_its_extra_is_refused(tmp_path, monkeypatch):
 
 
 def test_without_a_screen_it_draws_without_being_told_how(tmp_path):
-    code = ("from windwrench.envs import FanTrackingEnv\n"
-            "env = FanTrackingEnv(render_mode='rgb_array', width=320, height=240); env.reset(seed=0)\n"
-            "print(env.render().shape)")
+    code = (
+        "from windwrench.envs import FanTrackingEnv\n"
+        "env = FanTrackingEnv(render_mode='rgb_array', width=320, height=240); env.reset(seed=0)\n"
+        "print(env.render().shape)"
+    )
     done = run(tmp_path, sys.executable, "-c", code, MUJOCO_GL="", DISPLAY="", WAYLAND_DISPLAY="")
     assert done.stdout.strip() == "(240, 320, 3)", done.stderr
 
 
 def test_a_machine_that_cannot_draw_is_told_what_to_install(tmp_path):
-    code = ("import mujoco\n"
-            "def broken(*arguments): raise RuntimeError('no display')\n"
-            "mujoco.Renderer = broken\n"
-            "from windwrench.envs import FanTrackingEnv\n"
-            "env = FanTrackingEnv(render_mode='rgb_array'); env.reset(seed=0)\n"
-            "try: env.render()\n"
-            "except Exception as error: print(type(error).__name__, error)")
+    code = (
+        "import mujoco\n"
+        "def broken(*arguments): raise RuntimeError('no display')\n"
+        "mujoco.Renderer = broken\n"
+        "from windwrench.envs import FanTrackingEnv\n"
+        "env = FanTrackingEnv(render_mode='rgb_array'); env.reset(seed=0)\n"
+        "try: env.render()\n"
+        "except Exception as error: print(type(error).__name__, error)"
+    )
     done = run(tmp_path, sys.executable, "-c", code)
     assert done.stdout.startswith("InputError")
     assert "no display" in done.stdout

@@ -69,8 +69,16 @@ def test_it_swings_as_a_pendulum_and_the_thread_does_not_push():
     np.testing.assert_array_equal(pull(data, VEHICLE.com), 0.0)
 
 
-@pytest.mark.parametrize("bad", [{"mass": 0.0}, {"length": -1.0}, {"drag": np.nan}, {"anchor": (0.0, np.inf, 0.0)},
-                                 {"anchor": (0.0, 0.0)}])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"mass": 0.0},
+        {"length": -1.0},
+        {"drag": np.nan},
+        {"anchor": (0.0, np.inf, 0.0)},
+        {"anchor": (0.0, 0.0)},
+    ],
+)
 def test_bad_numbers_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         SuspendedLoad(**bad)

@@ -30,7 +30,9 @@ def test_each_is_the_single_environment_with_its_seed():
     envs = make(3, scenario="fast")
     singles = [gym.make(NAME, scenario="fast") for _ in range(3)]
     frames, _ = envs.reset(seed=40)
-    np.testing.assert_array_equal(frames, [env.reset(seed=40 + i)[0] for i, env in enumerate(singles)])
+    np.testing.assert_array_equal(
+        frames, [env.reset(seed=40 + i)[0] for i, env in enumerate(singles)]
+    )
     rng = np.random.default_rng(0)
     for _ in range(30):
         actions = rng.uniform(-1, 1, (3, 1)).astype(np.float32)
@@ -60,13 +62,28 @@ def rows(envs, seed, count, max_steps=None):
     rng, out = np.random.default_rng(seed), []
     frames, infos = envs.reset(seed=seed)
     for _ in range(count):
-        frames, rewards, lost, over, infos = envs.step(rng.uniform(-1, 1, (envs.num_envs, 1)).astype(np.float32))
+        frames, rewards, lost, over, infos = envs.step(
+            rng.uniform(-1, 1, (envs.num_envs, 1)).astype(np.float32)
+        )
         numbers = [infos[name] for name in NUMBERS]
-        out.append(np.column_stack([frames, rewards, lost, over, *numbers, infos["force"], infos["torque"]]))
+        out.append(
+            np.column_stack(
+                [frames, rewards, lost, over, *numbers, infos["force"], infos["torque"]]
+            )
+        )
     return np.array(out)
 
 
-NUMBERS = ("reward_tracking", "reward_change", "fan_y", "fan_velocity", "y", "offset", "time", "lost")
+NUMBERS = (
+    "reward_tracking",
+    "reward_change",
+    "fan_y",
+    "fan_velocity",
+    "y",
+    "offset",
+    "time",
+    "lost",
+)
 
 
 @pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
@@ -123,7 +140,9 @@ def test_seeds_may_be_listed_and_a_part_reset():
     assert not np.array_equal(frames[0], frames[1])
     for _ in range(2):
         envs.step(np.zeros((3, 1), np.float32))
-    again, infos = envs.reset(seed=[7, None, None], options={"reset_mask": np.array([True, False, False])})
+    again, infos = envs.reset(
+        seed=[7, None, None], options={"reset_mask": np.array([True, False, False])}
+    )
     np.testing.assert_array_equal(again[0], frames[0])
     assert infos["time"].tolist() == [0.0, pytest.approx(0.16), pytest.approx(0.16)]
     with pytest.raises(InputError, match="3 seeds"):
@@ -196,7 +215,9 @@ def go(turns):
 
 
 def test_helpers_sleep_and_are_called_back_and_the_bits_stay(monkeypatch):
-    """Steps come about as long after each other as a helper's patience lasts, so that they meet it in every state."""
+    """Steps come about as long after each other as a helper's patience lasts, so that they meet it
+    in every state.
+    """
     monkeypatch.setattr("windwrench.envs.vector.PATIENCE", 2000)
     alone, spread = make(4, scenario="base"), make(4, threads=3, scenario="base")
     alone.reset(seed=0)

@@ -21,22 +21,33 @@ YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0
 
 
 def run_filter(make, vehicle, tuning, runs, steps, claimed=None):
-    """Return NEES and NIS (runs, steps) of a filter that claims ``claimed`` on truth drawn from ``tuning``."""
+    """Return NEES and NIS (runs, steps) of a filter that claims ``claimed`` on truth drawn from
+    ``tuning``.
+    """
     estimator = make(vehicle, tuning if claimed is None else claimed)
     speeds = np.full((steps, 4), vehicle.hover_rate)
     out = np.empty((2, runs, steps))
     for r in range(runs):
         run = simulate_model(vehicle, tuning, speeds, seed=r, **YAWED)
-        estimator.reset(run.initial_position, run.initial_quaternion, run.initial_covariance, run.initial_velocity,
-                        run.initial_angular_velocity)
+        estimator.reset(
+            run.initial_position,
+            run.initial_quaternion,
+            run.initial_covariance,
+            run.initial_velocity,
+            run.initial_angular_velocity,
+        )
         for k in range(steps):
-            e = estimator.step(run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k])
+            e = estimator.step(
+                run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k]
+            )
             out[0, r, k], out[1, r, k] = nees(e, *run.truth(k)), e.nis
     return out
 
 
 def test_the_unscented_filter_is_consistent():
-    """Truth drawn from the filter's own model, 100 runs of 5 s, yawed by 120 degrees and turning at 3 rad/s."""
+    """Truth drawn from the filter's own model, 100 runs of 5 s, yawed by 120 degrees and turning at
+    3 rad/s.
+    """
     report = check_consistency(*run_filter(WrenchUKF, VEHICLE, UKFTuning(), 100, 1000))
     assert report.nis_band[0] <= report.mean_nis <= report.nis_band[1]
     # the far narrower band of all 100000 innovations holds too
@@ -48,15 +59,23 @@ def test_the_unscented_filter_is_consistent():
 
 @pytest.mark.parametrize("make", [WrenchUKF, WrenchEKF])
 def test_consistent_with_effects_and_anisotropic_noise(make):
-    vehicle = VEHICLE.with_effects(EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
-                                   EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
-    tuning = UKFTuning(motor_torque_noise=(0.02, 0.03, 0.04), thrust_noise=(0.2, 0.3, 0.4),
-                       position_noise=(0.001, 0.002, 0.003), attitude_noise=(0.003, 0.005, 0.008))
+    vehicle = VEHICLE.with_effects(
+        EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
+    )
+    tuning = UKFTuning(
+        motor_torque_noise=(0.02, 0.03, 0.04),
+        thrust_noise=(0.2, 0.3, 0.4),
+        position_noise=(0.001, 0.002, 0.003),
+        attitude_noise=(0.003, 0.005, 0.008),
+    )
     assert check_consistency(*run_filter(make, vehicle, tuning, 40, 300)).consistent
 
 
 def test_a_filter_that_claims_too_much_is_caught():
-    report = check_consistency(*run_filter(WrenchUKF, VEHICLE, UKFTuning(), 20, 200, UKFTuning(attitude_noise=0.003)))
+    report = check_consistency(
+        *run_filter(WrenchUKF, VEHICLE, UKFTuning(), 20, 200, UKFTuning(attitude_noise=0.003))
+    )
     assert not report.consistent
     assert report.mean_nis > report.nis_band[1]
 
@@ -103,20 +122,31 @@ def test_model_runs_repeat_and_have_the_stated_noise():
     tuning, speeds = UKFTuning(), np.full((3000, 4), VEHICLE.hover_rate)
     run, again = (simulate_model(VEHICLE, tuning, speeds, seed=7, **YAWED) for _ in range(2))
     assert np.array_equal(run.position, again.position)
-    assert not np.array_equal(run.position, simulate_model(VEHICLE, tuning, speeds, seed=8, **YAWED).position)
+    assert not np.array_equal(
+        run.position, simulate_model(VEHICLE, tuning, speeds, seed=8, **YAWED).position
+    )
     error = run.measured_position - run.position
     assert np.allclose(error.std(axis=0), 0.001, rtol=0.06)
-    turn = (Rotation.from_quat(run.measured_quaternion, scalar_first=True)
-            * Rotation.from_quat(run.quaternion, scalar_first=True).inv()).as_rotvec()
+    turn = (
+        Rotation.from_quat(run.measured_quaternion, scalar_first=True)
+        * Rotation.from_quat(run.quaternion, scalar_first=True).inv()
+    ).as_rotvec()
     assert np.allclose(turn.std(axis=0), 0.005, rtol=0.06)
     assert np.allclose(np.diff(run.force, axis=0).std(axis=0), 3.26e-3, rtol=0.06)
     assert np.allclose(np.diff(run.torque, axis=0).std(axis=0), 3.26e-4, rtol=0.06)
     # x' = x + T v + T^2/2 a and v' = v + T a share one acceleration
-    assert np.allclose(np.diff(run.position, axis=0), 0.0025 * (run.velocity[1:] + run.velocity[:-1]), atol=1e-12)
+    assert np.allclose(
+        np.diff(run.position, axis=0), 0.0025 * (run.velocity[1:] + run.velocity[:-1]), atol=1e-12
+    )
     # thrust noise, read from the accelerations in the body frame of the step's start
     rotation = Rotation.from_quat(run.quaternion[:-1], scalar_first=True)
-    force = VEHICLE.mass * (np.diff(run.velocity, axis=0) / 0.005 + [0, 0, VEHICLE.gravity]) - run.force[:-1]
-    noise = rotation.inv().apply(force) - np.outer(VEHICLE.rotor_wrench(run.rotor_speeds[1:])[:, 0], [0, 0, 1])
+    force = (
+        VEHICLE.mass * (np.diff(run.velocity, axis=0) / 0.005 + [0, 0, VEHICLE.gravity])
+        - run.force[:-1]
+    )
+    noise = rotation.inv().apply(force) - np.outer(
+        VEHICLE.rotor_wrench(run.rotor_speeds[1:])[:, 0], [0, 0, 1]
+    )
     assert np.allclose(noise.std(axis=0), 0.3, rtol=0.06)
     for bad in (np.ones(4), np.ones((0, 4)), np.full((3, 4), np.nan)):
         with pytest.raises(InputError, match="rotor_speeds"):
@@ -129,8 +159,14 @@ def test_the_benchmark_solves_the_same_problem_as_its_peer(capsys):
 
     filter_step.main(rounds=1, steps=20, peer_steps=20)
     assert "filterpy" in capsys.readouterr().out
-    run = simulate_model(VEHICLE, UKFTuning(), np.full((60, 4), VEHICLE.hover_rate), seed=1, **YAWED,
-                         covariance=1e-6 * np.eye(18))
+    run = simulate_model(
+        VEHICLE,
+        UKFTuning(),
+        np.full((60, 4), VEHICLE.hover_rate),
+        seed=1,
+        **YAWED,
+        covariance=1e-6 * np.eye(18),
+    )
     ours = WrenchUKF(VEHICLE, UKFTuning())
     for by_component in (True, False):
         peer = filter_step.PeerFilter(VEHICLE, UKFTuning(), 0.005, by_component)

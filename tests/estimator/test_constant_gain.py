@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from flights import PERIOD, yawing_flight
 
+from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs import Fan
 from windwrench.envs.closed_loop import ClosedLoop
@@ -13,17 +13,32 @@ from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
 VEHICLE = load_vehicle("ardrone2")
 ALL = ("position", "velocity", "angular_velocity", "force", "torque")
 # standard deviations of the converged filter: m, m/s, rad/s, N, Nm
-DEVIATION = {"position": 4.2e-4, "velocity": 0.011, "angular_velocity": 0.13, "force": 0.033, "torque": 3.2e-3}
+DEVIATION = {
+    "position": 4.2e-4,
+    "velocity": 0.011,
+    "angular_velocity": 0.13,
+    "force": 0.033,
+    "torque": 3.2e-3,
+}
 
 
 def largest_differences(a, b):
-    return {name: max(np.abs(getattr(x, name) - getattr(y, name)).max() for x, y in zip(a, b, strict=True)) for name in ALL}
+    return {
+        name: max(
+            np.abs(getattr(x, name) - getattr(y, name)).max() for x, y in zip(a, b, strict=True)
+        )
+        for name in ALL
+    }
 
 
 def assert_close(a, b, share):
-    """No difference exceeds a share of its standard deviation, or ten times that of the rate's: tilt turns the inertia."""
+    """No difference exceeds a share of its standard deviation, or ten times that of the rate's:
+    tilt turns the inertia.
+    """
     for name, difference in largest_differences(a, b).items():
-        assert difference < share * DEVIATION[name] * (10 if name == "angular_velocity" else 1), name
+        assert difference < share * DEVIATION[name] * (10 if name == "angular_velocity" else 1), (
+            name
+        )
 
 
 def both(vehicle, flight, settled, missing=(), **start):
@@ -33,7 +48,9 @@ def both(vehicle, flight, settled, missing=(), **start):
     for f, out in zip(filters, estimates, strict=True):
         f.reset(flight["position"][0], flight["quaternion"][0], **start)
         for k in range(1, len(flight["rotors"])):
-            pose = (None, None) if k in missing else (flight["position"][k], flight["quaternion"][k])
+            pose = (
+                (None, None) if k in missing else (flight["position"][k], flight["quaternion"][k])
+            )
             out.append(f.step(flight["rotors"][k], *pose))
     return [out[settled:] for out in estimates]
 
@@ -75,7 +92,13 @@ def test_what_was_not_measured_is_coasted_over(turning):
     missing = set(range(600, 700))  # half a second
     full, constant = both(VEHICLE, turning, 1800, missing, **twist(turning))
     assert_close(full, constant, 0.1)
-    during = both(VEHICLE, {name: values[:700] for name, values in turning.items()}, 640, missing, **twist(turning))[1]
+    during = both(
+        VEHICLE,
+        {name: values[:700] for name, values in turning.items()},
+        640,
+        missing,
+        **twist(turning),
+    )[1]
     assert all(np.isnan(e.nis) for e in during)
     np.testing.assert_array_equal(during[0].force, during[-1].force)
     assert np.linalg.norm(during[-1].position - during[0].position) > 0.01
@@ -85,7 +108,10 @@ def test_a_part_of_a_pose_is_taken_in(turning):
     f, base = ConstantGainFilter(VEHICLE), None
     for parts in ((True, True), (True, False), (False, True), (False, False)):
         f.reset(turning["position"][0], turning["quaternion"][0])
-        pose = [turning[name][5] if given else None for name, given in zip(("position", "quaternion"), parts, strict=True)]
+        pose = [
+            turning[name][5] if given else None
+            for name, given in zip(("position", "quaternion"), parts, strict=True)
+        ]
         e = f.step(turning["rotors"][1], *pose)
         assert np.isfinite(e.state[:19]).all()
         assert np.isfinite(e.nis) == all(parts)
@@ -106,15 +132,23 @@ def test_it_knows_the_declared_effects():
 
 def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
     tuning = UKFTuning(
-        motor_torque_noise=(0.02, 0.03, 0.04), torque_walk=(2e-4, 3e-4, 4e-4), thrust_noise=(0.2, 0.3, 0.4),
-        force_walk=(2e-3, 3e-3, 4e-3), position_noise=(0.001, 0.002, 0.003), attitude_noise=(0.003, 0.005, 0.008))
+        motor_torque_noise=(0.02, 0.03, 0.04),
+        torque_walk=(2e-4, 3e-4, 4e-4),
+        thrust_noise=(0.2, 0.3, 0.4),
+        force_walk=(2e-3, 3e-3, 4e-3),
+        position_noise=(0.001, 0.002, 0.003),
+        attitude_noise=(0.003, 0.005, 0.008),
+    )
     full, constant = WrenchUKF(VEHICLE, tuning, PERIOD), ConstantGainFilter(VEHICLE, tuning, PERIOD)
     rng, out = np.random.default_rng(0), ([], [])
     for f in (full, constant):
         f.reset([0, 0, 1], [1, 0, 0, 0])
     W = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, [0.0, 0.0, 0.0])
     for _ in range(3000):
-        x, q = [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal(3), np.append(1.0, 0.0025 * rng.standard_normal(3))
+        x, q = (
+            [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal(3),
+            np.append(1.0, 0.0025 * rng.standard_normal(3)),
+        )
         for f, kept in ((full, out[0]), (constant, out[1])):
             kept.append(f.step(W, x, q / np.linalg.norm(q)))
     assert_close(out[0][2500:], out[1][2500:], 0.1)

@@ -1,13 +1,15 @@
-"""The extended Kalman filter: its Jacobian against finite differences, its estimates against the unscented one."""
+"""The extended Kalman filter: its Jacobian against finite differences, its estimates against the
+unscented one.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from flights import PERIOD, yawing_flight
 from numba import njit
 from scipy.spatial.transform import Rotation
 
+from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
@@ -15,11 +17,19 @@ from windwrench.estimator.filter_record import drive, propagate
 
 VEHICLE = load_vehicle("ardrone2")
 OFFSET = EffectSetting("com_offset", {"cx": 0.02, "cy": -0.03, "cz": 0.05})
-EFFECTS = (OFFSET, EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),
-           EffectSetting("ground_effect", {"rho": 3.0}))
+EFFECTS = (
+    OFFSET,
+    EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),
+    EffectSetting("ground_effect", {"rho": 3.0}),
+)
 ANISOTROPIC = UKFTuning(
-    motor_torque_noise=(0.02, 0.03, 0.04), torque_walk=(2e-4, 3e-4, 4e-4), thrust_noise=(0.2, 0.3, 0.4),
-    force_walk=(2e-3, 3e-3, 4e-3), position_noise=(0.001, 0.002, 0.003), attitude_noise=(0.003, 0.005, 0.008))
+    motor_torque_noise=(0.02, 0.03, 0.04),
+    torque_walk=(2e-4, 3e-4, 4e-4),
+    thrust_noise=(0.2, 0.3, 0.4),
+    force_walk=(2e-3, 3e-3, 4e-3),
+    position_noise=(0.001, 0.002, 0.003),
+    attitude_noise=(0.003, 0.005, 0.008),
+)
 
 
 @njit
@@ -36,7 +46,9 @@ def jacobian(record, speeds, dt, out, A):
 
 
 def boxplus(x, error):
-    """Return the state (20,) that differs from ``x`` by an error (18,), the MRP's world-frame turn by scipy."""
+    """Return the state (20,) that differs from ``x`` by an error (18,), the MRP's world-frame turn
+    by scipy.
+    """
     y = x.copy()
     turn = Rotation.from_mrp(error[:3]) * Rotation.from_quat(x[3:7], scalar_first=True)
     y[3:7] = turn.as_quat(scalar_first=True)
@@ -48,14 +60,34 @@ def boxplus(x, error):
 
 
 def boxminus(y, x):
-    turn = Rotation.from_quat(y[3:7], scalar_first=True) * Rotation.from_quat(x[3:7], scalar_first=True).inv()
-    return np.concatenate([turn.as_mrp(), y[10:13] - x[10:13], y[0:3] - x[0:3], y[7:10] - x[7:10], y[13:19] - x[13:19]])
+    turn = (
+        Rotation.from_quat(y[3:7], scalar_first=True)
+        * Rotation.from_quat(x[3:7], scalar_first=True).inv()
+    )
+    return np.concatenate(
+        [
+            turn.as_mrp(),
+            y[10:13] - x[10:13],
+            y[0:3] - x[0:3],
+            y[7:10] - x[7:10],
+            y[13:19] - x[13:19],
+        ]
+    )
 
 
-@pytest.mark.parametrize("vehicle", [
-    VEHICLE, VEHICLE.with_effects(OFFSET), VEHICLE.with_effects(*EFFECTS),
-    replace(VEHICLE, inertia=np.array([[2.2e-3, 3e-4, -2e-4], [3e-4, 3e-3, 1e-4], [-2e-4, 1e-4, 4.8e-3]])),
-], ids=["plain", "offset", "effects", "full inertia"])
+@pytest.mark.parametrize(
+    "vehicle",
+    [
+        VEHICLE,
+        VEHICLE.with_effects(OFFSET),
+        VEHICLE.with_effects(*EFFECTS),
+        replace(
+            VEHICLE,
+            inertia=np.array([[2.2e-3, 3e-4, -2e-4], [3e-4, 3e-3, 1e-4], [-2e-4, 1e-4, 4.8e-3]]),
+        ),
+    ],
+    ids=["plain", "offset", "effects", "full inertia"],
+)
 @pytest.mark.parametrize("rate", [0.0, 4.0])
 def test_jacobian_equals_finite_differences(vehicle, rate):
     rng = np.random.default_rng(0)
@@ -82,7 +114,13 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
 def both(vehicle, flight, tuning=ANISOTROPIC, missing=()):
     filters = WrenchUKF(vehicle, tuning, PERIOD), WrenchEKF(vehicle, tuning, PERIOD)
     for f in filters:
-        f.reset(flight["true_x"][0], flight["true_q"][0], None, flight["velocity"][0], flight["omega"][0])
+        f.reset(
+            flight["true_x"][0],
+            flight["true_q"][0],
+            None,
+            flight["velocity"][0],
+            flight["omega"][0],
+        )
     out = []
     for k in range(1, len(flight["rotors"])):
         pose = () if k in missing else (flight["position"][k], flight["quaternion"][k])
@@ -96,8 +134,15 @@ def test_close_to_the_unscented_filter_over_a_yawing_flight():
     for u, e in pairs[400:]:
         assert np.allclose(u.force, e.force, atol=1e-3)
         assert np.allclose(u.torque, e.torque, atol=2e-5)
-        assert np.allclose(np.sqrt(np.diag(u.covariance)), np.sqrt(np.diag(e.covariance)), rtol=5e-3)
-    errors = np.array([np.concatenate([e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]]) for _, e in pairs[1000:]])
+        assert np.allclose(
+            np.sqrt(np.diag(u.covariance)), np.sqrt(np.diag(e.covariance)), rtol=5e-3
+        )
+    errors = np.array(
+        [
+            np.concatenate([e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]])
+            for _, e in pairs[1000:]
+        ]
+    )
     rms = np.sqrt(np.mean(errors**2, axis=0))
     assert np.all(rms[:3] < 0.03)
     assert np.all(rms[3:] < 2.4e-3)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from flights import PERIOD, yawing_flight
-from literal_ukf import matrix
 
+from tests.support.flights import PERIOD, yawing_flight
+from tests.support.literal_ukf import matrix
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 
@@ -15,18 +15,41 @@ GYRO, ACCELEROMETER = 0.005, 0.05
 
 def run(imu, attitude=True, steps=1600, seed=1):
     flight = yawing_flight(VEHICLE, steps, seed=seed, sigma_position=0.01, sigma_attitude=0.05)
-    ukf = WrenchUKF(VEHICLE, UKFTuning(position_noise=0.01, attitude_noise=0.05, gyro_noise=GYRO,
-                                       accelerometer_noise=ACCELEROMETER), PERIOD)
-    ukf.reset(flight["true_x"][0], flight["true_q"][0], velocity=flight["velocity"][0], angular_velocity=flight["omega"][0])
+    ukf = WrenchUKF(
+        VEHICLE,
+        UKFTuning(
+            position_noise=0.01,
+            attitude_noise=0.05,
+            gyro_noise=GYRO,
+            accelerometer_noise=ACCELEROMETER,
+        ),
+        PERIOD,
+    )
+    ukf.reset(
+        flight["true_x"][0],
+        flight["true_q"][0],
+        velocity=flight["velocity"][0],
+        angular_velocity=flight["omega"][0],
+    )
     rng, rows = np.random.default_rng(0), []
     for k in range(1, steps):
-        e = ukf.step(flight["rotors"][k], flight["position"][k], flight["quaternion"][k] if attitude else None)
+        e = ukf.step(
+            flight["rotors"][k],
+            flight["position"][k],
+            flight["quaternion"][k] if attitude else None,
+        )
         if imu:
             R = matrix(flight["true_q"][k])
             up = R @ [0, 0, VEHICLE.k @ flight["rotors"][k] ** 2]
             gyro = flight["omega"][k] + GYRO * rng.standard_normal(3)
-            e = ukf.correct_imu(gyro, R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3))
-        rows.append(np.concatenate([e.force - FORCE, e.torque - TORQUE, e.angular_velocity - flight["omega"][k]]))
+            e = ukf.correct_imu(
+                gyro, R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3)
+            )
+        rows.append(
+            np.concatenate(
+                [e.force - FORCE, e.torque - TORQUE, e.angular_velocity - flight["omega"][k]]
+            )
+        )
         assert np.linalg.eigvalsh(e.covariance)[0] > 0
     return np.sqrt(np.mean(np.array(rows)[600:].reshape(-1, 3, 3) ** 2, axis=(0, 2)))
 
@@ -57,7 +80,9 @@ def test_a_linear_measurement_is_a_kalman_update():
     S = P[3:6, 3:6] + 0.005**2 * np.eye(3)
     K = P[:, 3:6] @ np.linalg.inv(S)
     innovation = z - before.angular_velocity
-    np.testing.assert_allclose(after.angular_velocity, before.angular_velocity + (K @ innovation)[3:6], atol=1e-9)
+    np.testing.assert_allclose(
+        after.angular_velocity, before.angular_velocity + (K @ innovation)[3:6], atol=1e-9
+    )
     np.testing.assert_allclose(after.force, before.force + (K @ innovation)[15:18], atol=1e-9)
     np.testing.assert_allclose(after.covariance, P - K @ S @ K.T, atol=1e-9)
     assert after.nis == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=1e-9)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flights import PERIOD, yawing_flight
 
+from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchMassUKF, WrenchUKF
 
@@ -13,10 +13,16 @@ VEHICLE = load_vehicle("ardrone2")
 
 
 def test_a_flight_with_vertical_acceleration_weighs_the_vehicle():
-    flight = yawing_flight(replace(VEHICLE, mass=VEHICLE.mass + 0.053), 3000, seed=1, force=(0, 0, 0), torque=(0, 0, 0))
+    flight = yawing_flight(
+        replace(VEHICLE, mass=VEHICLE.mass + 0.053), 3000, seed=1, force=(0, 0, 0), torque=(0, 0, 0)
+    )
     ukf = WrenchMassUKF(VEHICLE, UKFTuning(), PERIOD)
-    ukf.reset(flight["position"][0], flight["quaternion"][0], velocity=flight["velocity"][0],
-              angular_velocity=flight["omega"][0])
+    ukf.reset(
+        flight["position"][0],
+        flight["quaternion"][0],
+        velocity=flight["velocity"][0],
+        angular_velocity=flight["omega"][0],
+    )
     for k in range(1, 3000):
         e = ukf.step(flight["rotors"][k], flight["position"][k], flight["quaternion"][k])
     assert abs(ukf.mass - VEHICLE.mass - 0.053) < 3 * ukf.mass_std

@@ -53,7 +53,10 @@ def test_of_a_batch():
     assert growth(work) < 4000
 
 
-@pytest.mark.parametrize("make", [lambda: FanTrackingEnv("base"), lambda: FanTrackingVectorEnv(3, threads=2, scenario="base")])
+@pytest.mark.parametrize(
+    "make",
+    [lambda: FanTrackingEnv("base"), lambda: FanTrackingVectorEnv(3, threads=2, scenario="base")],
+)
 def test_of_an_environment_over_episodes(make):
     env = make()
     action = np.zeros(env.action_space.shape, np.float32)

@@ -32,11 +32,18 @@ def both_ways(record, rotor_speeds, spread, dt, out):
 
 
 @pytest.mark.parametrize("vehicle", [VEHICLE, OFFSET], ids=["centred", "offset"])
-@pytest.mark.parametrize("rate", [0.0, 3.0, 60.0])  # at 60 rad/s the series for a turn no longer serves
+@pytest.mark.parametrize(
+    "rate", [0.0, 3.0, 60.0]
+)  # at 60 rad/s the series for a turn no longer serves
 def test_points_side_by_side_are_those_one_at_a_time_bit_for_bit(vehicle, rate):
     rng = np.random.default_rng(0)
     ukf = WrenchUKF(vehicle)
-    ukf.reset([0.3, -0.2, 1.0], QUATERNION, velocity=[1.0, -0.5, 0.2], angular_velocity=[0.3 * rate, -0.1, rate])
+    ukf.reset(
+        [0.3, -0.2, 1.0],
+        QUATERNION,
+        velocity=[1.0, -0.5, 0.2],
+        angular_velocity=[0.3 * rate, -0.1, rate],
+    )
     f = ukf.record[0]
     f["x"][13:19] = 0.1 * rng.standard_normal(6)
     f["S"] = 0.05 * rng.standard_normal((12, 18))
@@ -50,10 +57,18 @@ ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), 
 
 
 @pytest.mark.parametrize("kind", [WrenchUKF, NonlinearObserver])
-@pytest.mark.parametrize("form", [
-    list, tuple, lambda a: np.repeat(a, 2)[::2], lambda a: np.repeat(a, 2)[::2].astype(">f8"),
-    lambda a: a.astype(np.longdouble), lambda a: [np.array(v) for v in a],
-], ids=["list", "tuple", "strided", "big-endian", "long", "list of arrays"])
+@pytest.mark.parametrize(
+    "form",
+    [
+        list,
+        tuple,
+        lambda a: np.repeat(a, 2)[::2],
+        lambda a: np.repeat(a, 2)[::2].astype(">f8"),
+        lambda a: a.astype(np.longdouble),
+        lambda a: [np.array(v) for v in a],
+    ],
+    ids=["list", "tuple", "strided", "big-endian", "long", "list of arrays"],
+)
 def test_any_form_of_the_same_numbers_gives_the_same_estimate(kind, form):
     states = []
     for change in (np.asarray, form):
@@ -70,8 +85,13 @@ def test_whole_numbers_are_numbers():
     for kind in (float, int):
         ukf = WrenchUKF(VEHICLE)
         ukf.reset([0, 0, 1], [1, 0, 0, 0])
-        states.append(ukf.step(np.full(4, 380, dtype=kind), np.array([0, 0, 1], dtype=kind),
-                               np.array([1, 0, 0, 0], dtype=kind)).state)
+        states.append(
+            ukf.step(
+                np.full(4, 380, dtype=kind),
+                np.array([0, 0, 1], dtype=kind),
+                np.array([1, 0, 0, 0], dtype=kind),
+            ).state
+        )
     np.testing.assert_array_equal(*states)
 
 

@@ -16,10 +16,11 @@ FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.01, -0.015, 0.02])
 
 
 def lap(vehicle):
-    """Turn rates, positions and quaternions of a flight that closes after 20 s, by inverse dynamics.
+    """Turn rates, positions and quaternions of a flight that closes after 20 s, by inverse
+    dynamics.
 
-    The vehicle turns six times in a lap at a rate that swings between 1 and 3 rad/s, and translates, under a constant
-    wrench.
+    The vehicle turns six times in a lap at a rate that swings between 1 and 3 rad/s, and
+    translates, under a constant wrench.
     """
     t = 0.5 * PERIOD * np.arange(-2, 2 * LAP + 2)  # half steps
     base = 2 * np.pi / (LAP * PERIOD)
@@ -41,7 +42,12 @@ def lap(vehicle):
     J = vehicle.inertia
     torque = alpha @ J + np.cross(omega, omega @ J) - R[1:-1].inv().apply(TORQUE)
     middle = slice(2, 2 + 2 * LAP, 2)  # of the interval from one whole step to the next
-    rotors = np.array([vehicle.rotor_speeds(*pair) for pair in zip(size[1:-1][middle], torque[middle], strict=True)])
+    rotors = np.array(
+        [
+            vehicle.rotor_speeds(*pair)
+            for pair in zip(size[1:-1][middle], torque[middle], strict=True)
+        ]
+    )
     # each row: what the rotors do in an interval, and the pose at its end
     end = slice(4, 4 + 2 * LAP, 2)
     return rotors, position[end], R[end].as_quat(scalar_first=True)
@@ -59,12 +65,19 @@ def test_a_million_steps_with_faults_leave_the_filter_healthy():
     states = np.empty((LAP, STATE_SIZE))
     least_eigenvalue = np.inf
     for start in range(0, STEPS, LAP):
-        shift = np.where(rng.random(LAP) < 0.01, 0.5, 0.0)[:, None] * rng.choice([-1.0, 1.0], (LAP, 3)) / np.sqrt(3)
+        shift = (
+            np.where(rng.random(LAP) < 0.01, 0.5, 0.0)[:, None]
+            * rng.choice([-1.0, 1.0], (LAP, 3))
+            / np.sqrt(3)
+        )
         measured = position + 0.001 * rng.standard_normal((LAP, 3)) + shift
         turned = Rotation.from_rotvec(0.005 * rng.standard_normal((LAP, 3))) * Rotation.from_quat(
-            quaternion, scalar_first=True)
+            quaternion, scalar_first=True
+        )
         signed = turned.as_quat(scalar_first=True) * rng.choice([-1.0, 1.0], (LAP, 1))
-        kind = rng.choice(5, LAP, p=[0.95, 0.02, 0.01, 0.01, 0.01])  # whole, none, NaN, position only, attitude only
+        kind = rng.choice(
+            5, LAP, p=[0.95, 0.02, 0.01, 0.01, 0.01]
+        )  # whole, none, NaN, position only, attitude only
         bursts = np.arange(start, start + LAP) % FAULT_EVERY >= FAULT_EVERY - FAULT
         kind[bursts] = 1 + (np.arange(start, start + LAP)[bursts] // FAULT_EVERY) % 2
         for i, what in enumerate(kind.tolist()):
@@ -80,7 +93,9 @@ def test_a_million_steps_with_faults_leave_the_filter_healthy():
             states[i] = ukf.step(rotors[i], x, q).state
             if i % 2000 == 0:
                 least_eigenvalue = min(least_eigenvalue, np.linalg.eigvalsh(ukf.covariance)[0])
-        for column, (part, truth) in enumerate(((slice(0, 3), position), (slice(16, 19), FORCE), (slice(13, 16), TORQUE))):
+        for column, (part, truth) in enumerate(
+            ((slice(0, 3), position), (slice(16, 19), FORCE), (slice(13, 16), TORQUE))
+        ):
             errors[start : start + LAP, column] = np.abs(states[:, part] - truth).max(axis=1)
         attitude_match[start : start + LAP] = np.sum(states[:, 3:7] * quaternion, axis=1)
     assert least_eigenvalue > 0.0
@@ -88,5 +103,7 @@ def test_a_million_steps_with_faults_leave_the_filter_healthy():
     phase = np.arange(STEPS) % FAULT_EVERY
     recovered = (np.arange(STEPS) > 800) & (phase >= RECOVERY) & (phase < FAULT_EVERY - FAULT)
     np.testing.assert_array_less(errors[recovered].max(axis=0), [0.005, 0.08, 0.006])
-    np.testing.assert_array_less(np.sqrt(np.mean(errors[recovered] ** 2, axis=0)), [0.001, 0.02, 0.002])
+    np.testing.assert_array_less(
+        np.sqrt(np.mean(errors[recovered] ** 2, axis=0)), [0.001, 0.02, 0.002]
+    )
     assert np.abs(attitude_match[recovered]).min() > np.cos(0.5 * 0.03)  # 0.03 rad

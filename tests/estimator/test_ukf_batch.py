@@ -5,8 +5,8 @@ import pickle
 
 import numpy as np
 import pytest
-from flights import PERIOD, yawing_flight
 
+from tests.support.flights import PERIOD, yawing_flight
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF, WrenchUKFBatch
 
@@ -16,14 +16,19 @@ NAMES = ("rotors", "position", "quaternion")
 
 
 def with_effects(strength):
-    """A vehicle whose effects remember: the motors' lag, and drag, which keeps its own turn rates."""
-    return VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": strength, "kdy": strength}),
-                                EffectSetting("motor_lag", {"tau": 0.04}))
+    """A vehicle whose effects remember: the motors' lag, and drag, which keeps its
+    own turn rates."""
+    return VEHICLE.with_effects(
+        EffectSetting("rotor_drag", {"kdx": strength, "kdy": strength}),
+        EffectSetting("motor_lag", {"tau": 0.04}),
+    )
 
 
 @pytest.fixture(scope="module")
 def samples():
-    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and turn rates missing."""
+    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and turn
+    rates missing.
+    """
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
     rng = np.random.default_rng(0)
@@ -35,10 +40,20 @@ def samples():
     return rotors, position, quaternion
 
 
-@pytest.mark.parametrize(("vehicles", "gate"), [
-    (VEHICLE, None), (VEHICLE, 0.999), (with_effects(1e-4), None),
-    ([VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)] + 6 * [VEHICLE], None),
-], ids=["one vehicle", "gated", "effects", "one each"])
+@pytest.mark.parametrize(
+    ("vehicles", "gate"),
+    [
+        (VEHICLE, None),
+        (VEHICLE, 0.999),
+        (with_effects(1e-4), None),
+        (
+            [VEHICLE, load_vehicle("hummingbird"), with_effects(1e-4), VEHICLE, with_effects(2e-4)]
+            + 6 * [VEHICLE],
+            None,
+        ),
+    ],
+    ids=["one vehicle", "gated", "effects", "one each"],
+)
 def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     batch = WrenchUKFBatch(vehicles, COUNT, gate=gate)
     each = vehicles if isinstance(vehicles, list) else [vehicles] * COUNT
@@ -50,17 +65,33 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
     for k in range(1, STEPS):
         together = batch.step(rotors[k], position[k], quaternion[k])
         for n, ukf in enumerate(singles):
-            np.testing.assert_array_equal(together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state)
+            np.testing.assert_array_equal(
+                together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state
+            )
     np.testing.assert_array_equal(batch.covariance, [ukf.covariance for ukf in singles])
     last = singles[-1].estimate
-    for name in ("position", "quaternion", "velocity", "angular_velocity", "torque", "force", "nis"):
+    for name in (
+        "position",
+        "quaternion",
+        "velocity",
+        "angular_velocity",
+        "torque",
+        "force",
+        "nis",
+    ):
         np.testing.assert_array_equal(getattr(together, name)[-1], getattr(last, name))
 
 
 def test_it_starts_from_what_is_given_for_each_or_for_all():
     batch = WrenchUKFBatch(VEHICLE, 2, UKFTuning(), PERIOD)
     P = np.stack([1e-4 * np.eye(18), 4e-4 * np.eye(18)])
-    batch.reset([[0, 0, 1], [0, 0, 2]], [1, 0, 0, 0], P, velocity=[1, 0, 0], angular_velocity=[[0, 0, 1], [0, 0, 2]])
+    batch.reset(
+        [[0, 0, 1], [0, 0, 2]],
+        [1, 0, 0, 0],
+        P,
+        velocity=[1, 0, 0],
+        angular_velocity=[[0, 0, 1], [0, 0, 2]],
+    )
     for n in range(2):
         ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
         ukf.reset([0, 0, n + 1], [1, 0, 0, 0], P[n], [1, 0, 0], [0, 0, n + 1])
@@ -68,7 +99,9 @@ def test_it_starts_from_what_is_given_for_each_or_for_all():
         np.testing.assert_array_equal(batch.covariance[n], ukf.covariance)
 
 
-@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))])
+@pytest.mark.parametrize(
+    "duplicate", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))]
+)
 def test_a_copy_flies_on_alone(samples, duplicate):
     rotors, position, quaternion = samples
     batch = WrenchUKFBatch(VEHICLE, COUNT)
@@ -85,7 +118,10 @@ def test_a_copy_flies_on_alone(samples, duplicate):
 
 def test_one_may_spin_too_fast_for_the_series_of_sine_and_cosine():
     batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
-    rates, speeds = np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]]), np.full((3, 4), VEHICLE.hover_rate)
+    rates, speeds = (
+        np.array([[0.0, 0, 1], [0, 0, 60], [0, 0, -2]]),
+        np.full((3, 4), VEHICLE.hover_rate),
+    )
     batch.reset([0, 0, 1], [1, 0, 0, 0], angular_velocity=rates)
     for _ in range(3):
         together = batch.step(speeds)
@@ -98,7 +134,9 @@ def test_one_may_spin_too_fast_for_the_series_of_sine_and_cosine():
 
 def test_an_attitude_that_nobody_measures_stays_an_attitude():
     """Where its variance is held, which only some of those side by side need."""
-    P = np.stack([np.diag(np.r_[np.full(3, scale), np.full(15, 1e-4)]) for scale in (1e-4, 0.4, 1e-3)])
+    P = np.stack(
+        [np.diag(np.r_[np.full(3, scale), np.full(15, 1e-4)]) for scale in (1e-4, 0.4, 1e-3)]
+    )
     batch, single = WrenchUKFBatch(VEHICLE, 3), WrenchUKF(VEHICLE)
     batch.reset([0, 0, 1], [1, 0, 0, 0], P)
     speeds = np.full((3, 4), VEHICLE.hover_rate)
@@ -126,15 +164,22 @@ def test_without_a_pose_it_predicts_and_an_estimate_stays_what_it_was():
     assert np.isnan(first.nis).all()
 
 
-SPEEDS, POSITION, QUATERNION = np.full((2, 4), 400.0), np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1))
+SPEEDS, POSITION, QUATERNION = (
+    np.full((2, 4), 400.0),
+    np.zeros((2, 3)),
+    np.tile([1.0, 0, 0, 0], (2, 1)),
+)
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds must be \(2, 4\)"),
-    ((SPEEDS, POSITION[:, :2], QUATERNION), r"position must be \(2, 3\)"),
-    ((SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
-    ((SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((SPEEDS[:1], POSITION, QUATERNION), r"rotor_speeds must be \(2, 4\)"),
+        ((SPEEDS, POSITION[:, :2], QUATERNION), r"position must be \(2, 3\)"),
+        ((SPEEDS, POSITION, QUATERNION * [[1.0], [2.0]]), r"length 1, got 2 \(filter 1\)"),
+        ((SPEEDS, POSITION, QUATERNION, [1.0, 2.0, 3.0]), "voltage"),
+    ],
+)
 def test_bad_measurements_are_named_and_change_nothing(arguments, words):
     batch = WrenchUKFBatch(VEHICLE, 2)
     batch.reset([0, 0, 1], [1, 0, 0, 0])
@@ -145,12 +190,18 @@ def test_bad_measurements_are_named_and_change_nothing(arguments, words):
     np.testing.assert_array_equal(batch.covariance, P)
 
 
-@pytest.mark.parametrize(("make", "words"), [
-    (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
-    (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
-    (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
-    (lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]), r"length 1, got 3 \(filter 1\)"),
-])
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: WrenchUKFBatch(VEHICLE, 0), "one vehicle or one for each of 0"),
+        (lambda: WrenchUKFBatch([VEHICLE, VEHICLE], 3), "one for each of 3, got 2"),
+        (lambda: WrenchUKFBatch(VEHICLE, 2).reset(np.zeros((3, 3)), [1, 0, 0, 0]), "position"),
+        (
+            lambda: WrenchUKFBatch(VEHICLE, 2).reset([0, 0, 0], [[1, 0, 0, 0], [3, 0, 0, 0]]),
+            r"length 1, got 3 \(filter 1\)",
+        ),
+    ],
+)
 def test_bad_settings_are_named(make, words):
     with pytest.raises(InputError, match=words):
         make()

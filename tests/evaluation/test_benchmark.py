@@ -1,4 +1,5 @@
-"""The leaderboard: paired episodes, scores between hover and oracle, and the file that is written."""
+"""The leaderboard: paired episodes, scores between hover and oracle, and the file
+that is written."""
 
 import json
 from dataclasses import replace
@@ -14,8 +15,18 @@ from windwrench.evaluation.episodes import DECISIONS, FIRST_TEST_SEED, benchmark
 
 NAMES = ["hover", "admittance", "ratio", "oracle"]
 EPISODES = 6
-KEYS = ["controller", "scenario", "episodes", "seed", "rmse_m", "rmse_ci95_m", "median_rmse_m", "lost_fraction", "score",
-        "wins_over_admittance"]
+KEYS = [
+    "controller",
+    "scenario",
+    "episodes",
+    "seed",
+    "rmse_m",
+    "rmse_ci95_m",
+    "median_rmse_m",
+    "lost_fraction",
+    "score",
+    "wins_over_admittance",
+]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +53,10 @@ def test_hover_scores_0_and_the_oracle_1(rows):
 
 def test_wins_are_counted_against_admittance(results, rows):
     assert rows["admittance"].wins_over_admittance == 0.5
-    ahead = [o.rmse < a.rmse for o, a in zip(results["oracle", "base"], results["admittance", "base"], strict=True)]
+    ahead = [
+        o.rmse < a.rmse
+        for o, a in zip(results["oracle", "base"], results["admittance", "base"], strict=True)
+    ]
     assert rows["oracle"].wins_over_admittance == np.mean(ahead)
 
 
@@ -99,7 +113,9 @@ def test_a_lost_vehicle_s_remaining_time_counts_at_two_and_a_half_metres():
     assert episode.offset.shape == (DECISIONS,)
     assert np.all(episode.offset[flown:] == 2.5)
     assert episode.offset.max() == 2.5
-    expected = np.sum(np.minimum(np.abs(episode.y - episode.fan_y), 2.5) ** 2) + 6.25 * (DECISIONS - flown)
+    expected = np.sum(np.minimum(np.abs(episode.y - episode.fan_y), 2.5) ** 2) + 6.25 * (
+        DECISIONS - flown
+    )
     assert episode.rmse == pytest.approx(np.sqrt(expected / DECISIONS))
 
 
@@ -133,12 +149,15 @@ def test_a_score_that_means_nothing_is_still_valid_json(tmp_path, results):
     assert rows[0]["score"] is None
 
 
-@pytest.mark.parametrize(("controllers", "scenarios", "episodes", "seed", "words"), [
-    (["hovre"], ["base"], 2, 0, "Did you mean 'hover'"),
-    (["hover"], ["bsae"], 2, 0, "Did you mean 'base'"),
-    (["hover"], ["base"], 0, 0, "--episodes must be at least 1"),
-    (["hover"], ["base"], 2, -1, "--seed must lie between"),
-])
+@pytest.mark.parametrize(
+    ("controllers", "scenarios", "episodes", "seed", "words"),
+    [
+        (["hovre"], ["base"], 2, 0, "Did you mean 'hover'"),
+        (["hover"], ["bsae"], 2, 0, "Did you mean 'base'"),
+        (["hover"], ["base"], 0, 0, "--episodes must be at least 1"),
+        (["hover"], ["base"], 2, -1, "--seed must lie between"),
+    ],
+)
 def test_what_cannot_be_flown_is_named(controllers, scenarios, episodes, seed, words):
     with pytest.raises(InputError, match=words):
         fly_all(controllers, scenarios, episodes, seed, jobs=1)
@@ -146,7 +165,10 @@ def test_what_cannot_be_flown_is_named(controllers, scenarios, episodes, seed, w
 
 def test_an_episode_s_arrays_are_of_one_length():
     episode = fly_episode(FanTrackingEnv("base"), make_controller("admittance"), 3)
-    lengths = {len(getattr(episode, name)) for name in ("time", "y", "fan_y", "command", "observation", "force", "torque")}
+    lengths = {
+        len(getattr(episode, name))
+        for name in ("time", "y", "fan_y", "command", "observation", "force", "torque")
+    }
     assert lengths == {DECISIONS}
     assert episode.time[-1] == pytest.approx(20.0)
     assert episode.total_reward <= DECISIONS

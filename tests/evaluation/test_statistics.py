@@ -25,7 +25,9 @@ X, Y = RNG.normal(1.0, 0.3, (5, 12)), RNG.normal(0.8, 0.3, (4, 12))
 @pytest.mark.parametrize("shape", [(5, 12), (3, 7), (1, 5), (1, 1)])
 def test_the_interquartile_mean_is_scipy_s_trimmed_mean(shape):
     scores = RNG.normal(size=shape)
-    assert interquartile_mean(scores) == pytest.approx(scipy.stats.trim_mean(scores, 0.25, axis=None))
+    assert interquartile_mean(scores) == pytest.approx(
+        scipy.stats.trim_mean(scores, 0.25, axis=None)
+    )
 
 
 def test_one_wild_run_does_not_move_the_interquartile_mean():
@@ -37,8 +39,10 @@ def test_one_wild_run_does_not_move_the_interquartile_mean():
 
 def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
     a, b = X.round(1), Y.round(1)  # with ties
-    pairs = [(a[i, k] > b[j, k]) + 0.5 * (a[i, k] == b[j, k])
-             for i, j, k in itertools.product(range(5), range(4), range(12))]
+    pairs = [
+        (a[i, k] > b[j, k]) + 0.5 * (a[i, k] == b[j, k])
+        for i, j, k in itertools.product(range(5), range(4), range(12))
+    ]
     assert probability_of_improvement(a, b) == pytest.approx(np.mean(pairs))
     u = [scipy.stats.mannwhitneyu(a[:, k], b[:, k]).statistic / 20 for k in range(12)]
     assert probability_of_improvement(a, b) == pytest.approx(np.mean(u))
@@ -48,7 +52,9 @@ def test_probability_of_improvement_counts_all_pairs_of_runs_task_by_task():
 
 def test_a_performance_profile_is_the_share_above_each_threshold():
     scores = [[0.0, 1.0], [2.0, 3.0]]
-    np.testing.assert_array_equal(performance_profile(scores, [-1.0, 0.0, 1.5, 3.0]), [1.0, 0.75, 0.5, 0.0])
+    np.testing.assert_array_equal(
+        performance_profile(scores, [-1.0, 0.0, 1.5, 3.0]), [1.0, 0.75, 0.5, 0.0]
+    )
 
 
 def test_optimality_gap_and_relative_change():
@@ -83,14 +89,20 @@ def test_a_paired_bootstrap_draws_the_same_episodes_for_both():
     assert (low, high) == pytest.approx((-0.1, -0.1))
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda: interquartile_mean([]), "finite numbers"),
-    (lambda: interquartile_mean([[np.nan]]), "finite numbers"),
-    (lambda: probability_of_improvement([[1.0]], [[1.0, 2.0]]), "same tasks"),
-    (lambda: paired_wins([[1.0]], [[1.0, 2.0]]), "same tasks"),
-    (lambda: stratified_bootstrap(relative_change, [[1.0]], [[1.0, 2.0]], tasks=True), "same tasks"),
-    (lambda: stratified_bootstrap(interquartile_mean, [[1.0]], level=1.5), "level"),
-])
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: interquartile_mean([]), "finite numbers"),
+        (lambda: interquartile_mean([[np.nan]]), "finite numbers"),
+        (lambda: probability_of_improvement([[1.0]], [[1.0, 2.0]]), "same tasks"),
+        (lambda: paired_wins([[1.0]], [[1.0, 2.0]]), "same tasks"),
+        (
+            lambda: stratified_bootstrap(relative_change, [[1.0]], [[1.0, 2.0]], tasks=True),
+            "same tasks",
+        ),
+        (lambda: stratified_bootstrap(interquartile_mean, [[1.0]], level=1.5), "level"),
+    ],
+)
 def test_scores_that_mean_nothing_are_refused(call, words):
     with pytest.raises(InputError, match=words):
         call()

@@ -1,4 +1,6 @@
-"""Every form of input that a stranger may give: a good example of each, how it is spoiled, and what is done with it."""
+"""Every form of input that a stranger may give: a good example of each, how it is spoiled, and what
+is done with it.
+"""
 
 import gzip
 import hashlib
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 
 from tests.fuzz.mutations import spoil_bytes, spoil_table, spoil_text
 from tests.fuzz.ulog_writer import ulog_bytes
+from tests.support.paths import ROOT
 from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
@@ -80,29 +83,60 @@ def _own_log(name: str) -> bytes:
     vehicle = _vehicle("ardrone2")
     position = np.column_stack([0.1 * np.sin(t), 0.1 * np.cos(t), 1.0 + 0.0 * t])
     quaternion = np.column_stack([np.cos(0.1 * t), 0.0 * t, 0.0 * t, np.sin(0.1 * t)])
-    log = FlightLog(t, position, quaternion, np.full((_COUNT, 4), vehicle.hover_rate), np.full(_COUNT, 11.1),
-                    np.zeros((_COUNT, 3)), np.zeros((_COUNT, 3)))
+    log = FlightLog(
+        t,
+        position,
+        quaternion,
+        np.full((_COUNT, 4), vehicle.hover_rate),
+        np.full(_COUNT, 11.1),
+        np.zeros((_COUNT, 3)),
+        np.zeros((_COUNT, 3)),
+    )
     return _written(lambda path: write_log(log, path), name)
 
 
 def _text_table(columns: Mapping[str, Array]) -> bytes:
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{x:.17g}" for x in row) for row in rows)]).encode() + b"\n"
+    return (
+        "\n".join(
+            [",".join(columns), *(",".join(f"{x:.17g}" for x in row) for row in rows)]
+        ).encode()
+        + b"\n"
+    )
 
 
 def _nanobench() -> bytes:
     t = _times()
-    pose = dict.fromkeys(("px", "py", "qx", "qy", "qz"), 0.0 * t) | {"pz": 1.0 + 0.0 * t, "qw": 1.0 + 0.0 * t}
+    pose = dict.fromkeys(("px", "py", "qx", "qy", "qz"), 0.0 * t) | {
+        "pz": 1.0 + 0.0 * t,
+        "qw": 1.0 + 0.0 * t,
+    }
     motors = {f"motor_motor_m{i}": np.full(_COUNT, 36000.0) for i in range(1, 5)}
     return _text_table({"t": 1e9 + t, **pose, **motors, "pwr_pm_vbat": np.full(_COUNT, 3.9)})
 
 
 def _crazyswarm2() -> bytes:
     t = _times()
-    zero = ("est_x_m", "est_y_m", "est_vx_mps", "roll_rad", "pitch_rad", "yaw_rad", "mocap_x_m", "mocap_y_m",
-            *(f"torque_cmd_{axis}_Nm" for axis in "xyz"))
-    return _text_table({"t_s": t, **dict.fromkeys(zero, 0.0 * t), "est_z_m": 1.0 + 0.0 * t, "mocap_z_m": 1.0 + 0.001 * t,
-                        "thrust_cmd_N": np.full(_COUNT, 0.33)})
+    zero = (
+        "est_x_m",
+        "est_y_m",
+        "est_vx_mps",
+        "roll_rad",
+        "pitch_rad",
+        "yaw_rad",
+        "mocap_x_m",
+        "mocap_y_m",
+        *(f"torque_cmd_{axis}_Nm" for axis in "xyz"),
+    )
+    return _text_table(
+        {
+            "t_s": t,
+            **dict.fromkeys(zero, 0.0 * t),
+            "est_z_m": 1.0 + 0.0 * t,
+            "mocap_z_m": 1.0 + 0.001 * t,
+            "thrust_cmd_N": np.full(_COUNT, 0.33),
+        }
+    )
 
 
 @cache
@@ -111,21 +145,38 @@ def _ulog() -> bytes:
     stamps = np.round(1e6 * (t + 10.0)).astype(np.uint64)
     turned = np.column_stack([np.ones(_COUNT), np.zeros((_COUNT, 3))])
     esc = {f"int32_t esc[{i}].esc_rpm": np.full(_COUNT, 3600) for i in range(4)}
-    return ulog_bytes({
-        "vehicle_mocap_odometry": {"uint64_t timestamp": stamps, "uint64_t timestamp_sample": stamps,
-                                   "uint8_t pose_frame": np.full(_COUNT, 2), "float position": np.zeros((_COUNT, 3)),
-                                   "float q": turned},
-        "esc_status": {"uint64_t timestamp": stamps, **esc},
-        "actuator_motors": {"uint64_t timestamp": stamps, "uint64_t timestamp_sample": stamps,
-                            "float control": np.full((_COUNT, 4), 0.5)},
-        "battery_status": {"uint64_t timestamp": stamps, "float voltage_v": np.full(_COUNT, 11.1)},
-        "vehicle_land_detected": {"uint64_t timestamp": stamps, "bool landed": np.zeros(_COUNT, bool)},
-    }, {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4})
+    return ulog_bytes(
+        {
+            "vehicle_mocap_odometry": {
+                "uint64_t timestamp": stamps,
+                "uint64_t timestamp_sample": stamps,
+                "uint8_t pose_frame": np.full(_COUNT, 2),
+                "float position": np.zeros((_COUNT, 3)),
+                "float q": turned,
+            },
+            "esc_status": {"uint64_t timestamp": stamps, **esc},
+            "actuator_motors": {
+                "uint64_t timestamp": stamps,
+                "uint64_t timestamp_sample": stamps,
+                "float control": np.full((_COUNT, 4), 0.5),
+            },
+            "battery_status": {
+                "uint64_t timestamp": stamps,
+                "float voltage_v": np.full(_COUNT, 11.1),
+            },
+            "vehicle_land_detected": {
+                "uint64_t timestamp": stamps,
+                "bool landed": np.zeros(_COUNT, bool),
+            },
+        },
+        {"THR_MDL_FAC": 0.3, "CA_ROTOR_COUNT": 4},
+    )
 
 
 @cache
 def _bag(kind: str) -> dict[str, bytes]:
-    """Return the files of a bag with a pose and turn rates: one of ROS 1, or a folder's of ROS 2."""
+    """Return the files of a bag with a pose and turn rates: one of ROS 1, or a
+    folder's of ROS 2."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
@@ -135,18 +186,27 @@ def _bag(kind: str) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / ("flight.bag" if ros1 else "flight")
         plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
-        writer = rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9, storage_plugin=plugin)
+        writer = (
+            rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9, storage_plugin=plugin)
+        )
         with writer:
-            pose_name, rotor_name = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/Float32MultiArray"
+            pose_name, rotor_name = (
+                "geometry_msgs/msg/PoseStamped",
+                "std_msgs/msg/Float32MultiArray",
+            )
             pose_topic = writer.add_connection("/pose", pose_name, typestore=store)
             rotor_topic = writer.add_connection("/motors", rotor_name, typestore=store)
             for k in range(_COUNT):
                 nanoseconds = round(1e9 * _PERIOD) * k
                 stamp = types["builtin_interfaces/msg/Time"](begin, nanoseconds)
                 header = types["std_msgs/msg/Header"](*([0] if ros1 else []), stamp, "world")
-                pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](0.0, 0.0, 1.0),
-                                                       types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0))
-                rotors = types[rotor_name](types["std_msgs/msg/MultiArrayLayout"]([], 0), np.full(4, 376.0, np.float32))
+                pose = types["geometry_msgs/msg/Pose"](
+                    types["geometry_msgs/msg/Point"](0.0, 0.0, 1.0),
+                    types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
+                )
+                rotors = types[rotor_name](
+                    types["std_msgs/msg/MultiArrayLayout"]([], 0), np.full(4, 376.0, np.float32)
+                )
                 serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
                 at = begin * 10**9 + nanoseconds
                 writer.write(pose_topic, at, serialize(types[pose_name](header, pose), pose_name))
@@ -155,7 +215,10 @@ def _bag(kind: str) -> dict[str, bytes]:
         return {p.name: p.read_bytes() for p in found}
 
 
-TOPIC_MAP = (b"pose: {topic: /pose, frame: flu}\nrotors:\n  topic: /motors\n  unit: rad/s\n  order: [3, 2, 4, 1]\n")
+TOPIC_MAP = (
+    b"pose: {topic: /pose, frame: flu}\n"
+    b"rotors:\n  topic: /motors\n  unit: rad/s\n  order: [3, 2, 4, 1]\n"
+)
 
 
 def _log(path: Path, reader: str | None = None, vehicle: str = "ardrone2") -> None:
@@ -221,17 +284,31 @@ def _use_configuration(path: Path) -> None:
 def _policy() -> dict[str, bytes]:
     """Return the files of a policy with one hidden layer."""
     features = Features(("torque_z", "force_x"), 2)
-    weights = {"weight0": np.ones((3, features.size), np.float32), "bias0": np.zeros(3, np.float32),
-               "weight1": np.ones((1, 3), np.float32), "bias1": np.zeros(1, np.float32)}
-    card = {"features": {"frame": list(features.frame), "history": features.history, "scale": list(features.scale)},
-            "repeat": 1, "activation": "relu", "squash": True}
+    weights = {
+        "weight0": np.ones((3, features.size), np.float32),
+        "bias0": np.zeros(3, np.float32),
+        "weight1": np.ones((1, 3), np.float32),
+        "bias1": np.zeros(1, np.float32),
+    }
+    card = {
+        "features": {
+            "frame": list(features.frame),
+            "history": features.history,
+            "scale": list(features.scale),
+        },
+        "repeat": 1,
+        "activation": "relu",
+        "squash": True,
+    }
     with tempfile.TemporaryDirectory() as folder:
         save_policy(card, weights, Path(folder) / "policy.npz")
         return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
 
 
 def _use_policy(path: Path) -> None:
-    """Load a policy and fly a decision; the card is made to vouch for spoiled weights, as an attacker's would."""
+    """Load a policy and fly a decision; the card is made to vouch for spoiled weights, as an
+    attacker's would.
+    """
     if path.suffix == ".npz":
         card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
         card["sha256"] = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -241,14 +318,15 @@ def _use_policy(path: Path) -> None:
 
 
 def _preset() -> bytes:
-    return (Path(__file__).parent.parent / "dynamics" / "vehicles" / "ardrone2.yaml").read_bytes()
+    return (ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_bytes()
 
 
 def _effects_of_vehicle() -> bytes:
     text = _preset().decode() + "effects:\n"
     for name in ("rotor_drag", "mass", "slung_payload", "battery_sag", "latency"):
         setting = parse_setting(name, _vehicle("ardrone2"))
-        text += f"- name: {name}\n  coefficients: {{{', '.join(f'{k}: {v:g}' for k, v in setting.coefficients.items())}}}\n"
+        given = ", ".join(f"{k}: {v:g}" for k, v in setting.coefficients.items())
+        text += f"- name: {name}\n  coefficients: {{{given}}}\n"
     return text.encode()
 
 
@@ -262,16 +340,20 @@ def _effects() -> bytes:
 
 def _zipped(spoiled: Way) -> Way:
     """Return a way to spoil what a gzip file holds."""
+
     def way(data: bytes, rng: random.Random) -> bytes:
         try:
             return gzip.compress(spoiled(gzip.decompress(data), rng), 1)
         except (OSError, EOFError, zlib.error):
             return spoil_bytes(data, rng)
+
     return way
 
 
 def _spoil_parquet(data: bytes, rng: random.Random) -> bytes:
-    """Return a Parquet file with a column of another type, with holes, away, twice, or of another length."""
+    """Return a Parquet file with a column of another type, with holes, away, twice, or of another
+    length.
+    """
     import io
 
     import pyarrow
@@ -285,8 +367,18 @@ def _spoil_parquet(data: bytes, rng: random.Random) -> bytes:
     if table.num_columns == 0:
         return spoil_bytes(data, rng)
     name, count = table.column_names[i], table.num_rows
-    kinds: list[Any] = [["a"] * count, [None] * count, [True] * count, [[1.0]] * count, [b"\xff"] * count,
-                        [math.nan] * count, [math.inf] * count, [1e308] * count, [2**62] * count, [{"a": 1}] * count]
+    kinds: list[Any] = [
+        ["a"] * count,
+        [None] * count,
+        [True] * count,
+        [[1.0]] * count,
+        [b"\xff"] * count,
+        [math.nan] * count,
+        [math.inf] * count,
+        [1e308] * count,
+        [2**62] * count,
+        [{"a": 1}] * count,
+    ]
     how = rng.randrange(5)
     if how == 0:
         table = table.remove_column(i)
@@ -303,49 +395,151 @@ def _spoil_parquet(data: bytes, rng: random.Random) -> bytes:
 
 def forms() -> dict[str, Form]:
     """Return the forms whose libraries are installed."""
-    table, text = (spoil_table, spoil_table, spoil_bytes), (spoil_text, spoil_text, spoil_text, spoil_bytes)
+    table, text = (
+        (spoil_table, spoil_table, spoil_bytes),
+        (spoil_text, spoil_text, spoil_text, spoil_bytes),
+    )
     estimate = ("estimate", "--out", "out")
     found = [
         Form("CSV", "log.csv", partial(_own_log, "log.csv"), table, _log, estimate),
-        Form("gzipped CSV", "log.csv.gz", partial(_own_log, "log.csv.gz"), (_zipped(spoil_table), spoil_bytes), _log, estimate),
-        Form("nanobench", "log.csv", _nanobench, table, partial(_log, reader="nanobench", vehicle="crazyflie"),
-             (*estimate, "--reader", "nanobench", "--vehicle", "crazyflie")),
-        Form("crazyswarm2", "log.csv", _crazyswarm2, table, partial(_log, reader="crazyswarm2", vehicle="crazyflie"),
-             (*estimate, "--reader", "crazyswarm2", "--vehicle", "crazyflie")),
-        Form("vehicle", "v.yaml", _preset, text, _use_vehicle, ("record", "--seconds", "1", "--out", "out", "--vehicle")),
-        Form("vehicle with effects", "v.yaml", _effects_of_vehicle, text, _use_vehicle,
-             ("record", "--seconds", "1", "--out", "out", "--vehicle")),
+        Form(
+            "gzipped CSV",
+            "log.csv.gz",
+            partial(_own_log, "log.csv.gz"),
+            (_zipped(spoil_table), spoil_bytes),
+            _log,
+            estimate,
+        ),
+        Form(
+            "nanobench",
+            "log.csv",
+            _nanobench,
+            table,
+            partial(_log, reader="nanobench", vehicle="crazyflie"),
+            (*estimate, "--reader", "nanobench", "--vehicle", "crazyflie"),
+        ),
+        Form(
+            "crazyswarm2",
+            "log.csv",
+            _crazyswarm2,
+            table,
+            partial(_log, reader="crazyswarm2", vehicle="crazyflie"),
+            (*estimate, "--reader", "crazyswarm2", "--vehicle", "crazyflie"),
+        ),
+        Form(
+            "vehicle",
+            "v.yaml",
+            _preset,
+            text,
+            _use_vehicle,
+            ("record", "--seconds", "1", "--out", "out", "--vehicle"),
+        ),
+        Form(
+            "vehicle with effects",
+            "v.yaml",
+            _effects_of_vehicle,
+            text,
+            _use_vehicle,
+            ("record", "--seconds", "1", "--out", "out", "--vehicle"),
+        ),
         Form("effect settings", "effects.txt", _effects, text, _use_effect),
         Form("names", "names.txt", lambda: b"base\nadmittance\nardrone2", text, _use_names),
-        Form("tuning", "tuning.yaml", lambda: b"torque_walk: 0.001\nposition_noise: [0.1, 0.1, 0.2]\nkappa: 2.0\n", text,
-             _use_tuning),
-        Form("training configuration", "sac.yaml",
-             lambda: (Path(__file__).parent.parent / "training" / "configs" / "sac.yaml").read_bytes(), text,
-             _use_configuration),
-        Form("policy, weights", "policy.npz", lambda: _policy()["policy.npz"], (spoil_bytes,), _use_policy,
-             ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
-             lambda: {"policy.json": _policy()["policy.json"]}),
-        Form("policy, card", "policy.json", lambda: _policy()["policy.json"], text, _use_policy,
-             ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
-             lambda: {"policy.npz": _policy()["policy.npz"]}),
+        Form(
+            "tuning",
+            "tuning.yaml",
+            lambda: b"torque_walk: 0.001\nposition_noise: [0.1, 0.1, 0.2]\nkappa: 2.0\n",
+            text,
+            _use_tuning,
+        ),
+        Form(
+            "training configuration",
+            "sac.yaml",
+            lambda: (ROOT / "training" / "configs" / "sac.yaml").read_bytes(),
+            text,
+            _use_configuration,
+        ),
+        Form(
+            "policy, weights",
+            "policy.npz",
+            lambda: _policy()["policy.npz"],
+            (spoil_bytes,),
+            _use_policy,
+            ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
+            lambda: {"policy.json": _policy()["policy.json"]},
+        ),
+        Form(
+            "policy, card",
+            "policy.json",
+            lambda: _policy()["policy.json"],
+            text,
+            _use_policy,
+            ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
+            lambda: {"policy.npz": _policy()["policy.npz"]},
+        ),
     ]
     if find_spec("pyarrow"):
-        found.append(Form("Parquet", "log.parquet", partial(_own_log, "log.parquet"), (_spoil_parquet, spoil_bytes), _log,
-                          estimate))
+        found.append(
+            Form(
+                "Parquet",
+                "log.parquet",
+                partial(_own_log, "log.parquet"),
+                (_spoil_parquet, spoil_bytes),
+                _log,
+                estimate,
+            )
+        )
     if find_spec("pyulog"):
-        found.append(Form("px4_ulog", "log.ulg", _ulog, (spoil_bytes,), partial(_log, reader="px4_ulog"),
-                          (*estimate, "--reader", "px4_ulog")))
+        found.append(
+            Form(
+                "px4_ulog",
+                "log.ulg",
+                _ulog,
+                (spoil_bytes,),
+                partial(_log, reader="px4_ulog"),
+                (*estimate, "--reader", "px4_ulog"),
+            )
+        )
     if find_spec("rosbags"):
         reader = (*estimate, "--reader", "rosbag")
-        for title, kind in (("rosbag 1", "bag"), ("rosbag 2, SQLite", "db3"), ("rosbag 2, MCAP", "mcap")):
+        for title, kind in (
+            ("rosbag 1", "bag"),
+            ("rosbag 2, SQLite", "db3"),
+            ("rosbag 2, MCAP", "mcap"),
+        ):
             name = f"flight.{kind}"
-            found.append(Form(title, name, lambda kind=kind, name=name: _bag(kind)[name], (spoil_bytes,),  # type: ignore[misc]
-                              partial(_log, reader="rosbag"), reader, lambda: {"flight.topics.yaml": TOPIC_MAP}))
-        found.append(Form("rosbag 2, metadata", "metadata.yaml", lambda: _bag("db3")["metadata.yaml"], text, _folder_bag, (),
-                          lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP}))
-        found.append(Form("topic map", "flight.topics.yaml", lambda: TOPIC_MAP, text,
-                          lambda path: _log(path.with_name("flight.bag"), "rosbag"), (),
-                          lambda: _beside_bag("bag")))
+            found.append(
+                Form(
+                    title,
+                    name,
+                    lambda kind=kind, name=name: _bag(kind)[name],
+                    (spoil_bytes,),  # type: ignore[misc]
+                    partial(_log, reader="rosbag"),
+                    reader,
+                    lambda: {"flight.topics.yaml": TOPIC_MAP},
+                )
+            )
+        found.append(
+            Form(
+                "rosbag 2, metadata",
+                "metadata.yaml",
+                lambda: _bag("db3")["metadata.yaml"],
+                text,
+                _folder_bag,
+                (),
+                lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP},
+            )
+        )
+        found.append(
+            Form(
+                "topic map",
+                "flight.topics.yaml",
+                lambda: TOPIC_MAP,
+                text,
+                lambda path: _log(path.with_name("flight.bag"), "rosbag"),
+                (),
+                lambda: _beside_bag("bag"),
+            )
+        )
     return {form.name: form for form in found}
 
 

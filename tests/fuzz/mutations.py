@@ -1,4 +1,6 @@
-"""Spoiling an input in the ways in which files are spoiled: bytes, fields, rows, columns, and what attackers write."""
+"""Spoiling an input in the ways in which files are spoiled: bytes, fields, rows, columns, and what
+attackers write.
+"""
 
 import random
 import re
@@ -6,14 +8,74 @@ from collections.abc import Callable
 
 # what a field may hold that a program did not think of
 TOKENS = (
-    "", " ", "nan", "NaN", "inf", "-inf", "1e999", "-1e308", "1e308", "1e-320", "0", "-0.0", "-1", "1", "2", "1e9", "-1e9",
-    "1e18", "18446744073709551616", "0x10", "1_000", "1,5", "1;5", "1e", "--1", "٣", "None", "null", "true", "yes", "abc",
-    "'", '"', '"1', "[]", "{}", "[1, 2]", "{a: 1}", "~", "9" * 400, "x" * 5000, "\t", "=1+1", "2024-02-30", "1:61", "\ufeff1",
-    "!!python/object/apply:os.system ['exit 3']", "!!python/name:os.system", "!!binary aaaa", "!!timestamp 0000-00-00",
-    "&a [*a]", "*a", "? ", "- ", "%YAML 9.9", "../../etc/passwd", "$HOME", "rotor_dragg", "\udcff", "ünïcode",
+    "",
+    " ",
+    "nan",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e999",
+    "-1e308",
+    "1e308",
+    "1e-320",
+    "0",
+    "-0.0",
+    "-1",
+    "1",
+    "2",
+    "1e9",
+    "-1e9",
+    "1e18",
+    "18446744073709551616",
+    "0x10",
+    "1_000",
+    "1,5",
+    "1;5",
+    "1e",
+    "--1",
+    "٣",
+    "None",
+    "null",
+    "true",
+    "yes",
+    "abc",
+    "'",
+    '"',
+    '"1',
+    "[]",
+    "{}",
+    "[1, 2]",
+    "{a: 1}",
+    "~",
+    "9" * 400,
+    "x" * 5000,
+    "\t",
+    "=1+1",
+    "2024-02-30",
+    "1:61",
+    "\ufeff1",
+    "!!python/object/apply:os.system ['exit 3']",
+    "!!python/name:os.system",
+    "!!binary aaaa",
+    "!!timestamp 0000-00-00",
+    "&a [*a]",
+    "*a",
+    "? ",
+    "- ",
+    "%YAML 9.9",
+    "../../etc/passwd",
+    "$HOME",
+    "rotor_dragg",
+    "\udcff",
+    "ünïcode",
 )
-LAUGHS = "\n".join(["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]",
-                    *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)), "mass: *a11"])
+LAUGHS = "\n".join(
+    [
+        "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]",
+        *(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)),
+        "mass: *a11",
+    ]
+)
 _WORD = re.compile(r"[^\s,:\[\]{}]+")
 
 
@@ -87,7 +149,8 @@ def spoil_table(data: bytes, rng: random.Random) -> bytes:
         lines = lines[: rng.choice((0, 1, 2, 3, row + 1))]
     else:
         return rng.choice((b"\r\n", b"\r", b";", b"\x00\n")).join(
-            line.encode("utf-8", "surrogateescape") for line in lines)
+            line.encode("utf-8", "surrogateescape") for line in lines
+        )
     return "\n".join(lines).encode("utf-8", "surrogateescape")
 
 
@@ -100,13 +163,18 @@ def spoil_text(data: bytes, rng: random.Random) -> bytes:
     if how < 5:
         words = list(_WORD.finditer(text))
         if words:
-            for word in sorted(rng.sample(words, min(len(words), rng.choice((1, 1, 2, 4)))), key=lambda w: -w.start()):
+            for word in sorted(
+                rng.sample(words, min(len(words), rng.choice((1, 1, 2, 4)))),
+                key=lambda w: -w.start(),
+            ):
                 text = text[: word.start()] + rng.choice(TOKENS) + text[word.end() :]
         return text.encode("utf-8", "surrogatepass")
     if how == 5:
         del lines[row]
     elif how == 6:
-        lines.insert(row, rng.choice((*lines, LAUGHS, "[" * 3000, "- " * 500, "a: &x {b: *x}", "<<: *a")))
+        lines.insert(
+            row, rng.choice((*lines, LAUGHS, "[" * 3000, "- " * 500, "a: &x {b: *x}", "<<: *a"))
+        )
     elif how == 7:
         lines[row] = " " * rng.randrange(5) + lines[row]
     elif how == 8:
@@ -117,7 +185,9 @@ def spoil_text(data: bytes, rng: random.Random) -> bytes:
     return "\n".join(lines).encode("utf-8", "surrogatepass")
 
 
-def spoil(data: bytes, ways: tuple[Callable[[bytes, random.Random], bytes], ...], rng: random.Random) -> bytes:
+def spoil(
+    data: bytes, ways: tuple[Callable[[bytes, random.Random], bytes], ...], rng: random.Random
+) -> bytes:
     """Return an input spoiled one to three times, each time in one of the ``ways``."""
     for _ in range(rng.choice((1, 1, 2, 3))):
         data = rng.choice(ways)(data, rng) or b" "

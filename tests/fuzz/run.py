@@ -1,10 +1,12 @@
-"""Spoiled inputs by the thousand: every one is read or refused with a message that names it, and nothing else happens.
+"""Spoiled inputs by the thousand: every one is read or refused with a message that names it, and
+nothing else happens.
 
-``python -m tests.fuzz --inputs 20000 --seed 0`` spoils good files of every form that the kit reads, by
-bytes and by fields, and does with each what a command does: read it and, where it was read, use it. A fault is anything but
-success and ``InputError``: another exception, a warning that numbers overflowed, a message that does not name the file, more
-than 10 s, more memory than 4 GiB, or a process that dies. For a part of the refused files the whole command is run:
-it must end with exit code 2, one line on standard error, and no result.
+``python -m tests.fuzz --inputs 20000 --seed 0`` spoils good files of every form that the kit reads,
+by bytes and by fields, and does with each what a command does: read it and, where it was read, use
+it. A fault is anything but success and ``InputError``: another exception, a warning that numbers
+overflowed, a message that does not name the file, more than 10 s, more memory than 4 GiB, or a
+process that dies. For a part of the refused files the whole command is run: it must end with exit
+code 2, one line on standard error, and no result.
 """
 
 import argparse
@@ -47,7 +49,9 @@ class Tally:
     commands: int = 0  # whole commands that were run on refused inputs
     faults: list[str] = field(default_factory=list)
     slowest: float = 0.0  # s
-    messages: Counter[str] = field(default_factory=Counter)  # the refusals' last words, for how varied they are
+    messages: Counter[str] = field(
+        default_factory=Counter
+    )  # the refusals' last words, for how varied they are
 
     def add(self, other: "Tally") -> None:
         """Take in what became of other inputs."""
@@ -94,27 +98,41 @@ def spoiled(form: Form, number: int, seed: int) -> bytes:
 
 
 def attempt(form: Form, path: Path, longest: float = LONGEST) -> tuple[str, str]:
-    """Use a file for ``longest`` s at most; return ``read``, ``refused`` or ``fault``, and what was said."""
+    """Use a file for ``longest`` s at most; return ``read``, ``refused`` or ``fault``, and what was
+    said.
+    """
     try:
         with _limited(longest), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            warnings.filterwarnings("error", category=RuntimeWarning)  # numbers that overflow unseen
+            warnings.filterwarnings(
+                "error", category=RuntimeWarning
+            )  # numbers that overflow unseen
             form.use(path)
     except InputError as error:
         named = form.command == () or path.name in str(error) or path.stem in str(error)
-        return ("refused", str(error)) if named and str(error).strip() else ("fault", f"does not name the file: {error}")
+        return (
+            ("refused", str(error))
+            if named and str(error).strip()
+            else ("fault", f"does not name the file: {error}")
+        )
     except _TooLong:
         return "fault", f"more than {longest:g} s"
     except KeyboardInterrupt:
         raise
     except BaseException as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        return "fault", f"{type(error).__name__}: {str(error)[:120]} ({Path(where.filename).name}:{where.lineno})"
+        return (
+            "fault",
+            f"{type(error).__name__}: {str(error)[:120]} "
+            f"({Path(where.filename).name}:{where.lineno})",
+        )
     return "read", ""
 
 
 def run_command(form: Form, path: Path) -> str:
-    """Run the form's command on a file that is refused; return what is wrong with how it ends, or nothing."""
+    """Run the form's command on a file that is refused; return what is wrong with how it ends, or
+    nothing.
+    """
     from windwrench.cli import main
 
     before, argv, here = set(path.parent.iterdir()), sys.argv, Path.cwd()
@@ -148,7 +166,9 @@ def fuzz_chunk(name: str, first: int, count: int, seed: int) -> Tally:
     form, tally = forms()[name], Tally(name)
     with tempfile.TemporaryDirectory() as folder:
         # the first use of code is its slowest, and no fault of an input's
-        outcome, said = attempt(form, lay_out(form, form.good(), Path(folder) / "input"), longest=_COMPILING)
+        outcome, said = attempt(
+            form, lay_out(form, form.good(), Path(folder) / "input"), longest=_COMPILING
+        )
         if outcome != "read":
             tally.faults.append(f"{name}: the good example was not read: {said}")
         for number in range(first, first + count):
@@ -181,8 +201,13 @@ def _limited_chunk(name: str, first: int, count: int, seed: int) -> Tally:
     return fuzz_chunk(name, first, count, seed)
 
 
-def fuzz(inputs: int, seed: int, jobs: int | None = None, only: Sequence[str] = (),
-         advance: Callable[[int], None] = lambda count: None) -> list[Tally]:
+def fuzz(
+    inputs: int,
+    seed: int,
+    jobs: int | None = None,
+    only: Sequence[str] = (),
+    advance: Callable[[int], None] = lambda count: None,
+) -> list[Tally]:
     """Spoil ``inputs`` inputs, the same number of every form, and return what became of them.
 
     Args:
@@ -195,17 +220,24 @@ def fuzz(inputs: int, seed: int, jobs: int | None = None, only: Sequence[str] = 
     names = [name for name in forms() if not only or name in only]
     each = -(-inputs // len(names))
     tallies = {name: Tally(name) for name in names}
-    tasks = [(name, first, min(_CHUNK, each - first)) for name in names for first in range(0, each, _CHUNK)]
+    tasks = [
+        (name, first, min(_CHUNK, each - first))
+        for name in names
+        for first in range(0, each, _CHUNK)
+    ]
     while tasks:
         left: list[tuple[str, int, int]] = []
         with workers(min(jobs or os.cpu_count() or 1, len(tasks))) as pool:
             waiting: list[tuple[tuple[str, int, int], Future[Tally]]] = [
-                (task, pool.submit(_limited_chunk, *task, seed)) for task in tasks]
+                (task, pool.submit(_limited_chunk, *task, seed)) for task in tasks
+            ]
             for (name, first, count), future in waiting:
                 try:
                     tallies[name].add(future.result())
                     advance(count)
-                except BrokenProcessPool:  # an input killed its process; the others of that pool are innocent
+                except (
+                    BrokenProcessPool
+                ):  # an input killed its process; the others of that pool are innocent
                     left.append((name, first, count))
         if left and len(left) == len(tasks):
             name, first, count = left[0]
@@ -221,25 +253,34 @@ def fuzz(inputs: int, seed: int, jobs: int | None = None, only: Sequence[str] = 
 
 def table(tallies: Sequence[Tally]) -> str:
     """Return what became of the inputs as a Markdown table."""
-    lines = ["| form | inputs | read | refused | different refusals | commands run | faults | slowest |",
-             "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"]
+    lines = [
+        "| form | inputs | read | refused | different refusals | commands run | faults | slowest |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
     whole = Tally("all")
     for tally in tallies:
         whole.add(tally)
     for t in (*tallies, whole):
-        lines.append(f"| {t.form} | {t.inputs} | {t.read} | {t.refused} | {len(t.messages)} | {t.commands} | {len(t.faults)} | "
-                     f"{t.slowest:.1f} s |")
+        lines.append(
+            f"| {t.form} | {t.inputs} | {t.read} | {t.refused} | {len(t.messages)} | {t.commands} "
+            f"| {len(t.faults)} | "
+            f"{t.slowest:.1f} s |"
+        )
     return "\n".join(lines) + "\n"
 
 
 def main() -> int:
     """Run from a command line; the exit code is 1 where there was a fault."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0],
-                                     epilog="Example: python -m tests.fuzz --inputs 20000 --seed 0")
+    parser = argparse.ArgumentParser(
+        description=(__doc__ or "").partition("\n")[0],
+        epilog="Example: python -m tests.fuzz --inputs 20000 --seed 0",
+    )
     parser.add_argument("--inputs", type=int, default=20_000, help="in all (default: 20000)")
     parser.add_argument("--seed", type=int, default=0, help="of the spoiling (default: 0)")
     parser.add_argument("--jobs", type=int, help="processes (default: one a core)")
-    parser.add_argument("--only", action="append", default=[], help="name of a form; may be repeated")
+    parser.add_argument(
+        "--only", action="append", default=[], help="name of a form; may be repeated"
+    )
     parser.add_argument("--markdown", type=Path, help="also write the table to this file")
     given = parser.parse_args()
     done = 0

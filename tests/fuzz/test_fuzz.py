@@ -1,4 +1,6 @@
-"""Spoiled inputs: read, or refused with a message that names them; nothing runs, hangs, grows or is written."""
+"""Spoiled inputs: read, or refused with a message that names them; nothing runs, hangs, grows or is
+written.
+"""
 
 import gzip
 import pickle
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from tests.fuzz.forms import Form, forms, lay_out
 from tests.fuzz.mutations import LAUGHS, TOKENS
 from tests.fuzz.run import attempt, fuzz, fuzz_chunk, run_command, spoiled, table
+from tests.support.paths import ROOT
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names, parse_setting
@@ -29,16 +32,48 @@ FORMS = forms()
 INPUTS = 60  # of each form, here; the command spoils 20,000
 
 plain = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20) | st.dates() | st.binary(max_size=8),
-    lambda parts: st.lists(parts, max_size=4) | st.dictionaries(st.text(max_size=8) | st.integers(), parts, max_size=4),
-    max_leaves=12)
-FIELDS = ("name", "mass", "inertia", "arm_l", "k", "p", "spin", "rotor_positions", "com", "omega_lsb", "omega_max", "floor_z",
-          "ceiling_z", "mocap", "effects", "omega_source", "voltage_ref", "gravity", "rotor_radius", "thing")
-GOOD = yaml.safe_load((Path(__file__).parents[1] / "dynamics" / "vehicles" / "ardrone2.yaml").read_text())
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=20)
+    | st.dates()
+    | st.binary(max_size=8),
+    lambda parts: (
+        st.lists(parts, max_size=4)
+        | st.dictionaries(st.text(max_size=8) | st.integers(), parts, max_size=4)
+    ),
+    max_leaves=12,
+)
+FIELDS = (
+    "name",
+    "mass",
+    "inertia",
+    "arm_l",
+    "k",
+    "p",
+    "spin",
+    "rotor_positions",
+    "com",
+    "omega_lsb",
+    "omega_max",
+    "floor_z",
+    "ceiling_z",
+    "mocap",
+    "effects",
+    "omega_source",
+    "voltage_ref",
+    "gravity",
+    "rotor_radius",
+    "thing",
+)
+GOOD = yaml.safe_load((ROOT / "dynamics" / "vehicles" / "ardrone2.yaml").read_text())
 
 
 def taken_or_refused(words, call, *arguments):
-    """Return what a call makes of its input, or None where it refuses it in a message with these words."""
+    """Return what a call makes of its input, or None where it refuses it in a message with these
+    words.
+    """
     said = None
     try:
         return call(*arguments)
@@ -60,7 +95,10 @@ def test_spoiled_inputs_are_read_or_refused(name):
 @pytest.mark.parametrize("name", FORMS)
 def test_what_is_spoiled_was_good(name, tmp_path):
     form = FORMS[name]
-    assert attempt(form, lay_out(form, form.good(), tmp_path / "input"), longest=900.0) == ("read", "")
+    assert attempt(form, lay_out(form, form.good(), tmp_path / "input"), longest=900.0) == (
+        "read",
+        "",
+    )
     assert spoiled(form, 3, seed=5) == spoiled(form, 3, seed=5)
     assert len({spoiled(form, i, seed=5) for i in range(20)}) > 5
 
@@ -78,8 +116,10 @@ def test_the_fuzzer_sees_faults(tmp_path):
         raise InputError("something is wrong")
 
     form = Form("bad", "f.txt", lambda: b"", (), use, ("estimate",))
-    said = {how: attempt(form, lay_out(form, how.encode(), tmp_path / "input"), longest=0.2)
-            for how in ("trips", "hangs", "overflows", "silent")}
+    said = {
+        how: attempt(form, lay_out(form, how.encode(), tmp_path / "input"), longest=0.2)
+        for how in ("trips", "hangs", "overflows", "silent")
+    }
     assert [kind for kind, _ in said.values()] == ["fault"] * 4
     assert "ZeroDivisionError" in said["trips"][1]
     assert "more than 0.2 s" in said["hangs"][1]
@@ -93,12 +133,21 @@ def test_the_fuzzer_sees_faults(tmp_path):
 def test_the_outcome_does_not_depend_on_processes():
     one, two = (fuzz(30, 3, jobs, only=("effect settings", "names")) for jobs in (1, 2))
     for a, b in zip(one, two, strict=True):
-        assert (a.form, a.read, a.refused, a.faults, a.messages) == (b.form, b.read, b.refused, b.faults, b.messages)
+        assert (a.form, a.read, a.refused, a.faults, a.messages) == (
+            b.form,
+            b.read,
+            b.refused,
+            b.faults,
+            b.messages,
+        )
     assert "| all | 30 |" in table(one)
 
 
 @settings(deadline=None)
-@given(st.text(max_size=60) | st.builds(lambda n, t: f"{n}:{t}", st.sampled_from(names()), st.text(max_size=30)))
+@given(
+    st.text(max_size=60)
+    | st.builds(lambda n, t: f"{n}:{t}", st.sampled_from(names()), st.text(max_size=30))
+)
 def test_any_effect_setting_is_taken_or_refused(text):
     setting = taken_or_refused("", parse_setting, text)
     assert setting is None or setting.name in names()
@@ -129,10 +178,15 @@ def test_any_tuning_is_taken_or_refused(name, value):
 
 
 @settings(deadline=None)
-@given(st.lists(st.sampled_from([*TOKENS, "0.1", "1", "400"]), min_size=12, max_size=12), st.integers(0, 3))
+@given(
+    st.lists(st.sampled_from([*TOKENS, "0.1", "1", "400"]), min_size=12, max_size=12),
+    st.integers(0, 3),
+)
 def test_any_row_of_a_log_is_taken_or_refused(tmp_path_factory, fields, row):
-    lines = ["t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4",
-             *(f"0.0{i},0,0,1,1,0,0,0,400,400,400,400" for i in range(4))]
+    lines = [
+        "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4",
+        *(f"0.0{i},0,0,1,1,0,0,0,400,400,400,400" for i in range(4)),
+    ]
     lines[1 + row] = ",".join(fields)
     path = tmp_path_factory.mktemp("row") / "log.csv"
     path.write_bytes("\n".join(lines).encode("utf-8", "surrogatepass"))
@@ -143,14 +197,23 @@ def test_any_row_of_a_log_is_taken_or_refused(tmp_path_factory, fields, row):
 # what a stranger's file could do
 
 
-@pytest.mark.parametrize("tag", ["!!python/object/apply:os.system ['touch gone']",
-                                 "!!python/object/new:os.system ['touch gone']",
-                                 "!!python/name:os.system", "!!python/module:os", "!!python/object:builtins.object {}"])
+@pytest.mark.parametrize(
+    "tag",
+    [
+        "!!python/object/apply:os.system ['touch gone']",
+        "!!python/object/new:os.system ['touch gone']",
+        "!!python/name:os.system",
+        "!!python/module:os",
+        "!!python/object:builtins.object {}",
+    ],
+)
 def test_a_yaml_file_makes_no_objects(tmp_path, monkeypatch, tag):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "v.yaml"
     path.write_text(f"name: v\nmass: {tag}\n")
-    with pytest.raises(InputError, match=r"v\.yaml: not valid YAML: could not determine a constructor"):
+    with pytest.raises(
+        InputError, match=r"v\.yaml: not valid YAML: could not determine a constructor"
+    ):
         load_vehicle(path)
     (tmp_path / "flight.topics.yaml").write_text(f"pose: {tag}\n")
     (tmp_path / "flight.bag").write_bytes(b"#ROSBAG V2.0\n")
@@ -207,7 +270,12 @@ def test_weights_that_are_pickles_are_refused(tmp_path):
             return (Path.touch, (tmp_path / "gone",))
 
     with zipfile.ZipFile(path, "w") as archive:
-        header = b"\x93NUMPY\x01\x00v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(127) + b"\n"
+        header = (
+            b"\x93NUMPY\x01\x00v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(
+                127
+            )
+            + b"\n"
+        )
         archive.writestr("weight0.npy", header + pickle.dumps(Harm()))
     assert attempt(form, path)[0] == "refused"
     path.write_bytes(pickle.dumps(Harm()))
@@ -218,10 +286,17 @@ def test_weights_that_are_pickles_are_refused(tmp_path):
 
 
 def test_a_folder_in_a_files_place_is_refused(tmp_path):
-    for name, reader in (("a.csv", None), ("a.parquet", None), ("a.ulg", "px4_ulog"), ("a.yaml", None)):
+    for name, reader in (
+        ("a.csv", None),
+        ("a.parquet", None),
+        ("a.ulg", "px4_ulog"),
+        ("a.yaml", None),
+    ):
         (tmp_path / name).mkdir()
         with pytest.raises(InputError, match=name):
-            load_vehicle(tmp_path / name) if name.endswith("yaml") else read_log(tmp_path / name, reader)
+            load_vehicle(tmp_path / name) if name.endswith("yaml") else read_log(
+                tmp_path / name, reader
+            )
 
 
 def test_mutations_reach_everything():

@@ -7,13 +7,16 @@ from typing import Any
 _TYPES = {"uint64_t": "Q", "float": "f", "uint8_t": "B", "int32_t": "i", "bool": "?"}
 
 
-def ulog_bytes(topics: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, int | float] | None = None) -> bytes:
+def ulog_bytes(
+    topics: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, int | float] | None = None
+) -> bytes:
     """Return a ULog.
 
     Args:
-        topics: mapping from a topic's name (``name`` or ``name#instance``) to its fields ``{"type name": column}``;
-            a column (N,), or (N, K) for an array; ``timestamp`` comes first. Fields named ``item[0].field`` and so on,
-            one item after the other, become an array of a nested type.
+        topics: mapping from a topic's name (``name`` or ``name#instance``) to its fields
+            ``{"type name": column}``; a column (N,), or (N, K) for an array; ``timestamp`` comes
+            first. Fields named ``item[0].field`` and so on, one item after the other, become an
+            array of a nested type.
         parameters: mapping from a parameter's name to its value, int or float.
     """
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)]
@@ -30,8 +33,10 @@ def ulog_bytes(topics: Mapping[str, Mapping[str, Any]], parameters: Mapping[str,
     for number, fields in enumerate(topics.values()):
         codes = [_TYPES[key.split()[0]] for key in fields]
         for row in zip(*fields.values(), strict=True):
-            data = b"".join(struct.pack(f"<{len(_flat(value))}{code}", *_flat(value))
-                            for code, value in zip(codes, row, strict=True))
+            data = b"".join(
+                struct.pack(f"<{len(_flat(value))}{code}", *_flat(value))
+                for code, value in zip(codes, row, strict=True)
+            )
             out.append(_message("D", struct.pack("<H", number) + data))
     return b"".join(out)
 
@@ -47,10 +52,16 @@ def _formats(topic: str, fields: Mapping[str, Any]) -> list[bytes]:
     if not nested:
         return [_message("F", f"{topic}:{plain}".encode())]
     item = nested[0][1].partition("[")[0]
-    first = "".join(f"{kind} {name.partition('.')[2]};" for kind, name in nested if name.startswith(f"{item}[0]."))
+    first = "".join(
+        f"{kind} {name.partition('.')[2]};"
+        for kind, name in nested
+        if name.startswith(f"{item}[0].")
+    )
     count = len({name.partition(".")[0] for _, name in nested})
-    return [_message("F", f"{topic}:{plain}{item}_report[{count}] {item};".encode()),
-            _message("F", f"{item}_report:{first}".encode())]
+    return [
+        _message("F", f"{topic}:{plain}{item}_report[{count}] {item};".encode()),
+        _message("F", f"{item}_report:{first}".encode()),
+    ]
 
 
 def _declare(key: str, column: Any) -> str:
@@ -60,4 +71,8 @@ def _declare(key: str, column: Any) -> str:
 
 
 def _flat(value: Any) -> list[Any]:
-    return value.tolist() if getattr(value, "shape", ()) else [value.item() if hasattr(value, "item") else value]
+    return (
+        value.tolist()
+        if getattr(value, "shape", ())
+        else [value.item() if hasattr(value, "item") else value]
+    )

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from data_paths import data_file
 
+from tests.support.data_paths import data_file
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.envs.plant import TICK
@@ -27,7 +27,9 @@ from windwrench.studies.trials.practice_flights import fly_practice, practise
 
 
 @cache
-def fly(name: str = "", trajectory: str = "excite", seconds: float = 40.0, **coefficients: float) -> FlightLog:
+def fly(
+    name: str = "", trajectory: str = "excite", seconds: float = 40.0, **coefficients: float
+) -> FlightLog:
     effects = (EffectSetting(name, coefficients),) if name else ()
     return fly_practice(load_vehicle("ardrone2"), effects, trajectory, seconds, seed=3)
 
@@ -43,10 +45,13 @@ def test_nothing_is_named_where_nothing_was_added():
     assert found.remainder == "none"
 
 
-@pytest.mark.parametrize(("name", "trajectory", "coefficients", "ratio"), [
-    ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 0.9e-4}, 0.4),
-    ("mass", "excite", {"dm": 0.04}, 0.4),
-])
+@pytest.mark.parametrize(
+    ("name", "trajectory", "coefficients", "ratio"),
+    [
+        ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 0.9e-4}, 0.4),
+        ("mass", "excite", {"dm": 0.04}, 0.4),
+    ],
+)
 def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficients, ratio):
     found = diagnose([fly(name, trajectory, **coefficients)], load_vehicle("ardrone2"))
     assert named(found) == [name]
@@ -61,23 +66,40 @@ def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficient
     assert [e.name for e in found.amended.effects] == [name]
 
 
-@pytest.mark.parametrize(("name", "trajectory", "truth", "declared"), [
-    ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 0.6e-4, "kdy": 0.6e-4}),
-    ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 1.2e-4}),
-    ("com_offset", "shake", {"cx": 0.005, "cy": 0.004, "cz": 0.005}, {"cz": 0.005}),
-    ("latency", "excite", {"d": 0.03}, {"d": 0.01}),
-    ("wind", "excite", {"wx": 2.0, "wy": 1.0, "wz": 0.0, "cd": 0.04}, {"wx": 1.0, "wy": 1.0, "wz": 0.0, "cd": 0.04}),
-    ("slung_payload", "excite", {"m": 0.03, "l": 0.3, "damping": 1.0}, {"m": 0.02, "l": 0.3, "damping": 1.0}),
-    ("slung_payload", "excite", {"m": 0.03, "l": 0.3, "damping": 1.0}, {"l": 0.3}),
-])
-def test_an_effect_that_is_declared_wrongly_or_in_part_is_corrected(name, trajectory, truth, declared):
+@pytest.mark.parametrize(
+    ("name", "trajectory", "truth", "declared"),
+    [
+        ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 0.6e-4, "kdy": 0.6e-4}),
+        ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 1.2e-4}),
+        ("com_offset", "shake", {"cx": 0.005, "cy": 0.004, "cz": 0.005}, {"cz": 0.005}),
+        ("latency", "excite", {"d": 0.03}, {"d": 0.01}),
+        (
+            "wind",
+            "excite",
+            {"wx": 2.0, "wy": 1.0, "wz": 0.0, "cd": 0.04},
+            {"wx": 1.0, "wy": 1.0, "wz": 0.0, "cd": 0.04},
+        ),
+        (
+            "slung_payload",
+            "excite",
+            {"m": 0.03, "l": 0.3, "damping": 1.0},
+            {"m": 0.02, "l": 0.3, "damping": 1.0},
+        ),
+        ("slung_payload", "excite", {"m": 0.03, "l": 0.3, "damping": 1.0}, {"l": 0.3}),
+    ],
+)
+def test_an_effect_that_is_declared_wrongly_or_in_part_is_corrected(
+    name, trajectory, truth, declared
+):
     vehicle = load_vehicle("ardrone2").with_effects(EffectSetting(name, declared))
     found = diagnose([fly(name, trajectory, **truth)], vehicle)
     assert found.verdict == "explained"
     (effect,) = found.effects
     assert effect.name == name
     for key, value in truth.items():
-        assert effect.coefficients[key] == pytest.approx(value, rel=0.05, abs=0.0 if value else 0.01)
+        assert effect.coefficients[key] == pytest.approx(
+            value, rel=0.05, abs=0.0 if value else 0.01
+        )
     (amended,) = found.amended.effects
     assert {key: amended.coefficients[key] for key in effect.coefficients} == effect.coefficients
 
@@ -91,8 +113,12 @@ def test_what_is_declared_rightly_is_not_named():
 
 @pytest.mark.parametrize("seed", [2388482033, 153285395])
 def test_a_drag_along_one_axis_alone_is_no_sure_one(seed):
-    """A third of the rotors' inflow, which the library lacks, in twice the noise: a body's drag along z, and no other axis."""
-    flown = practise(load_vehicle("ardrone2"), "effect", ("inflow_thrust",), "small", "excite", seed, 60.0)
+    """A third of the rotors' inflow, which the library lacks, in twice the noise: a body's drag
+    along z, and no other axis.
+    """
+    flown = practise(
+        load_vehicle("ardrone2"), "effect", ("inflow_thrust",), "small", "excite", seed, 60.0
+    )
     found = diagnose([flown.log], flown.vehicle, without=["inflow_thrust"])
     assert "body_drag" in named(found)
     assert all(e.tentative for e in found.effects)
@@ -117,13 +143,20 @@ def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
     assert "mass" in (sure.name, *sure.indistinguishable_from)
 
 
-@pytest.mark.parametrize(("effect", "without", "seed", "word"), [
-    ("thrust_scale", ("thrust_scale", "rotor_efficiency"), 2380884864, "fit better"),
-    ("mass", ("mass",), 4024130846, "coincide"),
-])
+@pytest.mark.parametrize(
+    ("effect", "without", "seed", "word"),
+    [
+        ("thrust_scale", ("thrust_scale", "rotor_efficiency"), 2380884864, "fit better"),
+        ("mass", ("mass",), 4024130846, "coincide"),
+    ],
+)
 def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
-    """More thrust is less mass and less inertia: an inertia that is named coincides, and one that is not would fit better."""
-    flown = practise(load_vehicle("ardrone2"), "effect", (effect,), "typical", "vertical", seed, 60.0)
+    """More thrust is less mass and less inertia: an inertia that is named coincides, and one that
+    is not would fit better.
+    """
+    flown = practise(
+        load_vehicle("ardrone2"), "effect", (effect,), "typical", "vertical", seed, 60.0
+    )
     found = diagnose([flown.log], flown.vehicle, without=without)
     assert found.effects
     assert all(e.tentative for e in found.effects)
@@ -131,29 +164,41 @@ def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
 
 
 def test_what_takes_two_to_replace_it_gives_way():
-    """Heavier, with thrust that grows more steeply: on climbs one constant force does better than either of the two."""
+    """Heavier, with thrust that grows more steeply: on climbs one constant force does better than
+    either of the two.
+    """
     added = EffectSetting("mass", {"dm": 0.045}), EffectSetting("thrust_curvature", {"a": 0.1})
     log = fly_practice(load_vehicle("ardrone2"), added, "vertical", 40.0, 2, sensor=0.5)
     found = diagnose([log], load_vehicle("ardrone2"))
     assert found.candidates[0].name == "constant_force"
-    assert {e.name: e.tentative for e in found.effects} == {"mass": False, "thrust_curvature": False}
+    assert {e.name: e.tentative for e in found.effects} == {
+        "mass": False,
+        "thrust_curvature": False,
+    }
     for effect in added:
         (mine,) = (e for e in found.effects if e.name == effect.name)
         assert mine.coefficients == pytest.approx(dict(effect.coefficients), rel=0.05)
 
 
 def test_two_effects_are_found_behind_four_that_stand_for_them():
-    """A gain of the attitude and a battery's sag: innovations turn the sag down alone, and four others come in their place."""
+    """A gain of the attitude and a battery's sag: innovations turn the sag down alone, and four
+    others come in their place.
+    """
     flown = practise(load_vehicle("ardrone2"), "pair", (), "typical", None, 3127511905, 60.0)
     assert set(flown.truth) == {"attitude_gain", "battery_sag"}
     said: list[str] = []
     found = diagnose([flown.log], flown.vehicle, report=said.append)
     assert any(words.startswith("attitude_gain and battery_sag in place of") for words in said)
-    assert {e.name: e.tentative for e in found.effects} == {"attitude_gain": False, "battery_sag": False}
+    assert {e.name: e.tentative for e in found.effects} == {
+        "attitude_gain": False,
+        "battery_sag": False,
+    }
 
 
 def test_what_comes_and_goes_is_no_sure_mass():
-    """A battery's cell fails for seconds: what it costs has a mean, which a mass explains; no law scatters so."""
+    """A battery's cell fails for seconds: what it costs has a mean, which a mass explains; no law
+    scatters so.
+    """
     flown = practise_held_back(load_vehicle("ardrone2"), "failing_cell", "small", seed=202)
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.tentative for e in found.effects} == {"mass": True}
@@ -169,17 +214,24 @@ def test_what_is_on_a_soft_mount_is_no_sure_inertia():
 
 
 def test_an_inertia_that_only_innovations_show_is_not_passed_over():
-    """A third of such a camera, in calm air: the residual, which ends at 5 Hz, shows too little for a name."""
+    """A third of such a camera, in calm air: the residual, which ends at 5 Hz, shows too little for
+    a name.
+    """
     flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", 2585664215, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
-    assert found.structure[0].where in ("of inertia", "tau_y with what swings at 2.1 Hz")  # the second is at its threshold
+    assert found.structure[0].where in (
+        "of inertia",
+        "tau_y with what swings at 2.1 Hz",
+    )  # the second is at its threshold
     search = Search(Flights([flown.log], flown.vehicle), names())
     assert [sign.where for sign in overlooked(search, find(search)[0])] == ["of inertia"]
 
 
 def test_what_is_on_a_soft_mount_is_seen_to_swing():
-    """A third of such a camera in twice the noise: of an inertia little is left, but it swings at 2 Hz as the vehicle turns."""
+    """A third of such a camera in twice the noise: of an inertia little is left, but it swings at 2
+    Hz as the vehicle turns.
+    """
     flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", 977114585, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
@@ -188,7 +240,9 @@ def test_what_is_on_a_soft_mount_is_seen_to_swing():
 
 @pytest.mark.parametrize("seed", [914766417, 3979625931])
 def test_noise_that_takes_from_slow_turns_makes_no_inertia_tentative(seed):
-    """The attitude's noise is in what an inertia explains and in what is left: a mount would add to slow turns, not take."""
+    """The attitude's noise is in what an inertia explains and in what is left: a mount would add to
+    slow turns, not take.
+    """
     flown = practise(load_vehicle("ardrone2"), "pair", (), "typical", None, seed, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.tentative for e in found.effects} == dict.fromkeys(flown.truth, False)
@@ -196,9 +250,18 @@ def test_noise_that_takes_from_slow_turns_makes_no_inertia_tentative(seed):
 
 @pytest.mark.parametrize("friction", [True, False])
 def test_friction_on_a_circle_is_no_sure_drag(friction):
-    """At one speed friction is a drag; how the flight begins says that it is none, if little more."""
+    """At one speed friction is a drag; how the flight begins says that it is none,
+    if little more."""
     drag = () if friction else (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),)
-    log = fly_practice(load_vehicle("ardrone2"), drag, "circle", 60.0, 2, "dry_friction" if friction else None, sensor=0.5)
+    log = fly_practice(
+        load_vehicle("ardrone2"),
+        drag,
+        "circle",
+        60.0,
+        2,
+        "dry_friction" if friction else None,
+        sensor=0.5,
+    )
     found = diagnose([log], load_vehicle("ardrone2"))
     assert found.effects
     assert all(e.tentative for e in found.effects) == friction
@@ -206,16 +269,30 @@ def test_friction_on_a_circle_is_no_sure_drag(friction):
 
 @pytest.mark.parametrize("seed", [3326783031, 984713566])
 def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag(seed):
-    flown = practise(load_vehicle("ardrone2"), "outsider", ("dry_friction",), "small", None, seed, 60.0)
+    flown = practise(
+        load_vehicle("ardrone2"), "outsider", ("dry_friction",), "small", None, seed, 60.0
+    )
     found = diagnose([flown.log], flown.vehicle)
     assert [e.name for e in found.effects] == ["rotor_drag"]
     assert found.effects[0].tentative
-    assert [sign.where for sign in found.structure] == ["its force grows with another power of speed"]
+    assert [sign.where for sign in found.structure] == [
+        "its force grows with another power of speed"
+    ]
 
 
 def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
-    """A tenth of the thrust beyond a tenth more than at hover is lost, in few moments of this flight: too few for a law."""
-    flown = practise(load_vehicle("ardrone2"), "outsider", ("thrust_saturation",), "small", None, 2343211471, 60.0)
+    """A tenth of the thrust beyond a tenth more than at hover is lost, in few moments of this
+    flight: too few for a law.
+    """
+    flown = practise(
+        load_vehicle("ardrone2"),
+        "outsider",
+        ("thrust_saturation",),
+        "small",
+        None,
+        2343211471,
+        60.0,
+    )
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.tentative for e in found.effects} == {"thrust_curvature": True}
     assert found.structure[0].where == "what rotors deliver beyond 1.1 times the thrust of hover"
@@ -224,64 +301,107 @@ def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
 
 
 def test_a_rotor_that_stalls_is_not_passed_over_where_nothing_is_named():
-    """The same in fewer moments still: a law that acts in so few blocks is none of the dictionary's."""
-    flown = practise(load_vehicle("ardrone2"), "outsider", ("thrust_saturation",), "small", None, 2514248855, 60.0)
+    """The same in fewer moments still: a law that acts in so few blocks is none of the
+    dictionary's.
+    """
+    flown = practise(
+        load_vehicle("ardrone2"),
+        "outsider",
+        ("thrust_saturation",),
+        "small",
+        None,
+        2514248855,
+        60.0,
+    )
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
     assert "times the thrust of hover" in found.structure[0].where
 
 
 def test_a_load_that_the_library_lacks_is_seen_to_swing():
-    """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its swing."""
+    """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its
+    swing.
+    """
     log = fly("slung_payload", m=0.01, l=0.3, damping=1.0)
     found = diagnose([log], load_vehicle("ardrone2"), without=["slung_payload"])
     assert {e.name: e.tentative for e in found.effects} == {"mass": True}
-    assert any("what swings at 0." in sign.where or "what swings at 1 Hz" in sign.where for sign in found.structure)
+    assert any(
+        "what swings at 0." in sign.where or "what swings at 1 Hz" in sign.where
+        for sign in found.structure
+    )
 
 
-@pytest.mark.parametrize(("disturbance", "seed", "where"), [
-    ("thermal_column", 1782317122, "near x = "),
-    ("patchy_drag", 359922102, "a drag with world position x"),
-    ("patchy_drag", 2356848652, "a drag with place and heading together"),
-])
+@pytest.mark.parametrize(
+    ("disturbance", "seed", "where"),
+    [
+        ("thermal_column", 1782317122, "near x = "),
+        ("patchy_drag", 359922102, "a drag with world position x"),
+        ("patchy_drag", 2356848652, "a drag with place and heading together"),
+    ],
+)
 def test_what_acts_in_one_part_of_the_room_is_seen(disturbance, seed, where):
-    """Air that rises in one place, a drag in one half: in all of the flight they are worth too little for a name."""
-    flown = practise(load_vehicle("ardrone2"), "outsider", (disturbance,), "small", None, seed, 60.0)
+    """Air that rises in one place, a drag in one half: in all of the flight they are worth too
+    little for a name.
+    """
+    flown = practise(
+        load_vehicle("ardrone2"), "outsider", (disturbance,), "small", None, seed, 60.0
+    )
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
     assert any(where in sign.where for sign in found.structure)
 
 
 def test_names_are_sure_together_or_not_at_all():
-    """A hull's drag far above the centre of mass is two laws' in good part, and the third, for what they lack, is faint."""
+    """A hull's drag far above the centre of mass is two laws' in good part, and the third, for what
+    they lack, is faint.
+    """
     flown = practise_held_back(load_vehicle("ardrone2"), "high_hull", "small", 2838459735, 60.0)
     found = diagnose([flown.log], flown.vehicle)
-    assert {e.name: e.tentative for e in found.effects} == {"flapping_moment": True, "inflow_thrust": True, "rotor_drag": True}
+    assert {e.name: e.tentative for e in found.effects} == {
+        "flapping_moment": True,
+        "inflow_thrust": True,
+        "rotor_drag": True,
+    }
     assert found.remainder == "random"
 
 
 def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
-    """Markers off centre, on steady turns in twice the noise: too much is noise for a name, and a tilt explains less."""
+    """Markers off centre, on steady turns in twice the noise: too much is noise for a name, and a
+    tilt explains less.
+    """
     flown = practise(load_vehicle("ardrone2"), "pair", seed=508285241)
     assert {e.name for e in flown.effects} == {"marker_offset", "battery_sag"}
     assert "marker_offset" in Flights([flown.log], flown.vehicle).drowned
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.indistinguishable_from for e in found.effects} == {
-        "battery_sag": (), "thrust_axis_tilt": ("marker_offset",)}
+        "battery_sag": (),
+        "thrust_axis_tilt": ("marker_offset",),
+    }
     assert any("thrust_axis_tilt or marker_offset" in advice for advice in found.advice)
 
 
 def test_a_mass_beside_a_steady_force_is_no_load_that_swings():
-    """On a slow flight a mass and a force leave a thousandth of each other, which is still two hundred units."""
+    """On a slow flight a mass and a force leave a thousandth of each other, which is still two
+    hundred units.
+    """
     flown = practise(load_vehicle("ardrone2"), "pair", seed=4007009)
     assert {e.name for e in flown.effects} == {"constant_force", "mass"}
     assert set(named(diagnose([flown.log], flown.vehicle))) == {"constant_force", "mass"}
 
 
 def test_a_push_that_lies_in_the_noise_is_not_passed_over():
-    """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the floor, and yet not calm."""
+    """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the
+    floor, and yet not calm.
+    """
     vehicle = load_vehicle("ardrone2")
-    log = fly_practice(vehicle, seconds=40.0, seed=3, sensor=2.0, outsider="periodic_force", outsider_size=1.0 / 3.0)
+    log = fly_practice(
+        vehicle,
+        seconds=40.0,
+        seed=3,
+        sensor=2.0,
+        outsider="periodic_force",
+        outsider_size=1.0 / 3.0,
+    )
     found = diagnose([log], vehicle)
     assert found.after.force_rms < 1.2 * found.floor_force_rms
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())
@@ -291,9 +411,17 @@ def test_a_push_that_lies_in_the_noise_is_not_passed_over():
 
 
 def test_turn_rates_that_come_late_are_no_sign_of_structure():
-    """The pose's noise, moved in time with the pose, is in what a clock offset explains and in what it leaves."""
-    log = fly_practice(load_vehicle("ardrone2"), (EffectSetting("clock_offset", {"dt": -0.0306}),), seconds=40.0, seed=3,
-                       turbulence=0.0, sensor=2.0)
+    """The pose's noise, moved in time with the pose, is in what a clock offset explains and in what
+    it leaves.
+    """
+    log = fly_practice(
+        load_vehicle("ardrone2"),
+        (EffectSetting("clock_offset", {"dt": -0.0306}),),
+        seconds=40.0,
+        seed=3,
+        turbulence=0.0,
+        sensor=2.0,
+    )
     (found,) = diagnose([log], load_vehicle("ardrone2")).effects
     assert found.name == "clock_offset"
     assert not found.tentative
@@ -301,20 +429,36 @@ def test_turn_rates_that_come_late_are_no_sign_of_structure():
 
 
 def test_the_velocity_of_a_plant_that_holds_its_forces_is_half_a_tick_behind():
-    """Taken as in step, it would be a thrust that is off by 2e-3 of what acceleration asks for, and get a name."""
-    log = fly_practice(load_vehicle("ardrone2"), (EffectSetting("inflow_thrust", {"kz": 2.3e-4}),), seconds=40.0, seed=3,
-                       turbulence=0.0, sensor=0.5)
+    """Taken as in step, it would be a thrust that is off by 2e-3 of what acceleration asks for, and
+    get a name.
+    """
+    log = fly_practice(
+        load_vehicle("ardrone2"),
+        (EffectSetting("inflow_thrust", {"kz": 2.3e-4}),),
+        seconds=40.0,
+        seed=3,
+        turbulence=0.0,
+        sensor=0.5,
+    )
     fit, _ = find(Search(Flights([log], load_vehicle("ardrone2")), names()))
     assert fit.effects == ["inflow_thrust"]
     assert fit.setting["inflow_thrust"]["kz"] == pytest.approx(2.3e-4, rel=0.01)
-    assert fit.setting[""]["velocity_shift"] == pytest.approx(0.5 * TICK, abs=4.0 * fit.std["", "velocity_shift"])
+    assert fit.setting[""]["velocity_shift"] == pytest.approx(
+        0.5 * TICK, abs=4.0 * fit.std["", "velocity_shift"]
+    )
     assert fit.std["", "velocity_shift"] < 0.15 * TICK
 
 
 def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
-    """Four effects at once fill the model with two that stand for a third; what takes their place leaves room for the last."""
-    truth = {"rotor_drag": {"kdx": 1.19e-4, "kdy": 1.19e-4}, "translational_lift": {"kh": 3.39e-3},
-             "inflow_thrust": {"kz": 2.32e-4}, "body_drag": {"cx": 5e-3, "cy": 5e-3, "cz": 1e-2}}
+    """Four effects at once fill the model with two that stand for a third; what takes their place
+    leaves room for the last.
+    """
+    truth = {
+        "rotor_drag": {"kdx": 1.19e-4, "kdy": 1.19e-4},
+        "translational_lift": {"kh": 3.39e-3},
+        "inflow_thrust": {"kz": 2.32e-4},
+        "body_drag": {"cx": 5e-3, "cy": 5e-3, "cz": 1e-2},
+    }
     vehicle = load_vehicle("hummingbird")
     effects = tuple(EffectSetting(name, coefficients) for name, coefficients in truth.items())
     found = diagnose([fly_practice(vehicle, effects, "fast", 16.0, turbulence=0.0)], vehicle)
@@ -326,7 +470,9 @@ def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
 
 
 def test_no_flight_keeps_step_with_what_is_held_out():
-    """One block of each four, and not always the same one: of a flight that repeats itself all parts are held out in turn."""
+    """One block of each four, and not always the same one: of a flight that repeats itself all
+    parts are held out in turn.
+    """
     number = np.arange(400)
     held = number % 4 == held_out(number)
     assert np.all(held.reshape(-1, 4).sum(axis=1) == 1)
@@ -364,13 +510,17 @@ def test_sensor_noise_is_read_off_the_log():
 def test_whitened_noise_is_white():
     flights = Flights([fly()], load_vehicle("ardrone2"))
     remainder = flights.residual({})
-    white = Whitener(remainder, flights.sensor_noise, flights.start, flights.fit, flights.period)(remainder)[20:]
+    white = Whitener(remainder, flights.sensor_noise, flights.start, flights.fit, flights.period)(
+        remainder
+    )[20:]
     assert np.all(np.abs(white.std(axis=0) - 1.0) < 0.15)
     lag = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white * white, axis=0)
     assert np.all(np.abs(lag) < 0.2)
 
 
-@pytest.mark.parametrize("name", ["labelled_01", "labelled_02", "labelled_04", "labelled_06", "labelled_07"])
+@pytest.mark.parametrize(
+    "name", ["labelled_01", "labelled_02", "labelled_04", "labelled_06", "labelled_07"]
+)
 def test_flights_of_another_simulator(name):
     folder = data_file("flights")
     label = json.loads((folder / "labels.json").read_text())[f"{name}.csv.gz"]
@@ -390,7 +540,9 @@ def test_flights_of_another_simulator(name):
         force, torque, time = label["turbulence_N_Nm_s"]
         gusts = {"force": found.gusts[:3], "torque": found.gusts[3:5]}
         assert np.mean([g.rms for g in gusts["force"]]) == pytest.approx(force, rel=0.2)
-        assert np.mean([g.rms for g in gusts["torque"]]) == pytest.approx(torque, rel=0.4)  # rounding is in it
+        assert np.mean([g.rms for g in gusts["torque"]]) == pytest.approx(
+            torque, rel=0.4
+        )  # rounding is in it
         assert np.mean([g.time for g in gusts["force"]]) == pytest.approx(time, rel=0.3)
     for effect in found.effects:
         for key, value in effect.coefficients.items():

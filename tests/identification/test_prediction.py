@@ -25,8 +25,16 @@ SEGMENTS = [(3.0, 11.0), (15.0, 24.0)]
 
 def fly(*effects, trajectory="excite", seconds=25.0, settings=QUIET):
     c = record_flight(VEHICLE, effects, trajectory, seconds, 3, settings)
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), c["force"], c["torque"],
-                     name="flight")
+    return FlightLog(
+        c["t"],
+        c["position"],
+        c["quaternion"],
+        c["rotor_speeds"],
+        c.get("voltage"),
+        c["force"],
+        c["torque"],
+        name="flight",
+    )
 
 
 def typical(name):
@@ -37,8 +45,12 @@ def without_pose(log, rows):
     valid = log.valid.copy()
     valid[rows] = False
     lost = ~valid[:, None]
-    return replace(log, position=np.where(lost, np.nan, log.position), quaternion=np.where(lost, np.nan, log.quaternion),
-                   valid=valid)
+    return replace(
+        log,
+        position=np.where(lost, np.nan, log.position),
+        quaternion=np.where(lost, np.nan, log.quaternion),
+        valid=valid,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,21 +66,29 @@ def residual_rms(log):
     return np.sqrt(np.mean(np.concatenate(pieces) ** 2, axis=0))
 
 
-@pytest.mark.parametrize("effects", [
-    [EffectSetting("attitude_gain", {"g": 0.05})],
-    [EffectSetting("world_tilt", {"ax": 0.03, "ay": -0.03})],
-    [EffectSetting("marker_offset", {"mx": 0.02, "my": -0.02, "mz": 0.05})],
-    [EffectSetting("clock_offset", {"dt": 0.03})],
-    [EffectSetting("clock_offset", {"dt": -0.023})],
-    [EffectSetting("marker_offset", {"mz": 0.05}), EffectSetting("clock_offset", {"dt": -0.02}),
-     EffectSetting("world_tilt", {"ax": 0.03}), EffectSetting("attitude_gain", {"g": 0.05})],
-])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [EffectSetting("attitude_gain", {"g": 0.05})],
+        [EffectSetting("world_tilt", {"ax": 0.03, "ay": -0.03})],
+        [EffectSetting("marker_offset", {"mx": 0.02, "my": -0.02, "mz": 0.05})],
+        [EffectSetting("clock_offset", {"dt": 0.03})],
+        [EffectSetting("clock_offset", {"dt": -0.023})],
+        [
+            EffectSetting("marker_offset", {"mz": 0.05}),
+            EffectSetting("clock_offset", {"dt": -0.02}),
+            EffectSetting("world_tilt", {"ax": 0.03}),
+            EffectSetting("attitude_gain", {"g": 0.05}),
+        ],
+    ],
+)
 def test_a_log_without_its_sensing_effects_leaves_the_residual_of_a_clean_flight(clean, effects):
     floor, log = residual_rms(clean), fly(*effects)
     before = residual_rms(log) / floor
     after = residual_rms(undo_log_sensing(log, VEHICLE.with_effects(*effects))) / floor
     assert np.max(before) > 2.0
-    # a loop that sees late poses flies livelier than the clean flight, which leaves more behind at the plant's time step
+    # a loop that sees late poses flies livelier than the clean flight, which leaves more behind at
+    # the plant's time step
     assert np.max((np.square(after) - 1.0)[before > 1.5] / np.square(before[before > 1.5])) < 0.03
     assert np.max(after[before < 1.5]) < 1.2
 
@@ -89,7 +109,9 @@ def test_a_delayed_pose_is_not_made_up_after_a_gap():
 
 
 def test_turn_rates_ahead_of_the_pose_are_delayed(clean):
-    corrected = undo_log_sensing(clean, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": 0.03})))
+    corrected = undo_log_sensing(
+        clean, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": 0.03}))
+    )
     np.testing.assert_allclose(corrected.rotor_speeds[6:], clean.rotor_speeds[:-6], atol=1e-6)
     np.testing.assert_array_equal(corrected.position[6:], clean.position[6:])
 
@@ -97,7 +119,9 @@ def test_turn_rates_ahead_of_the_pose_are_delayed(clean):
 @pytest.mark.parametrize("dt", [0.03, -0.03])
 def test_the_voltage_of_a_log_with_a_clock_offset_is_that_of_the_flight_it_tells(clean, dt):
     log = replace(clean, voltage=11.0 + 0.1 * np.sin(3.0 * clean.t))
-    corrected = undo_log_sensing(log, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": dt})))
+    corrected = undo_log_sensing(
+        log, VEHICLE.with_effects(EffectSetting("clock_offset", {"dt": dt}))
+    )
     np.testing.assert_allclose(corrected.voltage[6:], log.voltage[:-6], atol=1e-9)
 
 
@@ -110,24 +134,29 @@ def test_a_lost_pose_stays_lost_without_sensing_effects_too():
     assert np.isfinite(corrected.quaternion[log.valid]).all()
 
 
-@pytest.mark.parametrize(("name", "trajectory", "ratio"), [
-    ("rotor_drag", "excite", 0.25),
-    ("mass", "gentle", 0.25),
-    ("inflow_thrust", "excite", 0.25),
-    ("ground_effect", "ground", 0.5),
-    ("motor_lag", "excite", 0.3),  # rotors with a memory
-    ("latency", "excite", 0.3),
-    ("slung_payload", "excite", 0.3),  # a wrench with a state of its own
-    ("com_offset", "excite", 0.1),  # the body
-    ("clock_offset", "excite", 0.3),  # the log
-    ("attitude_gain", "excite", 0.5),
-])
+@pytest.mark.parametrize(
+    ("name", "trajectory", "ratio"),
+    [
+        ("rotor_drag", "excite", 0.25),
+        ("mass", "gentle", 0.25),
+        ("inflow_thrust", "excite", 0.25),
+        ("ground_effect", "ground", 0.5),
+        ("motor_lag", "excite", 0.3),  # rotors with a memory
+        ("latency", "excite", 0.3),
+        ("slung_payload", "excite", 0.3),  # a wrench with a state of its own
+        ("com_offset", "excite", 0.1),  # the body
+        ("clock_offset", "excite", 0.3),  # the log
+        ("attitude_gain", "excite", 0.5),
+    ],
+)
 def test_the_missing_effect_brings_prediction_back_to_the_flight(name, trajectory, ratio):
     effect = typical(name)
     log = fly(effect, trajectory=trajectory, settings=None)
     whole = VEHICLE.with_effects(effect)
     assert rollout_error(log, whole, SEGMENTS) < ratio * rollout_error(log, VEHICLE, SEGMENTS)
-    assert nis_without_wrench_state(log, whole, SEGMENTS) < nis_without_wrench_state(log, VEHICLE, SEGMENTS)
+    assert nis_without_wrench_state(log, whole, SEGMENTS) < nis_without_wrench_state(
+        log, VEHICLE, SEGMENTS
+    )
 
 
 def test_time_runs_from_the_start_of_the_log():
@@ -137,7 +166,9 @@ def test_time_runs_from_the_start_of_the_log():
     after = [(15.0, 24.0)]
     whole = VEHICLE.with_effects(effect)
     assert rollout_error(log, whole, after) < 0.25 * rollout_error(log, VEHICLE, after)
-    assert nis_without_wrench_state(log, whole, after) < nis_without_wrench_state(log, VEHICLE, after)
+    assert nis_without_wrench_state(log, whole, after) < nis_without_wrench_state(
+        log, VEHICLE, after
+    )
 
 
 def test_a_whole_model_is_right_to_the_start(clean):
@@ -151,7 +182,9 @@ def test_a_missing_mass_falls_as_it_must():
     log = fly(EffectSetting("mass", {"dm": 0.04}), trajectory="hover")
     expected = 0.5 * VEHICLE.gravity * 0.04 / VEHICLE.mass
     assert rollout_error(log, VEHICLE, SEGMENTS) == pytest.approx(expected, rel=0.05)
-    assert rollout_error(log, VEHICLE, SEGMENTS, horizon=0.5) == pytest.approx(expected / 4, rel=0.1)
+    assert rollout_error(log, VEHICLE, SEGMENTS, horizon=0.5) == pytest.approx(
+        expected / 4, rel=0.1
+    )
 
 
 def test_a_slower_log_predicts_the_same():
@@ -159,13 +192,25 @@ def test_a_slower_log_predicts_the_same():
     log = fly(effect, trajectory="gentle")
     # a turn rate holds over the interval that ends at its sample: the mean of two at half the rate
     speeds = 0.5 * (log.rotor_speeds[1:] + log.rotor_speeds[:-1])
-    slow = FlightLog(log.t[2::2], log.position[2::2], log.quaternion[2::2], speeds[1::2], log.voltage[2::2], name="slow")
+    slow = FlightLog(
+        log.t[2::2],
+        log.position[2::2],
+        log.quaternion[2::2],
+        speeds[1::2],
+        log.voltage[2::2],
+        name="slow",
+    )
     for vehicle, tolerance in ((VEHICLE, 0.03), (VEHICLE.with_effects(effect), 0.5)):
-        assert rollout_error(slow, vehicle, SEGMENTS) == pytest.approx(rollout_error(log, vehicle, SEGMENTS), rel=tolerance)
+        assert rollout_error(slow, vehicle, SEGMENTS) == pytest.approx(
+            rollout_error(log, vehicle, SEGMENTS), rel=tolerance
+        )
 
 
 def test_only_whole_predictions_inside_a_segment_count(clean):
-    push = replace(clean, position=clean.position + np.where(clean.t > 20.0, 0.5, 0.0)[:, None] * [1.0, 0.0, 0.0])
+    push = replace(
+        clean,
+        position=clean.position + np.where(clean.t > 20.0, 0.5, 0.0)[:, None] * [1.0, 0.0, 0.0],
+    )
     before = rollout_error(clean, VEHICLE, [(4.0, 19.5)])
     assert rollout_error(push, VEHICLE, [(4.0, 19.5)]) == pytest.approx(before, rel=0.02)
     assert rollout_error(push, VEHICLE, [(19.2, 20.7)]) > 0.3
@@ -175,12 +220,16 @@ def test_only_whole_predictions_inside_a_segment_count(clean):
 
 def test_a_gap_is_left_out(clean):
     gap = without_pose(clean, slice(1000, 1600))
-    whole, broken = rollout_error(clean, VEHICLE, [(10.0, 22.0)]), rollout_error(gap, VEHICLE, [(3.0, 22.0)])
+    whole, broken = (
+        rollout_error(clean, VEHICLE, [(10.0, 22.0)]),
+        rollout_error(gap, VEHICLE, [(3.0, 22.0)]),
+    )
     assert broken < 1.5 * whole
     assert math.isnan(rollout_error(gap, VEHICLE, [(5.2, 7.8)]))
     assert math.isnan(nis_without_wrench_state(gap, VEHICLE, [(5.2, 7.8)]))
     assert nis_without_wrench_state(gap, VEHICLE, [(10.0, 22.0)]) == pytest.approx(
-        nis_without_wrench_state(clean, VEHICLE, [(10.0, 22.0)]), rel=0.02)
+        nis_without_wrench_state(clean, VEHICLE, [(10.0, 22.0)]), rel=0.02
+    )
 
 
 def test_a_log_without_a_pose_has_no_figures(clean):
@@ -196,7 +245,9 @@ def test_the_nis_is_that_of_the_filter_over_a_log_with_its_wrench_held():
     held = replace(usual, force_walk=1e-9, torque_walk=1e-9)
     series = estimate_log(log, VEHICLE, held)
     rows = (log.t >= 6.0) & (log.t <= 11.0)
-    assert nis_without_wrench_state(log, VEHICLE, [(6.0, 11.0)]) == pytest.approx(float(np.mean(series.nis[rows])), rel=0.01)
+    assert nis_without_wrench_state(log, VEHICLE, [(6.0, 11.0)]) == pytest.approx(
+        float(np.mean(series.nis[rows])), rel=0.01
+    )
 
 
 def test_the_wrench_filters_freedom_is_off():

@@ -3,10 +3,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from data_paths import NANOBENCH, data_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog
@@ -21,7 +21,22 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.report.wrench_picture import plot_wrench
 from windwrench.identification.wrench_series import estimate_log, truth_rmse, write_wrench
 
-HEADER = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "std_fx", "std_fy", "std_fz", "std_tx", "std_ty", "std_tz", "nis"]
+HEADER = [
+    "t",
+    "fx",
+    "fy",
+    "fz",
+    "tx",
+    "ty",
+    "tz",
+    "std_fx",
+    "std_fy",
+    "std_fz",
+    "std_tx",
+    "std_ty",
+    "std_tz",
+    "nis",
+]
 
 
 @pytest.fixture(scope="module")
@@ -40,15 +55,33 @@ def held_flight(vehicle, t, lift=0.3, lost=None, seed=0):
     valid = np.ones(count, dtype=bool)
     if lost is not None:
         valid[lost] = False
-    return FlightLog(t=t, position=np.where(valid[:, None], position, np.nan),
-                     quaternion=np.where(valid[:, None], quaternion, np.nan),
-                     rotor_speeds=np.full((count, 4), speed), valid=valid, name="held", source="held.csv",
-                     force=np.tile([0.0, 0.0, lift], (count, 1)), torque=np.zeros((count, 3)))
+    return FlightLog(
+        t=t,
+        position=np.where(valid[:, None], position, np.nan),
+        quaternion=np.where(valid[:, None], quaternion, np.nan),
+        rotor_speeds=np.full((count, 4), speed),
+        valid=valid,
+        name="held",
+        source="held.csv",
+        force=np.tile([0.0, 0.0, lift], (count, 1)),
+        torque=np.zeros((count, 3)),
+    )
 
 
 def finite(series):
-    return all(np.isfinite(getattr(series, name)).all() for name in (
-        "force", "torque", "std_force", "std_torque", "position", "quaternion", "velocity", "angular_velocity"))
+    return all(
+        np.isfinite(getattr(series, name)).all()
+        for name in (
+            "force",
+            "torque",
+            "std_force",
+            "std_torque",
+            "position",
+            "quaternion",
+            "velocity",
+            "angular_velocity",
+        )
+    )
 
 
 def test_a_constant_force_is_found(vehicle):
@@ -81,7 +114,9 @@ def test_uneven_times_and_lost_poses_give_a_finite_wrench(seed, jitter, share):
     lost[rng.integers(300)] = False
     series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
     assert finite(series)
-    np.testing.assert_array_equal(np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost)))
+    np.testing.assert_array_equal(
+        np.isfinite(series.nis), ~lost & (np.arange(300) > np.argmin(lost))
+    )
 
 
 def test_a_gap_widens_the_band_and_is_bridged(vehicle):
@@ -134,7 +169,9 @@ def test_wrench_csv(vehicle, tmp_path):
     values = np.array(rows[1:], dtype=float)
     np.testing.assert_array_equal(values[:, 0], log.t)
     np.testing.assert_array_equal(values[:, 1:7], np.column_stack([series.force, series.torque]))
-    np.testing.assert_array_equal(values[:, 7:13], np.column_stack([series.std_force, series.std_torque]))
+    np.testing.assert_array_equal(
+        values[:, 7:13], np.column_stack([series.std_force, series.std_torque])
+    )
     np.testing.assert_array_equal(values[:, 13], series.nis)
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
@@ -149,6 +186,7 @@ def test_the_picture_shows_truth_and_lost_poses(vehicle, tmp_path):
 
 
 # phases
+
 
 def hop(vehicle, top=1.0, rest=2.0, climb=1.0, stay=5.0, bounce=0.0):
     t = np.arange(0.0, 2 * rest + 2 * climb + stay, 0.01)
@@ -170,8 +208,13 @@ def test_phases_of_a_hop(vehicle, top, bounce):
 
 
 @settings(max_examples=50, deadline=None)
-@given(top=st.floats(0.0, 5.0), climb=st.floats(0.05, 10.0), stay=st.floats(0.05, 5.0), start=st.floats(0.0, 0.9),
-       end=st.floats(0.1, 1.0))
+@given(
+    top=st.floats(0.0, 5.0),
+    climb=st.floats(0.05, 10.0),
+    stay=st.floats(0.05, 5.0),
+    start=st.floats(0.0, 0.9),
+    end=st.floats(0.1, 1.0),
+)
 def test_phases_cover_the_log_in_order(top, climb, stay, start, end):
     vehicle = load_vehicle("crazyflie")
     t, height, speeds, _ = hop(vehicle, top=top, climb=climb, stay=stay)
@@ -193,6 +236,7 @@ def test_phases_without_a_flight(vehicle):
 
 # measured flights
 
+
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_flights(name, tmp_path):
     vehicle = load_vehicle("crazyflie")
@@ -202,9 +246,12 @@ def test_nanobench_flights(name, tmp_path):
     assert np.isfinite(series.nis[1:]).all()
     phases = flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle)
     assert [phase.name for phase in phases] == [GROUND, TAKE_OFF, FLIGHT, LANDING, GROUND]
-    for phase, (least, most) in zip(phases, [(2, 4), (1, 3), (29, 33), (1, 2.5), (3, 5)], strict=True):
+    for phase, (least, most) in zip(
+        phases, [(2, 4), (1, 3), (29, 33), (1, 2.5), (3, 5)], strict=True
+    ):
         assert least < phase.end - phase.start < most
-    # the floor carries the vehicle before and after; in the air a full battery would lift three quarters of it more
+    # the floor carries the vehicle before and after; in the air a full battery would lift three
+    # quarters of it more
     weight = vehicle.weight
     assert series.force[150, 2] == pytest.approx(weight, rel=0.01)
     assert series.force[-1, 2] == pytest.approx(weight, rel=0.02)
@@ -214,11 +261,15 @@ def test_nanobench_flights(name, tmp_path):
     assert np.abs(series.torque[flying]).max() < 0.2 * weight * vehicle.arm_l
     assert plot_wrench(series, log, tmp_path / "wrench.png").stat().st_size > 20_000
     # what a diagnosis of these flights finds, declared: next to nothing is left
-    known = vehicle.with_effects(EffectSetting("battery_sag", {"n": 1.5}), EffectSetting("thrust_scale", {"s": -0.28}))
+    known = vehicle.with_effects(
+        EffectSetting("battery_sag", {"n": 1.5}), EffectSetting("thrust_scale", {"s": -0.28})
+    )
     assert np.abs(estimate_log(log, known).force[flying, 2].mean()) < 0.05 * weight
 
 
-@pytest.mark.parametrize("name", [f"{kind}_{k:02d}" for kind in ("labelled", "unlabelled") for k in range(8)])
+@pytest.mark.parametrize(
+    "name", [f"{kind}_{k:02d}" for kind in ("labelled", "unlabelled") for k in range(8)]
+)
 def test_simulated_flights(name):
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
     log = read_log(data_file(f"flights/{name}.csv.gz"), vehicle=vehicle)

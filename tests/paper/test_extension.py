@@ -20,7 +20,10 @@ def test_an_imu_is_faster_at_the_same_spread(short):
     for what in ("vertical force", "lateral force", "torque"):
         rise = short.figures["rise_at_equal_spread"][what]["rise_s"]
         assert rise["pose, gyro, accelerometer"] < 0.7 * rise["pose"], what
-    assert short.figures["rise_at_equal_spread"]["torque"]["rise_s"]["position, gyro, accelerometer"] < 0.6
+    assert (
+        short.figures["rise_at_equal_spread"]["torque"]["rise_s"]["position, gyro, accelerometer"]
+        < 0.6
+    )
 
 
 def test_a_flight_with_vertical_acceleration_separates_mass_from_force(short):

@@ -20,9 +20,12 @@ def result():
 
 
 def test_the_mixture_finds_the_three_wrenches():
-    # one flight of 90 s a load: the actuator noise shifts its mean torque by 0.9 mNm in one standard deviation
+    # one flight of 90 s a load: the actuator noise shifts its mean torque by 0.9 mNm in one
+    # standard deviation
     estimates, added = fig3.fly_loads(load_vehicle("ardrone2"), (True, True, True), 1, 90.0)
-    for target, real, cluster in zip(fig3.TARGETS, added, fig3.fit_clusters(estimates), strict=True):
+    for target, real, cluster in zip(
+        fig3.TARGETS, added, fig3.fit_clusters(estimates), strict=True
+    ):
         off = np.abs(cluster.mean - target)
         assert np.all(off < cluster.std)
         assert np.all(off < [0.02, 0.003])
@@ -33,7 +36,9 @@ def test_the_mixture_finds_the_three_wrenches():
 
 def test_the_actuator_limits_the_spread(result):
     std = {row["source"]: row["std_Nm"] for row in result.figures["limits"]}
-    assert std["actuator noise alone"] > 3 * max(std["sensor noise alone"], std["8-bit turn rates alone"])
+    assert std["actuator noise alone"] > 3 * max(
+        std["sensor noise alone"], std["8-bit turn rates alone"]
+    )
     assert std["without actuator noise"] < 0.2 * std["everything"]
 
 

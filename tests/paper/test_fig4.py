@@ -46,7 +46,9 @@ def test_what_a_first_order_lag_shows_of_a_swing():
     shown = fig4.as_shown(time, step, np.sin(rate * since)[:, None])[:, 0]
     # of the lag's differential equation, from rest
     gain = 1.0 / (1.0 + (lag * rate) ** 2)
-    expected = gain * (np.sin(rate * since) - lag * rate * (np.cos(rate * since) - np.exp(-since / lag)))
+    expected = gain * (
+        np.sin(rate * since) - lag * rate * (np.cos(rate * since) - np.exp(-since / lag))
+    )
     np.testing.assert_allclose(shown, expected, atol=0.01)
     np.testing.assert_array_equal(shown[time < 7.0], 0.0)
 

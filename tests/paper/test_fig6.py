@@ -25,11 +25,15 @@ def test_estimate_and_truth_agree_where_the_jet_is(result):
 def test_the_torque_is_antisymmetric_with_its_largest_near_half_a_metre(result):
     assert result.figures["torque_z_antisymmetry"] > 0.95
     assert 0.35 <= result.figures["profile_torque_peak_offset_m"] <= 0.6
-    assert result.figures["profile_torque_peak_Nm"] == pytest.approx(result.figures["true_jet_torque_peak_Nm"], rel=0.2)
+    assert result.figures["profile_torque_peak_Nm"] == pytest.approx(
+        result.figures["true_jet_torque_peak_Nm"], rel=0.2
+    )
 
 
 def test_the_force_is_strong_on_the_axis_and_blows_away_from_the_fan(result):
-    assert result.figures["profile_force_x_on_axis_N"] == pytest.approx(result.figures["true_force_x_on_axis_N"], abs=0.03)
+    assert result.figures["profile_force_x_on_axis_N"] == pytest.approx(
+        result.figures["true_force_x_on_axis_N"], abs=0.03
+    )
     assert result.figures["profile_force_x_on_axis_N"] > 0.4
     assert result.figures["force_x_symmetry"] > 0.99
 

@@ -10,7 +10,13 @@ from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import fly_episode
 from windwrench.paper import fig7
 
-SHORT = {"GAINS": (12.0, 36.0), "SHOWN_GAINS": (18.0,), "RISE_TIMES": (0.45,), "FAN_SPEEDS": (0.2,), "HALVINGS": 3}
+SHORT = {
+    "GAINS": (12.0, 36.0),
+    "SHOWN_GAINS": (18.0,),
+    "RISE_TIMES": (0.45,),
+    "FAN_SPEEDS": (0.2,),
+    "HALVINGS": 3,
+}
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +81,9 @@ def test_calm_air_is_calm():
 def test_as_many_seeds_are_flown_as_it_takes(monkeypatch):
     def count(outcomes):
         flown = []
-        monkeypatch.setattr(fig7, "holds", lambda env, gain, path, seed: flown.append(seed) or outcomes[seed])
+        monkeypatch.setattr(
+            fig7, "holds", lambda env, gain, path, seed: flown.append(seed) or outcomes[seed]
+        )
         return fig7.enough_hold(None, 18.0, None, 10), flown
 
     assert count([True] * 10) == (True, list(range(8)))

@@ -1,4 +1,6 @@
-"""The runner of the paper's figures: whole files or none, the same bytes again, and a run that goes on where it stopped."""
+"""The runner of the paper's figures: whole files or none, the same bytes again, and a run that goes
+on where it stopped.
+"""
 
 import json
 
@@ -15,9 +17,14 @@ from windwrench.paper.result import Comparison, Result
 def small_result(value=1.0):
     figure = Figure()
     figure.subplots().plot([0, value])
-    return Result({"value": np.float64(value), "gone": float("nan")}, {"x": np.arange(3), "name": np.array(["a", "b", "c"])},
-                  figure, [Comparison("a value (m)", "about 1", f"{value:.2f}")], ["A remark."],
-                  timing=[Comparison("time (us)", "-", "5")])
+    return Result(
+        {"value": np.float64(value), "gone": float("nan")},
+        {"x": np.arange(3), "name": np.array(["a", "b", "c"])},
+        figure,
+        [Comparison("a value (m)", "about 1", f"{value:.2f}")],
+        ["A remark."],
+        timing=[Comparison("time (us)", "-", "5")],
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -34,7 +41,9 @@ def test_the_same_result_gives_the_same_bytes(tmp_path):
     names = sorted(p.name for p in (tmp_path / "one").iterdir())
     assert names == ["fig0.csv", "fig0.json", "fig0.png", "fig0.svg", "fig0.timing.json"]
     for name in names:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
+            name
+        )
     kept = json.loads((tmp_path / "one" / "fig0.json").read_text())
     assert kept["figures"] == {"value": 1.0, "gone": None}
     assert (tmp_path / "one" / "fig0.csv").read_text() == "x,name\n0,a\n1,b\n2,c\n"
@@ -57,7 +66,9 @@ def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
     assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
     (tmp_path / "fig6.png").unlink()
     shares = []
-    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1, report=lambda s: shares.append(s["fig6"])) == {"fig6": True}
+    assert reproduce(
+        ["fig6"], tmp_path, seeds=1, jobs=1, report=lambda s: shares.append(s["fig6"])
+    ) == {"fig6": True}
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == first
     assert shares[-1] == 1.0
     assert shares == sorted(shares)

@@ -1,8 +1,10 @@
-"""Every code block of README and documentation is run, page by page, from top to bottom, in an empty folder.
+"""Every code block of README and documentation is run, page by page, from top to bottom, in an
+empty folder.
 
-``sh`` blocks run in a shell, ``python`` blocks in one namespace a page; a block with a ``title`` is written to a file of that
-name. Under the comment ``<!-- dry run -->`` commands are run with ``--dry-run``: they would take minutes. ``pip`` and ``make``
-are not run; what they name must exist. Blocks of other languages are not code to run, except that YAML must be YAML.
+``sh`` blocks run in a shell, ``python`` blocks in one namespace a page; a block with a ``title`` is
+written to a file of that name. Under the comment ``<!-- dry run -->`` commands are run with
+``--dry-run``: they would take minutes. ``pip`` and ``make`` are not run; what they name must exist.
+Blocks of other languages are not code to run, except that YAML must be YAML.
 """
 
 import os
@@ -16,10 +18,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from data_paths import DATA
 from markdown_it import MarkdownIt
 
-ROOT = Path(__file__).parents[1]
+from tests.support.data_paths import DATA
+from tests.support.paths import ROOT
+
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
 NOT_CODE = {"", "text", "yaml"}
@@ -40,7 +43,9 @@ def blocks(page):
 
 
 def pages_with_code():
-    return [page for page in PAGES if any(language not in NOT_CODE for _, language, *_ in blocks(page))]
+    return [
+        page for page in PAGES if any(language not in NOT_CODE for _, language, *_ in blocks(page))
+    ]
 
 
 def commands(content):
@@ -55,7 +60,9 @@ def check_pip(words):
     extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     for word in words[2:]:
         for extra in re.findall(r"\[(.*?)\]", word):
-            assert all(re.search(rf"^{name} = \[", extras, re.M) for name in extra.split(",")), f"no extra {extra}"
+            assert all(re.search(rf"^{name} = \[", extras, re.M) for name in extra.split(",")), (
+                f"no extra {extra}"
+            )
 
 
 def run_shell(content, environment, dry, where):
@@ -63,15 +70,24 @@ def run_shell(content, environment, dry, where):
         if words[:2] == ["pip", "install"]:
             check_pip(words)
         elif words[0] == "make":
-            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M), f"no target {words[1]}"
+            assert re.search(
+                rf"^{words[1]}:", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M
+            ), f"no target {words[1]}"
         elif "--cluster" in words and find_spec("ray") is None:
             continue
         elif words[0] == "export":
             name, _, value = words[1].partition("=")
             environment[name] = value
         else:
-            done = subprocess.run([*words, *(["--dry-run"] if dry else [])], env=environment, capture_output=True, text=True)
-            assert done.returncode == 0, f"{where}: {shlex.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+            done = subprocess.run(
+                [*words, *(["--dry-run"] if dry else [])],
+                env=environment,
+                capture_output=True,
+                text=True,
+            )
+            assert done.returncode == 0, (
+                f"{where}: {shlex.join(words)}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+            )
 
 
 def prepare(page, folder):
@@ -79,20 +95,38 @@ def prepare(page, folder):
     if page.name == "diagnose.md":
         pytest.importorskip("pyulog")
         pytest.importorskip("rosbags")
-        from converted_flights import write_bag, write_ulog
-
+        from tests.support.converted_flights import write_bag, write_ulog
         from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log
 
-        app(["record", "--effect", "rotor_drag:kdx=1.2e-4,kdy=1.2e-4", "--seconds", "40", "--seed", "1", "--quiet",
-             "--out", str(folder / "given.csv")], standalone_mode=False)
+        app(
+            [
+                "record",
+                "--effect",
+                "rotor_drag:kdx=1.2e-4,kdy=1.2e-4",
+                "--seconds",
+                "40",
+                "--seed",
+                "1",
+                "--quiet",
+                "--out",
+                str(folder / "given.csv"),
+            ],
+            standalone_mode=False,
+        )
         log = read_log(folder / "given.csv")
         write_ulog(log, folder / "flight.ulg")
         write_bag(log, folder / "flight_bag")
-    for name in re.findall(r"results/[\w-]+/best", page.read_text(encoding="utf-8")) if page.name != "train.md" else ():
+    for name in (
+        re.findall(r"results/[\w-]+/best", page.read_text(encoding="utf-8"))
+        if page.name != "train.md"
+        else ()
+    ):
         for ending in (".npz", ".json"):  # what a dry run does not train
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / "training" / "policies" / f"sac-0{ending}", folder / f"{name}{ending}")
+            shutil.copy(
+                ROOT / "training" / "policies" / f"sac-0{ending}", folder / f"{name}{ending}"
+            )
     for name in re.findall(r"\bB\d\w+\.csv\b", page.read_text(encoding="utf-8")):
         found = next(iter(DATA.rglob(name)), None)
         if found is None:
@@ -105,7 +139,11 @@ def test_every_code_block_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     bin_folder = str(Path(sys.executable).parent)
-    environment = {**os.environ, "PATH": f"{bin_folder}{os.pathsep}{os.environ['PATH']}", "NO_COLOR": "1"}
+    environment = {
+        **os.environ,
+        "PATH": f"{bin_folder}{os.pathsep}{os.environ['PATH']}",
+        "NO_COLOR": "1",
+    }
     prepare(page, tmp_path)
     names = {"__name__": "__main__"}
     for line, language, title, dry, content in blocks(page):
@@ -125,11 +163,17 @@ def test_every_code_block_runs(page, tmp_path, monkeypatch):
 
 def test_the_reader_of_pages_reads_blocks(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text(f'```python title="a b.py"\nx\n```\n\n{DRY_RUN}\n```sh\nwindwrench fly \\\n  --seed 1 # why\n```\n\n'
-                    "```sh\nmake test\n```\n")
+    page.write_text(
+        f'```python title="a b.py"\nx\n```\n\n{DRY_RUN}\n```sh\nwindwrench fly \\\n  --seed 1 # '
+        f"why\n```\n\n"
+        "```sh\nmake test\n```\n"
+    )
     found = list(blocks(page))
     assert [(language, title, dry) for _, language, title, dry, _ in found] == [
-        ("python", "a b.py", False), ("sh", None, True), ("sh", None, False)]
+        ("python", "a b.py", False),
+        ("sh", None, True),
+        ("sh", None, False),
+    ]
     assert list(commands(found[1][-1])) == [["windwrench", "fly", "--seed", "1"]]
     with pytest.raises(AssertionError, match="no extra"):
         check_pip(["pip", "install", "windwrench[nothing]"])

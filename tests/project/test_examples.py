@@ -7,18 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.paths import ROOT
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics import effects as library
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 
-FOLDER = Path(__file__).parents[1] / "examples"
+FOLDER = ROOT / "examples"
 
 
 @pytest.fixture
 def example(monkeypatch, tmp_path):
-    """Return what imports a script; its folder is on the path, so that worker processes find it too."""
+    """Return what imports a script; its folder is on the path, so that worker processes find it
+    too.
+    """
     monkeypatch.syspath_prepend(FOLDER)
     monkeypatch.chdir(tmp_path)
     return importlib.import_module
@@ -41,7 +44,10 @@ def own_library(monkeypatch):
 
 def test_every_script_is_tested_and_in_the_table():
     scripts = {path.stem for path in FOLDER.glob("*.py")}
-    table, tests = (FOLDER / "README.md").read_text(encoding="utf-8"), Path(__file__).read_text(encoding="utf-8")
+    table, tests = (
+        (FOLDER / "README.md").read_text(encoding="utf-8"),
+        Path(__file__).read_text(encoding="utf-8"),
+    )
     assert [name for name in scripts if f"]({name}.py)" not in table] == []
     assert [name for name in scripts if f'example("{name}")' not in tests] == []
 
@@ -53,7 +59,10 @@ def test_a_controller_of_ones_own_follows_the_fan(example, capsys):
 
 
 def test_stable_baselines3_trains_on_the_plain_environment(example):
-    pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed: pip install 'windwrench[rl]'")
+    pytest.importorskip(
+        "stable_baselines3",
+        reason="stable-baselines3 is not installed: pip install 'windwrench[rl]'",
+    )
     found = example("sb3_ten_lines").main(steps=60, episodes=1)
     assert all(0.0 < reward <= 250.0 for reward in found.values())
     assert found["learned"] != found["hover"]
@@ -61,7 +70,9 @@ def test_stable_baselines3_trains_on_the_plain_environment(example):
 
 def test_rllib_does_an_iteration(example):
     pytest.importorskip("ray", reason="Ray is not installed: pip install 'windwrench[cluster]'")
-    pytest.importorskip("ray.rllib.algorithms.ppo", reason="RLlib lacks what it needs: pip install 'ray[rllib]'")
+    pytest.importorskip(
+        "ray.rllib.algorithms.ppo", reason="RLlib lacks what it needs: pip install 'ray[rllib]'"
+    )
     found = example("rllib").main(iterations=1, steps=260)
     assert found[0]["decisions"] == 260
     assert 0.0 < found[0]["return"] <= 250.0
@@ -72,7 +83,10 @@ def test_fans_on_paths_of_ones_own_are_followed_and_drawn(example, tmp_path):
     t = np.linspace(0.0, 20.0, 4001)
     assert np.abs(np.gradient(script.chirp(t), t)).max() < 0.4  # m/s, what the law can follow
     assert set(np.unique(script.steps(t))) == {0.0, 0.35}
-    followed, left_alone = script.main(tmp_path / "followed"), script.main(tmp_path / "hover", controller="hover")
+    followed, left_alone = (
+        script.main(tmp_path / "followed"),
+        script.main(tmp_path / "hover", controller="hover"),
+    )
     assert all(followed[name] < left_alone[name] for name in script.PATHS)
     assert (tmp_path / "followed" / "fan_path.png").read_bytes().startswith(b"\x89PNG")
 
@@ -93,18 +107,22 @@ def test_the_tether_pulls_to_its_hook_and_only_through_a_lever_turns(own_library
     double = np.ctypeslib.as_ctypes
     vehicle, state, wrench = np.zeros(base.VEHICLE_SIZE), np.zeros(base.STATE_SIZE), np.zeros(6)
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # yawed by 90 degrees
-    state[base.ROTATION:base.ROTATION + 9] = quarter.ravel()
-    state[base.POSITION:base.POSITION + 3] = position = np.array([1.0, -2.0, 1.5])
-    vehicle[base.COM:base.COM + 3] = com = np.array([0.01, 0.02, -0.03])
+    state[base.ROTATION : base.ROTATION + 9] = quarter.ravel()
+    state[base.POSITION : base.POSITION + 3] = position = np.array([1.0, -2.0, 1.5])
+    vehicle[base.COM : base.COM + 3] = com = np.array([0.01, 0.02, -0.03])
     law(double(np.array([0.1])), double(vehicle), double(state), double(wrench))
     force = 0.1 * (np.array([0.0, 0.0, 2.5]) - position)
     np.testing.assert_allclose(wrench[:3], force, rtol=1e-12)
-    np.testing.assert_allclose(wrench[3:], np.cross(-com, quarter.T @ force), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        wrench[3:], np.cross(-com, quarter.T @ force), rtol=1e-12, atol=1e-15
+    )
 
 
 def test_the_filter_finds_a_force_in_a_stream_with_late_and_lost_messages(example):
     script = example("filter_on_a_stream")
-    np.testing.assert_allclose(script.main(seconds=8.0, force=(-0.3, 0.25, 0.1), seed=3), [-0.3, 0.25, 0.1], atol=0.06)
+    np.testing.assert_allclose(
+        script.main(seconds=8.0, force=(-0.3, 0.25, 0.1), seed=3), [-0.3, 0.25, 0.1], atol=0.06
+    )
 
 
 def test_the_node_takes_in_a_late_pose_at_its_own_time_and_goes_on_without_any(example):
@@ -126,7 +144,11 @@ def test_the_node_takes_in_a_late_pose_at_its_own_time_and_goes_on_without_any(e
 def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_path):
     vehicle = load_vehicle("ardrone2")
     drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
-    for name, effects, seconds in (("plain", (), 16.0), ("drag", (drag,), 16.0), ("broken", (), 1.0)):
+    for name, effects, seconds in (
+        ("plain", (), 16.0),
+        ("drag", (drag,), 16.0),
+        ("broken", (), 1.0),
+    ):
         flown = record_flight(vehicle, effects, "excite", seconds, seed=2)
         log = FlightLog(flown["t"], flown["position"], flown["quaternion"], flown["rotor_speeds"])
         write_log(log, tmp_path / f"{name}.csv")
@@ -141,7 +163,9 @@ def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_pa
     assert rows["broken.csv"]["verdict"] == ""
     assert rows["drag.csv"]["effects"].startswith("rotor_drag: kdx = 0.00012")
     assert rows["drag.csv"]["error"] == ""
-    assert float(rows["drag.csv"]["force_after_N"]) < 0.9 * float(rows["drag.csv"]["force_before_N"])
+    assert float(rows["drag.csv"]["force_after_N"]) < 0.9 * float(
+        rows["drag.csv"]["force_before_N"]
+    )
     assert rows["plain.csv"]["verdict"] == "nothing to explain"
     with pytest.raises(InputError, match=r"holds no \.csv file"):
         script.main(tmp_path / "diagnoses" / "none")

@@ -1,11 +1,13 @@
-"""The house: a floor imports only from floors below it, and nothing goes round in a circle. Lazy imports count."""
+"""The house: a floor imports only from floors below it, and nothing goes round in a circle. Lazy
+imports count.
+"""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.support.paths import ROOT
+
 PACKAGE = "windwrench"
 
 # from the ground up; rooms of one floor do not know each other
@@ -20,7 +22,8 @@ FLOORS = (
     {"cli", "commands", "__main__"},
 )
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-# inside identification, from the ground up; what judges a log by the motion that it shows stands above that motion
+# inside identification, from the ground up; what judges a log by the motion that it shows stands
+# above that motion
 STOREYS = (
     {"logs"},
     {"motion"},
@@ -36,18 +39,25 @@ NOT_ROOMS = {"tests", "docs", "examples", "build", "results", "site"}
 
 
 def sources(root=ROOT):
-    """The package's files by the names of their modules: ``estimator.ukf``, and ``estimator`` for its ``__init__``."""
+    """The package's files by the names of their modules: ``estimator.ukf``, and ``estimator`` for
+    its ``__init__``.
+    """
     found = {}
     for path in sorted(root.rglob("*.py")):
         parts = path.relative_to(root).with_suffix("").parts
-        if parts[0] in NOT_ROOMS or any(part.startswith(".") for part in parts) or parts == ("__init__",):
+        if (
+            parts[0] in NOT_ROOMS
+            or any(part.startswith(".") for part in parts)
+            or parts == ("__init__",)
+        ):
             continue
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 
 
 def imports(module, path, modules):
-    """Yield ``(line number, imported module)`` for each import statement of a file, wherever in it it stands.
+    """Yield ``(line number, imported module)`` for each import statement of a file, wherever in it
+    it stands.
 
     Modules of the package are named as in ``sources``, all others by their own whole names.
     """
@@ -91,7 +101,9 @@ def line_of(modules, module, line):
 
 
 def upward(modules):
-    """The lines that import from a floor that does not lie below; the front doors, ``__main__``, are above all."""
+    """The lines that import from a floor that does not lie below; the front doors, ``__main__``,
+    are above all.
+    """
     return [
         line_of(modules, module, line)
         for module, line, other in edges(modules)
@@ -170,8 +182,13 @@ def test_who_knows_torch_and_mujoco(modules):
     for module, path in modules.items():
         for line, other in imports(module, path, modules):
             library = other.partition(".")[0]
-            below_training = FLOOR[room(module)] < FLOOR["training"] or room(module) in ("paper", "speed")
-            if (library in TORCH and below_training) or (library == "mujoco" and room(module) in MUJOCO_FREE):
+            below_training = FLOOR[room(module)] < FLOOR["training"] or room(module) in (
+                "paper",
+                "speed",
+            )
+            if (library in TORCH and below_training) or (
+                library == "mujoco" and room(module) in MUJOCO_FREE
+            ):
                 found.append(line_of(modules, module, line))
     assert not found, "\n".join(found)
 
@@ -189,10 +206,26 @@ def test_torch_is_imported_by_training_alone(modules):
 @pytest.mark.parametrize(
     ("file", "text", "seen"),
     [
-        ("estimator/ukf.py", "def f():\n    from ..envs import plant\n", "from ..envs import plant"),
-        ("identification/diagnosis.py", "import windwrench.envs.fan\n", "import windwrench.envs.fan"),
-        ("evaluation/benchmark.py", "from ..training.train import train\n", "from ..training.train import train"),
-        ("runtime/workers.py", "if TYPE_CHECKING:\n    from ..dynamics import vehicle\n", "from ..dynamics import vehicle"),
+        (
+            "estimator/ukf.py",
+            "def f():\n    from ..envs import plant\n",
+            "from ..envs import plant",
+        ),
+        (
+            "identification/diagnosis.py",
+            "import windwrench.envs.fan\n",
+            "import windwrench.envs.fan",
+        ),
+        (
+            "evaluation/benchmark.py",
+            "from ..training.train import train\n",
+            "from ..training.train import train",
+        ),
+        (
+            "runtime/workers.py",
+            "if TYPE_CHECKING:\n    from ..dynamics import vehicle\n",
+            "from ..dynamics import vehicle",
+        ),
     ],
 )
 def test_a_forbidden_import_is_seen_and_its_line_told(tmp_path, file, text, seen):

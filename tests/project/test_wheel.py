@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.paths import ROOT
 from windwrench.cli import app
 
-ROOT = Path(__file__).parents[1]
 CHECKOUT_ONLY = ("studies", "tests")
 MOST_BYTES = 1_500_000  # of the wheel
 
@@ -22,16 +22,38 @@ def wheel(tmp_path_factory):
     """The wheel, built from a copy of the checkout."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
-    # built from a copy: a build folder in the checkout must not leak into the wheel, nor be left behind
-    names = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True)
-    files = names.stdout.splitlines() if names.returncode == 0 else [
-        str(p.relative_to(ROOT)) for p in ROOT.rglob("*") if p.is_file() and ".venv" not in p.parts[len(ROOT.parts)]]
+    # built from a copy: a build folder in the checkout must not leak into the wheel, nor be left
+    # behind
+    names = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True
+    )
+    files = (
+        names.stdout.splitlines()
+        if names.returncode == 0
+        else [
+            str(p.relative_to(ROOT))
+            for p in ROOT.rglob("*")
+            if p.is_file() and ".venv" not in p.parts[len(ROOT.parts)]
+        ]
+    )
     for name in files:
         if (ROOT / name).is_file():
             (source / name).parent.mkdir(parents=True, exist_ok=True)
             (source / name).write_bytes((ROOT / name).read_bytes())
-    built = subprocess.run([sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(source)],
-                           capture_output=True, text=True)
+    built = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "build",
+            "--wheel",
+            "--no-isolation",
+            "--outdir",
+            str(folder),
+            str(source),
+        ],
+        capture_output=True,
+        text=True,
+    )
     assert built.returncode == 0, built.stdout + built.stderr
     (path,) = folder.glob("*.whl")
     return path
@@ -39,17 +61,41 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def empty(wheel, tmp_path_factory):
-    """The programs' folder of an environment that holds the wheel alone; dependencies are those of the running one."""
+    """The programs' folder of an environment that holds the wheel alone; dependencies are those of
+    the running one.
+    """
     folder = tmp_path_factory.mktemp("environment")
     venv.create(folder, with_pip=False, symlinks=os.name != "nt")
     programs = folder / ("Scripts" if os.name == "nt" else "bin")
-    done = subprocess.run([sys.executable, "-m", "pip", "--python", str(programs / "python"), "install", "--no-deps", "--quiet",
-                           "--disable-pip-version-check", "--no-index", str(wheel)], capture_output=True, text=True)
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pip",
+            "--python",
+            str(programs / "python"),
+            "install",
+            "--no-deps",
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-index",
+            str(wheel),
+        ],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
-    site = subprocess.run([programs / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
-                          capture_output=True, text=True, check=True).stdout.strip()
-    # a line of a .pth file is a folder whose own .pth files, an editable install's among them, do not count
-    (Path(site) / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    site = subprocess.run(
+        [programs / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    # a line of a .pth file is a folder whose own .pth files, an editable install's among them, do
+    # not count
+    (Path(site) / "dependencies.pth").write_text(
+        sysconfig.get_path("purelib") + "\n", encoding="utf-8"
+    )
     return programs
 
 
@@ -60,26 +106,50 @@ def installed(empty):
 
 
 def run(installed, code, folder):
-    return subprocess.run([sys.executable, "-c", f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"],
-                          cwd=folder, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
 
 
 def call(empty, folder, *arguments):
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    return subprocess.run([empty / "windwrench", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
+    return subprocess.run(
+        [empty / "windwrench", *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
     package = installed / "windwrench"
-    for name in ("py.typed", "cli.py", "envs/quadrotor.xml", "dynamics/vehicles/ardrone2.yaml",
-                 "dynamics/effects/rotor_drag.py", "identification/logs/readers/nanobench.py"):
+    for name in (
+        "py.typed",
+        "cli.py",
+        "envs/quadrotor.xml",
+        "dynamics/vehicles/ardrone2.yaml",
+        "dynamics/effects/rotor_drag.py",
+        "identification/logs/readers/nanobench.py",
+    ):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()
-    rooms = [path.name for path in ROOT.iterdir() if (path / "__init__.py").is_file() and path.name not in CHECKOUT_ONLY]
+    rooms = [
+        path.name
+        for path in ROOT.iterdir()
+        if (path / "__init__.py").is_file() and path.name not in CHECKOUT_ONLY
+    ]
     sources = {str(p.relative_to(ROOT)) for room in rooms for p in (ROOT / room).rglob("*.py")}
     wrapped = {str(p.relative_to(package)) for p in package.rglob("*.py")}
     assert sources <= wrapped
-    assert not [name for name in wrapped if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name]
+    assert not [
+        name
+        for name in wrapped
+        if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name
+    ]
     entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
     assert "windwrench = windwrench.cli:main" in entry.read_text()
 
@@ -99,10 +169,14 @@ def test_a_study_says_where_it_runs(empty, tmp_path):
 
 
 def test_it_runs_from_any_folder(installed, tmp_path):
-    out = run(installed, "import gymnasium, windwrench, pathlib\n"
-              f"assert pathlib.Path(windwrench.__file__).is_relative_to({str(installed)!r})\n"
-              "env = gymnasium.make('windwrench:windwrench/FanTracking-v0')\n"
-              "env.reset(seed=0); print(env.step([0.1])[1])", tmp_path)
+    out = run(
+        installed,
+        "import gymnasium, windwrench, pathlib\n"
+        f"assert pathlib.Path(windwrench.__file__).is_relative_to({str(installed)!r})\n"
+        "env = gymnasium.make('windwrench:windwrench/FanTracking-v0')\n"
+        "env.reset(seed=0); print(env.step([0.1])[1])",
+        tmp_path,
+    )
     assert out.returncode == 0, out.stderr
     assert float(out.stdout) > 0
 
@@ -116,7 +190,19 @@ def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
 
 
 def test_the_demo_runs_where_there_is_no_checkout(empty, tmp_path):
-    done = call(empty, tmp_path, "benchmark", "--episodes", "1", "--scenarios", "static", "--jobs", "1", "--out", "demo")
+    done = call(
+        empty,
+        tmp_path,
+        "benchmark",
+        "--episodes",
+        "1",
+        "--scenarios",
+        "static",
+        "--jobs",
+        "1",
+        "--out",
+        "demo",
+    )
     assert done.returncode == 0, done.stderr
     assert len(json.loads((tmp_path / "demo" / "leaderboard.json").read_text())) == 4
     done = call(empty, tmp_path, "fly", "--scenario", "static", "--out", "demo", "--json")
@@ -128,6 +214,10 @@ def test_the_demo_runs_where_there_is_no_checkout(empty, tmp_path):
 
 
 def test_importing_the_package_is_light(installed, tmp_path):
-    out = run(installed, "import windwrench\nprint(any(m in sys.modules for m in ('mujoco', 'torch', 'numba', 'scipy')))",
-              tmp_path)
+    out = run(
+        installed,
+        "import windwrench\nprint(any(m in sys.modules for m in ('mujoco', 'torch', 'numba', "
+        "'scipy')))",
+        tmp_path,
+    )
     assert out.stdout.strip() == "False", out.stderr

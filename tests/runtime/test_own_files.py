@@ -1,4 +1,6 @@
-"""Controllers and effects in files of a user's own: found, used by commands and their workers, and refused in clear words."""
+"""Controllers and effects in files of a user's own: found, used by commands and their workers, and
+refused in clear words.
+"""
 
 import json
 import os
@@ -12,7 +14,7 @@ from windwrench.controllers.own_file import is_file_name, load_controller
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
 from windwrench.evaluation.benchmark import make_pilot
-from windwrench.identification.report.files.words import effect_summary
+from windwrench.identification.report.words import effect_summary
 
 LAWS = """
 import numpy as np
@@ -68,29 +70,54 @@ def test_a_class_of_a_file_is_a_controller(laws):
 
 
 def test_a_subclass_is_one_too(laws):
-    laws.write_text("from windwrench.controllers import Admittance\n\nclass Stiff(Admittance):\n    def __init__(self):\n"
-                    "        super().__init__(40.0)\n")
+    laws.write_text(
+        "from windwrench.controllers import Admittance\n\nclass Stiff(Admittance):\n    def "
+        "__init__(self):\n"
+        "        super().__init__(40.0)\n"
+    )
     assert make_pilot(str(laws)).gain == 40.0
 
 
 def test_workers_fly_it(laws, tmp_path):
-    app(["benchmark", "--controllers", f"{laws}:Left", "--scenarios", "static", "--episodes", "6", "--jobs", "2", "--quiet",
-         "--out", str(tmp_path / "out")], standalone_mode=False)
+    app(
+        [
+            "benchmark",
+            "--controllers",
+            f"{laws}:Left",
+            "--scenarios",
+            "static",
+            "--episodes",
+            "6",
+            "--jobs",
+            "2",
+            "--quiet",
+            "--out",
+            str(tmp_path / "out"),
+        ],
+        standalone_mode=False,
+    )
     rows = json.loads((tmp_path / "out" / "leaderboard.json").read_text())
     (row,) = rows
     assert row["controller"] == f"{laws}:Left"
     assert row["lost_fraction"] == 1.0  # it flies off to the left
 
 
-@pytest.mark.parametrize(("text", "name", "words"), [
-    (None, "laws.py", "there is no such file; expected a Python file"),
-    ("x = (", "laws.py", "line 1: SyntaxError"),
-    ("import math\nmath.nothing", "laws.py", "line 2: AttributeError: .*nothing"),
-    ("x = 1", "laws.py", "holds no controller"),
-    (LAWS, "laws.py:Lef", "unknown controller 'Lef'.*Did you mean 'Left'"),
-    (LAWS + LAWS.replace("Left", "Right"), "laws.py", r"holds Left, Right; expected one of them"),
-    (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
-])
+@pytest.mark.parametrize(
+    ("text", "name", "words"),
+    [
+        (None, "laws.py", "there is no such file; expected a Python file"),
+        ("x = (", "laws.py", "line 1: SyntaxError"),
+        ("import math\nmath.nothing", "laws.py", "line 2: AttributeError: .*nothing"),
+        ("x = 1", "laws.py", "holds no controller"),
+        (LAWS, "laws.py:Lef", "unknown controller 'Lef'.*Did you mean 'Left'"),
+        (
+            LAWS + LAWS.replace("Left", "Right"),
+            "laws.py",
+            r"holds Left, Right; expected one of them",
+        ),
+        (LAWS.replace("speed=0.25", "speed"), "laws.py", "cannot be made without arguments"),
+    ],
+)
 def test_what_is_no_controller_is_named(text, name, words, tmp_path):
     if text is not None:
         (tmp_path / "laws.py").write_text(text)
@@ -113,11 +140,17 @@ def test_a_folder_s_files_join_the_library(folder):
     assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("x = 1", "expected EFFECT = Effect.name='own_spring'"),
-    (EFFECT.replace("NAME", "another"), "expected EFFECT = Effect.name='own_spring', ....*got 'another'"),
-    ("raise RuntimeError('no')", "line 1: RuntimeError: no"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1", "expected EFFECT = Effect.name='own_spring'"),
+        (
+            EFFECT.replace("NAME", "another"),
+            "expected EFFECT = Effect.name='own_spring', ....*got 'another'",
+        ),
+        ("raise RuntimeError('no')", "line 1: RuntimeError: no"),
+    ],
+)
 def test_what_is_no_effect_is_named(text, words, folder):
     (folder / "own_spring.py").write_text(text)
     effects.add_folder(folder)

@@ -10,7 +10,9 @@ from numba import njit
 
 from windwrench.runtime.vector_lanes import WIDTH, LaneRecord, all_of, any_of, choose
 
-SINGLE = np.dtype([("a", "f8"), ("b", "f8", (2,)), ("out", "f8", (12,)), ("gain", "f8"), ("count", "i8")])
+SINGLE = np.dtype(
+    [("a", "f8"), ("b", "f8", (2,)), ("out", "f8", (12,)), ("gain", "f8"), ("count", "i8")]
+)
 RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"))
 _at = RECORD.at
 
@@ -52,7 +54,10 @@ numbers = st.one_of(st.floats(-10, 10), st.sampled_from([0.0, -0.0, math.nan, ma
 
 
 @settings(max_examples=60, deadline=None)
-@given(a=st.lists(numbers, min_size=WIDTH, max_size=WIDTH), b=st.lists(numbers, min_size=WIDTH, max_size=WIDTH))
+@given(
+    a=st.lists(numbers, min_size=WIDTH, max_size=WIDTH),
+    b=st.lists(numbers, min_size=WIDTH, max_size=WIDTH),
+)
 def test_each_lane_is_a_single_number(a, b):
     lanes, singles = RECORD.zeros(1), np.zeros(WIDTH, SINGLE)
     for records in (lanes, singles):

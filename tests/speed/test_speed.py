@@ -18,8 +18,13 @@ from windwrench.speed.growth import over_formats, over_logs, over_steps, over_th
 
 def test_medians_and_ratios_are_taken_round_by_round(tmp_path):
     values = iter([1.0, 10.0, 2.0, 10.0, 3.0, 60.0])
-    figures = measure([Contender("one", "s", "x", lambda: next(values), reference=True),
-                       Contender("two", "s", "y", lambda: next(values))], rounds=3)
+    figures = measure(
+        [
+            Contender("one", "s", "x", lambda: next(values), reference=True),
+            Contender("two", "s", "y", lambda: next(values)),
+        ],
+        rounds=3,
+    )
     assert figures[0].value == (2.0, 1.0, 3.0)
     assert figures[1].value == (10.0, 10.0, 60.0)
     assert figures[1].ratio == (10.0, 5.0, 20.0)
@@ -31,13 +36,20 @@ def test_medians_and_ratios_are_taken_round_by_round(tmp_path):
 
 def test_every_contender_runs():
     # crazyflow compiles for half a minute
-    for figure in measure([*filters(), *(c for c in flights((2, 3)) if "crazyflow" not in c.name)], rounds=1):
+    for figure in measure(
+        [*filters(), *(c for c in flights((2, 3)) if "crazyflow" not in c.name)], rounds=1
+    ):
         assert figure.value[0] > 0, figure.contender.name
 
 
 def test_a_page_holds_the_sections(tmp_path):
     figures = measure([Contender("one", "s", "x", lambda: 1.0, reference=True)], rounds=1)
-    write_markdown(figures, 1, tmp_path / "speed.md", [Section("Growth", ["n", "us"], [["1", "2.5"]], "In words.")])
+    write_markdown(
+        figures,
+        1,
+        tmp_path / "speed.md",
+        [Section("Growth", ["n", "us"], [["1", "2.5"]], "In words.")],
+    )
     page = (tmp_path / "speed.md").read_text()
     assert "## Growth\n\n| n | us |\n| --- | --- |\n| 1 | 2.5 |\n\nIn words.\n" in page
 

@@ -55,7 +55,9 @@ def test_the_amended_model_comes_near_the_exact_one(short):
     for result in results:
         for key in ("force_error_N", "torque_error_Nm"):
             summary = result["summary"][key]
-            assert summary["amended"]["mean"] == pytest.approx(summary["exact"]["mean"], rel=0.03), (result["name"], key)
+            assert summary["amended"]["mean"] == pytest.approx(
+                summary["exact"]["mean"], rel=0.03
+            ), (result["name"], key)
 
 
 def test_what_is_finished_is_kept_and_what_was_asked_otherwise_is_not(short, monkeypatch):
@@ -81,7 +83,10 @@ def test_page_and_picture_hold_the_results(short, tmp_path):
     assert write_picture(results, tmp_path / "pictures").stat().st_size > 10_000
     write_page(results, tmp_path / "pictures", tmp_path / "page.md")
     page = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert "windwrench close-loop --effect mass:dm=0.06 --effect com_offset --episodes 2 --seed 0" in page
+    assert (
+        "windwrench close-loop --effect mass:dm=0.06 --effect com_offset --episodes 2 --seed 0"
+        in page
+    )
     assert "](pictures/close_loop.png)" in page
     for result in results:
         assert f"x{result['summary']['force_error_N']['ratio']:.3f}" in page
@@ -95,7 +100,9 @@ def test_conclusions_say_what_helps_and_what_does_not(short):
     assert "mass" in falls
     for result in results:
         summary = result["summary"]["force_error_N"]
-        assert (result["name"] in falls and "falls with" in falls) == (summary["verdict"] == "falls")
+        assert (result["name"] in falls and "falls with" in falls) == (
+            summary["verdict"] == "falls"
+        )
         assert (result["name"] in rest) == (summary["verdict"] != "falls")
 
 
@@ -117,14 +124,19 @@ def test_a_declared_effect_does_not_come_into_the_world_twice():
 
 def test_without_a_truth_the_true_vehicle_is_as_declared():
     vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
-    flown = [fly_episode(FanTrackingEnv("varied", vehicle=vehicle, truth=truth), Admittance(), 5) for truth in (None, vehicle)]
+    flown = [
+        fly_episode(FanTrackingEnv("varied", vehicle=vehicle, truth=truth), Admittance(), 5)
+        for truth in (None, vehicle)
+    ]
     assert np.array_equal(flown[0].observation, flown[1].observation)
     other = fly_episode(FanTrackingEnv("varied", vehicle=vehicle, truth=VEHICLE), Admittance(), 5)
     assert not np.array_equal(flown[0].observation, other.observation)
 
 
 def test_the_flight_loop_knows_a_declared_mass():
-    """At hover in still air it commands the thrust that the true weight needs, and the height does not sag."""
+    """At hover in still air it commands the thrust that the true weight needs, and the height does
+    not sag.
+    """
     heights = []
     for model in (VEHICLE, VEHICLE.with_effects(HEAVY)):
         env = FanTrackingEnv("static", vehicle=model, truth=VEHICLE, effects=(HEAVY,))
@@ -144,21 +156,30 @@ def test_a_ratio_is_of_paired_episodes():
     assert low < before.mean() < high
 
 
-@pytest.mark.parametrize(("interval", "word"), [
-    ((0.5, 0.98), "falls"), ((0.5, 0.995), "unchanged"), ((0.9, 1.1), "unchanged"), ((1.005, 1.2), "unchanged"),
-    ((1.02, 1.2), "rises"),
-])
+@pytest.mark.parametrize(
+    ("interval", "word"),
+    [
+        ((0.5, 0.98), "falls"),
+        ((0.5, 0.995), "unchanged"),
+        ((0.9, 1.1), "unchanged"),
+        ((1.005, 1.2), "unchanged"),
+        ((1.02, 1.2), "rises"),
+    ],
+)
 def test_a_change_counts_beyond_a_margin(interval, word):
     assert verdict(interval) == word
 
 
-@pytest.mark.parametrize(("requests", "message"), [
-    ([request("mass"), request("mass:dm=0.04")], "given twice"),
-    ([request("mass", episodes=0)], "--episodes must be at least 1"),
-    ([Request(HEAVY, VEHICLE, 1, -1)], "--seed must lie"),
-    ([Request(HEAVY, VEHICLE.with_effects(HEAVY), 1, 0)], "declares it already"),
-    ([request("ceiling_effect")], "expected ceiling_z"),
-])
+@pytest.mark.parametrize(
+    ("requests", "message"),
+    [
+        ([request("mass"), request("mass:dm=0.04")], "given twice"),
+        ([request("mass", episodes=0)], "--episodes must be at least 1"),
+        ([Request(HEAVY, VEHICLE, 1, -1)], "--seed must lie"),
+        ([Request(HEAVY, VEHICLE.with_effects(HEAVY), 1, 0)], "declares it already"),
+        ([request("ceiling_effect")], "expected ceiling_z"),
+    ],
+)
 def test_bad_requests_are_named(requests, message):
     with pytest.raises(InputError, match=message):
         check_requests(requests)

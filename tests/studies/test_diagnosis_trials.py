@@ -1,4 +1,6 @@
-"""Trials of the diagnosis: what is flown, what an outcome is worth, and that a run goes on where it stopped."""
+"""Trials of the diagnosis: what is flown, what an outcome is worth, and that a run goes on where it
+stopped.
+"""
 
 import json
 from dataclasses import replace
@@ -35,25 +37,65 @@ SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, secon
 
 
 def name(effect, tentative=False, like=(), **coefficients):
-    return {"name": effect, "coefficients": coefficients, "std": {k: 0.01 * abs(v) for k, v in coefficients.items()},
-            "tentative": tentative, "indistinguishable_from": list(like), "evidence": {}}
+    return {
+        "name": effect,
+        "coefficients": coefficients,
+        "std": {k: 0.01 * abs(v) for k, v in coefficients.items()},
+        "tentative": tentative,
+        "indistinguishable_from": list(like),
+        "evidence": {},
+    }
 
 
 def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more):
-    verdict = ("explained" if remainder == "none" else "partly explained") if effects else (
-        "nothing to explain" if remainder == "none" else "unexplained")
-    return {"without": list(without), "verdict": verdict, "remainder": remainder, "effects": list(effects),
-            "before": {"force_rms": 0.2, "torque_rms": 2e-3, "rollout_1s_position_rms": 1.0},
-            "after": {"force_rms": 0.02 * after, "torque_rms": 1e-3, "rollout_1s_position_rms": rollout},
-            "floor": {"force_rms": 0.02, "torque_rms": 1e-3}, "structure": [], "notes": [], "seconds": 1.0, **more}
+    verdict = (
+        ("explained" if remainder == "none" else "partly explained")
+        if effects
+        else ("nothing to explain" if remainder == "none" else "unexplained")
+    )
+    return {
+        "without": list(without),
+        "verdict": verdict,
+        "remainder": remainder,
+        "effects": list(effects),
+        "before": {"force_rms": 0.2, "torque_rms": 2e-3, "rollout_1s_position_rms": 1.0},
+        "after": {
+            "force_rms": 0.02 * after,
+            "torque_rms": 1e-3,
+            "rollout_1s_position_rms": rollout,
+        },
+        "floor": {"force_rms": 0.02, "torque_rms": 1e-3},
+        "structure": [],
+        "notes": [],
+        "seconds": 1.0,
+        **more,
+    }
 
 
 def outcome(group, truth, *diagnoses, outsider=None, size="typical", vehicle="ardrone2"):
-    trial = {"group": group, "added": [outsider] if outsider else list(truth), "size": size, "vehicle": vehicle}
-    flown = {"trajectory": "excite", "turbulence": 1.0, "sensor": 1.0, "truth": truth, "outsider": outsider,
-             "rollout_of_truth": 0.28}
+    trial = {
+        "group": group,
+        "added": [outsider] if outsider else list(truth),
+        "size": size,
+        "vehicle": vehicle,
+    }
+    flown = {
+        "trajectory": "excite",
+        "turbulence": 1.0,
+        "sensor": 1.0,
+        "truth": truth,
+        "outsider": outsider,
+        "rollout_of_truth": 0.28,
+    }
     key = f"{group}/{outsider or '+'.join(truth)}/{size}/{vehicle}"
-    return {"key": key, "code": "x", "trial": trial, "flown": flown, "seconds": 1.0, "diagnoses": list(diagnoses)}
+    return {
+        "key": key,
+        "code": "x",
+        "trial": trial,
+        "flown": flown,
+        "seconds": 1.0,
+        "diagnoses": list(diagnoses),
+    }
 
 
 def outcomes_of(*diagnoses, truth, group="typical", outsider=None):
@@ -81,10 +123,12 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
             assert trial.libraries[-1] == (effect, *EQUIVALENTS.get(effect, ()))
     assert {t.added[0] for t in trials if t.group == "outsider"} == set(OUTSIDERS)
     assert {t.added[0] for t in trials if t.group == "held back"} == set(HELD_BACK)
-    assert len({t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}) == len(TRAJECTORIES)
+    assert len(
+        {t.trajectory for t in trials if t.group == "strong turbulence" and t.turbulence == 4.0}
+    ) == len(TRAJECTORIES)
     assert {t.key for t in plan(quick=True)} < set(by_key)
     twice = plan(2)
-    assert [t.key for t in plan(first=1)] == [t.key for t in twice[len(trials):]]
+    assert [t.key for t in plan(first=1)] == [t.key for t in twice[len(trials) :]]
     assert len({t.key for t in twice}) == len(twice) == 2 * len(trials)
     assert len({t.flight_seed for t in twice}) == len(twice)
     assert plan(groups=("pair", "hover")) == [t for t in trials if t.group in ("pair", "hover")]
@@ -98,28 +142,46 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
 
 def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell():
     assert outcomes_of(found(name("mass", dm=0.041)), truth=MASS) == [RIGHT]
-    assert outcomes_of(found(name("mass", tentative=True, dm=0.041)), truth=MASS) == [RIGHT_TENTATIVE]
+    assert outcomes_of(found(name("mass", tentative=True, dm=0.041)), truth=MASS) == [
+        RIGHT_TENTATIVE
+    ]
     assert outcomes_of(found(name("thrust_scale", like=["mass"], s=-0.08)), truth=MASS) == [RIGHT]
     assert outcomes_of(found(name("thrust_scale", s=-0.08)), truth=MASS) == [WRONG]
-    assert outcomes_of(found(name("thrust_scale", tentative=True, s=-0.08)), truth=MASS) == [TENTATIVE]
+    assert outcomes_of(found(name("thrust_scale", tentative=True, s=-0.08)), truth=MASS) == [
+        TENTATIVE
+    ]
     assert outcomes_of(found(name("mass", dm=0.04), name("wind", wx=1.0)), truth=MASS) == [WRONG]
-    assert outcomes_of(found(name("mass", dm=0.04), name("wind", tentative=True, wx=1.0)), truth=MASS) == [TENTATIVE]
+    assert outcomes_of(
+        found(name("mass", dm=0.04), name("wind", tentative=True, wx=1.0)), truth=MASS
+    ) == [TENTATIVE]
     assert outcomes_of(found(), truth=MASS) == [SILENT]
     assert outcomes_of(found(remainder="random"), truth=MASS) == [UNEXPLAINED]
-    assert outcomes_of({"without": [], "error": "ValueError: no", "seconds": 1.0}, truth=MASS) == [FAILED]
+    assert outcomes_of({"without": [], "error": "ValueError: no", "seconds": 1.0}, truth=MASS) == [
+        FAILED
+    ]
     # one name cannot stand for two effects
     assert match([name("motor_lag", like=["latency", "mass"])], list(PAIR)) is None
     assert match([name("mass"), name("motor_lag", like=["latency", "mass"])], list(PAIR)) == [
-        ("mass", "mass"), ("motor_lag", "latency")]
+        ("mass", "mass"),
+        ("motor_lag", "latency"),
+    ]
 
 
 def test_where_nothing_is_in_the_library_only_doubt_or_silence_is_good():
     assert outcomes_of(found(), truth={}, group="nothing") == [RIGHT]
-    assert outcomes_of(found(remainder="structured"), truth={}, group="nothing") == [RIGHT_TENTATIVE]
-    assert outcomes_of(found(name("wind", tentative=True)), truth={}, group="nothing") == [TENTATIVE]
+    assert outcomes_of(found(remainder="structured"), truth={}, group="nothing") == [
+        RIGHT_TENTATIVE
+    ]
+    assert outcomes_of(found(name("wind", tentative=True)), truth={}, group="nothing") == [
+        TENTATIVE
+    ]
     assert outcomes_of(found(name("wind")), truth={}, group="nothing") == [WRONG]
-    assert outcomes_of(found(name("wind")), truth={}, group="outsider", outsider="tether") == [WRONG]
-    assert outcomes_of(found(remainder="structured"), truth={}, group="outsider", outsider="tether") == [UNEXPLAINED]
+    assert outcomes_of(found(name("wind")), truth={}, group="outsider", outsider="tether") == [
+        WRONG
+    ]
+    assert outcomes_of(
+        found(remainder="structured"), truth={}, group="outsider", outsider="tether"
+    ) == [UNEXPLAINED]
 
 
 def test_coefficients_are_compared_where_the_truth_is_not_zero():
@@ -128,7 +190,13 @@ def test_coefficients_are_compared_where_the_truth_is_not_zero():
     assert {k: round(e, 6) for k, (e, _) in j.errors.items()} == {"wind.wx": 0.05, "wind.wy": 0.01}
     assert j.errors["wind.wx"][1] == pytest.approx(0.1 / 0.021)
     # a latency and a clock offset are the same number; a mass and a thrust scale are not
-    (j,) = judge(outcome("typical", {"latency": {"d": 0.03}}, found(name("clock_offset", like=["latency"], dt=0.033))))
+    (j,) = judge(
+        outcome(
+            "typical",
+            {"latency": {"d": 0.03}},
+            found(name("clock_offset", like=["latency"], dt=0.033)),
+        )
+    )
     assert j.errors["latency.d"][0] == pytest.approx(0.1)
     assert not j.exact
     (j,) = judge(outcome("typical", MASS, found(name("thrust_scale", like=["mass"], s=0.04))))
@@ -140,10 +208,20 @@ def test_the_rules_count_what_they_say():
         return outcome("typical", {effect: {"x": 1.0}}, *diagnoses)
 
     outcomes = [
-        typical("mass", found(name("mass", x=1.01), rollout=0.3), found(name("wind"), without=("mass",))),
-        typical("wind", found(name("wind", tentative=True, x=1.2)), found(remainder="structured", without=("wind",))),
-        typical("latency", found(), found(name("clock_offset"), without=("latency",)),
-                found(name("motor_lag", tentative=True), without=("latency", "clock_offset"))),
+        typical(
+            "mass", found(name("mass", x=1.01), rollout=0.3), found(name("wind"), without=("mass",))
+        ),
+        typical(
+            "wind",
+            found(name("wind", tentative=True, x=1.2)),
+            found(remainder="structured", without=("wind",)),
+        ),
+        typical(
+            "latency",
+            found(),
+            found(name("clock_offset"), without=("latency",)),
+            found(name("motor_lag", tentative=True), without=("latency", "clock_offset")),
+        ),
         outcome("held back", {}, found(name("wind")), outsider="soft_arm"),
         outcome("nothing", {}, found(remainder="random")),
         outcome("hover", MASS, found(name("thrust_scale", like=["mass"]))),
@@ -167,14 +245,18 @@ def test_the_rules_count_what_they_say():
     assert rule(judged, "3. outside the library, a third").met is None
     assert rule(judged, "4. hover: no name").met
     assert rule(judged, "6. one-second prediction error after over before, mass").measured == (
-        "0.30 at worst, 0 of 1 within; there the true model comes to 0.28")
+        "0.30 at worst, 0 of 1 within; there the true model comes to 0.28"
+    )
     assert rule(judged, "6. one-second prediction error after over before, rotor_drag").met is None
     assert rule(judged, "2. two effects").measured == "not flown"
     assert rule(judged, "6. residual").measured == "1.10 at worst"
 
 
 def test_gusts_are_compared_with_those_flown():
-    right, calm = outcome("nothing", {}, found(gusts=[0.012, 0.018, 0.03, 1.0, 1.0, 1.0])), outcome("nothing", {}, found())
+    right, calm = (
+        outcome("nothing", {}, found(gusts=[0.012, 0.018, 0.03, 1.0, 1.0, 1.0])),
+        outcome("nothing", {}, found()),
+    )
     right["flown"]["gusts"], calm["flown"]["gusts"] = 0.01, 0.0
     (windy,), (still,) = judge(right), judge(calm)
     assert windy.gusts == pytest.approx(2.0)
@@ -184,19 +266,39 @@ def test_gusts_are_compared_with_those_flown():
 
 
 def test_what_a_flight_cannot_tell_is_told_apart_from_what_the_diagnosis_overlooks():
-    cannot = outcome("typical", MASS, found(name("mass", like=["thrust_scale"], dm=0.04)),
-                     found(name("thrust_scale", like=["battery_sag"]), without=("mass",)))
-    could = outcome("typical", {"latency": {"d": 0.03}}, found(name("latency", d=0.03)),
-                    found(name("motor_lag"), without=("latency", "clock_offset")))
+    cannot = outcome(
+        "typical",
+        MASS,
+        found(name("mass", like=["thrust_scale"], dm=0.04)),
+        found(name("thrust_scale", like=["battery_sag"]), without=("mass",)),
+    )
+    could = outcome(
+        "typical",
+        {"latency": {"d": 0.03}},
+        found(name("latency", d=0.03)),
+        found(name("motor_lag"), without=("latency", "clock_offset")),
+    )
     judged = [j for o in (cannot, could) for j in judge(o)]
     assert rule(judged, "5. of those confidently wrong").measured == "50.0% (1 of 2)"
 
 
 def test_coefficients_of_rotorpy_are_held_to_the_bar():
-    truth = {"rotor_drag": {"kdx": 1e-4, "kdy": 1e-4}, "inflow_thrust": {"kz": 2e-4}, "translational_lift": {"kh": 3e-3},
-             "body_drag": {"cx": 5e-3}}
-    near = [name("rotor_drag", kdx=1.01e-4, kdy=0.98e-4), name("inflow_thrust", kz=2e-4), name("translational_lift", kh=3e-3)]
-    good = [j for o in (outcome("rotorpy", truth, found(*near)), outcome("rotorpy", {}, found())) for j in judge(o)]
+    truth = {
+        "rotor_drag": {"kdx": 1e-4, "kdy": 1e-4},
+        "inflow_thrust": {"kz": 2e-4},
+        "translational_lift": {"kh": 3e-3},
+        "body_drag": {"cx": 5e-3},
+    }
+    near = [
+        name("rotor_drag", kdx=1.01e-4, kdy=0.98e-4),
+        name("inflow_thrust", kz=2e-4),
+        name("translational_lift", kh=3e-3),
+    ]
+    good = [
+        j
+        for o in (outcome("rotorpy", truth, found(*near)), outcome("rotorpy", {}, found()))
+        for j in judge(o)
+    ]
     assert all(r.met for r in rules(good) if r.subject.startswith("7."))
     assert rule(good, "7. RotorPy, aerodynamics on: k_d").measured == "2.0% at worst"
     bad = judge(outcome("rotorpy", truth, found(*near[:2], name("wind"))))
@@ -205,13 +307,28 @@ def test_coefficients_of_rotorpy_are_held_to_the_bar():
 
 def test_the_page_lists_every_miss(tmp_path):
     outcomes = [
-        outcome("typical", MASS, found(name("mass", dm=0.05)), found(name("wind"), without=("mass",))),
+        outcome(
+            "typical", MASS, found(name("mass", dm=0.05)), found(name("wind"), without=("mass",))
+        ),
         outcome("third", MASS, found(), found(without=("mass",)), size="small"),
-        outcome("outsider", {}, found(name("wind", tentative=True), remainder="structured"), outsider="tether"),
+        outcome(
+            "outsider",
+            {},
+            found(name("wind", tentative=True), remainder="structured"),
+            outsider="tether",
+        ),
         outcome("nothing", {}, found()),
-        {"key": "pair/-/typical/-/ardrone2/0", "trial": {}, "code": "x", "error": "it crashed", "diagnoses": []},
+        {
+            "key": "pair/-/typical/-/ardrone2/0",
+            "trial": {},
+            "code": "x",
+            "error": "it crashed",
+            "diagnoses": [],
+        },
     ]
-    data, picture, page = write_results(outcomes, tmp_path, tmp_path / "docs" / "page.md", 1, quick=True)
+    data, picture, page = write_results(
+        outcomes, tmp_path, tmp_path / "docs" / "page.md", 1, quick=True
+    )
     text = page.read_text(encoding="utf-8")
     missed = text.split("## What was missed")[1]
     assert "mass.dm by 25.0%" in missed
@@ -230,7 +347,11 @@ def test_the_page_lists_every_miss(tmp_path):
 
 
 def timeless(outcome):
-    return {**outcome, "seconds": 0, "diagnoses": [{**d, "seconds": 0} for d in outcome["diagnoses"]]}
+    return {
+        **outcome,
+        "seconds": 0,
+        "diagnoses": [{**d, "seconds": 0} for d in outcome["diagnoses"]],
+    }
 
 
 def test_a_flight_is_diagnosed_and_not_again(tmp_path):
@@ -271,21 +392,52 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
 
     monkeypatch.setattr("windwrench.studies.trials.trials.plan", planned)
     page = tmp_path / "page.md"
-    monkeypatch.setattr("sys.argv", ["windwrench", "trials", "--seeds", "3", "--seed", "5", "--quick", "--group",
-                                     "outsider", "--jobs", "1", "--out", str(tmp_path / "out"), "--markdown", str(page)])
+    monkeypatch.setattr(
+        "sys.argv",
+        [
+            "windwrench",
+            "trials",
+            "--seeds",
+            "3",
+            "--seed",
+            "5",
+            "--quick",
+            "--group",
+            "outsider",
+            "--jobs",
+            "1",
+            "--out",
+            str(tmp_path / "out"),
+            "--markdown",
+            str(page),
+        ],
+    )
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code in (0, None)
     assert asked == [(3, True, 5, "outsider")]
     assert "1. one effect of typical size" in capfd.readouterr().out
-    assert "`windwrench trials --seed 5 --seeds 3 --quick --group outsider`" in page.read_text(encoding="utf-8")
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {"run.json", "trials.json", "trials.jsonl", "trials.png"}
+    assert "`windwrench trials --seed 5 --seeds 3 --quick --group outsider`" in page.read_text(
+        encoding="utf-8"
+    )
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "run.json",
+        "trials.json",
+        "trials.jsonl",
+        "trials.png",
+    }
 
 
-@pytest.mark.parametrize("trial", [
-    Trial("strong turbulence", (), seed=1, trajectory="circle", turbulence=4.0),  # an inertia and two more, once
-    Trial("hover", ("rotor_efficiency",), seed=1),  # and a mass, once
-], ids=lambda trial: trial.group)
+@pytest.mark.parametrize(
+    "trial",
+    [
+        Trial(
+            "strong turbulence", (), seed=1, trajectory="circle", turbulence=4.0
+        ),  # an inertia and two more, once
+        Trial("hover", ("rotor_efficiency",), seed=1),  # and a mass, once
+    ],
+    ids=lambda trial: trial.group,
+)
 def test_a_flight_loops_answer_to_gusts_and_noise_is_given_no_name(trial):
     (judged,) = judge(fly_and_diagnose(trial))
     assert judged.outcome in (RIGHT, SILENT)
@@ -294,7 +446,8 @@ def test_a_flight_loops_answer_to_gusts_and_noise_is_given_no_name(trial):
 
 def test_an_unbiased_fit_is_expected_within_the_bar_as_often_as_its_deviations_say():
     (judged,) = judge(outcome("typical", MASS, found(name("mass", dm=0.04))))
-    # one coefficient with a standard deviation of 5 %, another with one of 2.5 %; whatever their errors are
+    # one coefficient with a standard deviation of 5 %, another with one of 2.5 %; whatever their
+    # errors are
     some = [replace(judged, errors={"mass.dm": (0.05 * s, s)}) for s in (0.1, 3.0)]
     expected = rule(some, "1. the same of both")
     assert expected.measured.startswith("68.3% of flights; 50% of the coefficients are within one")

@@ -1,12 +1,13 @@
 """The diagnosis on measured flights, each judged on flights that the fit never saw.
 
-The NanoBench fold is B5 from B2 and B3; the page of ``studies.measured_flights`` has all seven and what each misses.
+The NanoBench fold is B5 from B2 and B3; the page of ``studies.measured_flights`` has all seven and
+what each misses.
 """
 
 import numpy as np
 import pytest
-from data_paths import data_file
 
+from tests.support.data_paths import data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import (
@@ -70,19 +71,41 @@ def test_nanobench_residual_on_a_flight_not_seen(nanobench):
 def test_nanobench_names(nanobench):
     _, _, diagnosis, _ = nanobench
     named = by_name(diagnosis)
-    assert not set(named) & {"wind", "com_offset", "inflow_thrust", "ground_effect", "slung_payload", "fan_jet"}
+    assert not set(named) & {
+        "wind",
+        "com_offset",
+        "inflow_thrust",
+        "ground_effect",
+        "slung_payload",
+        "fan_jet",
+    }
     assert 0.8 < named["battery_sag"].coefficients["n"] < 2.0
-    assert set(named) <= {"thrust_scale", "battery_sag", "thrust_curvature", "thrust_fade", "latency", "rotor_drag",
-                          "body_drag", "world_tilt", "thrust_axis_tilt", "constant_force", "marker_offset"}
+    assert set(named) <= {
+        "thrust_scale",
+        "battery_sag",
+        "thrust_curvature",
+        "thrust_fade",
+        "latency",
+        "rotor_drag",
+        "body_drag",
+        "world_tilt",
+        "thrust_axis_tilt",
+        "constant_force",
+        "marker_offset",
+    }
     assert named["battery_sag"].indistinguishable_from == ()
     drag = named.get("rotor_drag") or named["body_drag"]
     assert {drag.name, *drag.indistinguishable_from} >= {"rotor_drag", "body_drag"}
-    assert np.all((np.array(linear_drag(diagnosis)) > 0.0090) & (np.array(linear_drag(diagnosis)) < 0.0125))
+    assert np.all(
+        (np.array(linear_drag(diagnosis)) > 0.0090) & (np.array(linear_drag(diagnosis)) < 0.0125)
+    )
     delay = named["latency"]
     assert delay.indistinguishable_from == ("motor_lag", "clock_offset")
     assert 0.030 < delay.coefficients["d"] < 0.055
     assert delay.std["d"] < 0.01
-    lean = next(named[n] for n in ("world_tilt", "constant_force", "thrust_axis_tilt") if n in named)
+    lean = next(
+        named[n] for n in ("world_tilt", "constant_force", "thrust_axis_tilt") if n in named
+    )
     assert {lean.name, *lean.indistinguishable_from} >= {"world_tilt", "constant_force"}
 
 
@@ -121,12 +144,18 @@ def test_only_the_time_in_the_air_counts(vehicle):
     # a log's turn rate is that at the instant of its row
     same = np.interp(thin.t, signals.t, signals.rotor_speeds[:, 0])
     late = np.interp(thin.t - 0.01, signals.t, signals.rotor_speeds[:, 0])
-    assert np.corrcoef(thin.rotor_speeds[:, 0], same)[0, 1] > np.corrcoef(thin.rotor_speeds[:, 0], late)[0, 1]
+    assert (
+        np.corrcoef(thin.rotor_speeds[:, 0], same)[0, 1]
+        > np.corrcoef(thin.rotor_speeds[:, 0], late)[0, 1]
+    )
 
 
 def test_deviations_have_no_mean():
     columns = deviations(4)
-    setting = {"": {name: 0.1 * (i + 1) for i, (_, name) in enumerate(columns)}, "mass": {"dm": 1.0}}
+    setting = {
+        "": {name: 0.1 * (i + 1) for i, (_, name) in enumerate(columns)},
+        "mass": {"dm": 1.0},
+    }
     assert len(columns) == 9
     for kind in ("thrust scale", "lean x", "lean y"):
         each = [deviation(setting, kind, i, 4) for i in range(4)]
@@ -137,20 +166,47 @@ def test_deviations_have_no_mean():
 
 
 def test_page_of_a_result():
-    fold = {"flight": "B", "fitted_on": "all others", "before_rms": [1, 1, 6], "after_rms": [0.1, 0.1, 0.125],
-            "before_std": [1, 1, 1], "after_std": [0.5, 0.25, 0.1], "constant_thrust_std": [1, 1, 0.2],
-            "norm_before": 9.0, "norm_after": 3.0,
-            "drag_N_per_mps": [0.01, 0.01], "imu": {"model_std": 0.1, "constant_std": 0.2}, "effects": []}
-    effect = {"name": "slung_payload", "coefficients": {"m": 0.005}, "tentative": True, "indistinguishable_from": ["mass"]}
-    load = {"logs": ["202"], "payload": True, "effects": [effect],
-            "swing": {"log202": {"law_std": [0.01, 0.02], "tracked_std": [0.01, 0.03]}}}
+    fold = {
+        "flight": "B",
+        "fitted_on": "all others",
+        "before_rms": [1, 1, 6],
+        "after_rms": [0.1, 0.1, 0.125],
+        "before_std": [1, 1, 1],
+        "after_std": [0.5, 0.25, 0.1],
+        "constant_thrust_std": [1, 1, 0.2],
+        "norm_before": 9.0,
+        "norm_after": 3.0,
+        "drag_N_per_mps": [0.01, 0.01],
+        "imu": {"model_std": 0.1, "constant_std": 0.2},
+        "effects": [],
+    }
+    effect = {
+        "name": "slung_payload",
+        "coefficients": {"m": 0.005},
+        "tentative": True,
+        "indistinguishable_from": ["mass"],
+    }
+    load = {
+        "logs": ["202"],
+        "payload": True,
+        "effects": [effect],
+        "swing": {"log202": {"law_std": [0.01, 0.02], "tracked_std": [0.01, 0.03]}},
+    }
     text = page({"cutoff_hz": 4.0, "nanobench": [fold], "slung_payload": [load]}, "pictures")
-    assert "| B | all others | 6.00 | 0.125 | 0.100 | 0.200 | 2.0 | 4.0 | 3.0 | 0.100 / 0.200 |" in text
-    assert "* B from all others: all three axes down 4 times; battery_sag named; delay of 30 to 55 ms" in text
+    assert (
+        "| B | all others | 6.00 | 0.125 | 0.100 | 0.200 | 2.0 | 4.0 | 3.0 | 0.100 / 0.200 |"
+        in text
+    )
+    assert (
+        "* B from all others: all three axes down 4 times; battery_sag named; delay of 30 to 55 ms"
+        in text
+    )
     assert "| 202 | yes | slung_payload (tentative) | m = 0.005 kg | mass |" in text
     assert "| 202 | log202 | 10.0, 20.0 | 10.0, 30.0 |" in text
 
 
 def test_flights_that_are_missing(tmp_path):
-    with pytest.raises(InputError, match=r"0 CSV file\(s\); expected at least three NanoBench flights"):
+    with pytest.raises(
+        InputError, match=r"0 CSV file\(s\); expected at least three NanoBench flights"
+    ):
         run(tmp_path / "out", tmp_path, tmp_path)

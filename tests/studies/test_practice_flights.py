@@ -1,4 +1,5 @@
-"""Practice flights: what was added is what acts, and RotorPy's flights are told in our conventions."""
+"""Practice flights: what was added is what acts, and RotorPy's flights are told in
+our conventions."""
 
 import itertools
 from dataclasses import replace
@@ -38,11 +39,15 @@ LEVEL = np.eye(3)
 LARGEST = 0.3  # parts of weight (times the arm, for torque) that a disturbance reaches in flight
 CUTOFF, EDGE = 4.0, 200  # Hz, samples
 
-needs_rotorpy = pytest.mark.skipif(not available(), reason="RotorPy is not installed (pip install rotorpy)")
+needs_rotorpy = pytest.mark.skipif(
+    not available(), reason="RotorPy is not installed (pip install rotorpy)"
+)
 
 
 def left_over(log, vehicle):
-    """Residual (n, 6) through the low-pass, and the true wrench in the world frame through the same."""
+    """Residual (n, 6) through the low-pass, and the true wrench in the world frame through the
+    same.
+    """
     (signals,) = log_signals(log)
     r = residual_wrench(signals, vehicle)
     r[:, 3:] = np.einsum("nij,nj->ni", signals.rotation, r[:, 3:])
@@ -54,15 +59,23 @@ def law(name, vehicle=VEHICLE, seed=0):
     return OUTSIDERS[name](vehicle, np.random.default_rng(seed), PATH)
 
 
-def moment(t=1.0, position=(0, 0, 1.5), velocity=(0, 0, 0), rotation=LEVEL, rate=(0, 0, 0), speeds=HOVER):
-    return Moment(t, *(np.asarray(x, dtype=float) for x in (position, velocity, rotation, rate, speeds)))
+def moment(
+    t=1.0, position=(0, 0, 1.5), velocity=(0, 0, 0), rotation=LEVEL, rate=(0, 0, 0), speeds=HOVER
+):
+    return Moment(
+        t, *(np.asarray(x, dtype=float) for x in (position, velocity, rotation, rate, speeds))
+    )
 
 
 @pytest.mark.parametrize("name", sorted(OUTSIDERS))
 def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
     assert OUTSIDERS[name].__doc__
-    trajectory = {"vortex_ring": "vertical", "thrust_saturation": "vertical", "thermal_column": "gentle",
-                  "wall_attraction": "gentle"}.get(name, "excite")
+    trajectory = {
+        "vortex_ring": "vertical",
+        "thrust_saturation": "vertical",
+        "thermal_column": "gentle",
+        "wall_attraction": "gentle",
+    }.get(name, "excite")
     log = fly_practice(VEHICLE, (), trajectory, 8.0, 3, name, turbulence=0.0, sensor=0.0)
     r, truth = left_over(log, VEHICLE)
     scale = np.repeat([WEIGHT, WEIGHT * ARM], 3)
@@ -78,20 +91,33 @@ def test_a_disturbance_is_in_proportion_to_the_vehicle(name):
     one, two = law(name), law(name, heavy)
     for i in range(400):
         t = TICK * i
-        m = moment(t, (0.9 * np.sin(t), 0.3, 1.8), (0.9 * np.cos(t), 0.5, -0.8), LEVEL, (0.3, 0.2, 0.9), 1.2 * HOVER)
+        m = moment(
+            t,
+            (0.9 * np.sin(t), 0.3, 1.8),
+            (0.9 * np.cos(t), 0.5, -0.8),
+            LEVEL,
+            (0.3, 0.2, 0.9),
+            1.2 * HOVER,
+        )
         np.testing.assert_allclose(two(m), 2.0 * one(m), rtol=1e-9, atol=1e-15)
 
 
 def test_friction_has_one_size_and_drag_grows_with_the_cube():
     slow, fast = moment(velocity=(0.5, 0, 0)), moment(velocity=(1.0, 0, 0))
-    np.testing.assert_allclose(law("dry_friction")(fast)[:3], [-0.04 * WEIGHT, 0, 0], rtol=2e-3, atol=1e-15)
+    np.testing.assert_allclose(
+        law("dry_friction")(fast)[:3], [-0.04 * WEIGHT, 0, 0], rtol=2e-3, atol=1e-15
+    )
     assert law("dry_friction")(slow)[0] == pytest.approx(law("dry_friction")(fast)[0], rel=0.01)
     assert law("cubic_drag")(fast)[0] == pytest.approx(8.0 * law("cubic_drag")(slow)[0])
     assert np.all(law("dry_friction")(moment()) == 0.0)
 
 
 def test_side_force_and_precession_do_no_work():
-    m = moment(velocity=(0.7, -0.4, 0.2), rate=(0.5, -0.3, 0.8), rotation=matrix_of(np.array([0.8, 0.36, 0.0, 0.48])))
+    m = moment(
+        velocity=(0.7, -0.4, 0.2),
+        rate=(0.5, -0.3, 0.8),
+        rotation=matrix_of(np.array([0.8, 0.36, 0.0, 0.48])),
+    )
     side, turn = law("magnus_force")(m), law("flywheel")(m)
     assert np.linalg.norm(side[:3]) > 1e-3
     assert side[:3] @ m.velocity == pytest.approx(0.0, abs=1e-15)
@@ -123,22 +149,31 @@ def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
     share = 0.1 * WEIGHT / 4
     # it turns about +z and drags the body backwards, less so now
     yaw = share * VEHICLE.p[1] / VEHICLE.k[1]
-    np.testing.assert_allclose(lost, np.tile([0, 0, -share, -ARM * share, -ARM * share, yaw], (len(lost), 1)), rtol=1e-12,
-                               atol=1e-15)
+    np.testing.assert_allclose(
+        lost,
+        np.tile([0, 0, -share, -ARM * share, -ARM * share, yaw], (len(lost), 1)),
+        rtol=1e-12,
+        atol=1e-15,
+    )
 
 
 def test_wash_costs_thrust_only_in_a_descent_and_saturation_only_at_high_rates():
     assert np.all(law("vortex_ring")(moment(velocity=(1.0, 0.0, -0.29))) == 0.0)
     assert law("vortex_ring")(moment(velocity=(0.0, 0.0, -0.8)))[2] < -0.02 * WEIGHT
     assert np.all(law("thrust_saturation")(moment(speeds=1.04 * HOVER)) == 0.0)
-    assert law("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(-0.3 * (1.44 - 1.1) * WEIGHT)
+    assert law("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(
+        -0.3 * (1.44 - 1.1) * WEIGHT
+    )
 
 
 def test_the_liquid_sloshes_most_at_its_own_frequency():
     force = {}
     for hertz in (0.3, 1.2, 4.0):
         slosh, w = law("sloshing"), 2 * np.pi * hertz
-        run = [slosh(moment(TICK * i, velocity=(np.sin(w * TICK * i) / w, 0, 0)))[0] for i in range(4000)]
+        run = [
+            slosh(moment(TICK * i, velocity=(np.sin(w * TICK * i) / w, 0, 0)))[0]
+            for i in range(4000)
+        ]
         force[hertz] = np.abs(run[2000:]).max()
     assert force[1.2] > 4 * max(force[0.3], force[4.0])
     # far below it, the liquid moves with the tank: its mass times the acceleration of 1 m/s2
@@ -147,14 +182,19 @@ def test_the_liquid_sloshes_most_at_its_own_frequency():
 
 def test_the_same_seed_gives_the_same_log_and_another_one_another():
     drag = (EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),)
-    logs = [fly_practice(VEHICLE, drag, "excite", 2.0, seed, "contact_pushes") for seed in (1, 1, 2)]
+    logs = [
+        fly_practice(VEHICLE, drag, "excite", 2.0, seed, "contact_pushes") for seed in (1, 1, 2)
+    ]
     for field in ("position", "quaternion", "rotor_speeds", "voltage", "force", "torque"):
         np.testing.assert_array_equal(getattr(logs[0], field), getattr(logs[1], field))
         assert not np.array_equal(getattr(logs[0], field), getattr(logs[2], field))
 
 
 def test_noise_and_turbulence_are_as_asked():
-    noisy, calm = (fly_practice(VEHICLE, (), "hover", 6.0, 0, sensor=s, turbulence=u) for s, u in ((2.0, 3.0), (0.5, 0.0)))
+    noisy, calm = (
+        fly_practice(VEHICLE, (), "hover", 6.0, 0, sensor=s, turbulence=u)
+        for s, u in ((2.0, 3.0), (0.5, 0.0))
+    )
 
     def sigma(log):
         return np.diff(log.position, axis=0).std() / np.sqrt(2)
@@ -206,14 +246,17 @@ def test_a_set_flies_every_effect_and_every_disturbance():
     assert len({f.log.position.tobytes() for f in flown}) == len(flown)
 
 
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda: fly_practice(VEHICLE, outsider="ghost"), "disturbance"),
-    (lambda: fly_practice(VEHICLE, sensor=-1.0), "sensor"),
-    (lambda: fly_practice(VEHICLE, trajectory="loop", outsider="tether"), "trajectory"),
-    (lambda: practise(VEHICLE, "ghost"), "kind"),
-    (lambda: practise(VEHICLE, "effect", size="huge"), "size"),
-    (lambda: list(itertools.islice(practice_set(VEHICLE, ("ghost",)), 1)), "kind"),
-])
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: fly_practice(VEHICLE, outsider="ghost"), "disturbance"),
+        (lambda: fly_practice(VEHICLE, sensor=-1.0), "sensor"),
+        (lambda: fly_practice(VEHICLE, trajectory="loop", outsider="tether"), "trajectory"),
+        (lambda: practise(VEHICLE, "ghost"), "kind"),
+        (lambda: practise(VEHICLE, "effect", size="huge"), "size"),
+        (lambda: list(itertools.islice(practice_set(VEHICLE, ("ghost",)), 1)), "kind"),
+    ],
+)
 def test_a_wrong_word_is_named(call, words):
     with pytest.raises(InputError, match=words):
         call()
@@ -237,7 +280,9 @@ def test_rotorpy_s_hummingbird_is_told_in_our_conventions():
     assert vehicle.effects == ()
     for setting in aero_settings():
         check_setting(setting)
-    assert {"rotor_drag", "inflow_thrust", "translational_lift", "body_drag"} == set(hummingbird_aero())
+    assert {"rotor_drag", "inflow_thrust", "translational_lift", "body_drag"} == set(
+        hummingbird_aero()
+    )
 
 
 def test_without_aerodynamics_our_model_explains_rotorpy_s_flight(flights):
@@ -265,7 +310,11 @@ def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
 def test_rotorpy_s_turn_rates_are_those_at_the_instant_of_the_pose(flights):
     log, vehicle = flights[False], hummingbird_vehicle()
     up = np.array([matrix_of(q)[:, 2] for q in log.quaternion[1:-1]])
-    acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [0.0, 0.0, vehicle.gravity]
+    acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [
+        0.0,
+        0.0,
+        vehicle.gravity,
+    ]
     thrust = np.array([vehicle.rotor_wrench(speeds)[0] for speeds in log.rotor_speeds])
     gap = vehicle.mass * np.einsum("ni,ni->n", up, acceleration) - thrust[1:-1]
     slope = np.gradient(thrust, TICK)[1:-1]

@@ -1,4 +1,5 @@
-"""The study behind the leaderboard: it goes on where it was, and its page says what its files say."""
+"""The study behind the leaderboard: it goes on where it was, and its page says
+what its files say."""
 
 import json
 from pathlib import Path
@@ -24,21 +25,52 @@ from windwrench.studies.learning.study import (
 pytest.importorskip("stable_baselines3")
 
 PLAN = {
-    "worlds": {"base": {"scenario": "base"}, "fast": {"scenario": "fast"},
-               "other filter": {"scenario": "base", "estimator": "constant-gain"},
-               "weak-rotor": {"scenario": "base", "effects": ["rotor_efficiency:e1=-0.08"]}},
+    "worlds": {
+        "base": {"scenario": "base"},
+        "fast": {"scenario": "fast"},
+        "other filter": {"scenario": "base", "estimator": "constant-gain"},
+        "weak-rotor": {"scenario": "base", "effects": ["rotor_efficiency:e1=-0.08"]},
+    },
     "episodes": 3,
     "designed": ["hover", "admittance", "admittance-tuned-fast", "ratio", "oracle"],
-    "learned": {"sac": {"algorithm": "sac", "scenario": "base", "seeds": 2, "ship": True, "set": [
-        "steps=200", "net=[8]", "validation.every=100", "validation.episodes=1", "learner.batch_size=16",
-        "learner.learning_starts=50", "checkpoint=100"]}},
-    "ablation": {"worlds": ["base"], "seeds": 1, "algorithm": "sac", "scenario": "base", "reference": "as it is",
-                 "set": ["steps=100", "net=[8]", "validation.every=100", "validation.episodes=1",
-                         "learner.learning_starts=90", "learner.batch_size=16"],
-                 "changes": {"truth instead": ["features.frame=[true_torque_z, true_force_x]"],
-                             "with deviations": ["features.frame=[torque_z, std_torque_z]"],
-                             "an observer": ["features.frame=[observer_torque_z]"],
-                             "slower": ["repeat=2"]}},
+    "learned": {
+        "sac": {
+            "algorithm": "sac",
+            "scenario": "base",
+            "seeds": 2,
+            "ship": True,
+            "set": [
+                "steps=200",
+                "net=[8]",
+                "validation.every=100",
+                "validation.episodes=1",
+                "learner.batch_size=16",
+                "learner.learning_starts=50",
+                "checkpoint=100",
+            ],
+        }
+    },
+    "ablation": {
+        "worlds": ["base"],
+        "seeds": 1,
+        "algorithm": "sac",
+        "scenario": "base",
+        "reference": "as it is",
+        "set": [
+            "steps=100",
+            "net=[8]",
+            "validation.every=100",
+            "validation.episodes=1",
+            "learner.learning_starts=90",
+            "learner.batch_size=16",
+        ],
+        "changes": {
+            "truth instead": ["features.frame=[true_torque_z, true_force_x]"],
+            "with deviations": ["features.frame=[torque_z, std_torque_z]"],
+            "an observer": ["features.frame=[observer_torque_z]"],
+            "slower": ["repeat=2"],
+        },
+    },
 }
 
 
@@ -60,7 +92,12 @@ def test_everything_is_done_once(places):
     before = {p: p.stat().st_mtime_ns for p in places.results.iterdir()}
     assert run_study(entries, PLAN, places, 1) == 0
     assert {p: p.stat().st_mtime_ns for p in places.results.iterdir()} == before
-    assert sorted(p.name for p in places.policies.iterdir()) == ["sac-0.json", "sac-0.npz", "sac-1.json", "sac-1.npz"]
+    assert sorted(p.name for p in places.policies.iterdir()) == [
+        "sac-0.json",
+        "sac-0.npz",
+        "sac-1.json",
+        "sac-1.npz",
+    ]
 
 
 def test_what_is_missing_is_scored_from_the_shipped_policy(places, tmp_path):
@@ -73,7 +110,9 @@ def test_what_is_missing_is_scored_from_the_shipped_policy(places, tmp_path):
     assert not is_done(entry, PLAN, other)
     do_entry(entry, PLAN, other)
     assert is_done(entry, PLAN, other)
-    assert json.loads((other.results / "sac-1.json").read_text()) == json.loads((places.results / "sac-1.json").read_text())
+    assert json.loads((other.results / "sac-1.json").read_text()) == json.loads(
+        (places.results / "sac-1.json").read_text()
+    )
     assert not other.runs.exists()
 
 
@@ -88,8 +127,10 @@ def test_a_shipped_policy_reproduces_its_line(places):
 def test_rows_are_those_of_the_files(places):
     results = read_results(places)
     rows = {(r.world, r.name): r for r in rows_of(results, PLAN)}
-    rmse = {name: np.array([r["scores"]["fast"]["rmse_m"] for r in results if r["name"] == name])
-            for name in ("hover", "oracle", "sac", "admittance", "admittance-tuned-fast")}
+    rmse = {
+        name: np.array([r["scores"]["fast"]["rmse_m"] for r in results if r["name"] == name])
+        for name in ("hover", "oracle", "sac", "admittance", "admittance-tuned-fast")
+    }
     row = rows["fast", "sac"]
     assert row.rmse_m == pytest.approx(rmse["sac"].mean())
     assert row.by_seed == pytest.approx(rmse["sac"].mean(axis=1))

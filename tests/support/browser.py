@@ -1,4 +1,6 @@
-"""A page as a real browser shows it: what it complains about, what overflows, which pictures are missing."""
+"""A page as a real browser shows it: what it complains about, what overflows, which pictures are
+missing.
+"""
 
 import html
 import json
@@ -9,10 +11,15 @@ from pathlib import Path
 
 import pytest
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium, chromium-browser or google-chrome is installed")
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no chromium, chromium-browser or google-chrome is installed"
+)
 
-# A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is looked at is kept.
+# A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is
+# looked at is kept.
 _FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 <iframe id="page" style="border:0;width:{width}px;height:1000px" srcdoc="{page}"></iframe><pre id="found"></pre>
 <script>{script}</script>"""
@@ -38,16 +45,34 @@ addEventListener("load", () => {
 
 
 def look(page, width, folder, dark=False):
-    """Show a page (HTML text) ``width`` pixels wide; return what was found in it, with the browser's ``complaints``."""
+    """Show a page (HTML text) ``width`` pixels wide; return what was found in it, with the
+    browser's ``complaints``.
+    """
     path = Path(folder) / "frame.html"
-    path.write_text(_FRAME.format(width=width, page=html.escape(page), script=_LOOK), encoding="utf-8")
+    path.write_text(
+        _FRAME.format(width=width, page=html.escape(page), script=_LOOK), encoding="utf-8"
+    )
     for attempt in range(3):  # on a busy machine a browser may die before it has shown anything
         shown = subprocess.run(
-            [BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
-             "--no-first-run", f"--user-data-dir={Path(folder) / f'profile{attempt}'}", "--enable-logging=stderr",
-             f"--blink-settings=preferredColorScheme={0 if dark else 1}", f"--window-size={max(width, 500)},1000",
-             "--dump-dom", path.resolve().as_uri()],
-            capture_output=True, text=True, timeout=120)
+            [
+                BROWSER,
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--hide-scrollbars",
+                "--no-first-run",
+                f"--user-data-dir={Path(folder) / f'profile{attempt}'}",
+                "--enable-logging=stderr",
+                f"--blink-settings=preferredColorScheme={0 if dark else 1}",
+                f"--window-size={max(width, 500)},1000",
+                "--dump-dom",
+                path.resolve().as_uri(),
+            ],
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
         dumped = re.search(r'<pre id="found">(.+?)</pre>', shown.stdout, re.DOTALL)
         if dumped:
             break

@@ -12,16 +12,29 @@ START = 1_700_000_000_000_000_000  # ns
 
 
 def write_ulog(log, path):
-    """Motion capture and turn rates as PX4 logs them: north, east, down, and its own order of motors."""
+    """Motion capture and turn rates as PX4 logs them: north, east, down, and its own order of
+    motors.
+    """
     stamps = np.round(1e6 * (log.t + 10.0)).astype(np.uint64)
     turned = FLIP @ Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix() @ FLIP
     rpm = np.round(log.rotor_speeds[:, [3, 1, 0, 2]] * 30.0 / np.pi).astype(int)
-    path.write_bytes(ulog_bytes({
-        "vehicle_mocap_odometry": {
-            "uint64_t timestamp": stamps, "uint64_t timestamp_sample": stamps, "uint8_t pose_frame": np.full(len(log.t), 2),
-            "float position": log.position @ FLIP, "float q": Rotation.from_matrix(turned).as_quat(scalar_first=True)},
-        "esc_status": {"uint64_t timestamp": stamps, **{f"int32_t esc[{i}].esc_rpm": rpm[:, i] for i in range(4)}},
-    }))
+    path.write_bytes(
+        ulog_bytes(
+            {
+                "vehicle_mocap_odometry": {
+                    "uint64_t timestamp": stamps,
+                    "uint64_t timestamp_sample": stamps,
+                    "uint8_t pose_frame": np.full(len(log.t), 2),
+                    "float position": log.position @ FLIP,
+                    "float q": Rotation.from_matrix(turned).as_quat(scalar_first=True),
+                },
+                "esc_status": {
+                    "uint64_t timestamp": stamps,
+                    **{f"int32_t esc[{i}].esc_rpm": rpm[:, i] for i in range(4)},
+                },
+            }
+        )
+    )
 
 
 def write_bag(log, path):
@@ -32,11 +45,15 @@ def write_bag(log, path):
     with rosbag2.Writer(path, version=9) as writer:
         pose_topic = writer.add_connection("/vicon/drone", pose_name, typestore=store)
         rotor_topic = writer.add_connection("/motors", array_name, typestore=store)
-        for t, p, q, speeds in zip(log.t, log.position, log.quaternion, log.rotor_speeds, strict=True):
+        for t, p, q, speeds in zip(
+            log.t, log.position, log.quaternion, log.rotor_speeds, strict=True
+        ):
             now = START + round(1e9 * t)
             stamp = types["builtin_interfaces/msg/Time"](now // 10**9, now % 10**9)
-            pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](*p),
-                                                   types["geometry_msgs/msg/Quaternion"](q[1], q[2], q[3], q[0]))
+            pose = types["geometry_msgs/msg/Pose"](
+                types["geometry_msgs/msg/Point"](*p),
+                types["geometry_msgs/msg/Quaternion"](q[1], q[2], q[3], q[0]),
+            )
             message = types[pose_name](types["std_msgs/msg/Header"](stamp, "world"), pose)
             writer.write(pose_topic, now, store.serialize_cdr(message, pose_name))
             layout = types["std_msgs/msg/MultiArrayLayout"]([], 0)

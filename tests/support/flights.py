@@ -1,31 +1,59 @@
 """Flights for the tests, drawn from equations of motion that share no code with the package."""
 
 import numpy as np
-from literal_ukf import matrix, multiply
 from scipy.spatial.transform import Rotation
+
+from tests.support.literal_ukf import matrix, multiply
 
 PERIOD = 0.005
 
 
-def yawing_flight(vehicle, steps, seed=0, sigma_position=0.001, sigma_attitude=0.005, torque=(0.0, 0.0, 0.02),
-                  force=(0.3, -0.2, -0.1), substeps=10, yaw_rate=3.0):
+def yawing_flight(
+    vehicle,
+    steps,
+    seed=0,
+    sigma_position=0.001,
+    sigma_attitude=0.005,
+    torque=(0.0, 0.0, 0.02),
+    force=(0.3, -0.2, -0.1),
+    substeps=10,
+    yaw_rate=3.0,
+):
     """Start yawed by 120 degrees, turn at several rad/s and translate, under a constant wrench.
 
-    A feedback on the true state gives the rotor speeds; truth is integrated in fine substeps. Returns a dict of arrays.
+    A feedback on the true state gives the rotor speeds; truth is integrated in fine substeps.
+    Returns a dict of arrays.
     """
     rng = np.random.default_rng(seed)
     force, torque = np.asarray(force, float), np.asarray(torque, float)
     x, v = np.array([0.0, 0.0, 1.5]), np.zeros(3)
     q, w = np.array([np.cos(np.pi / 3), 0, 0, np.sin(np.pi / 3)]), np.array([0.0, 0.0, yaw_rate])
-    mixing = np.linalg.inv(np.array([
-        vehicle.k, vehicle.arm_l * vehicle.k * [1, 1, -1, -1], vehicle.arm_l * vehicle.k * [-1, 1, 1, -1],
-        vehicle.p * [1, -1, 1, -1]]))
-    out = {name: [] for name in ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")}
+    mixing = np.linalg.inv(
+        np.array(
+            [
+                vehicle.k,
+                vehicle.arm_l * vehicle.k * [1, 1, -1, -1],
+                vehicle.arm_l * vehicle.k * [-1, 1, 1, -1],
+                vehicle.p * [1, -1, 1, -1],
+            ]
+        )
+    )
+    out = {
+        name: []
+        for name in ("rotors", "position", "quaternion", "velocity", "omega", "true_q", "true_x")
+    }
     for k in range(steps):
         t = k * PERIOD
         target = np.array([np.sin(1.3 * t), 0.8 * np.sin(0.9 * t + 1), 1.5 + 0.2 * np.sin(0.7 * t)])
-        speed = np.array([1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)])
-        a = 4 * (target - x) + 3.5 * (speed - v) + np.array([0, 0, vehicle.gravity]) - force / vehicle.mass
+        speed = np.array(
+            [1.3 * np.cos(1.3 * t), 0.72 * np.cos(0.9 * t + 1), 0.14 * np.cos(0.7 * t)]
+        )
+        a = (
+            4 * (target - x)
+            + 3.5 * (speed - v)
+            + np.array([0, 0, vehicle.gravity])
+            - force / vehicle.mass
+        )
         R = matrix(q)
         up = a / np.linalg.norm(a)
         tilt = R.T @ np.cross(R[:, 2], up)
@@ -35,19 +63,28 @@ def yawing_flight(vehicle, steps, seed=0, sigma_position=0.001, sigma_attitude=0
         squares = mixing @ np.array([vehicle.mass * a @ R[:, 2], *moment])
         W = np.sqrt(np.maximum(squares, 1e3))
         c, M = vehicle.k * W**2, vehicle.p * W**2
-        moment = np.array([vehicle.arm_l * (c[0] + c[1] - c[2] - c[3]), vehicle.arm_l * (-c[0] + c[1] + c[2] - c[3]),
-                           M[0] - M[1] + M[2] - M[3]])
+        moment = np.array(
+            [
+                vehicle.arm_l * (c[0] + c[1] - c[2] - c[3]),
+                vehicle.arm_l * (-c[0] + c[1] + c[2] - c[3]),
+                M[0] - M[1] + M[2] - M[3],
+            ]
+        )
         h = PERIOD / substeps
         for _ in range(substeps):
             R = matrix(q)
             acc = (R @ [0, 0, c.sum()] + force) / vehicle.mass - [0, 0, vehicle.gravity]
-            alpha = np.linalg.solve(vehicle.inertia, moment + R.T @ torque - np.cross(w, vehicle.inertia @ w))
+            alpha = np.linalg.solve(
+                vehicle.inertia, moment + R.T @ torque - np.cross(w, vehicle.inertia @ w)
+            )
             x, v = x + h * v + h * h / 2 * acc, v + h * acc
             middle = w + h / 2 * alpha
             turn = Rotation.from_rotvec(middle * h).as_quat(scalar_first=True)
             q, w = multiply(q, turn), w + h * alpha
             q = q / np.linalg.norm(q)
-        error = Rotation.from_rotvec(sigma_attitude * rng.standard_normal(3)).as_quat(scalar_first=True)
+        error = Rotation.from_rotvec(sigma_attitude * rng.standard_normal(3)).as_quat(
+            scalar_first=True
+        )
         out["rotors"].append(W)
         out["true_x"].append(x)
         out["true_q"].append(q)

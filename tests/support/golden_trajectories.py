@@ -1,32 +1,37 @@
 """Trajectories of every scenario, as a few numbers: what a change of the physics changes.
 
-``python tests/golden_trajectories.py`` writes ``tests/golden/trajectories.json`` anew. Do that only for a change of physics
-that is meant, and say it in the environment's version history, with a new version of the environment's name.
+``python -m tests.support.golden_trajectories`` writes ``tests/golden/trajectories.json`` anew. Do
+that only for a change of physics that is meant, and say it in the environment's version history,
+with a new version of the environment's name.
 """
 
 import json
-from pathlib import Path
 
 import numpy as np
 
+from tests.support.paths import ROOT
 from windwrench.controllers import make_controller
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.scenarios import SCENARIOS
 
-GOLDEN = Path(__file__).parent / "golden" / "trajectories.json"
+GOLDEN = ROOT / "tests" / "golden" / "trajectories.json"
 SEED = 20161009
 DECISIONS = 40  # 3.2 s
 EVERY = 8  # decisions between two samples
 
 
 def trajectory(scenario):
-    """Return observations (5, 8), true wrench (5, 6) and position (5,) y in m of an episode's first seconds."""
+    """Return observations (5, 8), true wrench (5, 6) and position (5,) y in m of an episode's first
+    seconds.
+    """
     env, pilot = FanTrackingEnv(scenario), make_controller("admittance")
     pilot.reset()
     observation, info = env.reset(seed=SEED)
     kept = {"observation": [], "wrench": [], "y": [], "reward": []}
     for k in range(1, DECISIONS + 1):
-        observation, reward, _, _, info = env.step(np.asarray(pilot(observation, info), dtype=np.float32))
+        observation, reward, _, _, info = env.step(
+            np.asarray(pilot(observation, info), dtype=np.float32)
+        )
         if k % EVERY == 0:
             kept["observation"].append([float(x) for x in observation])
             kept["wrench"].append([float(x) for x in (*info["force"], *info["torque"])])
@@ -42,6 +47,10 @@ if __name__ == "__main__":
 
     version = f"v{gymnasium.spec('windwrench/FanTracking-v0').version}"
     GOLDEN.parent.mkdir(exist_ok=True)
-    kept = {"version": version, "seed": SEED, "scenarios": {name: trajectory(name) for name in SCENARIOS}}
+    kept = {
+        "version": version,
+        "seed": SEED,
+        "scenarios": {name: trajectory(name) for name in SCENARIOS},
+    }
     GOLDEN.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(f"wrote {GOLDEN}")

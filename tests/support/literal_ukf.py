@@ -1,16 +1,20 @@
-"""The filter of McKinnon and Schoellig (2016), equation by equation with all its sigma points: slow, and the judge.
+"""The filter of McKinnon and Schoellig (2016), equation by equation with all its sigma points:
+slow, and the judge.
 
-It shares no code with the package. Where the paper's text slips, the signs that hold are coded (see docs/estimator.md).
+It shares no code with the package. Where the paper's text slips, the signs that hold are coded (see
+docs/estimator.md).
 """
 
 import numpy as np
 
 
 def multiply(a, b):
-    return np.array([
-        a[0] * b[0] - a[1:] @ b[1:],
-        *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])),
-    ])
+    return np.array(
+        [
+            a[0] * b[0] - a[1:] @ b[1:],
+            *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])),
+        ]
+    )
 
 
 def conjugate(q):
@@ -41,18 +45,36 @@ def to_mrp(q):
 class LiteralUKF:
     def __init__(self, vehicle, tuning, period, effect_wrench=None):
         self.v, self.t, self.T = vehicle, tuning, period
-        self.effect_wrench = effect_wrench  # (x, q, v, omega, rotor_speeds) -> force in world, torque in body
+        self.effect_wrench = (
+            effect_wrench  # (x, q, v, omega, rotor_speeds) -> force in world, torque in body
+        )
 
         def three(s):
             return np.square(np.broadcast_to(s, 3).astype(float))
 
-        self.Q = np.diag(np.concatenate([three(tuning.motor_torque_noise), three(tuning.torque_walk),
-                                         three(tuning.thrust_noise), three(tuning.force_walk)]))
-        self.R = np.diag(np.concatenate([three(tuning.attitude_noise) / 16, three(tuning.position_noise)]))
+        self.Q = np.diag(
+            np.concatenate(
+                [
+                    three(tuning.motor_torque_noise),
+                    three(tuning.torque_walk),
+                    three(tuning.thrust_noise),
+                    three(tuning.force_walk),
+                ]
+            )
+        )
+        self.R = np.diag(
+            np.concatenate([three(tuning.attitude_noise) / 16, three(tuning.position_noise)])
+        )
 
     def reset(self, position, quaternion, P, velocity, omega):
-        self.x = dict(q=np.array(quaternion, float), w=np.array(omega, float), x=np.array(position, float),
-                      v=np.array(velocity, float), tau=np.zeros(3), f=np.zeros(3))
+        self.x = dict(
+            q=np.array(quaternion, float),
+            w=np.array(omega, float),
+            x=np.array(position, float),
+            v=np.array(velocity, float),
+            tau=np.zeros(3),
+            f=np.zeros(3),
+        )
         self.P = np.array(P)
 
     def process(self, s, noise, W):
@@ -61,15 +83,21 @@ class LiteralUKF:
         T, v = self.T, self.v
         C = matrix(s["q"])
         c, M = v.k * W**2, v.p * W**2
-        moment = np.array([v.arm_l * (c[0] + c[1] - c[2] - c[3]), v.arm_l * (-c[0] + c[1] + c[2] - c[3]),
-                           M[0] - M[1] + M[2] - M[3]])
+        moment = np.array(
+            [
+                v.arm_l * (c[0] + c[1] - c[2] - c[3]),
+                v.arm_l * (-c[0] + c[1] + c[2] - c[3]),
+                M[0] - M[1] + M[2] - M[3],
+            ]
+        )
         force, torque = np.zeros(3), np.zeros(3)
         if self.effect_wrench is not None:
             force, torque = self.effect_wrench(s["x"], s["q"], s["v"], s["w"], W)
         thrust = np.array([0, 0, c.sum()])
         moment = moment - np.cross(v.com, thrust)
-        alpha = np.linalg.solve(v.inertia, moment + n_m + torque + C.T @ s["tau"]
-                                - np.cross(s["w"], v.inertia @ s["w"]))
+        alpha = np.linalg.solve(
+            v.inertia, moment + n_m + torque + C.T @ s["tau"] - np.cross(s["w"], v.inertia @ s["w"])
+        )
         a = (C @ (thrust + n_c) + s["f"] + force) / v.mass - np.array([0, 0, v.gravity])
         a = a - C @ (np.cross(alpha, v.com) + np.cross(s["w"], np.cross(s["w"], v.com)))
         angle = np.linalg.norm(s["w"]) * T / 2
@@ -77,13 +105,25 @@ class LiteralUKF:
         omega = np.zeros((4, 4))  # (13): right multiplication by the body rate, so -[psi]x
         omega[0, 0], omega[0, 1:], omega[1:, 0] = np.cos(angle), -psi, psi
         omega[1:, 1:] = np.cos(angle) * np.eye(3) - skew(psi)
-        return dict(q=omega @ s["q"], w=s["w"] + T * alpha, x=s["x"] + T * s["v"] + T**2 / 2 * a, v=s["v"] + T * a,
-                    tau=s["tau"] + n_tau, f=s["f"] + n_f)
+        return dict(
+            q=omega @ s["q"],
+            w=s["w"] + T * alpha,
+            x=s["x"] + T * s["v"] + T**2 / 2 * a,
+            v=s["v"] + T * a,
+            tau=s["tau"] + n_tau,
+            f=s["f"] + n_f,
+        )
 
     def displaced(self, e):
         s = self.x
-        return dict(q=multiply(to_quaternion(e[:3]), s["q"]), w=s["w"] + e[3:6], x=s["x"] + e[6:9], v=s["v"] + e[9:12],
-                    tau=s["tau"] + e[12:15], f=s["f"] + e[15:18])
+        return dict(
+            q=multiply(to_quaternion(e[:3]), s["q"]),
+            w=s["w"] + e[3:6],
+            x=s["x"] + e[6:9],
+            v=s["v"] + e[9:12],
+            tau=s["tau"] + e[12:15],
+            f=s["f"] + e[15:18],
+        )
 
     def fold(self, centre, mean):
         self.x = centre
@@ -97,14 +137,28 @@ class LiteralUKF:
 
     def predict(self, W):
         L = 30
-        root = np.linalg.cholesky((L + self.t.kappa) * np.block([
-            [self.P, np.zeros((18, 12))], [np.zeros((12, 18)), self.Q]]))
+        root = np.linalg.cholesky(
+            (L + self.t.kappa)
+            * np.block([[self.P, np.zeros((18, 12))], [np.zeros((12, 18)), self.Q]])
+        )
         points = np.concatenate([np.zeros((1, L)), root.T, -root.T])  # 61
         after = [self.process(self.displaced(p[:18]), p[18:], W) for p in points]
         centre = after[0]
-        errors = np.array([np.concatenate([to_mrp(multiply(s["q"], conjugate(centre["q"]))), s["w"] - centre["w"],
-                                           s["x"] - centre["x"], s["v"] - centre["v"], s["tau"] - centre["tau"],
-                                           s["f"] - centre["f"]]) for s in after])  # (24)
+        errors = np.array(
+            [
+                np.concatenate(
+                    [
+                        to_mrp(multiply(s["q"], conjugate(centre["q"]))),
+                        s["w"] - centre["w"],
+                        s["x"] - centre["x"],
+                        s["v"] - centre["v"],
+                        s["tau"] - centre["tau"],
+                        s["f"] - centre["f"],
+                    ]
+                )
+                for s in after
+            ]
+        )  # (24)
         w = self.weights(L)
         mean = w @ errors  # (25)
         self.P = (w[:, None] * (errors - mean)).T @ (errors - mean)  # (26)
@@ -112,16 +166,22 @@ class LiteralUKF:
 
     def correct(self, position, quaternion):
         L = 24
-        root = np.linalg.cholesky((L + self.t.kappa) * np.block([
-            [self.P, np.zeros((18, 6))], [np.zeros((6, 18)), self.R]]))
-        points = np.concatenate([np.zeros((1, L)), root.T, -root.T])  # 49, redrawn: no second Q or R
+        root = np.linalg.cholesky(
+            (L + self.t.kappa)
+            * np.block([[self.P, np.zeros((18, 6))], [np.zeros((6, 18)), self.R]])
+        )
+        points = np.concatenate(
+            [np.zeros((1, L)), root.T, -root.T]
+        )  # 49, redrawn: no second Q or R
         w = self.weights(L)
         predicted = np.array([np.concatenate([p[0:3], p[6:9]]) + p[18:] for p in points])
         z_mean = w @ predicted
         dz, dx = predicted - z_mean, points[:, :18] - w @ points[:, :18]
         S = (w[:, None] * dz).T @ dz
         K = ((w[:, None] * dx).T @ dz) @ np.linalg.inv(S)
-        innovation = np.concatenate([to_mrp(multiply(quaternion, conjugate(self.x["q"]))), position - self.x["x"]])
+        innovation = np.concatenate(
+            [to_mrp(multiply(quaternion, conjugate(self.x["q"]))), position - self.x["x"]]
+        )
         innovation = innovation - z_mean
         self.P = self.P - K @ S @ K.T
         self.nis = innovation @ np.linalg.solve(S, innovation)

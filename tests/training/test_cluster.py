@@ -1,9 +1,12 @@
-"""Training runs and flights on a Ray cluster: the same numbers as here, and a lost worker costs nothing."""
+"""Training runs and flights on a Ray cluster: the same numbers as here, and a lost worker costs
+nothing.
+"""
 
 import os
 import signal
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,23 +17,45 @@ from windwrench.runtime.cluster import spread
 from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
-TINY = ["steps=240", "environments=2", "net=[8]", "learner.learning_starts=40", "learner.batch_size=16", "checkpoint=60",
-        "validation.every=120", "validation.episodes=1"]
+TINY = [
+    "steps=240",
+    "environments=2",
+    "net=[8]",
+    "learner.learning_starts=40",
+    "learner.batch_size=16",
+    "checkpoint=60",
+    "validation.every=120",
+    "validation.episodes=1",
+]
 
 
 def test_a_sweep_is_every_value_with_every_seed():
     jobs = jobs_of("sac", "base", range(2), TINY, ["learner.gamma=0.9|0.95", "net=[8]|[16]"])
-    assert [job.name for job in jobs][:3] == ["gamma-0.9-net-8-seed-0", "gamma-0.9-net-8-seed-1",
-                                             "gamma-0.9-net-16-seed-0"]
+    assert [job.name for job in jobs][:3] == [
+        "gamma-0.9-net-8-seed-0",
+        "gamma-0.9-net-8-seed-1",
+        "gamma-0.9-net-16-seed-0",
+    ]
     assert [(job.config["learner"]["gamma"], job.config["net"], job.seed) for job in jobs] == [
-        (0.9, [8], 0), (0.9, [8], 1), (0.9, [16], 0), (0.9, [16], 1),
-        (0.95, [8], 0), (0.95, [8], 1), (0.95, [16], 0), (0.95, [16], 1)]
+        (0.9, [8], 0),
+        (0.9, [8], 1),
+        (0.9, [16], 0),
+        (0.9, [16], 1),
+        (0.95, [8], 0),
+        (0.95, [8], 1),
+        (0.95, [16], 0),
+        (0.95, [16], 1),
+    ]
 
 
-@pytest.mark.parametrize(("search", "words"), [
-    ("learner.gamma", "expected KEY=VALUE"), ("learner.gamma=0.9", "expected KEY=VALUE"),
-    ("learner.gama=0.9|0.8", "Did you mean 'learner.gamma'"),
-])
+@pytest.mark.parametrize(
+    ("search", "words"),
+    [
+        ("learner.gamma", "expected KEY=VALUE"),
+        ("learner.gamma=0.9", "expected KEY=VALUE"),
+        ("learner.gama=0.9|0.8", "Did you mean 'learner.gamma'"),
+    ],
+)
 def test_a_search_that_cannot_be_is_named(search, words):
     with pytest.raises(InputError, match=words):
         jobs_of("sac", "base", [0], [], [search])
@@ -38,7 +63,9 @@ def test_a_search_that_cannot_be_is_named(search, words):
 
 @pytest.fixture(scope="module")
 def cluster():
-    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'windwrench[cluster]'")
+    ray = pytest.importorskip(
+        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
+    )
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
     yield "local"  # the one that is connected already
     ray.shutdown()
@@ -58,7 +85,9 @@ def processes_of(word):
     return found
 
 
-@pytest.mark.skipif(not os.path.exists("/proc/self/stat"), reason="looks for processes in Linux's /proc")
+@pytest.mark.skipif(
+    not os.path.exists("/proc/self/stat"), reason="looks for processes in Linux's /proc"
+)
 def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
     pytest.importorskip("stable_baselines3")
     jobs = jobs_of("sac", "base", range(2), TINY, [])
@@ -69,7 +98,8 @@ def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster,
         while not killed and time.monotonic() < deadline:
             if (tmp_path / "there" / jobs[0].name / "checkpoint.pt").exists():
                 for process in processes_of("ray::"):
-                    if any(word in open(f"/proc/{process}/cmdline").read() for word in ("trial", "ImplicitFunc")):  # noqa: SIM115
+                    words = Path(f"/proc/{process}/cmdline").read_text()
+                    if "trial" in words or "ImplicitFunc" in words:
                         os.kill(process, signal.SIGKILL)
                         killed.append(process)
                         break
@@ -85,7 +115,9 @@ def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster,
     assert [r["validation_rmse_m"] for r in there] == [r["validation_rmse_m"] for r in here]
     for job in jobs:
         for name in ("best.npz", "last.npz"):
-            assert (tmp_path / "there" / job.name / name).read_bytes() == (tmp_path / "here" / job.name / name).read_bytes()
+            assert (tmp_path / "there" / job.name / name).read_bytes() == (
+                tmp_path / "here" / job.name / name
+            ).read_bytes()
 
 
 def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
@@ -112,10 +144,16 @@ def test_flights_on_a_cluster_are_the_local_ones(cluster):
 
 def test_rllib_knows_the_environment_after_one_line(cluster):
     register_with_rllib()
-    ppo = pytest.importorskip("ray.rllib.algorithms.ppo", reason="RLlib lacks what it needs: pip install dm-tree ormsgpack")
-    config = (ppo.PPOConfig().environment("windwrench", env_config={"scenario": "base"})
-              .env_runners(num_env_runners=0, rollout_fragment_length=50)
-              .training(train_batch_size_per_learner=50, minibatch_size=25, num_epochs=1))
+    ppo = pytest.importorskip(
+        "ray.rllib.algorithms.ppo",
+        reason="RLlib lacks what it needs: pip install dm-tree ormsgpack",
+    )
+    config = (
+        ppo.PPOConfig()
+        .environment("windwrench", env_config={"scenario": "base"})
+        .env_runners(num_env_runners=0, rollout_fragment_length=50)
+        .training(train_batch_size_per_learner=50, minibatch_size=25, num_epochs=1)
+    )
     algorithm = config.build_algo()
     result = algorithm.train()
     assert result["env_runners"]["num_env_steps_sampled"] == 50
@@ -123,7 +161,9 @@ def test_rllib_knows_the_environment_after_one_line(cluster):
 
 
 def test_a_cluster_that_is_not_there_is_named():
-    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'windwrench[cluster]'")
+    ray = pytest.importorskip(
+        "ray", reason="Ray is not installed: pip install 'windwrench[cluster]'"
+    )
     if ray.is_initialized():
         ray.shutdown()
     with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):

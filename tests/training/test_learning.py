@@ -11,10 +11,14 @@ from windwrench.training.train import read_progress, train
 
 
 def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
-    config = load_config("sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"])
+    config = load_config(
+        "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]
+    )
     path = str(train(config, "base", 0, tmp_path))
     assert read_progress(tmp_path).steps == [1000, 2000, 3000, 4000]
     results = fly_all([path], ["base"], 20, seed=0, jobs=1)
-    hover, oracle, learned = (np.mean([e.rmse for e in results[name, "base"]]) for name in ("hover", "oracle", path))
+    hover, oracle, learned = (
+        np.mean([e.rmse for e in results[name, "base"]]) for name in ("hover", "oracle", path)
+    )
     assert learned < hover - 0.5 * (hover - oracle)
     assert not any(e.lost for e in results[path, "base"])

@@ -1,4 +1,6 @@
-"""Training: configurations, the update, exact resumption, and policies that fly as the learner would."""
+"""Training: configurations, the update, exact resumption, and policies that fly as the learner
+would.
+"""
 
 import json
 import os
@@ -31,9 +33,21 @@ LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
 TINY = {
     "sac": ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"],
     "td3": ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"],
-    "ppo": ["steps=240", "environments=2", "learner.n_steps=30", "learner.batch_size=20", "learner.n_epochs=2"],
-    "recurrent-ppo": ["steps=240", "environments=2", "learner.n_steps=30", "learner.batch_size=20", "learner.n_epochs=2",
-                      "lstm=4"],
+    "ppo": [
+        "steps=240",
+        "environments=2",
+        "learner.n_steps=30",
+        "learner.batch_size=20",
+        "learner.n_epochs=2",
+    ],
+    "recurrent-ppo": [
+        "steps=240",
+        "environments=2",
+        "learner.n_steps=30",
+        "learner.batch_size=20",
+        "learner.n_epochs=2",
+        "lstm=4",
+    ],
     "imitation": ["steps=600", "rounds=2", "epochs=2"],
 }
 SHORT = ["net=[8]", "validation.every=120", "validation.episodes=1"]
@@ -47,7 +61,11 @@ def tiny(algorithm, *more):
 
 
 def make_env(config, seed=0):
-    return FeatureVecEnv(make_worlds("base", config["environments"]), features_of(config), lambda i, e: seed + 10 * i + e)
+    return FeatureVecEnv(
+        make_worlds("base", config["environments"]),
+        features_of(config),
+        lambda i, e: seed + 10 * i + e,
+    )
 
 
 @pytest.mark.parametrize("algorithm", LEARNERS)
@@ -72,11 +90,29 @@ def test_another_seed_is_another_run(tmp_path):
 
 
 def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
-    words = [sys.executable, "-c", "from windwrench.cli import main; main()", "train", "sac", "--seed", "3", "--out"]
-    words += [str(tmp_path / "killed"), *(w for s in [*SHORT, *TINY["sac"], "checkpoint=60"] for w in ("--set", s))]
-    process = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    words = [
+        sys.executable,
+        "-c",
+        "from windwrench.cli import main; main()",
+        "train",
+        "sac",
+        "--seed",
+        "3",
+        "--out",
+    ]
+    words += [
+        str(tmp_path / "killed"),
+        *(w for s in [*SHORT, *TINY["sac"], "checkpoint=60"] for w in ("--set", s)),
+    ]
+    process = subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     deadline = time.monotonic() + 120
-    while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None and time.monotonic() < deadline:
+    while (
+        not (tmp_path / "killed" / "checkpoint.pt").exists()
+        and process.poll() is None
+        and time.monotonic() < deadline
+    ):
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
@@ -84,7 +120,9 @@ def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
     config = tiny("sac")
     train(config, "base", 3, tmp_path / "killed")
     train(config, "base", 3, tmp_path / "whole")
-    assert (tmp_path / "whole" / "last.npz").read_bytes() == (tmp_path / "killed" / "last.npz").read_bytes()
+    assert (tmp_path / "whole" / "last.npz").read_bytes() == (
+        tmp_path / "killed" / "last.npz"
+    ).read_bytes()
     assert not list((tmp_path / "killed").glob(".*.tmp"))
 
 
@@ -94,12 +132,16 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     env = make_env(config)
     learner = make_learner(config, env, 0)
     learner.learn(120)
-    policy = TrainedPolicy(card_of(config, "base", 0, 120, squashes(algorithm)), weights_of(learner, algorithm))
+    policy = TrainedPolicy(
+        card_of(config, "base", 0, 120, squashes(algorithm)), weights_of(learner, algorithm)
+    )
     policy.reset()
     rng, state = np.random.default_rng(0), None
     for _ in range(5):
         x = rng.normal(size=features_of(config).size).astype(np.float32)
-        expected, state = learner.predict(x[None], state=state, episode_start=np.array([state is None]), deterministic=True)
+        expected, state = learner.predict(
+            x[None], state=state, episode_start=np.array([state is None]), deterministic=True
+        )
         np.testing.assert_allclose(policy.act(x), expected[0], atol=1e-5)
 
 
@@ -110,17 +152,27 @@ def test_the_fast_update_is_that_of_stable_baselines3():
         env = make_env(config)
         learner = make_learner(config, env, 0)
         if kind is not None:
-            learner = kind("MlpPolicy", make_env(config), seed=0, device="cpu", policy_kwargs={"net_arch": config["net"]},
-                           **{**config["learner"], "learning_rate": 0.0008})
+            learner = kind(
+                "MlpPolicy",
+                make_env(config),
+                seed=0,
+                device="cpu",
+                policy_kwargs={"net_arch": config["net"]},
+                **{**config["learner"], "learning_rate": 0.0008},
+            )
         learner.learn(60)  # the first updates too
         torch.manual_seed(1)
         np.random.seed(1)  # noqa: NPY002
         learner.train(20, 64)
-        learned.append({**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()})
+        learned.append(
+            {**learner.policy.state_dict(), "log_ent_coef": learner.log_ent_coef.detach()}
+        )
     for name, value in learned[0].items():
         np.testing.assert_allclose(value.numpy(), learned[1][name].numpy(), atol=2e-5, err_msg=name)
     fresh = make_learner(config, make_env(config), 0).policy.state_dict()
-    assert float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3  # something was learned
+    assert (
+        float((fresh["actor.mu.weight"] - learned[0]["actor.mu.weight"]).abs().max()) > 1e-3
+    )  # something was learned
 
 
 def test_a_checkpoint_of_another_configuration_is_refused(tmp_path):
@@ -148,8 +200,17 @@ def test_a_run_says_beside_the_policy_what_it_was(tmp_path):
 
 
 def test_imitation_learns_the_oracle_s_commands(tmp_path):
-    config = load_config("imitation", ["steps=3000", "rounds=3", "epochs=15", "net=[32]", "validation.every=1000",
-                                       "validation.episodes=3"])
+    config = load_config(
+        "imitation",
+        [
+            "steps=3000",
+            "rounds=3",
+            "epochs=15",
+            "net=[32]",
+            "validation.every=1000",
+            "validation.episodes=3",
+        ],
+    )
     imitate(config, "base", 0, tmp_path)
     progress = read_progress(tmp_path)
     assert progress.steps[-1] >= 3000
@@ -172,33 +233,44 @@ def test_every_key_can_be_overridden_and_no_other():
                 assert again == config
 
 
-@pytest.mark.parametrize(("override", "words"), [
-    ("learner.gama=0.9", "Did you mean 'learner.gamma'"),
-    ("learner.gamma=high", "learner.gamma must be a number"),
-    ("learner.gamma", "expected KEY=VALUE"),
-    ("learner=1", "holds keys of its own"),
-    ("steps=0", "steps must be at least 1"),
-    ("steps=1.5", "steps must be a whole number"),
-    ("net=[0]", "net must list"),
-    ("features.frame=[torque]", "unknown quantity"),
-    ("estimator=kalman", "unknown estimator"),
-    ("algorithm=ppo", "cannot be overridden"),
-    ("validation.episodes=0", "validation.episodes"),
-])
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("learner.gama=0.9", "Did you mean 'learner.gamma'"),
+        ("learner.gamma=high", "learner.gamma must be a number"),
+        ("learner.gamma", "expected KEY=VALUE"),
+        ("learner=1", "holds keys of its own"),
+        ("steps=0", "steps must be at least 1"),
+        ("steps=1.5", "steps must be a whole number"),
+        ("net=[0]", "net must list"),
+        ("features.frame=[torque]", "unknown quantity"),
+        ("estimator=kalman", "unknown estimator"),
+        ("algorithm=ppo", "cannot be overridden"),
+        ("validation.episodes=0", "validation.episodes"),
+    ],
+)
 def test_a_wrong_setting_is_named(override, words):
     with pytest.raises(InputError, match=words):
         load_config("sac", [override])
 
 
 def test_a_configuration_file_comes_before_single_settings(tmp_path):
-    (tmp_path / "mine.yaml").write_text("learner: {gamma: 0.9, tau: 0.02}\nsteps: 99\n", encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(
+        "learner: {gamma: 0.9, tau: 0.02}\nsteps: 99\n", encoding="utf-8"
+    )
     config = load_config("sac", ["learner.gamma=0.8"], tmp_path / "mine.yaml")
-    assert (config["learner"]["gamma"], config["learner"]["tau"], config["steps"]) == (0.8, 0.02, 99)
+    assert (config["learner"]["gamma"], config["learner"]["tau"], config["steps"]) == (
+        0.8,
+        0.02,
+        99,
+    )
     with pytest.raises(InputError, match=r"mine2.yaml: cannot be read"):
         load_config("sac", [], tmp_path / "mine2.yaml")
 
 
-@pytest.mark.parametrize("starts", [[0, 1, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0, 1, 0, 0, 0], [1, 0, 0, 0, 0, 0, 1, 0]])
+@pytest.mark.parametrize(
+    "starts", [[0, 1, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0, 1, 0, 0, 0], [1, 0, 0, 0, 0, 0, 1, 0]]
+)
 def test_sequences_in_one_call_are_those_of_sb3_contrib(starts):
     """One sequence or two, with an episode's start at the first step, at none, or in the middle."""
     from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy

@@ -18,7 +18,9 @@ def test_tuned_laws_fly_with_the_gains_in_the_file():
     for law, scenarios in gains.items():
         assert set(scenarios) == {"base", "fast", "wide"}
         for scenario, found in scenarios.items():
-            controller = make_controller(f"{law}-tuned" if scenario == "base" else f"{law}-tuned-{scenario}")
+            controller = make_controller(
+                f"{law}-tuned" if scenario == "base" else f"{law}-tuned-{scenario}"
+            )
             assert {name: getattr(controller, name) for name in found["gains"]} == found["gains"]
             assert found["rmse_m"] <= found["default_rmse_m"]
             assert found["command"].startswith(f"windwrench tune {law} --scenario {scenario} ")
@@ -38,28 +40,33 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
     keep_gains(found, path, "the command")
     kept = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert kept["ratio"]["base"]["gains"]["gain"] == 5.0
-    assert kept["admittance"]["static"]["gains"]["gain"] == pytest.approx(found["gains"]["gain"], rel=1e-3)
+    assert kept["admittance"]["static"]["gains"]["gain"] == pytest.approx(
+        found["gains"]["gain"], rel=1e-3
+    )
     assert np.isfinite(kept["admittance"]["static"]["rmse_m"])
     path.write_text("- 1\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"tuned.yaml: expected laws"):
         keep_gains(found, path, "the command")
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (("train", "saq"), "Did you mean 'sac'"),
-    (("train", "sac", "--scenario", "bse"), "Did you mean 'base'"),
-    (("train", "sac", "--set", "learner.gama=1"), "Did you mean 'learner.gamma'"),
-    (("train", "sac", "--steps", "0"), "--steps"),
-    (("train", "sac", "--search", "steps"), "expected KEY=VALUE|VALUE"),
-    (("imitate", "--scenario", "wid"), "Did you mean 'wide'"),
-    (("tune", "admitance"), "Did you mean 'admittance'"),
-    (("tune", "ratio", "--episodes", "200000"), "there are 100000 episodes"),
-    (("leaderboard", "--only", "sack"), "Did you mean 'sac'"),
-    (("leaderboard", "--plan", "nowhere.yaml"), "nowhere.yaml"),
-    (("leaderboard", "--results", "empty", "--policies", "empty"), "holds no scores of hover"),
-    (("benchmark", "--controllers", "nowhere.npz"), "nowhere.json: no such file"),
-    (("fly", "--controller", "nowhere.npz"), "nowhere.json: no such file"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("train", "saq"), "Did you mean 'sac'"),
+        (("train", "sac", "--scenario", "bse"), "Did you mean 'base'"),
+        (("train", "sac", "--set", "learner.gama=1"), "Did you mean 'learner.gamma'"),
+        (("train", "sac", "--steps", "0"), "--steps"),
+        (("train", "sac", "--search", "steps"), "expected KEY=VALUE|VALUE"),
+        (("imitate", "--scenario", "wid"), "Did you mean 'wide'"),
+        (("tune", "admitance"), "Did you mean 'admittance'"),
+        (("tune", "ratio", "--episodes", "200000"), "there are 100000 episodes"),
+        (("leaderboard", "--only", "sack"), "Did you mean 'sac'"),
+        (("leaderboard", "--plan", "nowhere.yaml"), "nowhere.yaml"),
+        (("leaderboard", "--results", "empty", "--policies", "empty"), "holds no scores of hover"),
+        (("benchmark", "--controllers", "nowhere.npz"), "nowhere.json: no such file"),
+        (("fly", "--controller", "nowhere.npz"), "nowhere.json: no such file"),
+    ],
+)
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, capfd, arguments, words):
     pytest.importorskip("stable_baselines3")
     pytest.importorskip("optuna")

@@ -1,4 +1,6 @@
-"""The environments as stable-baselines3 sees them: where each one's episode ends, and how it is flown back to."""
+"""The environments as stable-baselines3 sees them: where each one's episode ends, and how it is
+flown back to.
+"""
 
 import numpy as np
 import pytest
@@ -55,14 +57,18 @@ def test_each_environment_ends_by_itself_with_its_own_last_observation():
     np.testing.assert_array_equal(seen[1], first[0])
     still, _, _ = lone_flight(seed_of(0, 0), [0.0] * limit)
     for k in range(1, limit + 1):
-        seen, _, dones, infos = env.step(np.array([[0.0], [direction if k <= gone else 0.0], [0.0]]))
+        seen, _, dones, infos = env.step(
+            np.array([[0.0], [direction if k <= gone else 0.0], [0.0]])
+        )
         assert dones.tolist() == [k == limit, k == gone, k == limit]
         assert ["terminal_observation" in info for info in infos] == dones.tolist()
         if k == gone:
             np.testing.assert_array_equal(infos[1]["terminal_observation"], first[-1])
             assert infos[1]["TimeLimit.truncated"] is False
             assert infos[1]["episode"]["l"] == gone
-            np.testing.assert_array_equal(seen[1], lone_flight(seed_of(1, 1), [])[0][0])  # its next episode's first
+            np.testing.assert_array_equal(
+                seen[1], lone_flight(seed_of(1, 1), [])[0][0]
+            )  # its next episode's first
             np.testing.assert_array_equal(seen[0], still[k])  # nobody else's changed
         if k == limit:
             for i in (0, 2):
@@ -88,9 +94,15 @@ def test_rewards_are_weighted_terms():
     _, rewards, _ = lone_flight(seed_of(0, 0), commands)
     env = make(1, 50)
     env.reset()
-    np.testing.assert_allclose([env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6)
-    squared = FeatureVecEnv(FanTrackingVectorEnv(1, 50, scenario="static"), FEATURES, seed_of,
-                            {"tracking": 0.0, "change": 0.0, "squared": 1.0})
+    np.testing.assert_allclose(
+        [env.step(np.array([[c]]))[1][0] for c in commands], rewards, rtol=1e-6
+    )
+    squared = FeatureVecEnv(
+        FanTrackingVectorEnv(1, 50, scenario="static"),
+        FEATURES,
+        seed_of,
+        {"tracking": 0.0, "change": 0.0, "squared": 1.0},
+    )
     squared.reset()
     assert squared.step(np.array([[0.0]]))[1][0] == pytest.approx(-0.64, abs=0.1)  # about 0.8 m off
 

@@ -1,7 +1,8 @@
-"""Readers of flight logs of other forms. Each states what it assumed, the thrust model above all, in the log's notes.
+"""Readers of flight logs of other forms. Each states what it assumed, the thrust model above all,
+in the log's notes.
 
-To add one: a file in this folder with a function ``read(path, vehicle)`` that returns a FlightLog, and a line in
-``READERS``.
+To add one: a file in this folder with a function ``read(path, vehicle)`` that returns a FlightLog,
+and a line in ``READERS``.
 """
 
 from collections.abc import Callable
@@ -17,21 +18,28 @@ from . import crazyswarm2, nanobench, px4_ulog, rosbag
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader: its name, its function, and the columns or the endings by which a log of its form is known."""
+    """A reader: its name, its function, and the columns or the endings by which a log of its form
+    is known.
+    """
 
     name: str
     read: Callable[[Path, Vehicle | None], FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
     suffixes: tuple[str, ...] = ()  # of a file's name
-    read_with: Callable[..., FlightLog] | None = None  # takes a third argument, the option behind the name's colon
+    read_with: Callable[..., FlightLog] | None = (
+        None  # takes a third argument, the option behind the name's colon
+    )
 
 
-READERS = {reader.name: reader for reader in (
-    Reader("nanobench", nanobench.read, nanobench.SIGNATURE),
-    Reader("crazyswarm2", crazyswarm2.read, crazyswarm2.SIGNATURE),
-    Reader("px4_ulog", px4_ulog.read, suffixes=px4_ulog.SUFFIXES),
-    Reader("rosbag", rosbag.read, suffixes=rosbag.SUFFIXES, read_with=rosbag.read),
-)}
+READERS = {
+    reader.name: reader
+    for reader in (
+        Reader("nanobench", nanobench.read, nanobench.SIGNATURE),
+        Reader("crazyswarm2", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        Reader("px4_ulog", px4_ulog.read, suffixes=px4_ulog.SUFFIXES),
+        Reader("rosbag", rosbag.read, suffixes=rosbag.SUFFIXES, read_with=rosbag.read),
+    )
+}
 
 
 def find_reader(name: str) -> Reader:
@@ -47,5 +55,7 @@ def find_reader(name: str) -> Reader:
     if not colon:
         return reader
     if reader.read_with is None:
-        raise InputError(f"reader {name!r} takes no option, got {option!r}; expected the name alone")
+        raise InputError(
+            f"reader {name!r} takes no option, got {option!r}; expected the name alone"
+        )
     return replace(reader, read=partial(reader.read_with, option=option))

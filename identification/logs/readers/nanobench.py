@@ -39,7 +39,7 @@ The product with the voltage halves the scatter at least; which curve then decid
 stated is 27 g, and with its marker deck the vehicle may have had 30 to 35 g: every curve promises more thrust than
 there was (worn motors, or a heavier vehicle), this one the least. What is left is a constant factor on thrust, for
 diagnosis to find; a hover cannot tell it from mass.
-"""
+"""  # noqa: E501
 
 from pathlib import Path
 
@@ -65,7 +65,12 @@ Array = NDArray[np.float64]
 SIGNATURE = ("motor_motor_m1", "motor_motor_m2", "motor_motor_m3", "motor_motor_m4", "pwr_pm_vbat")
 
 _POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
-_MOTORS = ("motor_motor_m4", "motor_motor_m3", "motor_motor_m2", "motor_motor_m1")  # in the kit's order of rotors
+_MOTORS = (
+    "motor_motor_m4",
+    "motor_motor_m3",
+    "motor_motor_m2",
+    "motor_motor_m1",
+)  # in the kit's order of rotors
 _FULL_COUNT = 65535.0
 _FULL_VOLTAGE = 4.2  # V
 _VOLTAGE_LATE = 0.075  # s
@@ -73,7 +78,8 @@ _THRUST = (2.130295e-11, 1.032633e-6, 5.484560e-4)  # N per motor, powers 2, 1, 
 
 
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
-    """Read a NanoBench CSV; ``vehicle`` (default: the crazyflie preset) turns thrust into turn rates through its k.
+    """Read a NanoBench CSV; ``vehicle`` (default: the crazyflie preset) turns thrust into turn
+    rates through its k.
 
     Raises:
         InputError: the file cannot be read, lacks a column, or holds a number out of range.
@@ -83,7 +89,9 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     names = ["t", *_POSE, *SIGNATURE]
     missing = [name for name in names if name not in table.header]
     if missing:
-        raise InputError(f"{path}: missing column(s) {', '.join(missing)}; expected those of a nanobench log")
+        raise InputError(
+            f"{path}: missing column(s) {', '.join(missing)}; expected those of a nanobench log"
+        )
     columns = table.read(names)
     pose = np.column_stack([columns[name] for name in _POSE])
     valid: Mask = ~np.all(np.isnan(pose), axis=1)
@@ -94,20 +102,29 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     sooner = np.interp(columns["t"] + _VOLTAGE_LATE, columns["t"], voltage)
     if np.any(voltage <= 0):
         i = int(np.flatnonzero(voltage <= 0)[0])
-        raise InputError(f"{path}: column pwr_pm_vbat, {table.row(i)}: {voltage[i]:g} V; expected a positive voltage")
+        raise InputError(
+            f"{path}: column pwr_pm_vbat, {table.row(i)}: {voltage[i]:g} V; expected a positive "
+            f"voltage"
+        )
     pwm = np.column_stack([columns[name] for name in _MOTORS])
     reference = vehicle.voltage_ref if vehicle.voltage_ref > 0 else _FULL_VOLTAGE
     notes = [
-        "motors renumbered: rotors 1, 2, 3, 4 are the log's m4, m3, m2, m1; time counts from the first sample",
-        f"thrust model: 2.130e-11 u^2 + 1.033e-6 u + 5.48e-4 N per motor (Foerster 2015) at u = PWM * {reference:g} V / 4.2 V; "
-        f"turn rates are sqrt(thrust / k) with the k of {vehicle.name}. The PWM logged is after battery compensation, so "
-        f"thrust falls with the voltage: these are turn rates at {reference:g} V, and battery_sag is left to be declared "
+        "motors renumbered: rotors 1, 2, 3, 4 are the log's m4, m3, m2, m1; time counts from the "
+        "first sample",
+        f"thrust model: 2.130e-11 u^2 + 1.033e-6 u + 5.48e-4 N per motor (Foerster 2015) at u = "
+        f"PWM * {reference:g} V / 4.2 V; "
+        f"turn rates are sqrt(thrust / k) with the k of {vehicle.name}. The PWM logged is after "
+        f"battery compensation, so "
+        f"thrust falls with the voltage: these are turn rates at {reference:g} V, and battery_sag "
+        f"is left to be declared "
         "or found. A constant factor on thrust remains unknown",
         f"battery voltage put {_VOLTAGE_LATE:g} s sooner, by which it is logged late",
     ]
     outside = (pwm < 0) | (pwm > _FULL_COUNT)
     if outside.any():
-        notes.append(f"{int(outside.sum())} PWM value(s) outside 0 to 65535 were taken at the limit")
+        notes.append(
+            f"{int(outside.sum())} PWM value(s) outside 0 to 65535 were taken at the limit"
+        )
         pwm = np.clip(pwm, 0.0, _FULL_COUNT)
     saturated = float(np.mean(pwm.max(axis=1) >= 65500.0))
     if saturated > 0:
@@ -127,7 +144,9 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
 
 
 def motor_thrust(pwm: Array, voltage: Array) -> Array:
-    """Return thrusts (N, 4) in N of PWM counts (N, 4) after compensation at battery voltages (N,) in V."""
+    """Return thrusts (N, 4) in N of PWM counts (N, 4) after compensation at battery voltages (N,)
+    in V.
+    """
     u = pwm * (voltage[:, None] / _FULL_VOLTAGE)
     thrust: Array = np.where(pwm > 0, (_THRUST[0] * u + _THRUST[1]) * u + _THRUST[2], 0.0)
     return thrust

@@ -16,7 +16,10 @@ _WHOLE = re.compile(rb"compression_mode:\s*['\"]?(file|message)", re.IGNORECASE)
 
 
 def _at_most(make: Callable[[], Any]) -> Callable[..., bytes]:
-    """Return the decompression of ``make()``'s kind, which refuses what unpacks to more than ``LARGEST`` bytes."""
+    """Return the decompression of ``make()``'s kind, which refuses what unpacks to more than
+    ``LARGEST`` bytes.
+    """
+
     def unpack(data: bytes, *_: object) -> bytes:
         machine = make()
         out: bytes = machine.decompress(data, max_length=LARGEST)
@@ -35,13 +38,21 @@ def limited_unpacking() -> Iterator[None]:
     from rosbags.rosbag2 import storage_mcap
 
     lz4_at_most = _at_most(lz4.frame.LZ4FrameDecompressor)
-    with (patch.dict(reader.decompressors, {"bz2": _at_most(bz2.BZ2Decompressor), "lz4": lz4_at_most}),
-          patch.dict(storage_mcap.DECOMPRESSORS, {"zstd": _at_most(storage_mcap.zstd.ZstdDecompressor), "lz4": lz4_at_most})):
+    with (
+        patch.dict(
+            reader.decompressors, {"bz2": _at_most(bz2.BZ2Decompressor), "lz4": lz4_at_most}
+        ),
+        patch.dict(
+            storage_mcap.DECOMPRESSORS,
+            {"zstd": _at_most(storage_mcap.zstd.ZstdDecompressor), "lz4": lz4_at_most},
+        ),
+    ):
         yield
 
 
 def refuse_packed_files(path: Path) -> None:
-    """Refuse a ROS 2 bag whose files or messages are packed one by one: what they unpack to cannot be limited.
+    """Refuse a ROS 2 bag whose files or messages are packed one by one: what they unpack to cannot
+    be limited.
 
     Raises:
         InputError: it is one.
@@ -54,5 +65,8 @@ def refuse_packed_files(path: Path) -> None:
         return  # the reader says what is missing
     if found:
         mode = found.group(1).decode().lower()
-        raise InputError(f"{metadata}: compression_mode {mode}: expected a bag that is not packed, or by chunks (MCAP); "
-                         "`ros2 bag convert` makes one")
+        raise InputError(
+            f"{metadata}: compression_mode {mode}: expected a bag that is not packed, or by chunks "
+            f"(MCAP); "
+            "`ros2 bag convert` makes one"
+        )

@@ -13,22 +13,40 @@ from windwrench.identification.inference.search import Fit
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
-LEVEL = SimpleNamespace(signals=SimpleNamespace(velocity=np.tile([1.0, 0.0, 0.0], (5, 1))), rows=np.arange(5))  # at 1 m/s
+LEVEL = SimpleNamespace(
+    signals=SimpleNamespace(velocity=np.tile([1.0, 0.0, 0.0], (5, 1))), rows=np.arange(5)
+)  # at 1 m/s
 
 
 def search(columns, pulls, precision=1e8):
-    """A search whose regression would move each coefficient, all at zero, by so many standard deviations."""
+    """A search whose regression would move each coefficient, all at zero, by so many standard
+    deviations.
+    """
     count = len(columns)
     std = 1.0 / np.sqrt(precision)
     block = np.zeros((1, count + 1, count + 1))
     block[0, :count, :count] = precision * np.eye(count)
     block[0, :count, -1] = precision * std * np.array(pulls)
     zero, far = np.zeros(count), np.full(count, np.inf)
-    gram = Gram(tuple(columns), np.zeros((0, 6, count + 1)), np.zeros(1, dtype=np.intp), block, zero, zero, zero, far)
-    return SimpleNamespace(flights=SimpleNamespace(vehicle=VEHICLE, pieces=lambda setting: [LEVEL]), at=lambda fit: gram)
+    gram = Gram(
+        tuple(columns),
+        np.zeros((0, 6, count + 1)),
+        np.zeros(1, dtype=np.intp),
+        block,
+        zero,
+        zero,
+        zero,
+        far,
+    )
+    return SimpleNamespace(
+        flights=SimpleNamespace(vehicle=VEHICLE, pieces=lambda setting: [LEVEL]),
+        at=lambda fit: gram,
+    )
 
 
-@pytest.mark.parametrize(("pull", "doubtful"), [(-6.0, True), (-2.0, False), (0.0, False), (6.0, False)])
+@pytest.mark.parametrize(
+    ("pull", "doubtful"), [(-6.0, True), (-2.0, False), (0.0, False), (6.0, False)]
+)
 def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
     fit = Fit({"body_drag": {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}})
@@ -37,7 +55,9 @@ def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     assert not doubtful or "cx" in found[0]
 
 
-@pytest.mark.parametrize(("dx", "dz", "doubtful"), [(0.0, 1e-3, True), (1e-3, 1e-3, False), (1e-3, 0.0, False)])
+@pytest.mark.parametrize(
+    ("dx", "dz", "doubtful"), [(0.0, 1e-3, True), (1e-3, 1e-3, False), (1e-3, 0.0, False)]
+)
 def test_air_that_damps_yaw_alone_is_a_doubt(dx, dz, doubtful):
     fit = Fit({"rate_damping": {"dx": dx, "dy": dx, "dz": dz}})
     assert bool(beyond_belief(search([("rate_damping", "dz")], [1.0]), fit)) == doubtful
@@ -49,10 +69,19 @@ def test_what_is_small_beside_the_effect_itself_is_no_doubt():
     assert not beyond_belief(search(columns, [1.0, -6.0]), fit)
 
 
-@pytest.mark.parametrize(("dx", "cx", "std", "doubtful"), [
-    (0.0, 0.0, 0.003, True), (0.0, 0.0, 0.01, False), (0.02, 0.0, 0.001, False), (0.0, 0.02, 0.001, False)])
+@pytest.mark.parametrize(
+    ("dx", "cx", "std", "doubtful"),
+    [
+        (0.0, 0.0, 0.003, True),
+        (0.0, 0.0, 0.01, False),
+        (0.02, 0.0, 0.001, False),
+        (0.0, 0.02, 0.001, False),
+    ],
+)
 def test_a_body_that_air_drags_along_some_axes_alone_is_a_doubt(dx, cx, std, doubtful):
-    fit = Fit({"body_drag": {"dx": dx, "dy": 0.05, "dz": 0.1, "cx": cx}}, {("body_drag", "dx"): std})
+    fit = Fit(
+        {"body_drag": {"dx": dx, "dy": 0.05, "dz": 0.1, "cx": cx}}, {("body_drag", "dx"): std}
+    )
     assert bool(beyond_belief(search([("body_drag", "dx")], [0.0]), fit)) == doubtful
 
 
@@ -67,11 +96,15 @@ def test_a_wind_on_hardly_any_drag_is_a_steady_force_unless_another_drag_feels_i
     columns, wind = [("wind", "wx")], {"wx": 6.0, "cd": 1e-3}
     (doubt,) = beyond_belief(search(columns, [0.0]), Fit({"wind": wind}))
     assert "hardly any drag" in doubt
-    assert not beyond_belief(search(columns, [0.0]), Fit({"wind": wind, "rotor_drag": {"kdx": 1e-4}}))
+    assert not beyond_belief(
+        search(columns, [0.0]), Fit({"wind": wind, "rotor_drag": {"kdx": 1e-4}})
+    )
 
 
 def test_a_dry_friction_is_no_sure_drag():
-    log = fly_practice(VEHICLE, trajectory="vertical", seconds=40.0, seed=3, outsider="dry_friction", sensor=2.0)
+    log = fly_practice(
+        VEHICLE, trajectory="vertical", seconds=40.0, seed=3, outsider="dry_friction", sensor=2.0
+    )
     found = diagnose([log], VEHICLE)
     assert found.verdict in ("partly explained", "unexplained")
     assert all(effect.tentative for effect in found.effects)

@@ -14,13 +14,17 @@ FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
 MASS = FLIGHTS.vehicle.mass
 
 
-@pytest.mark.parametrize(("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)])
+@pytest.mark.parametrize(
+    ("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)]
+)
 def test_mass_and_thrust_that_cancel_may_be_an_inertia(thrust, cancels):
     fit = Fit({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
     assert bool(composites(FLIGHTS, fit)) == cancels
 
 
-@pytest.mark.parametrize(("shift", "doubtful"), [(-0.006, True), (-0.005, False), (0.0, False), (0.006, False)])
+@pytest.mark.parametrize(
+    ("shift", "doubtful"), [(-0.006, True), (-0.005, False), (0.0, False), (0.006, False)]
+)
 def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
     fit = Fit({"": {"rate_shift": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}})
     assert bool(composites(FLIGHTS, fit)) == doubtful
@@ -28,15 +32,24 @@ def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
 
 
 def test_what_coincides_within_its_noise_may_be_one_effect():
-    fit = Fit({"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}})
+    fit = Fit(
+        {"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}}
+    )
     assert not composites(FLIGHTS, fit)
-    fit.std = {("thrust_scale", "s"): 3e-5, ("inertia", "jx"): 0.021, ("inertia", "jy"): 0.020, ("inertia", "jz"): 0.003}
+    fit.std = {
+        ("thrust_scale", "s"): 3e-5,
+        ("inertia", "jx"): 0.021,
+        ("inertia", "jy"): 0.020,
+        ("inertia", "jz"): 0.003,
+    }
     assert len(composites(FLIGHTS, fit)) == 1
     fit.std["inertia", "jx"] = 0.004
     assert not composites(FLIGHTS, fit)
 
 
-@pytest.mark.parametrize(("dm", "cx", "hangs"), [(0.02, 0.0, True), (0.02, 0.002, False), (-0.02, 0.0, False)])
+@pytest.mark.parametrize(
+    ("dm", "cx", "hangs"), [(0.02, 0.0, True), (0.02, 0.002, False), (-0.02, 0.0, False)]
+)
 def test_mass_and_a_centre_below_may_be_a_load_that_hangs(dm, cx, hangs):
     fit = Fit({"mass": {"dm": dm}, "com_offset": {"cx": cx, "cy": 0.0, "cz": 0.004}})
     library = ("mass", "thrust_scale", "com_offset")
@@ -46,14 +59,24 @@ def test_mass_and_a_centre_below_may_be_a_load_that_hangs(dm, cx, hangs):
 
 
 def test_more_than_two_effects_may_stand_for_one():
-    three = {"mass": {"dm": 0.02}, "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0}, "battery_sag": {"n": 1.0}}
+    three = {
+        "mass": {"dm": 0.02},
+        "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0},
+        "battery_sag": {"n": 1.0},
+    }
     assert len(composites(FLIGHTS, Fit(three))) == 1
     assert not composites(FLIGHTS, Fit({name: three[name] for name in ("mass", "com_offset")}))
 
 
-@pytest.mark.parametrize(("off", "doubtful"), [
-    ((-0.066, -0.067, -0.066, -0.14), True), ((0.0, 0.001, 0.0, -0.14), False), ((-0.066, -0.067, -0.066, -0.067), False),
-    ((-0.066, -0.02, 0.03, -0.14), False)])
+@pytest.mark.parametrize(
+    ("off", "doubtful"),
+    [
+        ((-0.066, -0.067, -0.066, -0.14), True),
+        ((0.0, 0.001, 0.0, -0.14), False),
+        ((-0.066, -0.067, -0.066, -0.067), False),
+        ((-0.066, -0.02, 0.03, -0.14), False),
+    ],
+)
 def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
     rotors = {f"e{i + 1}": value for i, value in enumerate(off)}
     fit = Fit({"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors})
@@ -62,10 +85,19 @@ def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
 
 @pytest.mark.parametrize("trajectory", ["hover", "vertical"])
 def test_a_thrust_beside_a_steady_force_needs_flight_that_tells_them_apart(trajectory):
-    """In hover they are the same but for a hundred-thousandth; the attitude's noise would have less thrust, and more force."""
+    """In hover they are the same but for a hundred-thousandth; the attitude's noise would have less
+    thrust, and more force.
+    """
     truth = {"constant_force": {"fx": -0.23, "fy": -0.23, "fz": -0.23}}
-    log = fly_practice(FLIGHTS.vehicle, tuple(EffectSetting(k, v) for k, v in truth.items()), trajectory, 40.0, seed=1,
-                       turbulence=0.0, sensor=0.5)
+    log = fly_practice(
+        FLIGHTS.vehicle,
+        tuple(EffectSetting(k, v) for k, v in truth.items()),
+        trajectory,
+        40.0,
+        seed=1,
+        turbulence=0.0,
+        sensor=0.5,
+    )
     search = Search(Flights([log], FLIGHTS.vehicle), ("constant_force", "thrust_scale", "mass"))
     fit = Fit(truth)
     regression = search.linearise(fit)

@@ -15,8 +15,14 @@ from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
-TRUTHS = {"inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.0}, "attitude_gain": {"g": 0.05}, "latency": {"d": 0.012},
-          "constant_force": {"fx": 0.2, "fy": 0.0, "fz": 0.0}, "motor_lag": {"tau": 0.02}, "clock_offset": {"dt": -0.012}}
+TRUTHS = {
+    "inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.0},
+    "attitude_gain": {"g": 0.05},
+    "latency": {"d": 0.012},
+    "constant_force": {"fx": 0.2, "fy": 0.0, "fz": 0.0},
+    "motor_lag": {"tau": 0.02},
+    "clock_offset": {"dt": -0.012},
+}
 
 
 @pytest.fixture(scope="module")
@@ -42,26 +48,35 @@ def test_innovations_are_white_and_small_with_the_gusts_that_are(strength):
     pose, drive = gusts(strength, 0.25, 40_000, np.random.default_rng(1))
     e = {}
     for factor in (1.0, 0.01, 100.0):
-        e[factor] = innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[1000:, 0]
+        e[factor] = innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[
+            1000:, 0
+        ]
     white = np.array([np.corrcoef(e[1.0][k:], e[1.0][:-k])[0, 1] for k in range(1, 20)])
     assert np.abs(white).max() < 0.025
     assert e[1.0].var() < min(e[0.01].var(), e[100.0].var())
 
 
 def test_what_gusts_suggest_is_not_confirmed(gusty):
-    """The loop's torques follow the gusts: regressed on from both sides, an effect that is not there explains much."""
+    """The loop's torques follow the gusts: regressed on from both sides, an effect that is not
+    there explains much.
+    """
     search = Search(Flights([gusty], VEHICLE), names())
     regression = search.linearise(Fit({}))
     search.set_noise(Fit({}), regression)
     best = search.gains(Fit({}), regression, search.gram(Fit({}), regression))[0]
     suggested = search.refit(best.fit).setting[best.effect]
     assert best.energy > 10.0 * LEAST_GAIN
-    assert max(abs(value) / typical((best.effect, name), VEHICLE) for name, value in suggested.items()) > LEAST_SIZE
+    assert (
+        max(abs(value) / typical((best.effect, name), VEHICLE) for name, value in suggested.items())
+        > LEAST_SIZE
+    )
     assert not Innovations(search.flights, {}).confirm({best.effect: suggested})
 
 
 def test_gusts_are_measured(gusty):
-    """Turbulence of 0.06 N and 0.0012 Nm for a quarter of a second, of which the wrench in the log is told nothing."""
+    """Turbulence of 0.06 N and 0.0012 Nm for a quarter of a second, of which the wrench in the log
+    is told nothing.
+    """
     found = Innovations(Flights([gusty], VEHICLE), {}).gusts()
     true = [*gusty.force.std(axis=0), *gusty.torque.std(axis=0)]
     for channel, (gust, rms) in enumerate(zip(found, true, strict=True)):
@@ -89,7 +104,9 @@ def test_the_truth_is_confirmed_in_gusts_and_twice_it_is_not(effect):
 
 def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
     truth = {"constant_force": {"fx": 0.1, "fy": -0.1, "fz": 0.0}}
-    log = fly_practice(VEHICLE, tuple(EffectSetting(k, v) for k, v in truth.items()), "excite", 20.0, seed=2)
+    log = fly_practice(
+        VEHICLE, tuple(EffectSetting(k, v) for k, v in truth.items()), "excite", 20.0, seed=2
+    )
     flights = Flights([log], VEHICLE)
     column = flights.residual({}) - flights.residual(truth)
     innovations = Innovations(flights, {})
@@ -99,7 +116,9 @@ def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
     assert not Innovations(flights, truth).confirm_column(column)
 
 
-@pytest.mark.parametrize(("library", "doubtful"), [("flapping_moment", False), ("rate_damping", True)])
+@pytest.mark.parametrize(
+    ("library", "doubtful"), [("flapping_moment", False), ("rate_damping", True)]
+)
 def test_what_stands_for_another_law_is_at_odds_with_the_innovations(library, doubtful):
     flapping = EffectSetting("flapping_moment", {"kflap": 3e-6})
     flights = Flights([fly_practice(VEHICLE, (flapping,), "excite", 40.0, seed=4)], VEHICLE)

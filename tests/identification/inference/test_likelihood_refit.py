@@ -1,4 +1,6 @@
-"""What the flight loop's answer to noise bends in the residual's least squares, innovations measure as it is."""
+"""What the flight loop's answer to noise bends in the residual's least squares, innovations measure
+as it is.
+"""
 
 from types import SimpleNamespace
 
@@ -22,9 +24,13 @@ VEHICLE = load_vehicle("ardrone2")
 
 
 def fitted(truth, guess, seconds=40.0, **flight):
-    """Return the search, and the least-squares fit of the effects of ``guess``, on a flight with those of ``truth``."""
+    """Return the search, and the least-squares fit of the effects of ``guess``, on a flight with
+    those of ``truth``.
+    """
     settings = tuple(EffectSetting(name, dict(values)) for name, values in truth.items())
-    search = Search(Flights([fly_practice(VEHICLE, settings, seconds=seconds, **flight)], VEHICLE), names())
+    search = Search(
+        Flights([fly_practice(VEHICLE, settings, seconds=seconds, **flight)], VEHICLE), names()
+    )
     fit = Fit({name: dict(values) for name, values in guess.items()})
     search.set_noise(fit, search.linearise(fit))
     return search, search.refit(fit)
@@ -34,7 +40,9 @@ def test_a_lag_is_no_delay_of_the_turn_rates():
     truth = {"motor_lag": {"tau": 0.0134}}
     search, fit = fitted(truth, truth, seed=2, sensor=0.5, turbulence=0.0)
     found = measured(search, fit)
-    by_residual, by_innovations = (abs(x.setting["motor_lag"]["tau"] - 0.0134) for x in (fit, found))
+    by_residual, by_innovations = (
+        abs(x.setting["motor_lag"]["tau"] - 0.0134) for x in (fit, found)
+    )
     assert by_residual > 0.002, "if least squares is right, nothing needs measuring anew"
     assert by_innovations < 0.5 * by_residual
     assert abs(found.setting[SHIFT[0]][SHIFT[1]]) < 0.5 * abs(fit.setting[SHIFT[0]][SHIFT[1]])
@@ -57,7 +65,13 @@ def test_lag_and_delay_are_told_apart(truth, guess):
 
 
 def test_a_lag_takes_no_delay_s_place_that_the_library_lacks():
-    search, fit = fitted({"motor_lag": {"tau": 0.012}}, {"latency": {"d": 0.01}}, seconds=20.0, seed=4, turbulence=0.0)
+    search, fit = fitted(
+        {"motor_lag": {"tau": 0.012}},
+        {"latency": {"d": 0.01}},
+        seconds=20.0,
+        seed=4,
+        turbulence=0.0,
+    )
     search.library = tuple(name for name in search.library if name != "motor_lag")
     assert with_lag(search, fit) is fit
 
@@ -77,7 +91,9 @@ def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
     """On a gentle flight in twice the noise."""
     truth = {"attitude_gain": {"g": 0.05}}
     search, fit = fitted(truth, truth, trajectory="gentle", seed=0, sensor=2.0, turbulence=1.0)
-    by_residual, by_innovations = (x.setting["attitude_gain"]["g"] - 0.05 for x in (fit, measured(search, fit)))
+    by_residual, by_innovations = (
+        x.setting["attitude_gain"]["g"] - 0.05 for x in (fit, measured(search, fit))
+    )
     assert by_residual > 0.02
     assert abs(by_innovations) < 0.3 * by_residual
     # that the residual's share of noise is there is known: it is no sign of another effect

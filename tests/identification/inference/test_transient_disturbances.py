@@ -1,4 +1,6 @@
-"""What comes now and then is no gust of a steady strength, however little it is over a whole flight."""
+"""What comes now and then is no gust of a steady strength, however little it is over a whole
+flight.
+"""
 
 from dataclasses import replace
 
@@ -9,7 +11,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.transient_disturbances import pushes
-from windwrench.identification.report.files.words import remainder_sentence
+from windwrench.identification.report.words import remainder_sentence
 from windwrench.studies.trials.held_back_outsiders import practise_held_back
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -17,7 +19,9 @@ VEHICLE = load_vehicle("ardrone2")
 
 
 def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
-    """A third of it, 0.05 weights for half a second, in twice the noise: as steady gusts it is next to nothing."""
+    """A third of it, 0.05 weights for half a second, in twice the noise: as steady gusts it is next
+    to nothing.
+    """
     flown = practise_held_back(VEHICLE, "passing_wash", "small", 3628941416, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "random", ())

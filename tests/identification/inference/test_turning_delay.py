@@ -14,7 +14,9 @@ from windwrench.identification.motion.signals import log_signals
 
 def flown(vehicle, *effects):
     c = record_flight(vehicle, effects, "excite", 20.0, seed=3)
-    return log_signals(FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage")))
+    return log_signals(
+        FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"))
+    )
 
 
 @pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie"])
@@ -36,6 +38,8 @@ def test_a_lag_shows_as_the_latency_of_what_it_delays():
 
 def test_moments_of_another_flight_show_no_delay():
     model = load_vehicle("ardrone2")
-    pieces = [replace(s, rotor_speeds=np.ascontiguousarray(s.rotor_speeds[::-1])) for s in flown(model)]
+    pieces = [
+        replace(s, rotor_speeds=np.ascontiguousarray(s.rotor_speeds[::-1])) for s in flown(model)
+    ]
     assert turning_delay(pieces, model) is None
     assert turning_delay([], model) is None

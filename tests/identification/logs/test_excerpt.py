@@ -1,4 +1,5 @@
-"""Long flights are looked at by windows, and what is found in them is what is found in a short one."""
+"""Long flights are looked at by windows, and what is found in them is what is
+found in a short one."""
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from windwrench.identification.motion.signals import log_signals
 def long_log(seconds, period=0.02):
     t = 5.0 + period * np.arange(round(seconds / period))
     ones = np.ones((len(t), 4))
-    return FlightLog(t, np.zeros((len(t), 3)), ones * [1.0, 0, 0, 0], 300.0 * ones, voltage=t, name="long")
+    return FlightLog(
+        t, np.zeros((len(t), 3)), ones * [1.0, 0, 0, 0], 300.0 * ones, voltage=t, name="long"
+    )
 
 
 def test_what_is_short_stays_whole():

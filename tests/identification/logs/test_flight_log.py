@@ -4,13 +4,13 @@ import warnings
 
 import numpy as np
 import pytest
-from data_paths import NANOBENCH, data_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
+from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.flight_log import POSE, REQUIRED, ROTORS, FlightLog, write_log
 from windwrench.identification.logs.readers.nanobench import motor_thrust
@@ -22,11 +22,15 @@ SUFFIXES = (".csv", ".csv.gz", ".parquet")
 def hover_rows(count=20):
     """The fields of a hovering AR.Drone's log, as text: a list of dicts."""
     pose = dict(zip(POSE, ("0.1", "-0.2", "1.0", "1", "0", "0", "0"), strict=True))
-    return [{"t": f"{0.005 * k:.3f}", **pose, **dict.fromkeys(ROTORS, "376.0")} for k in range(count)]
+    return [
+        {"t": f"{0.005 * k:.3f}", **pose, **dict.fromkeys(ROTORS, "376.0")} for k in range(count)
+    ]
 
 
 def write_text(path, rows):
-    path.write_text("\n".join([",".join(rows[0]), *(",".join(row.values()) for row in rows)]) + "\n")
+    path.write_text(
+        "\n".join([",".join(rows[0]), *(",".join(row.values()) for row in rows)]) + "\n"
+    )
     return path
 
 
@@ -66,22 +70,41 @@ def change(rows, k, **fields):
     return rows
 
 
-@pytest.mark.parametrize(("name", "value", "expected"), [
-    ("px", "nan", "column px, row 4 .line 5. is empty or NaN; expected a finite number"),
-    ("pz", "", "column pz, row 4 .line 5. is empty or NaN.*all seven pose columns"),
-    ("omega2", "nan", "column omega2, row 4 .line 5. is empty or NaN; expected a finite number$"),
-    ("omega3", "inf", "column omega3, row 4 .line 5. is infinite; expected a finite number"),
-    ("t", "-inf", "column t, row 4 .line 5. is infinite"),
-    ("t", "", "column t, row 4 .line 5. is empty or NaN"),
-    ("qx", "0.5", "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 1.118; expected 1"),
-    ("qw", "0", "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 0; expected 1"),
-    ("t", "0.010", "column t, row 4 .line 5.: 0.01 s repeats the time 0.01 s .* strictly increasing"),
-    ("t", "0.009", "column t, row 4 .line 5.: 0.009 s goes back from 0.01 s .* strictly increasing"),
-    ("omega1", "fast", "column omega1, row 4 .line 5.: 'fast' is not a number"),
-    ("omega1", "1_0", "column omega1, row 4 .line 5.: '1_0' is not a number"),
-    ("omega1", " ", "column omega1, row 4 .line 5.: ' ' is not a number"),
-    ("omega4", "-376", "column omega4, row 4 .line 5.: -376 is negative; expected a turn rate"),
-])
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("px", "nan", "column px, row 4 .line 5. is empty or NaN; expected a finite number"),
+        ("pz", "", "column pz, row 4 .line 5. is empty or NaN.*all seven pose columns"),
+        (
+            "omega2",
+            "nan",
+            "column omega2, row 4 .line 5. is empty or NaN; expected a finite number$",
+        ),
+        ("omega3", "inf", "column omega3, row 4 .line 5. is infinite; expected a finite number"),
+        ("t", "-inf", "column t, row 4 .line 5. is infinite"),
+        ("t", "", "column t, row 4 .line 5. is empty or NaN"),
+        (
+            "qx",
+            "0.5",
+            "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 1.118; expected 1",
+        ),
+        ("qw", "0", "columns qw, qx, qy, qz, row 4 .line 5.: a quaternion of length 0; expected 1"),
+        (
+            "t",
+            "0.010",
+            "column t, row 4 .line 5.: 0.01 s repeats the time 0.01 s .* strictly increasing",
+        ),
+        (
+            "t",
+            "0.009",
+            "column t, row 4 .line 5.: 0.009 s goes back from 0.01 s .* strictly increasing",
+        ),
+        ("omega1", "fast", "column omega1, row 4 .line 5.: 'fast' is not a number"),
+        ("omega1", "1_0", "column omega1, row 4 .line 5.: '1_0' is not a number"),
+        ("omega1", " ", "column omega1, row 4 .line 5.: ' ' is not a number"),
+        ("omega4", "-376", "column omega4, row 4 .line 5.: -376 is negative; expected a turn rate"),
+    ],
+)
 def test_a_bad_number_is_named(path, rows, name, value, expected):
     with pytest.raises(InputError, match=f"flight.csv: {expected}"):
         read_log(write_text(path, change(rows, 3, **{name: value})))
@@ -91,21 +114,29 @@ def test_a_bad_number_is_named(path, rows, name, value, expected):
 def test_a_missing_column_is_named(path, rows, name):
     for row in rows:
         del row[name]
-    with pytest.raises(InputError, match=rf"flight.csv: missing column\(s\) {name}; expected t, px"):
+    with pytest.raises(
+        InputError, match=rf"flight.csv: missing column\(s\) {name}; expected t, px"
+    ):
         read_log(write_text(path, rows))
 
 
-@pytest.mark.parametrize(("content", "expected"), [
-    (b"", "empty file; expected a header"),
-    (",".join(REQUIRED).encode() + b"\n", "no rows; expected"),
-    (b"\xff\xfe\x00binary", "not a text file"),
-    (b"t\0px", "not a text file .it holds zero bytes"),
-    ((",".join(REQUIRED) + "\n1,2,3\n").encode(), "row 1 .line 2. has 3 field.s.; expected 12"),
-    ((",".join(REQUIRED) + "\n0,0,0,1,1,0,0,0,9,9,9,9\n").encode(), "only one row; expected at least two"),
-    ((",".join(REQUIRED) + ",t\n").encode(), "column t stands there more than once"),
-    (b't,"px\n1,2\n', "not valid CSV"),
-    (b"t," * 600_000, "more than 1000000 in line 1"),
-])
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "empty file; expected a header"),
+        (",".join(REQUIRED).encode() + b"\n", "no rows; expected"),
+        (b"\xff\xfe\x00binary", "not a text file"),
+        (b"t\0px", "not a text file .it holds zero bytes"),
+        ((",".join(REQUIRED) + "\n1,2,3\n").encode(), "row 1 .line 2. has 3 field.s.; expected 12"),
+        (
+            (",".join(REQUIRED) + "\n0,0,0,1,1,0,0,0,9,9,9,9\n").encode(),
+            "only one row; expected at least two",
+        ),
+        ((",".join(REQUIRED) + ",t\n").encode(), "column t stands there more than once"),
+        (b't,"px\n1,2\n', "not valid CSV"),
+        (b"t," * 600_000, "more than 1000000 in line 1"),
+    ],
+)
 def test_a_file_that_is_no_log_is_refused(path, content, expected):
     path.write_bytes(content)
     with pytest.raises(InputError, match=f"flight.csv: {expected}"):
@@ -115,7 +146,9 @@ def test_a_file_that_is_no_log_is_refused(path, content, expected):
 def test_unreadable_files_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"absent.csv: cannot be read: .*No such file"):
         read_log(tmp_path / "absent.csv")
-    with pytest.raises(InputError, match=r"flight.txt: unknown kind of file; expected a name that ends in \.csv"):
+    with pytest.raises(
+        InputError, match=r"flight.txt: unknown kind of file; expected a name that ends in \.csv"
+    ):
         read_log(tmp_path / "flight.txt")
     (tmp_path / "flight.csv.gz").write_bytes(b"t,px\n")
     with pytest.raises(InputError, match=r"flight.csv.gz: cannot be read"):
@@ -147,7 +180,9 @@ def test_parquet_columns_must_be_numbers(tmp_path):
 def test_truth_comes_whole_or_not_at_all(path, rows):
     for row in rows:
         row["fx"] = "0"
-    with pytest.raises(InputError, match=r"missing column\(s\) fy, fz, tx, ty, tz; expected all of .* or none"):
+    with pytest.raises(
+        InputError, match=r"missing column\(s\) fy, fz, tx, ty, tz; expected all of .* or none"
+    ):
         read_log(write_text(path, rows))
 
 
@@ -165,14 +200,19 @@ def test_a_gap_in_time_is_a_note(path, rows):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         log = read_log(write_text(path, change(rows, 19, t="1.09")))
-    assert log.notes == ("1 gap(s) in time; the longest is 1 s, at t = 0.09 s (median step 0.005 s)",)
+    assert log.notes == (
+        "1 gap(s) in time; the longest is 1 s, at t = 0.09 s (median step 0.005 s)",
+    )
 
 
-@pytest.mark.parametrize(("field", "factor", "expected"), [
-    ("omega", 60 / (2 * np.pi), "omega1..omega4 in rpm"),
-    ("omega", 1 / (2 * np.pi), "revolutions per second"),
-    ("t", 1000.0, "milliseconds"),
-])
+@pytest.mark.parametrize(
+    ("field", "factor", "expected"),
+    [
+        ("omega", 60 / (2 * np.pi), "omega1..omega4 in rpm"),
+        ("omega", 1 / (2 * np.pi), "revolutions per second"),
+        ("t", 1000.0, "milliseconds"),
+    ],
+)
 def test_other_units_are_doubted(path, rows, field, factor, expected):
     for row in rows:
         for name in row:
@@ -192,7 +232,9 @@ def test_millimetres_are_doubted(path, rows):
 
 def test_more_columns_in_any_order_and_text_dialect(path, rows):
     plain = read_log(write_text(path, rows))
-    shuffled = [{"phase": '"hover, steady"', **dict(reversed(row.items())), "empty": ""} for row in rows]
+    shuffled = [
+        {"phase": '"hover, steady"', **dict(reversed(row.items())), "empty": ""} for row in rows
+    ]
     other = write_text(path.with_name("dialect.csv"), shuffled)
     other.write_bytes(b"\xef\xbb\xbf" + other.read_bytes().replace(b"\n", b"\r\n") + b"\r\n\r\n")
     assert_same(read_log(other), plain)
@@ -205,17 +247,26 @@ finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 def flight_logs(draw):
     count = draw(st.integers(2, 12))
     steps = draw(arrays(float, count, elements=st.floats(1e-3, 0.4)))
-    quaternions = Rotation.from_rotvec(draw(arrays(float, (count, 3), elements=st.floats(-3, 3)))).as_quat()
+    quaternions = Rotation.from_rotvec(
+        draw(arrays(float, (count, 3), elements=st.floats(-3, 3)))
+    ).as_quat()
     valid = draw(arrays(bool, count))
-    pose = np.where(valid[:, None], np.column_stack([draw(arrays(float, (count, 3), elements=st.floats(-9, 9))),
-                                                     quaternions]), np.nan)
+    pose = np.where(
+        valid[:, None],
+        np.column_stack([draw(arrays(float, (count, 3), elements=st.floats(-9, 9))), quaternions]),
+        np.nan,
+    )
     optional = draw(st.booleans())
     return FlightLog(
-        t=np.cumsum(steps), position=pose[:, :3], quaternion=pose[:, [6, 3, 4, 5]], valid=valid,
+        t=np.cumsum(steps),
+        position=pose[:, :3],
+        quaternion=pose[:, [6, 3, 4, 5]],
+        valid=valid,
         rotor_speeds=draw(arrays(float, (count, 4), elements=st.floats(0, 3e3))),
         voltage=draw(arrays(float, count, elements=st.floats(0, 20))) if optional else None,
         force=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
-        torque=draw(arrays(float, (count, 3), elements=finite)) if optional else None)
+        torque=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
+    )
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -246,14 +297,30 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, rows, path):
 
 
 def test_an_unknown_reader_is_named(path):
-    with pytest.raises(InputError, match=r"unknown reader 'nanobensh'; expected one of .*nanobench.*Did you mean 'nanobench'"):
+    with pytest.raises(
+        InputError,
+        match=r"unknown reader 'nanobensh'; expected one of .*nanobench.*Did you mean 'nanobench'",
+    ):
         read_log(path, reader="nanobensh")
 
 
 # NanoBench
 
-NANOBENCH_COLUMNS = ("t", "px", "py", "pz", "qx", "qy", "qz", "qw", "motor_motor_m1", "motor_motor_m2",
-                     "motor_motor_m3", "motor_motor_m4", "pwr_pm_vbat")
+NANOBENCH_COLUMNS = (
+    "t",
+    "px",
+    "py",
+    "pz",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+    "motor_motor_m1",
+    "motor_motor_m2",
+    "motor_motor_m3",
+    "motor_motor_m4",
+    "pwr_pm_vbat",
+)
 
 
 def nanobench_rows(**fields):
@@ -269,7 +336,10 @@ def test_a_nanobench_log_asks_for_its_reader(path):
 
 def test_nanobench_conventions(path):
     half = np.sqrt(0.5)
-    write_text(path, nanobench_rows(qz=str(half), qw=str(half), motor_motor_m1="10000", motor_motor_m4="40000"))
+    write_text(
+        path,
+        nanobench_rows(qz=str(half), qw=str(half), motor_motor_m1="10000", motor_motor_m4="40000"),
+    )
     vehicle = load_vehicle("crazyflie")
     log = read_log(path, reader="nanobench", vehicle=vehicle)
     np.testing.assert_allclose(log.t, [0, 0.01, 0.02], atol=1e-6)
@@ -279,10 +349,22 @@ def test_nanobench_conventions(path):
     np.testing.assert_allclose(thrust[[1, 2]], 0.0)
     # at the vehicle's reference voltage, whatever the battery's, which is passed on
     full = vehicle.voltage_ref / 4.2
-    assert thrust[0] == pytest.approx(2.130295e-11 * (4e4 * full) ** 2 + 1.032633e-6 * 4e4 * full + 5.484560e-4)
-    assert thrust[3] == pytest.approx(2.130295e-11 * (1e4 * full) ** 2 + 1.032633e-6 * 1e4 * full + 5.484560e-4)
-    write_text(path, nanobench_rows(qz=str(half), qw=str(half), motor_motor_m1="10000", motor_motor_m4="40000",
-                                    pwr_pm_vbat="3.3"))
+    assert thrust[0] == pytest.approx(
+        2.130295e-11 * (4e4 * full) ** 2 + 1.032633e-6 * 4e4 * full + 5.484560e-4
+    )
+    assert thrust[3] == pytest.approx(
+        2.130295e-11 * (1e4 * full) ** 2 + 1.032633e-6 * 1e4 * full + 5.484560e-4
+    )
+    write_text(
+        path,
+        nanobench_rows(
+            qz=str(half),
+            qw=str(half),
+            motor_motor_m1="10000",
+            motor_motor_m4="40000",
+            pwr_pm_vbat="3.3",
+        ),
+    )
     low = read_log(path, reader="nanobench", vehicle=vehicle)
     np.testing.assert_array_equal(low.rotor_speeds, log.rotor_speeds)
     np.testing.assert_allclose(low.voltage, 3.3)
@@ -297,7 +379,9 @@ def test_nanobench_thrust_goes_with_duty_times_voltage():
 
 
 def test_nanobench_bad_numbers_are_named(path):
-    with pytest.raises(InputError, match=r"column pwr_pm_vbat, row 1 .line 2.: 0 V; expected a positive voltage"):
+    with pytest.raises(
+        InputError, match=r"column pwr_pm_vbat, row 1 .line 2.: 0 V; expected a positive voltage"
+    ):
         read_log(write_text(path, nanobench_rows(pwr_pm_vbat="0")), reader="nanobench")
     with pytest.raises(InputError, match=r"column motor_motor_m2, row 1 .line 2. is empty or NaN"):
         read_log(write_text(path, nanobench_rows(motor_motor_m2="")), reader="nanobench")
@@ -314,10 +398,13 @@ def banded(log, signal, band, kind):
 
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_thrust_follows_the_specific_force(name):
-    # what mass balances the thrust, with the sag that a diagnosis of these flights finds, and how much scatter is left
+    # what mass balances the thrust, with the sag that a diagnosis of these flights finds, and how
+    # much scatter is left
     vehicle = load_vehicle("crazyflie")
     log = read_log(data_file(f"nanobench/{name}.csv"), reader="nanobench", vehicle=vehicle)
-    acceleration = np.gradient(np.gradient(banded(log, log.position, 4.0, "low"), log.t, axis=0), log.t, axis=0)
+    acceleration = np.gradient(
+        np.gradient(banded(log, log.position, 4.0, "low"), log.t, axis=0), log.t, axis=0
+    )
     up = Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]]).as_matrix()[:, :, 2]
     specific = banded(log, np.sum(up * (acceleration + np.array([0, 0, 9.81])), axis=1), 4.0, "low")
     sag = (log.voltage / vehicle.voltage_ref) ** 1.5
@@ -331,11 +418,17 @@ def test_nanobench_thrust_follows_the_specific_force(name):
 def test_nanobench_rotors_turn_the_vehicle_the_right_way():
     # torque from the rotors, 40 ms later, against angular acceleration: the signs of all three axes
     vehicle = load_vehicle("crazyflie")
-    log = read_log(data_file("nanobench/B2_circle_fast_rep3.csv"), reader="nanobench", vehicle=vehicle)
+    log = read_log(
+        data_file("nanobench/B2_circle_fast_rep3.csv"), reader="nanobench", vehicle=vehicle
+    )
     attitude = Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]])
-    rate = banded(log, (attitude[:-1].inv() * attitude[1:]).as_rotvec() / log.period, (0.5, 8.0), "band")
+    rate = banded(
+        log, (attitude[:-1].inv() * attitude[1:]).as_rotvec() / log.period, (0.5, 8.0), "band"
+    )
     acceleration = np.gradient(rate, log.period, axis=0)
-    torque = np.roll(banded(log, vehicle.rotor_wrench(log.rotor_speeds)[:-1, 1:], (0.5, 8.0), "band"), 4, axis=0)
+    torque = np.roll(
+        banded(log, vehicle.rotor_wrench(log.rotor_speeds)[:-1, 1:], (0.5, 8.0), "band"), 4, axis=0
+    )
     flying = (log.t[:-1] > 6) & (log.t[:-1] < 35)
     for axis, least in enumerate((0.4, 0.15, 0.05)):
         assert np.corrcoef(acceleration[flying, axis], torque[flying, axis])[0, 1] > least

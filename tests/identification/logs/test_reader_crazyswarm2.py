@@ -1,20 +1,44 @@
 import numpy as np
 import pytest
-from data_paths import data_file
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
+from tests.support.data_paths import data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.wrench_series import estimate_log
 
 FLIGHTS = (100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204)
 LOADED = (201, 202, 204)
-ONBOARD = ("est_x_m", "est_y_m", "est_z_m", "est_vx_mps", "est_vy_mps", "est_vz_mps", "roll_rad", "pitch_rad", "yaw_rad",
-           "omega_x_radps", "omega_y_radps", "omega_z_radps", "thrust_cmd_N", "torque_cmd_x_Nm", "torque_cmd_y_Nm",
-           "torque_cmd_z_Nm")
-TRACKED = ("mocap_x_m", "mocap_y_m", "mocap_z_m", "payload_x_m", "payload_y_m", "payload_z_m", "payload_vx_mps",
-           "payload_vy_mps", "payload_vz_mps")
+ONBOARD = (
+    "est_x_m",
+    "est_y_m",
+    "est_z_m",
+    "est_vx_mps",
+    "est_vy_mps",
+    "est_vz_mps",
+    "roll_rad",
+    "pitch_rad",
+    "yaw_rad",
+    "omega_x_radps",
+    "omega_y_radps",
+    "omega_z_radps",
+    "thrust_cmd_N",
+    "torque_cmd_x_Nm",
+    "torque_cmd_y_Nm",
+    "torque_cmd_z_Nm",
+)
+TRACKED = (
+    "mocap_x_m",
+    "mocap_y_m",
+    "mocap_z_m",
+    "payload_x_m",
+    "payload_y_m",
+    "payload_z_m",
+    "payload_vx_mps",
+    "payload_vy_mps",
+    "payload_vz_mps",
+)
 
 
 @pytest.fixture(scope="module")
@@ -26,22 +50,38 @@ def vehicle():
 def write(tmp_path):
     def to_file(count=40, columns=ONBOARD, **given):
         t = 0.004 * np.arange(count)
-        values = {"t_s": t, **{name: np.zeros(count) for name in columns}, "thrust_cmd_N": np.full(count, 0.3)}
-        values |= {name: value * np.ones(count) for name, value in given.items() if value is not None}
+        values = {
+            "t_s": t,
+            **{name: np.zeros(count) for name in columns},
+            "thrust_cmd_N": np.full(count, 0.3),
+        }
+        values |= {
+            name: value * np.ones(count) for name, value in given.items() if value is not None
+        }
         names = [name for name in values if given.get(name, 0.0) is not None]
         path = tmp_path / "log.csv"
         rows = np.column_stack([values[name] for name in names])
-        path.write_text("\n".join([",".join(names), *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n")
+        path.write_text(
+            "\n".join([",".join(names), *(",".join(f"{x:.9g}" for x in row) for row in rows)])
+            + "\n"
+        )
         return path
+
     return to_file
 
 
 def test_commands_become_turn_rates(write, vehicle):
     path = write(torque_cmd_x_Nm=1e-3, torque_cmd_y_Nm=-5e-4, torque_cmd_z_Nm=1e-4)
     log = read_log(path, "crazyswarm2", vehicle)
-    np.testing.assert_allclose(vehicle.rotor_wrench(log.rotor_speeds[7]), [0.3, 1e-3, -5e-4, 1e-4], rtol=1e-9)
-    np.testing.assert_allclose(log.rotor_speeds[7], vehicle.rotor_speeds(0.3, np.array([1e-3, -5e-4, 1e-4])))
-    assert any("inverse of the rotor mixing of crazyflie, clipped at zero" in note for note in log.notes)
+    np.testing.assert_allclose(
+        vehicle.rotor_wrench(log.rotor_speeds[7]), [0.3, 1e-3, -5e-4, 1e-4], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        log.rotor_speeds[7], vehicle.rotor_speeds(0.3, np.array([1e-3, -5e-4, 1e-4]))
+    )
+    assert any(
+        "inverse of the rotor mixing of crazyflie, clipped at zero" in note for note in log.notes
+    )
     assert log.valid.all()
     assert log.voltage is None
 
@@ -65,7 +105,9 @@ def test_attitude_turns_about_z_then_y_then_x(write, vehicle):
 
 def test_held_positions_are_no_measurements(write, vehicle):
     held = np.repeat(np.arange(14.0), 3)[:40]
-    path = write(columns=(*ONBOARD, *TRACKED), mocap_y_m=0.01 * held, payload_z_m=0.5, payload_vx_mps=0.1)
+    path = write(
+        columns=(*ONBOARD, *TRACKED), mocap_y_m=0.01 * held, payload_z_m=0.5, payload_vx_mps=0.1
+    )
     log = read_log(path, "crazyswarm2", vehicle)
     np.testing.assert_array_equal(np.flatnonzero(log.valid), np.arange(0, 40, 3))
     np.testing.assert_allclose(log.position[3], [0, 0.01, 0])
@@ -95,24 +137,33 @@ def test_stray_samples_are_dropped(write, vehicle):
 
 
 def test_bad_logs_are_named(write, tmp_path, vehicle):
-    with pytest.raises(InputError, match=r"log.csv: missing column.s. pitch_rad, torque_cmd_y_Nm; expected those of a crazysw"):
+    with pytest.raises(
+        InputError,
+        match=r"log.csv: missing column.s. pitch_rad, torque_cmd_y_Nm; expected those of a crazysw",
+    ):
         read_log(write(pitch_rad=None, torque_cmd_y_Nm=None), "crazyswarm2", vehicle)
     with pytest.raises(InputError, match=r"column thrust_cmd_N, row 1 .line 2. is empty or NaN"):
         read_log(write(thrust_cmd_N=np.nan), "crazyswarm2", vehicle)
     with pytest.raises(InputError, match=r"column t, row 2 .line 3.: 0 s repeats"):
         read_log(write(t_s=0.0), "crazyswarm2", vehicle)
-    with pytest.raises(InputError, match=r"this is a crazyswarm2 log; expected --reader crazyswarm2"):
+    with pytest.raises(
+        InputError, match=r"this is a crazyswarm2 log; expected --reader crazyswarm2"
+    ):
         read_log(write())
     with pytest.raises(InputError, match=r"absent.csv: cannot be read"):
         read_log(tmp_path / "absent.csv", "crazyswarm2")
 
 
 def test_an_unknown_reader_is_told_all():
-    with pytest.raises(InputError, match="unknown reader 'ros'; expected one of crazyswarm2, nanobench, px4_ulog, rosbag"):
+    with pytest.raises(
+        InputError,
+        match="unknown reader 'ros'; expected one of crazyswarm2, nanobench, px4_ulog, rosbag",
+    ):
         read_log("flight.bag", "ros")
 
 
 # measured flights
+
 
 @pytest.mark.parametrize("number", FLIGHTS)
 def test_measured_flights_read(number, vehicle):
@@ -122,17 +173,25 @@ def test_measured_flights_read(number, vehicle):
     assert ("payload_position" in log.extra) == (number in LOADED)
     rate = log.valid.sum() / log.t[-1]
     assert 70 < rate < 100 if number in LOADED else log.valid.all()
-    # torque commanded turns the vehicle, 50 ms later, and thrust pushes it where its z axis points: signs and axes
+    # torque commanded turns the vehicle, 50 ms later, and thrust pushes it where its z axis points:
+    # signs and axes
     attitude = Rotation.from_quat(log.extra["onboard_quaternion"][:, [1, 2, 3, 0]])
     b, a = butter(2, np.array([0.5, 10.0]) * 2 * log.period, "band")
     turning = np.gradient(filtfilt(b, a, log.extra["angular_velocity"], axis=0), log.period, axis=0)
     torque = filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, 1:], axis=0)
     b, a = butter(2, 3.0 * 2 * log.period)
-    push = filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, :1], axis=0) * attitude.as_matrix()[:, :, 2]
-    acceleration = np.gradient(filtfilt(b, a, log.extra["onboard_velocity"], axis=0), log.period, axis=0)
+    push = (
+        filtfilt(b, a, vehicle.rotor_wrench(log.rotor_speeds)[:, :1], axis=0)
+        * attitude.as_matrix()[:, :, 2]
+    )
+    acceleration = np.gradient(
+        filtfilt(b, a, log.extra["onboard_velocity"], axis=0), log.period, axis=0
+    )
     for axis, (lag, least) in enumerate(((12, 0.65), (12, 0.65), (7, 0.35))):
         assert np.corrcoef(turning[lag:, axis], torque[:-lag, axis])[0, 1] > least
-        assert np.corrcoef(acceleration[50:-50, axis], push[50:-50, axis])[0, 1] > (0.7 if axis < 2 else 0.25)
+        assert np.corrcoef(acceleration[50:-50, axis], push[50:-50, axis])[0, 1] > (
+            0.7 if axis < 2 else 0.25
+        )
 
 
 def test_a_measured_flight_has_a_sane_wrench(vehicle):
@@ -144,7 +203,8 @@ def test_a_measured_flight_has_a_sane_wrench(vehicle):
     assert force[:, 2].mean() == pytest.approx(-(0.0406 - vehicle.mass) * 9.81, abs=0.005)
     assert np.abs(force[:, :2]).max() < 0.02
     assert np.abs(series.torque[flying]).max() < 1e-3
-    # the cable pulls towards the payload: the force goes with where that hangs, as late as the filter is slow
+    # the cable pulls towards the payload: the force goes with where that hangs, as late as the
+    # filter is slow
     lean = (log.extra["payload_position"] - log.extra["onboard_position"])[flying]
     late = 75  # samples, 0.3 s
     for axis in range(2):

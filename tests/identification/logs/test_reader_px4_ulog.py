@@ -12,7 +12,9 @@ pytest.importorskip("pyulog")
 
 # our world and body seen from PX4's, each half a turn about x
 FLIP = np.diag([1.0, -1.0, -1.0])
-OURS = np.array([301.0, 302.0, 303.0, 304.0])  # rad/s of front-left, rear-left, rear-right, front-right
+OURS = np.array(
+    [301.0, 302.0, 303.0, 304.0]
+)  # rad/s of front-left, rear-left, rear-right, front-right
 PX4 = OURS[[3, 1, 0, 2]]  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
 
 
@@ -24,13 +26,17 @@ def vehicle():
 def motion(t):
     """A climbing, yawing, tilting flight in the kit's frames."""
     position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    turn = Rotation.from_euler("ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)]))
+    turn = Rotation.from_euler(
+        "ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
+    )
     return position, turn
 
 
 def ned(t):
     position, turn = motion(t)
-    return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP).as_quat()[:, [3, 0, 1, 2]]
+    return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP).as_quat()[
+        :, [3, 0, 1, 2]
+    ]
 
 
 def stamps(t):
@@ -41,7 +47,11 @@ def odometry(t, new=True):
     position, quaternion = ned(t)
     head = {"uint64_t timestamp": stamps(t + 0.02), "uint64_t timestamp_sample": stamps(t)}
     if new:
-        return head | {"uint8_t pose_frame": np.full(len(t), 2), "float position": position, "float q": quaternion}
+        return head | {
+            "uint8_t pose_frame": np.full(len(t), 2),
+            "float position": position,
+            "float q": quaternion,
+        }
     xyz = {f"float {axis}": position[:, i] for i, axis in enumerate("xyz")}
     return head | {"uint8_t local_frame": np.full(len(t), 0), **xyz, "float q": quaternion}
 
@@ -64,9 +74,13 @@ def onboard(t):
     position, _ = ned(t)
     fast = np.linspace(t[0] - 0.1, t[-1] + 0.1, 4 * len(t))
     return {
-        "vehicle_local_position": {"uint64_t timestamp": stamps(t), "uint64_t timestamp_sample": stamps(t),
-                                   **{f"float {axis}": position[:, i] for i, axis in enumerate("xyz")},
-                                   "bool xy_valid": np.ones(len(t), bool), "bool z_valid": np.ones(len(t), bool)},
+        "vehicle_local_position": {
+            "uint64_t timestamp": stamps(t),
+            "uint64_t timestamp_sample": stamps(t),
+            **{f"float {axis}": position[:, i] for i, axis in enumerate("xyz")},
+            "bool xy_valid": np.ones(len(t), bool),
+            "bool z_valid": np.ones(len(t), bool),
+        },
         "vehicle_attitude": {"uint64_t timestamp": stamps(fast), "float q": ned(fast)[1]},
     }
 
@@ -86,6 +100,7 @@ def write(tmp_path):
         path = tmp_path / "flight.ulg"
         path.write_bytes(ulog_bytes(topics, parameters))
         return path
+
     return to_file
 
 
@@ -100,9 +115,17 @@ def assert_motion(log, t, atol=1e-6):
 @pytest.mark.parametrize("topic", ["vehicle_mocap_odometry", "vehicle_visual_odometry"])
 @pytest.mark.parametrize("new", [True, False])
 def test_motion_capture_and_turn_rates(write, t, topic, new, vehicle):
-    path = write({topic: odometry(t, new), "esc_status": esc(wide(t)), **onboard(t[::3]),
-                  "battery_status": {"uint64_t timestamp": stamps(wide(t)[::25]),
-                                     "float voltage_v": 12.0 - 0.1 * wide(t)[::25]}})
+    path = write(
+        {
+            topic: odometry(t, new),
+            "esc_status": esc(wide(t)),
+            **onboard(t[::3]),
+            "battery_status": {
+                "uint64_t timestamp": stamps(wide(t)[::25]),
+                "float voltage_v": 12.0 - 0.1 * wide(t)[::25],
+            },
+        }
+    )
     log = read_log(path, "px4_ulog", vehicle)
     assert_motion(log, t)
     np.testing.assert_allclose(log.rotor_speeds, np.multiply.outer(growth(t), OURS), atol=0.06)
@@ -114,7 +137,9 @@ def test_motion_capture_and_turn_rates(write, t, topic, new, vehicle):
 def test_level_and_facing_north_is_the_unit_quaternion(write, t, vehicle):
     ones = np.ones((len(t), 1))
     still = odometry(t) | {"float q": ones * [1.0, 0, 0, 0], "float position": ones * [1.0, 2, -3]}
-    log = read_log(write({"vehicle_mocap_odometry": still, "esc_status": esc(wide(t))}), "px4_ulog", vehicle)
+    log = read_log(
+        write({"vehicle_mocap_odometry": still, "esc_status": esc(wide(t))}), "px4_ulog", vehicle
+    )
     np.testing.assert_allclose(log.quaternion[0], [1, 0, 0, 0], atol=1e-12)
     np.testing.assert_allclose(log.position[0], [1, -2, 3], atol=1e-12)
 
@@ -127,7 +152,11 @@ def test_the_onboard_pose_where_there_is_no_other(write, t, vehicle):
 
 def test_odometry_without_attitude_takes_the_onboard_one(write, t, vehicle):
     bare = odometry(t) | {"float q": np.full((len(t), 4), np.nan)}
-    log = read_log(write({"vehicle_visual_odometry": bare, "esc_status": esc(wide(t)), **onboard(t)}), "px4_ulog", vehicle)
+    log = read_log(
+        write({"vehicle_visual_odometry": bare, "esc_status": esc(wide(t)), **onboard(t)}),
+        "px4_ulog",
+        vehicle,
+    )
     assert_motion(log, t, atol=1e-5)
     assert any("has no attitude" in note for note in log.notes)
 
@@ -135,18 +164,26 @@ def test_odometry_without_attitude_takes_the_onboard_one(write, t, vehicle):
 def test_lost_positions_are_not_valid(write, t, vehicle):
     lossy = odometry(t)
     lossy["float position"][50:60] = np.nan
-    log = read_log(write({"vehicle_mocap_odometry": lossy, "esc_status": esc(wide(t))}), "px4_ulog", vehicle)
+    log = read_log(
+        write({"vehicle_mocap_odometry": lossy, "esc_status": esc(wide(t))}), "px4_ulog", vehicle
+    )
     np.testing.assert_array_equal(np.flatnonzero(~log.valid), np.arange(50, 60))
 
 
 def test_esc_functions_and_rotor_places_renumber_the_motors(write, t, vehicle):
-    # ESC 1 drives motor 4 and so on; and motors 1 to 4 sit front-left, front-right, rear-right, rear-left
+    # ESC 1 drives motor 4 and so on; and motors 1 to 4 sit front-left, front-right, rear-right,
+    # rear-left
     places = {"CA_ROTOR_COUNT": 4}
     for i, (x, right) in enumerate([(0.1, -0.1), (0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1)]):
         places |= {f"CA_ROTOR{i}_PX": x, f"CA_ROTOR{i}_PY": right}
     motors = OURS[[0, 3, 2, 1]]
-    path = write({"vehicle_mocap_odometry": odometry(t),
-                  "esc_status": esc(wide(t), motors[::-1], f0=104, f1=103, f2=102, f3=101)}, places)
+    path = write(
+        {
+            "vehicle_mocap_odometry": odometry(t),
+            "esc_status": esc(wide(t), motors[::-1], f0=104, f1=103, f2=102, f3=101),
+        },
+        places,
+    )
     log = read_log(path, "px4_ulog", vehicle)
     np.testing.assert_allclose(log.rotor_speeds[0], OURS, atol=0.06)
 
@@ -168,10 +205,19 @@ def test_relative_thrust_is_scaled_to_the_weight(write, t, vehicle):
     control = np.full((len(at), 12), np.nan)
     control[:, :4] = theirs
     control[:20, :4] = np.nan  # disarmed
-    path = write({"vehicle_mocap_odometry": odometry(t), "esc_status": esc(at, 0 * PX4),
-                  "actuator_motors": {"uint64_t timestamp": stamps(at), "float control": control}}, {"THR_MDL_FAC": 0.3})
+    path = write(
+        {
+            "vehicle_mocap_odometry": odometry(t),
+            "esc_status": esc(at, 0 * PX4),
+            "actuator_motors": {"uint64_t timestamp": stamps(at), "float control": control},
+        },
+        {"THR_MDL_FAC": 0.3},
+    )
     assert_scaled(read_log(path, "px4_ulog", vehicle), ours, vehicle)
-    with pytest.raises(InputError, match=r"flight.ulg: the log has motor commands but no turn rates; expected a vehicle"):
+    with pytest.raises(
+        InputError,
+        match=r"flight.ulg: the log has motor commands but no turn rates; expected a vehicle",
+    ):
         read_log(path, "px4_ulog")
 
 
@@ -184,13 +230,26 @@ def test_outputs_go_through_the_thrust_curve(write, t, vehicle, pulses):
     output = np.zeros((len(at), 16))
     output[:, 2:6] = 1100.0 + 800.0 * x if pulses else x
     output[:10, 2:6] = 900.0 if pulses else 0.0
-    landed = {"uint64_t timestamp": stamps(np.array([-0.5, -0.3])), "bool landed": np.array([True, False])}
-    limits = {f"PWM_AUX_{end}{i}": value for end, value in (("MIN", 1100), ("MAX", 1900)) for i in range(3, 7)}
+    landed = {
+        "uint64_t timestamp": stamps(np.array([-0.5, -0.3])),
+        "bool landed": np.array([True, False]),
+    }
+    limits = {
+        f"PWM_AUX_{end}{i}": value
+        for end, value in (("MIN", 1100), ("MAX", 1900))
+        for i in range(3, 7)
+    }
     functions = {f"PWM_AUX_FUNC{i + 3}": 101 + i for i in range(4)}
     fields = {"uint64_t timestamp": stamps(at), "float output": output}
-    path = write({"vehicle_mocap_odometry": odometry(t), "actuator_outputs": fields | {"float output": 0 * output},
-                  "actuator_outputs#1": fields, "vehicle_land_detected": landed},
-                 {"THR_MDL_FAC": factor, **limits, **functions})
+    path = write(
+        {
+            "vehicle_mocap_odometry": odometry(t),
+            "actuator_outputs": fields | {"float output": 0 * output},
+            "actuator_outputs#1": fields,
+            "vehicle_land_detected": landed,
+        },
+        {"THR_MDL_FAC": factor, **limits, **functions},
+    )
     log = read_log(path, "px4_ulog", vehicle)
     assert_scaled(log, ours, vehicle)
     assert any("f = 0.6" in note and "outputs 3, 4, 5, 6" in note for note in log.notes)
@@ -199,35 +258,50 @@ def test_outputs_go_through_the_thrust_curve(write, t, vehicle, pulses):
 def test_bad_pulse_limits_are_named(write, t, vehicle):
     at = wide(t)
     output = 1500.0 + np.multiply.outer(np.sin(at), np.ones(16))
-    topics = {"vehicle_mocap_odometry": odometry(t),
-              "actuator_outputs": {"uint64_t timestamp": stamps(at), "float output": output}}
+    topics = {
+        "vehicle_mocap_odometry": odometry(t),
+        "actuator_outputs": {"uint64_t timestamp": stamps(at), "float output": output},
+    }
     with pytest.raises(InputError, match="expected MIN below MAX"):
         read_log(write(topics, {"PWM_MAIN_MIN2": 2100}), "px4_ulog", vehicle)
     log = read_log(write(topics, {"THR_MDL_FAC": np.nan}), "px4_ulog", vehicle)
     assert any("f = 0;" in note and "1000 to 2000 us" in note for note in log.notes)
 
 
-@pytest.mark.parametrize(("topics", "parameters", "expected"), [
-    ([], {}, "no pose: no usable vehicle_mocap_odometry"),
-    (["esc"], {}, "no pose: .* no vehicle_local_position and no vehicle_attitude; expected"),
-    (["pose"], {}, "no motors: expected esc_status .* found vehicle_mocap_odometry"),
-    (["pose", "esc"], {"CA_ROTOR_COUNT": 6}, "CA_ROTOR_COUNT is 6; expected a quadrotor's 4"),
-    (["pose", "esc"], {"CA_ROTOR_COUNT": 4, "CA_ROTOR0_PX": 0.1}, "expected one in each quadrant"),
-    (["pose", "late"], {}, "do not overlap; expected both over the same flight"),
-    (["pose", "short"], {}, r"esc_status: 1 message\(s\); expected at least two"),
-    (["long", "esc"], {}, "a quaternion of length 2; expected 1"),
-])
+@pytest.mark.parametrize(
+    ("topics", "parameters", "expected"),
+    [
+        ([], {}, "no pose: no usable vehicle_mocap_odometry"),
+        (["esc"], {}, "no pose: .* no vehicle_local_position and no vehicle_attitude; expected"),
+        (["pose"], {}, "no motors: expected esc_status .* found vehicle_mocap_odometry"),
+        (["pose", "esc"], {"CA_ROTOR_COUNT": 6}, "CA_ROTOR_COUNT is 6; expected a quadrotor's 4"),
+        (
+            ["pose", "esc"],
+            {"CA_ROTOR_COUNT": 4, "CA_ROTOR0_PX": 0.1},
+            "expected one in each quadrant",
+        ),
+        (["pose", "late"], {}, "do not overlap; expected both over the same flight"),
+        (["pose", "short"], {}, r"esc_status: 1 message\(s\); expected at least two"),
+        (["long", "esc"], {}, "a quaternion of length 2; expected 1"),
+    ],
+)
 def test_what_is_missing_is_named(write, t, vehicle, topics, parameters, expected):
     long = odometry(t)
     long["float q"] = 2 * long["float q"]
-    known = {"pose": ("vehicle_mocap_odometry", odometry(t)), "long": ("vehicle_mocap_odometry", long),
-             "esc": ("esc_status", esc(wide(t))), "late": ("esc_status", esc(wide(t) + 60)),
-             "short": ("esc_status", esc(t[:1]))}
+    known = {
+        "pose": ("vehicle_mocap_odometry", odometry(t)),
+        "long": ("vehicle_mocap_odometry", long),
+        "esc": ("esc_status", esc(wide(t))),
+        "late": ("esc_status", esc(wide(t) + 60)),
+        "short": ("esc_status", esc(t[:1])),
+    }
     with pytest.raises(InputError, match=f"flight.ulg: .*{expected}"):
         read_log(write(dict(known[name] for name in topics), parameters), "px4_ulog", vehicle)
 
 
-@pytest.mark.parametrize("content", [b"", b"ULog", b"PK\x03\x04" + bytes(100), b"ULog\x01\x12\x35\x01" + bytes(8)])
+@pytest.mark.parametrize(
+    "content", [b"", b"ULog", b"PK\x03\x04" + bytes(100), b"ULog\x01\x12\x35\x01" + bytes(8)]
+)
 def test_what_is_no_ulog_is_refused(tmp_path, content, vehicle):
     (tmp_path / "flight.ulg").write_bytes(content)
     with pytest.raises(InputError, match=r"flight.ulg: (cannot be read as a ULog|no pose)"):
@@ -265,5 +339,7 @@ def test_a_ulog_asks_for_its_reader(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"flight.ulg: expected --reader px4_ulog"):
         read_log(tmp_path / "flight.ulg")
     monkeypatch.setitem(sys.modules, "pyulog", None)
-    with pytest.raises(InputError, match=r"pip install 'windwrench\[logs\]', or pip install pyulog"):
+    with pytest.raises(
+        InputError, match=r"pip install 'windwrench\[logs\]', or pip install pyulog"
+    ):
         read_log(tmp_path / "flight.ulg", "px4_ulog")

@@ -15,9 +15,13 @@ from rosbags.rosbag1 import reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 ACTUATORS = "mav_msgs/msg/Actuators"
-ACTUATORS_TEXT = "std_msgs/Header header\nfloat64[] angles\nfloat64[] angular_velocities\nfloat64[] normalized\n"
+ACTUATORS_TEXT = (
+    "std_msgs/Header header\nfloat64[] angles\nfloat64[] angular_velocities\nfloat64[] normalized\n"
+)
 START = 1_700_000_000_000_000_000  # ns
-OURS = np.array([301.0, 302.0, 303.0, 304.0])  # rad/s of front-left, rear-left, rear-right, front-right
+OURS = np.array(
+    [301.0, 302.0, 303.0, 304.0]
+)  # rad/s of front-left, rear-left, rear-right, front-right
 PX4 = OURS[[3, 1, 0, 2]]  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
 FLIP = np.diag([1.0, -1.0, -1.0])
 T = 0.01 * np.arange(50)
@@ -40,7 +44,9 @@ def stores():
 
 def motion(t):
     position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
-    turn = Rotation.from_euler("ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)]))
+    turn = Rotation.from_euler(
+        "ZYX", np.column_stack([2.0 + 1.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
+    )
     return position, turn
 
 
@@ -66,38 +72,65 @@ class Messages:
         matrix = turn.as_matrix()[0]
         if ned:
             p, matrix = FLIP @ p, FLIP @ matrix @ FLIP
-        quaternion = self.types["geometry_msgs/msg/Quaternion"](*Rotation.from_matrix(matrix).as_quat())
+        quaternion = self.types["geometry_msgs/msg/Quaternion"](
+            *Rotation.from_matrix(matrix).as_quat()
+        )
         header = self.header(t if stamp else None)
         if kind == "geometry_msgs/msg/TransformStamped":
             place = self.types["geometry_msgs/msg/Vector3"](*p)
-            return self.types[kind](header, "body", self.types["geometry_msgs/msg/Transform"](place, quaternion))
-        pose = self.types["geometry_msgs/msg/Pose"](self.types["geometry_msgs/msg/Point"](*p), quaternion)
+            return self.types[kind](
+                header, "body", self.types["geometry_msgs/msg/Transform"](place, quaternion)
+            )
+        pose = self.types["geometry_msgs/msg/Pose"](
+            self.types["geometry_msgs/msg/Point"](*p), quaternion
+        )
         if kind == "geometry_msgs/msg/PoseStamped":
             return self.types[kind](header, pose)
         zero = self.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
         twist = self.types["geometry_msgs/msg/Twist"](zero, zero)
-        return self.types[kind](header, "body", self.types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
-                                self.types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)))
+        return self.types[kind](
+            header,
+            "body",
+            self.types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
+            self.types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
+        )
 
     def actuators(self, t, speeds):
-        return self.types[ACTUATORS](self.header(t), np.zeros(0), np.asarray(speeds) * growth(t), np.zeros(0))
+        return self.types[ACTUATORS](
+            self.header(t), np.zeros(0), np.asarray(speeds) * growth(t), np.zeros(0)
+        )
 
     def array(self, t, speeds):
         layout = self.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-        return self.types["std_msgs/msg/Float32MultiArray"](layout, (np.asarray(speeds) * growth(t)).astype(np.float32))
+        return self.types["std_msgs/msg/Float32MultiArray"](
+            layout, (np.asarray(speeds) * growth(t)).astype(np.float32)
+        )
 
     def battery(self, t):
         kind = self.types["sensor_msgs/msg/BatteryState"]
-        names = {name: 0 if "power" in name else 0.0 for name in kind.__dataclass_fields__ if not name.startswith("__")}
-        names |= {"header": self.header(t), "voltage": 12.0 - t, "present": True, "location": "", "serial_number": "",
-                  "cell_voltage": np.zeros(0, np.float32), "cell_temperature": np.zeros(0, np.float32)}
+        names = {
+            name: 0 if "power" in name else 0.0
+            for name in kind.__dataclass_fields__
+            if not name.startswith("__")
+        }
+        names |= {
+            "header": self.header(t),
+            "voltage": 12.0 - t,
+            "present": True,
+            "location": "",
+            "serial_number": "",
+            "cell_voltage": np.zeros(0, np.float32),
+            "cell_temperature": np.zeros(0, np.float32),
+        }
         return kind(**names)
 
 
 @pytest.fixture
 def write(tmp_path, stores):
     def to_bag(kind, topics, topic_map=None, delay=0.0, packed=()):
-        """Write ``{topic: (type, times, make(messages, t), definition)}`` into a bag and return its path."""
+        """Write ``{topic: (type, times, make(messages, t), definition)}`` into a bag and return its
+        path.
+        """
         ros1 = kind == "bag"
         store, path = stores[ros1], tmp_path / ("flight.bag" if ros1 else "flight")
         messages = Messages(store, ros1)
@@ -110,15 +143,24 @@ def write(tmp_path, stores):
             writer.set_compression(*packed)
         with writer:
             for topic, (name, times, make, *definition) in topics.items():
-                how = {"msgdef": definition[0], "md5sum": 32 * "0"} if definition else {"typestore": store}
+                how = (
+                    {"msgdef": definition[0], "md5sum": 32 * "0"}
+                    if definition
+                    else {"typestore": store}
+                )
                 connection = writer.add_connection(topic, name, **how)
                 for t in times:
                     message = make(messages, t)
-                    raw = store.serialize_ros1(message, name) if ros1 else store.serialize_cdr(message, name)
+                    raw = (
+                        store.serialize_ros1(message, name)
+                        if ros1
+                        else store.serialize_cdr(message, name)
+                    )
                     writer.write(connection, START + round(1e9 * (t + delay)), raw)
         if topic_map is not None:
             (tmp_path / "flight.topics.yaml").write_text(topic_map)
         return path
+
     return to_bag
 
 
@@ -142,29 +184,50 @@ def assert_motion(log, atol=1e-7):
     position, turn = motion(T)
     np.testing.assert_allclose(log.t, T, atol=1e-8)
     np.testing.assert_allclose(log.position, position, atol=atol)
-    assert (turn.inv() * Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]])).magnitude().max() < 10 * atol
+    assert (
+        turn.inv() * Rotation.from_quat(log.quaternion[:, [1, 2, 3, 0]])
+    ).magnitude().max() < 10 * atol
     np.testing.assert_allclose(log.rotor_speeds, np.multiply.outer(growth(T), OURS), rtol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_only_topics_that_fit_are_taken(write, kind, vehicle):
-    path = write(kind, {"/vicon/drone": pose_topic(), "/motors": actuator_topic(), "/battery": battery_topic()}, delay=0.01)
+    path = write(
+        kind,
+        {"/vicon/drone": pose_topic(), "/motors": actuator_topic(), "/battery": battery_topic()},
+        delay=0.01,
+    )
     log = read_log(path, "rosbag", vehicle)
     assert_motion(log)
     np.testing.assert_allclose(log.voltage, 12.0 - T, atol=1e-5)
     assert log.name == "flight"
-    assert any("pose: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in note for note in log.notes)
+    assert any(
+        "pose: topic /vicon/drone (geometry_msgs/msg/PoseStamped)" in note for note in log.notes
+    )
     if kind != "bag":
         inside = next(path.glob(f"*.{kind}"))
         assert_motion(read_log(inside, "rosbag", vehicle))
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
-@pytest.mark.parametrize("pose", ["geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TransformStamped",
-                                  "nav_msgs/msg/Odometry"])
+@pytest.mark.parametrize(
+    "pose",
+    [
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/TransformStamped",
+        "nav_msgs/msg/Odometry",
+    ],
+)
 def test_a_map_states_topics_frames_units_and_order(write, kind, pose, vehicle):
-    path = write(kind, {"/a": pose_topic(pose, ned=True), "/b": pose_topic(), "/rpm": array_topic(PX4 * 30 / np.pi)},
-                 "pose: {topic: /a, frame: ned}\nrotors: {topic: /rpm, unit: rpm, order: [3, 2, 4, 1]}\n")
+    path = write(
+        kind,
+        {
+            "/a": pose_topic(pose, ned=True),
+            "/b": pose_topic(),
+            "/rpm": array_topic(PX4 * 30 / np.pi),
+        },
+        "pose: {topic: /a, frame: ned}\nrotors: {topic: /rpm, unit: rpm, order: [3, 2, 4, 1]}\n",
+    )
     log = read_log(path, "rosbag", vehicle)
     assert_motion(log)
     assert log.voltage is None
@@ -185,7 +248,9 @@ def test_a_map_may_lie_elsewhere(write, tmp_path, vehicle):
 def test_an_order_picks_four_of_more(write, vehicle):
     six = np.concatenate([[1.0], OURS[:2], [2.0], OURS[2:]])
     path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic(six)})
-    with pytest.raises(InputError, match=r"topic /motors, message 1: 6 turn rate.s.; expected 4, or an order"):
+    with pytest.raises(
+        InputError, match=r"topic /motors, message 1: 6 turn rate.s.; expected 4, or an order"
+    ):
         read_log(path, "rosbag", vehicle)
     path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 6]}\n")
     assert_motion(read_log(path, "rosbag", vehicle))
@@ -202,50 +267,92 @@ def test_stamps_of_another_clock_are_not_mixed_with_the_bags(write, vehicle):
 
 
 def test_poses_without_stamps_take_the_time_of_recording(write, vehicle):
-    log = read_log(write("mcap", {"/a": pose_topic(stamp=False), "/motors": actuator_topic()}), "rosbag", vehicle)
+    log = read_log(
+        write("mcap", {"/a": pose_topic(stamp=False), "/motors": actuator_topic()}),
+        "rosbag",
+        vehicle,
+    )
     assert_motion(log)
     assert any("no time stamps" in note for note in log.notes)
 
 
 def test_messages_out_of_order_are_left_out(write, vehicle):
-    path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic(times=[*WIDE[:50], WIDE[20], *WIDE[50:]])})
+    path = write(
+        "bag",
+        {"/a": pose_topic(), "/motors": actuator_topic(times=[*WIDE[:50], WIDE[20], *WIDE[50:]])},
+    )
     log = read_log(path, "rosbag", vehicle)
     assert_motion(log)
     assert any("1 of 164 samples repeat or go back" in note for note in log.notes)
 
 
-@pytest.mark.parametrize(("topic_map", "expected"), [
-    ("pose: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
-    ("pose: /motors", "pose: topic /motors is of type mav_msgs/msg/Actuators; expected geometry_msgs/msg/PoseStamped"),
-    ("pos: /a", "unknown key 'pos'; expected one of pose, rotors, voltage"),
-    ("pose: {topic: /a, frames: ned}", "pose: unknown key 'frames'; expected one of frame, topic"),
-    ("pose: {topic: /a, frame: enu}", "pose: unknown frame 'enu'; expected one of flu, ned"),
-    ("pose: {topic: [1]}", r"pose: topic: expected a name such as /motors, got \[1\]"),
-    ("pose: 3", "pose: expected a topic or a mapping of topic, frame, got 3"),
-    ("rotors: {unit: [rpm]}", "rotors: unknown unit"),
-    ("rotors: {order: [1, 2, 3, 3]}", "order: expected four different elements"),
-    ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
-    ("rotors: {order: 5}", "order: expected four different elements"),
-    ("rotors: /n", "states no unit; expected unit: rad/s, rpm, rev/s"),
-    ("- pose", "expected a mapping of pose, rotors, voltage to topics, got list"),
-    ("pose: [", "not valid YAML"),
-])
+@pytest.mark.parametrize(
+    ("topic_map", "expected"),
+    [
+        ("pose: /nowhere", r"unknown topic '/nowhere'; expected one of /a, /motors, /n"),
+        (
+            "pose: /motors",
+            "pose: topic /motors is of type mav_msgs/msg/Actuators; expected "
+            "geometry_msgs/msg/PoseStamped",
+        ),
+        ("pos: /a", "unknown key 'pos'; expected one of pose, rotors, voltage"),
+        (
+            "pose: {topic: /a, frames: ned}",
+            "pose: unknown key 'frames'; expected one of frame, topic",
+        ),
+        ("pose: {topic: /a, frame: enu}", "pose: unknown frame 'enu'; expected one of flu, ned"),
+        ("pose: {topic: [1]}", r"pose: topic: expected a name such as /motors, got \[1\]"),
+        ("pose: 3", "pose: expected a topic or a mapping of topic, frame, got 3"),
+        ("rotors: {unit: [rpm]}", "rotors: unknown unit"),
+        ("rotors: {order: [1, 2, 3, 3]}", "order: expected four different elements"),
+        ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
+        ("rotors: {order: 5}", "order: expected four different elements"),
+        ("rotors: /n", "states no unit; expected unit: rad/s, rpm, rev/s"),
+        ("- pose", "expected a mapping of pose, rotors, voltage to topics, got list"),
+        ("pose: [", "not valid YAML"),
+    ],
+)
 def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
-    path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic(), "/n": array_topic(OURS)}, topic_map)
-    with pytest.raises(InputError, match=f"flight.(bag|topics.yaml): .*{expected}|flight.topics.yaml: {expected}"):
+    path = write(
+        "bag", {"/a": pose_topic(), "/motors": actuator_topic(), "/n": array_topic(OURS)}, topic_map
+    )
+    with pytest.raises(
+        InputError, match=f"flight.(bag|topics.yaml): .*{expected}|flight.topics.yaml: {expected}"
+    ):
         read_log(path, "rosbag", vehicle)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("topics", "expected"), [
-    ({"/motors": actuator_topic()}, "pose: no topic of a type that fits; expected one of geometry_msgs/msg/PoseStamped"),
-    ({"/a": pose_topic()}, r"rotors: no topic .* in \S*flight.topics.yaml. The bag's topics: /a"),
-    ({"/a": pose_topic(), "/b": pose_topic(), "/motors": actuator_topic()}, r"pose: 2 topics could be it \(/a, /b\)"),
-    ({"/a": pose_topic(times=[]), "/motors": actuator_topic()}, "pose: topic /a has no messages"),
-    ({"/a": pose_topic(times=[0.0]), "/motors": actuator_topic()}, r"/a: 1 message\(s\); expected at least two"),
-    ({"/a": pose_topic(), "/motors": actuator_topic(times=WIDE + 9)}, "do not overlap"),
-    ({"/a": pose_topic(), "/motors": actuator_topic([1, 2, np.nan, 3])}, "turn rate of rotor 3 is nan; expected a finite"),
-])
+@pytest.mark.parametrize(
+    ("topics", "expected"),
+    [
+        (
+            {"/motors": actuator_topic()},
+            "pose: no topic of a type that fits; expected one of geometry_msgs/msg/PoseStamped",
+        ),
+        (
+            {"/a": pose_topic()},
+            r"rotors: no topic .* in \S*flight.topics.yaml. The bag's topics: /a",
+        ),
+        (
+            {"/a": pose_topic(), "/b": pose_topic(), "/motors": actuator_topic()},
+            r"pose: 2 topics could be it \(/a, /b\)",
+        ),
+        (
+            {"/a": pose_topic(times=[]), "/motors": actuator_topic()},
+            "pose: topic /a has no messages",
+        ),
+        (
+            {"/a": pose_topic(times=[0.0]), "/motors": actuator_topic()},
+            r"/a: 1 message\(s\); expected at least two",
+        ),
+        ({"/a": pose_topic(), "/motors": actuator_topic(times=WIDE + 9)}, "do not overlap"),
+        (
+            {"/a": pose_topic(), "/motors": actuator_topic([1, 2, np.nan, 3])},
+            "turn rate of rotor 3 is nan; expected a finite",
+        ),
+    ],
+)
 def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
     with pytest.raises(InputError, match=f"flight.*: .*{expected}"):
         read_log(write(kind, topics), "rosbag", vehicle)
@@ -253,12 +360,17 @@ def test_what_is_missing_is_named(write, kind, topics, expected, vehicle):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_empty_bag_is_refused(write, kind, vehicle):
-    with pytest.raises(InputError, match=r"flight.*(cannot be read as a ROS|The bag's topics: none)"):
+    with pytest.raises(
+        InputError, match=r"flight.*(cannot be read as a ROS|The bag's topics: none)"
+    ):
         read_log(write(kind, {}), "rosbag", vehicle)
 
 
 @pytest.mark.parametrize("name", ["flight.bag", "flight.db3", "flight.mcap"])
-@pytest.mark.parametrize("content", [b"", b"#ROSBAG V1.2\n", b"PK\x03\x04" + bytes(200), b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"])
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"#ROSBAG V1.2\n", b"PK\x03\x04" + bytes(200), b"#ROSBAG V2.0\n", b"\x89MCAP0\r\n"],
+)
 def test_what_is_no_bag_is_refused(tmp_path, name, content, vehicle):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=rf"{name}: cannot be read as a ROS"):
@@ -268,7 +380,9 @@ def test_what_is_no_bag_is_refused(tmp_path, name, content, vehicle):
 def test_what_is_not_there_is_refused(tmp_path, vehicle):
     with pytest.raises(InputError, match=r"absent.bag: cannot be read as a ROS 1 bag"):
         read_log(tmp_path / "absent.bag", "rosbag", vehicle)
-    with pytest.raises(InputError, match=r"flight.csv: unknown kind of bag; expected .bag, .db3, .mcap"):
+    with pytest.raises(
+        InputError, match=r"flight.csv: unknown kind of bag; expected .bag, .db3, .mcap"
+    ):
         read_log(tmp_path / "flight.csv", "rosbag", vehicle)
     with pytest.raises(InputError, match=r"cannot be read as a ROS 2 bag: .*metadata"):
         read_log(tmp_path, "rosbag", vehicle)
@@ -296,13 +410,22 @@ def test_a_cut_or_spoiled_bag_reads_or_is_refused(write, kind, vehicle):
 
 
 def test_another_definition_of_a_known_type_is_refused(write, vehicle):
-    path = write("bag", {"/a": pose_topic(), "/motors": (*actuator_topic(), "float64[] angular_velocities\n")})
-    with pytest.raises(InputError, match=r"topic /motors: its mav_msgs/msg/Actuators has another definition"):
+    path = write(
+        "bag",
+        {"/a": pose_topic(), "/motors": (*actuator_topic(), "float64[] angular_velocities\n")},
+    )
+    with pytest.raises(
+        InputError, match=r"topic /motors: its mav_msgs/msg/Actuators has another definition"
+    ):
         read_log(path, "rosbag", vehicle)
 
 
 def test_a_voltage_that_nobody_asked_for_may_be_unreadable(write, vehicle):
-    topics = {"/a": pose_topic(), "/motors": actuator_topic(), "/battery": (*battery_topic(), "float32 voltage\n")}
+    topics = {
+        "/a": pose_topic(),
+        "/motors": actuator_topic(),
+        "/battery": (*battery_topic(), "float32 voltage\n"),
+    }
     path = write("bag", topics)
     log = read_log(path, "rosbag", vehicle)
     assert_motion(log)
@@ -334,8 +457,15 @@ def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypat
 
 @pytest.mark.parametrize("mode", [rosbag2.CompressionMode.FILE, rosbag2.CompressionMode.MESSAGE])
 def test_files_and_messages_packed_one_by_one_are_refused(mode, write, vehicle):
-    path = write("db3", {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=(mode, rosbag2.CompressionFormat.ZSTD))
-    with pytest.raises(InputError, match=rf"metadata.yaml: compression_mode {mode.name.lower()}: expected a bag that is not"):
+    path = write(
+        "db3",
+        {"/pose": pose_topic(), "/motors": actuator_topic()},
+        packed=(mode, rosbag2.CompressionFormat.ZSTD),
+    )
+    with pytest.raises(
+        InputError,
+        match=rf"metadata.yaml: compression_mode {mode.name.lower()}: expected a bag that is not",
+    ):
         read_log(path, "rosbag", vehicle)
 
 
@@ -343,5 +473,7 @@ def test_a_bag_asks_for_its_reader(tmp_path, monkeypatch, vehicle):
     with pytest.raises(InputError, match=r"flight.bag: expected --reader rosbag"):
         read_log(tmp_path / "flight.bag")
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(InputError, match=r"pip install 'windwrench\[logs\]', or pip install rosbags"):
+    with pytest.raises(
+        InputError, match=r"pip install 'windwrench\[logs\]', or pip install rosbags"
+    ):
         read_log(tmp_path / "flight.bag", "rosbag", vehicle)

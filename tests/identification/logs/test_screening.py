@@ -1,4 +1,6 @@
-"""Logs that are not what they claim to be are refused with what they look like; honest ones pass, whatever they lack."""
+"""Logs that are not what they claim to be are refused with what they look like; honest ones pass,
+whatever they lack.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -6,9 +8,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from data_paths import NANOBENCH, data_file
 from scipy.spatial.transform import Rotation
 
+from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
@@ -30,20 +32,41 @@ def flight(trajectory="excite", effect=None, size=2.0, seconds=14.0):
     if effect is not None:
         limits = {c.name: (c.minimum, c.maximum) for c in get(effect).coefficients}
         setting = parse_setting(effect, VEHICLE)
-        effects = (EffectSetting(effect, {name: float(np.clip(size * value, *limits[name]))
-                                          for name, value in setting.coefficients.items()}),)
-    return FlightLog(**record_flight(VEHICLE, effects, trajectory, seconds, seed=3), name=trajectory, source="flight.csv")
+        effects = (
+            EffectSetting(
+                effect,
+                {
+                    name: float(np.clip(size * value, *limits[name]))
+                    for name, value in setting.coefficients.items()
+                },
+            ),
+        )
+    return FlightLog(
+        **record_flight(VEHICLE, effects, trajectory, seconds, seed=3),
+        name=trajectory,
+        source="flight.csv",
+    )
 
 
 def turned(log, position=None, attitude=None):
     """The log with positions (3, 3) times themselves and a function on rotation matrices."""
     R = Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix()
-    quaternion = log.quaternion if attitude is None else Rotation.from_matrix(attitude(R)).as_quat(scalar_first=True)
-    return replace(log, position=log.position if position is None else log.position @ position.T, quaternion=quaternion)
+    quaternion = (
+        log.quaternion
+        if attitude is None
+        else Rotation.from_matrix(attitude(R)).as_quat(scalar_first=True)
+    )
+    return replace(
+        log,
+        position=log.position if position is None else log.position @ position.T,
+        quaternion=quaternion,
+    )
 
 
 def shifted(log, seconds):
-    rotors = np.column_stack([np.interp(log.t - seconds, log.t, column) for column in log.rotor_speeds.T])
+    rotors = np.column_stack(
+        [np.interp(log.t - seconds, log.t, column) for column in log.rotor_speeds.T]
+    )
     return replace(log, rotor_speeds=rotors)
 
 
@@ -60,34 +83,101 @@ def ned(log):
 
 
 HOSTILE = {
-    "scalar last": (scalar_last, "quaternion is scalar last; expected scalar first.*reorder the columns"),
+    "scalar last": (
+        scalar_last,
+        "quaternion is scalar last; expected scalar first.*reorder the columns",
+    ),
     "conjugate": (conjugate, "quaternion is world to body; expected body to world"),
-    "scalar last, conjugate": (lambda log: scalar_last(conjugate(log)), "quaternion is scalar last and world to body"),
+    "scalar last, conjugate": (
+        lambda log: scalar_last(conjugate(log)),
+        "quaternion is scalar last and world to body",
+    ),
     "NED": (ned, "world is z down .north, east, down. and the body z down"),
-    "z down": (lambda log: turned(log, DOWN, lambda R: DOWN @ R), "world is z down while the body axes"),
-    "FRD body": (lambda log: turned(log, None, lambda R: R @ DOWN), "body axes are forward, right, down in a world"),
+    "z down": (
+        lambda log: turned(log, DOWN, lambda R: DOWN @ R),
+        "world is z down while the body axes",
+    ),
+    "FRD body": (
+        lambda log: turned(log, None, lambda R: R @ DOWN),
+        "body axes are forward, right, down in a world",
+    ),
     "NED position": (lambda log: turned(log, DOWN), "position is z down .* but the attitude z up"),
-    "NED attitude": (lambda log: turned(log, None, lambda R: DOWN @ R @ DOWN), "attitude is z down .* but the position"),
-    "y up": (lambda log: turned(log, Y_UP, lambda R: Y_UP @ R), "world is y up, .* with body axes forward, left, up"),
-    "y up body": (lambda log: turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T), "world and the body are y up"),
-    "y, z swapped": (lambda log: replace(log, position=log.position[:, [0, 2, 1]]), "py and pz are swapped, the attitude"),
-    "all y, z swapped": (lambda log: replace(log, position=log.position[:, [0, 2, 1]],
-                                             quaternion=log.quaternion[:, [0, 1, 3, 2]]), "y and z are swapped, in posi"),
-    "x, y swapped": (lambda log: replace(log, position=log.position[:, [1, 0, 2]]), "px and py are swapped"),
-    "scalar last, NED": (lambda log: scalar_last(ned(log)), "quaternion is scalar last and the world z down"),
-    "millimetres": (lambda log: replace(log, position=1e3 * log.position), "px, py, pz look like millimetres"),
-    "centimetres": (lambda log: replace(log, position=1e2 * log.position), "px, py, pz look like centimetres"),
-    "deg/s": (lambda log: replace(log, rotor_speeds=np.degrees(log.rotor_speeds)), "look like degrees per second"),
-    "rpm": (lambda log: replace(log, rotor_speeds=log.rotor_speeds * 30 / np.pi), "look like revolutions per minute"),
-    "Hz": (lambda log: replace(log, rotor_speeds=log.rotor_speeds / (2 * np.pi)), "look like revolutions per second"),
-    "ms": (lambda log: replace(log, t=1e3 * log.t), "t looks like milliseconds: .*divide t by 1000"),
+    "NED attitude": (
+        lambda log: turned(log, None, lambda R: DOWN @ R @ DOWN),
+        "attitude is z down .* but the position",
+    ),
+    "y up": (
+        lambda log: turned(log, Y_UP, lambda R: Y_UP @ R),
+        "world is y up, .* with body axes forward, left, up",
+    ),
+    "y up body": (
+        lambda log: turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T),
+        "world and the body are y up",
+    ),
+    "y, z swapped": (
+        lambda log: replace(log, position=log.position[:, [0, 2, 1]]),
+        "py and pz are swapped, the attitude",
+    ),
+    "all y, z swapped": (
+        lambda log: replace(
+            log, position=log.position[:, [0, 2, 1]], quaternion=log.quaternion[:, [0, 1, 3, 2]]
+        ),
+        "y and z are swapped, in posi",
+    ),
+    "x, y swapped": (
+        lambda log: replace(log, position=log.position[:, [1, 0, 2]]),
+        "px and py are swapped",
+    ),
+    "scalar last, NED": (
+        lambda log: scalar_last(ned(log)),
+        "quaternion is scalar last and the world z down",
+    ),
+    "millimetres": (
+        lambda log: replace(log, position=1e3 * log.position),
+        "px, py, pz look like millimetres",
+    ),
+    "centimetres": (
+        lambda log: replace(log, position=1e2 * log.position),
+        "px, py, pz look like centimetres",
+    ),
+    "deg/s": (
+        lambda log: replace(log, rotor_speeds=np.degrees(log.rotor_speeds)),
+        "look like degrees per second",
+    ),
+    "rpm": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds * 30 / np.pi),
+        "look like revolutions per minute",
+    ),
+    "Hz": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds / (2 * np.pi)),
+        "look like revolutions per second",
+    ),
+    "ms": (
+        lambda log: replace(log, t=1e3 * log.t),
+        "t looks like milliseconds: .*divide t by 1000",
+    ),
     "us": (lambda log: replace(log, t=1e6 * log.t), "t looks like microseconds"),
-    "rotors late": (lambda log: shifted(log, 0.3), r"turn rates come 0\.[23]\d s too late .* put omega1..omega4 .* earlier"),
-    "rotors early": (lambda log: shifted(log, -0.5), r"turn rates come 0\.[45]\d s too early .* later"),
-    "Betaflight": (lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [2, 3, 1, 0]]),
-                   "rotors look permuted: omega1..omega4 are rotors 3,4,2,1 of this vehicle .Betaflight's order"),
-    "PX4": (lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [3, 1, 0, 2]]), "rotors 4,2,1,3 .* PX4"),
-    "Crazyflie": (lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, ::-1]), "rotors 4,3,2,1 .* Crazyflie's"),
+    "rotors late": (
+        lambda log: shifted(log, 0.3),
+        r"turn rates come 0\.[23]\d s too late .* put omega1..omega4 .* earlier",
+    ),
+    "rotors early": (
+        lambda log: shifted(log, -0.5),
+        r"turn rates come 0\.[45]\d s too early .* later",
+    ),
+    "Betaflight": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [2, 3, 1, 0]]),
+        "rotors look permuted: omega1..omega4 are rotors 3,4,2,1 of this vehicle .Betaflight's "
+        "order",
+    ),
+    "PX4": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [3, 1, 0, 2]]),
+        "rotors 4,2,1,3 .* PX4",
+    ),
+    "Crazyflie": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, ::-1]),
+        "rotors 4,3,2,1 .* Crazyflie's",
+    ),
 }
 
 
@@ -105,16 +195,23 @@ def test_every_order_of_rotors_is_told_apart(trajectory):
     for order in permutations(range(4)):
         for mirrored in (False, True):
             vehicle = replace(VEHICLE, spin=-VEHICLE.spin) if mirrored else VEHICLE
-            found = recognise(Balances(replace(log, rotor_speeds=log.rotor_speeds[:, order]), vehicle))
+            found = recognise(
+                Balances(replace(log, rotor_speeds=log.rotor_speeds[:, order]), vehicle)
+            )
             expected = [] if order == (0, 1, 2, 3) and not mirrored else [(order, mirrored)]
             assert [(reading.order, reading.mirrored) for reading in found] == expected
 
 
 def test_rotors_that_work_against_a_cord_turn_as_declared():
-    """Slow turns against a spring of the heading need the opposite of what rotors give, as if these turned the other way."""
+    """Slow turns against a spring of the heading need the opposite of what rotors give, as if these
+    turned the other way.
+    """
     flown = practise_held_back(VEHICLE, "winding_cord", "typical", 2714764493, 60.0)
     balances = Balances(flown.log, flown.vehicle)
-    assert balances.fit(Reading("", "", mirrored=True)).torques[2] < 0.25 * balances.fit(Reading("", "")).torques[2]
+    assert (
+        balances.fit(Reading("", "", mirrored=True)).torques[2]
+        < 0.25 * balances.fit(Reading("", "")).torques[2]
+    )
     assert screen_log(flown.log, flown.vehicle) == ()
 
 
@@ -140,9 +237,13 @@ def test_a_quiet_hover_decides_nothing():
     """Without excitation no order of rotors explains more than another."""
     rng = np.random.default_rng(0)
     t = np.arange(0.0, 15.0, 0.005)
-    attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(scalar_first=True)
+    attitude = Rotation.from_rotvec(0.005 * rng.standard_normal((len(t), 3))).as_quat(
+        scalar_first=True
+    )
     rotors = VEHICLE.hover_rate + rng.standard_normal((len(t), 4))
-    log = FlightLog(t, np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal((len(t), 3)), attitude, rotors)
+    log = FlightLog(
+        t, np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal((len(t), 3)), attitude, rotors
+    )
     assert screen_log(log, VEHICLE) == ()
     assert Balances(log, VEHICLE).fit(Reading("", "")).torque > 0.5  # there is nothing to tell
 
@@ -151,7 +252,12 @@ def test_a_quiet_hover_decides_nothing():
 def test_the_shared_flights_pass(number):
     kind = "labelled" if number < 8 else "unlabelled"
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
-    assert screen_log(read_log(data_file(f"flights/{kind}_{number % 8:02d}.csv.gz"), None, vehicle), vehicle) == ()
+    assert (
+        screen_log(
+            read_log(data_file(f"flights/{kind}_{number % 8:02d}.csv.gz"), None, vehicle), vehicle
+        )
+        == ()
+    )
 
 
 @pytest.mark.parametrize("name", NANOBENCH)
@@ -160,19 +266,37 @@ def test_measured_flights_pass(name):
     screen_log(read_log(data_file(f"nanobench/{name}.csv"), "nanobench", vehicle), vehicle)
 
 
-@pytest.mark.parametrize("number", [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204])
+@pytest.mark.parametrize(
+    "number", [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204]
+)
 def test_short_measured_flights_pass_where_short_is_enough(number):
     vehicle = load_vehicle("crazyflie")
     log = read_log(data_file(f"crazyswarm2_payload/csv/log{number}.csv"), "crazyswarm2", vehicle)
     screen_log(log, vehicle, least_seconds=3.0)
     if log.t[-1] < 9.0:
-        with pytest.raises(InputError, match=r"s of flight in unbroken runs of poses; expected at least 10 s"):
+        with pytest.raises(
+            InputError, match=r"s of flight in unbroken runs of poses; expected at least 10 s"
+        ):
             screen_log(log, vehicle)
 
 
 def rows(log, keep):
-    return replace(log, **{name: getattr(log, name)[keep] for name in
-                           ("t", "position", "quaternion", "rotor_speeds", "voltage", "force", "torque", "valid")})
+    return replace(
+        log,
+        **{
+            name: getattr(log, name)[keep]
+            for name in (
+                "t",
+                "position",
+                "quaternion",
+                "rotor_speeds",
+                "voltage",
+                "force",
+                "torque",
+                "valid",
+            )
+        },
+    )
 
 
 def without_pose(log, lost):
@@ -194,22 +318,59 @@ def uneven_clock(log):
 
 
 TORN = {
-    "short": (lambda log: rows(log, log.t < 6.0), r"6 s of flight in unbroken runs.*expected at least 10 s"),
+    "short": (
+        lambda log: rows(log, log.t < 6.0),
+        r"6 s of flight in unbroken runs.*expected at least 10 s",
+    ),
     "very short": (lambda log: rows(log, log.t < 2.0), r"longest unbroken run of poses is 2 s"),
-    "slow": (lambda log: rows(log, np.arange(len(log.t)) % 8 == 0), r"25 new poses a second; expected at least 50: acceler"),
-    "held": (lambda log: replace(log, position=log.position[np.arange(len(log.t)) // 8 * 8],
-                                 quaternion=log.quaternion[np.arange(len(log.t)) // 8 * 8]), "25 new poses a second"),
-    "lost often": (lambda log: without_pose(log, log.t % 2.0 < 0.2), r"pose is lost in 8 run\(s\).*longest unbroken run"),
-    "lost long": (lambda log: without_pose(log, log.t > 8.0), r"lost in 1 run\(s\).*8\.\d* s of flight in unbroken runs"),
+    "slow": (
+        lambda log: rows(log, np.arange(len(log.t)) % 8 == 0),
+        r"25 new poses a second; expected at least 50: acceler",
+    ),
+    "held": (
+        lambda log: replace(
+            log,
+            position=log.position[np.arange(len(log.t)) // 8 * 8],
+            quaternion=log.quaternion[np.arange(len(log.t)) // 8 * 8],
+        ),
+        "25 new poses a second",
+    ),
+    "lost often": (
+        lambda log: without_pose(log, log.t % 2.0 < 0.2),
+        r"pose is lost in 8 run\(s\).*longest unbroken run",
+    ),
+    "lost long": (
+        lambda log: without_pose(log, log.t > 8.0),
+        r"lost in 1 run\(s\).*8\.\d* s of flight in unbroken runs",
+    ),
     "no pose": (lambda log: without_pose(log, log.t > -1.0), "no row has a pose"),
-    "uneven clock": (uneven_clock, "column t: time steps vary wildly.*expected the times at which the poses were taken"),
-    "clock jump": (jumped_clock, r"column t jumps by 5\.\d* s at t = .*, but the pose goes on from where it was"),
-    "rows cut out": (lambda log: replace(rows(log, (log.t < 5.0) | (log.t > 6.3)),
-                                         t=log.t[: int(np.sum((log.t < 5.0) | (log.t > 6.3)))]),
-                     r"pose leaps by .* m within 0.005 s at t = 5"),
-    "at rest": (lambda log: replace(log, rotor_speeds=0.0 * log.rotor_speeds), "omega1..omega4 are at rest all the time"),
-    "dead column": (lambda log: replace(log, rotor_speeds=log.rotor_speeds * [1, 1, 0, 1]), "omega3 is 0 while the other"),
-    "PWM": (lambda log: replace(log, rotor_speeds=100.0 * log.rotor_speeds), r"expected about 1: omega1..omega4 in rad/s"),
+    "uneven clock": (
+        uneven_clock,
+        "column t: time steps vary wildly.*expected the times at which the poses were taken",
+    ),
+    "clock jump": (
+        jumped_clock,
+        r"column t jumps by 5\.\d* s at t = .*, but the pose goes on from where it was",
+    ),
+    "rows cut out": (
+        lambda log: replace(
+            rows(log, (log.t < 5.0) | (log.t > 6.3)),
+            t=log.t[: int(np.sum((log.t < 5.0) | (log.t > 6.3)))],
+        ),
+        r"pose leaps by .* m within 0.005 s at t = 5",
+    ),
+    "at rest": (
+        lambda log: replace(log, rotor_speeds=0.0 * log.rotor_speeds),
+        "omega1..omega4 are at rest all the time",
+    ),
+    "dead column": (
+        lambda log: replace(log, rotor_speeds=log.rotor_speeds * [1, 1, 0, 1]),
+        "omega3 is 0 while the other",
+    ),
+    "PWM": (
+        lambda log: replace(log, rotor_speeds=100.0 * log.rotor_speeds),
+        r"expected about 1: omega1..omega4 in rad/s",
+    ),
 }
 
 
@@ -237,5 +398,8 @@ def test_a_file_cut_within_its_last_line_says_so(tmp_path, cut):
     path = tmp_path / "flight.csv"
     write_log(rows(flight(), flight().t < 0.1), path)
     path.write_text(path.read_text()[:-cut])
-    with pytest.raises(InputError, match=r"flight.csv: .*row 20 \(line 21\) (has \d+ field\(s\); expected 19|is empty)"):
+    with pytest.raises(
+        InputError,
+        match=r"flight.csv: .*row 20 \(line 21\) (has \d+ field\(s\); expected 19|is empty)",
+    ):
         read_log(path)

@@ -14,9 +14,11 @@ from windwrench.identification.motion.signals import log_signals
 from windwrench.studies.trials.practice_flights import fly_practice
 
 DECLARED = load_vehicle("ardrone2")
-VEHICLE = DECLARED.with_effects(EffectSetting("mass", {"dm": 0.05}),
-                                EffectSetting("inertia", {"jx": 0.1, "jy": -0.2, "jz": 0.3}),
-                                EffectSetting("com_offset", {"cx": 0.01, "cy": 0.003, "cz": -0.02}))
+VEHICLE = DECLARED.with_effects(
+    EffectSetting("mass", {"dm": 0.05}),
+    EffectSetting("inertia", {"jx": 0.1, "jy": -0.2, "jz": 0.3}),
+    EffectSetting("com_offset", {"cx": 0.01, "cy": 0.003, "cz": -0.02}),
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,10 +31,21 @@ def test_the_residual_is_newton_and_euler(flown):
     rotors, effects, body = model_wrench(flown, VEHICLE)
     R, omega, alpha = flown.rotation, flown.rate, flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
-    acceleration = flown.acceleration + np.array([0.0, 0.0, VEHICLE.gravity]) + np.einsum("nij,nj->ni", R, centre)
+    acceleration = (
+        flown.acceleration
+        + np.array([0.0, 0.0, VEHICLE.gravity])
+        + np.einsum("nij,nj->ni", R, centre)
+    )
     force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1] - effects[:, :3]
-    torque = alpha @ body.inertia.T + np.cross(omega, omega @ body.inertia.T) - rotors[:, 1:] - effects[:, 3:]
-    np.testing.assert_allclose(residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10)
+    torque = (
+        alpha @ body.inertia.T
+        + np.cross(omega, omega @ body.inertia.T)
+        - rotors[:, 1:]
+        - effects[:, 3:]
+    )
+    np.testing.assert_allclose(
+        residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10
+    )
 
 
 def test_by_the_declared_body_it_is_the_same_accelerations(flown):
@@ -40,6 +53,10 @@ def test_by_the_declared_body_it_is_the_same_accelerations(flown):
     assert by is DECLARED
     body = model_wrench(flown, VEHICLE)[2]
     r = residual_wrench(flown, VEHICLE)
-    r = np.column_stack([DECLARED.mass / body.mass * r[:, :3],
-                         np.linalg.solve(body.inertia, r[:, 3:].T).T @ DECLARED.inertia.T])
+    r = np.column_stack(
+        [
+            DECLARED.mass / body.mass * r[:, :3],
+            np.linalg.solve(body.inertia, r[:, 3:].T).T @ DECLARED.inertia.T,
+        ]
+    )
     np.testing.assert_allclose(needed_wrench(flown, DECLARED) - acting, r, atol=1e-10)

@@ -19,14 +19,26 @@ CUTOFF = 4.0
 
 def fly(*effects, trajectory="excite", seconds=15.0, settings=QUIET, vehicle=VEHICLE):
     c = record_flight(vehicle, effects, trajectory, seconds, 3, settings)
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), c["force"], c["torque"],
-                     name="flight")
+    return FlightLog(
+        c["t"],
+        c["position"],
+        c["quaternion"],
+        c["rotor_speeds"],
+        c.get("voltage"),
+        c["force"],
+        c["torque"],
+        name="flight",
+    )
 
 
 def residual(log, vehicle=VEHICLE):
     (signals,) = log_signals(log)
     edge = round(0.6 / signals.period)
-    return low_pass(residual_wrench(signals, vehicle), CUTOFF, signals.period)[edge:-edge], signals, edge
+    return (
+        low_pass(residual_wrench(signals, vehicle), CUTOFF, signals.period)[edge:-edge],
+        signals,
+        edge,
+    )
 
 
 def test_an_exact_plant_leaves_only_the_sensors_noise():
@@ -38,7 +50,10 @@ def test_an_exact_plant_leaves_only_the_sensors_noise():
 
 
 def test_it_is_the_true_wrench_where_a_simulator_knows_it():
-    log = fly(EffectSetting("rotor_drag", {"kdx": 4e-4, "kdy": 4e-4}), settings=replace(QUIET, sensor_noise=False))
+    log = fly(
+        EffectSetting("rotor_drag", {"kdx": 4e-4, "kdy": 4e-4}),
+        settings=replace(QUIET, sensor_noise=False),
+    )
     r, signals, edge = residual(log)
     truth = low_pass(log.force, CUTOFF, signals.period)[edge:-edge]
     for axis in range(2):
@@ -46,13 +61,16 @@ def test_it_is_the_true_wrench_where_a_simulator_knows_it():
         assert r[:, axis].std() == pytest.approx(truth[:, axis].std(), rel=0.03)
 
 
-@pytest.mark.parametrize("effect", [
-    EffectSetting("rotor_drag", {"kdx": 2e-4, "kdy": 1e-4}),
-    EffectSetting("mass", {"dm": 0.04}),
-    EffectSetting("com_offset", {"cx": 0.006, "cy": -0.004, "cz": 0.01}),
-    EffectSetting("battery_sag", {"n": 1.0}),
-    EffectSetting("motor_lag", {"tau": 0.035}),
-])
+@pytest.mark.parametrize(
+    "effect",
+    [
+        EffectSetting("rotor_drag", {"kdx": 2e-4, "kdy": 1e-4}),
+        EffectSetting("mass", {"dm": 0.04}),
+        EffectSetting("com_offset", {"cx": 0.006, "cy": -0.004, "cz": 0.01}),
+        EffectSetting("battery_sag", {"n": 1.0}),
+        EffectSetting("motor_lag", {"tau": 0.035}),
+    ],
+)
 def test_with_the_effect_declared_the_noise_is_left(effect):
     floor = np.sqrt(np.mean(residual(fly())[0] ** 2, axis=0))
     log = fly(effect)

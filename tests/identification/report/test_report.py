@@ -1,4 +1,6 @@
-"""The report of a diagnosis: strict numbers, a vehicle that loads again, and a page that a real browser shows whole."""
+"""The report of a diagnosis: strict numbers, a vehicle that loads again, and a page that a real
+browser shows whole.
+"""
 
 import json
 import math
@@ -8,8 +10,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from browser import look, needs_browser
 
+from tests.support.browser import look, needs_browser
 from windwrench.dynamics import EffectSetting, InputError, dump_vehicle, load_vehicle
 from windwrench.dynamics.effects import get
 from windwrench.envs.recording import record_flight
@@ -27,30 +29,52 @@ from windwrench.identification.findings import (
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals, low_pass
-from windwrench.identification.report.files.files import write_report
-from windwrench.identification.report.files.pictures import draw_over_frequency, draw_over_time
-from windwrench.identification.report.files.words import headline, percent, rounded, with_std
+from windwrench.identification.report.files import write_report
+from windwrench.identification.report.pictures import draw_over_frequency, draw_over_time
+from windwrench.identification.report.words import headline, percent, rounded, with_std
 
 VEHICLE = load_vehicle("ardrone2")
 DRAG = {"kdx": 2.4e-4, "kdy": 1.8e-4}
 CUTOFF = 4.0
-TRIED = ("rotor_drag", "body_drag", "mass", "constant_force", "constant_torque", "thrust_scale", "inflow_thrust",
-         "rate_damping", "motor_lag", "com_offset", "thrust_axis_tilt", "world_tilt", "translational_lift",
-         "flapping_moment", "rotor_inertia", "latency", "clock_offset")
+TRIED = (
+    "rotor_drag",
+    "body_drag",
+    "mass",
+    "constant_force",
+    "constant_torque",
+    "thrust_scale",
+    "inflow_thrust",
+    "rate_damping",
+    "motor_lag",
+    "com_offset",
+    "thrust_axis_tilt",
+    "world_tilt",
+    "translational_lift",
+    "flapping_moment",
+    "rotor_inertia",
+    "latency",
+    "clock_offset",
+)
 
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    """A diagnosis of a flight with rotor drag, every effect fitted alone by least squares about the declared vehicle."""
+    """A diagnosis of a flight with rotor drag, every effect fitted alone by least squares about the
+    declared vehicle.
+    """
     c = record_flight(VEHICLE, (EffectSetting("rotor_drag", DRAG),), "excite", 20.0, 3)
-    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), name="flight")
+    log = FlightLog(
+        c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), name="flight"
+    )
     (signals,) = log_signals(log)
     edge = round(0.6 / signals.period)
     inside = slice(edge, -edge)
     t = signals.t[inside]
 
     def residual(*effects):
-        return low_pass(residual_wrench(signals, VEHICLE.with_effects(*effects)), CUTOFF, signals.period)[inside]
+        return low_pass(
+            residual_wrench(signals, VEHICLE.with_effects(*effects)), CUTOFF, signals.period
+        )[inside]
 
     before = residual()
     held = (t // 2.0).astype(int) % 4 == 2
@@ -58,15 +82,24 @@ def diagnosis():
 
     def fit(name):
         sizes = {c.name: c.typical[0] for c in get(name).coefficients if c.typical[0]}
-        columns = [((before - residual(EffectSetting(name, {k: v}))) / scale) for k, v in sizes.items()]
-        A, y = np.stack([c[~held].ravel() for c in columns], axis=1), (before / scale)[~held].ravel()
+        columns = [
+            ((before - residual(EffectSetting(name, {k: v}))) / scale) for k, v in sizes.items()
+        ]
+        A, y = (
+            np.stack([c[~held].ravel() for c in columns], axis=1),
+            (before / scale)[~held].ravel(),
+        )
         share = np.linalg.lstsq(A, y, rcond=None)[0]
         left = before / scale - sum(s * c for s, c in zip(share, columns, strict=True))
         gain = 1.0 - np.sum(left[held] ** 2) / np.sum((before / scale)[held] ** 2)
-        # neighbouring samples of a low-passed signal say the same: as many independent ones as the filter lets through
+        # neighbouring samples of a low-passed signal say the same: as many independent ones as the
+        # filter lets through
         covariance = np.linalg.pinv(A.T @ A) * left[~held].var() / (2 * CUTOFF * signals.period)
         coefficients = {k: float(s * v) for (k, v), s in zip(sizes.items(), share, strict=True)}
-        std = {k: float(math.sqrt(d) * abs(v)) for (k, v), d in zip(sizes.items(), np.diag(covariance), strict=True)}
+        std = {
+            k: float(math.sqrt(d) * abs(v))
+            for (k, v), d in zip(sizes.items(), np.diag(covariance), strict=True)
+        }
         return coefficients, std, float(gain)
 
     fits = {name: fit(name) for name in TRIED}
@@ -78,46 +111,114 @@ def diagnosis():
         rms = np.sqrt(np.mean(np.square(x[held]), axis=0))
         return Errors(float(np.linalg.norm(rms[:3])), float(np.linalg.norm(rms[3:])), nis, rollout)
 
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int))).reshape(-1, 2)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int))).reshape(
+        -1, 2
+    )
     return Diagnosis(
-        verdict="explained", remainder="random",
-        effects=(NamedEffect("rotor_drag", coefficients, std, dict.fromkeys(DRAG, "N/(rad/s m/s)"), False, (),
-                             {"share_of_residual": gain}),),
+        verdict="explained",
+        remainder="random",
+        effects=(
+            NamedEffect(
+                "rotor_drag",
+                coefficients,
+                std,
+                dict.fromkeys(DRAG, "N/(rad/s m/s)"),
+                False,
+                (),
+                {"share_of_residual": gain},
+            ),
+        ),
         held_out_segments=tuple(("flight", float(t[a]), float(t[b - 1])) for a, b in edges),
-        before=errors(before, 41.3, 0.0712), after=errors(after, 6.41, math.nan),
-        floor_force_rms=0.0123, floor_torque_rms=0.00094,
-        advice=("Fly at 2 m/s and more along both body axes with hard climbs, to tell rotor drag from body drag.",),
+        before=errors(before, 41.3, 0.0712),
+        after=errors(after, 6.41, math.nan),
+        floor_force_rms=0.0123,
+        floor_torque_rms=0.00094,
+        advice=(
+            "Fly at 2 m/s and more along both body axes with hard climbs, to tell rotor drag from "
+            "body drag.",
+        ),
         notes=("battery voltage falls from 11.1 to 10.9 V",),
-        candidates=tuple(sorted((Candidate(n, g, n == "rotor_drag") for n, (_, _, g) in fits.items()), key=lambda c: -c.gain)),
+        candidates=tuple(
+            sorted(
+                (Candidate(n, g, n == "rotor_drag") for n, (_, _, g) in fits.items()),
+                key=lambda c: -c.gain,
+            )
+        ),
         traces=(Trace("flight", signals.period, t, before, after, held),),
         signatures=tuple(
-            Signature("rotor_drag", CHANNELS[i], f"velocity {'xy'[i]} (m/s)", signals.velocity[inside][:, i], before[:, i],
-                      (before - after)[:, i]) for i in range(2)),
-        structure=(), gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)), pushes=(),
-        cutoff_hz=CUTOFF, declared=VEHICLE, amended=amended, logs=("flight",), test_logs=(), seconds=20.0)
+            Signature(
+                "rotor_drag",
+                CHANNELS[i],
+                f"velocity {'xy'[i]} (m/s)",
+                signals.velocity[inside][:, i],
+                before[:, i],
+                (before - after)[:, i],
+            )
+            for i in range(2)
+        ),
+        structure=(),
+        gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)),
+        pushes=(),
+        cutoff_hz=CUTOFF,
+        declared=VEHICLE,
+        amended=amended,
+        logs=("flight",),
+        test_logs=(),
+        seconds=20.0,
+    )
 
 
 def hard(diagnosis):
-    """All that makes a page long, wide or wrong: many effects, several logs with rude names, missing numbers."""
-    rude = '<script>alert("1")</script> & ' + "a_very_long_name_without_a_single_space_" * 3 + "$x_{"
+    """All that makes a page long, wide or wrong: many effects, several logs with rude names,
+    missing numbers.
+    """
+    rude = (
+        '<script>alert("1")</script> & ' + "a_very_long_name_without_a_single_space_" * 3 + "$x_{"
+    )
     effects = [
         replace(diagnosis.effects[0], indistinguishable_from=("body_drag", "attitude_gain")),
-        NamedEffect("wind", {"wx": 1.234, "wy": -0.004, "wz": math.nan, "cd": 0.02}, {"wx": 0.05, "wy": 0.3, "cd": 0.0},
-                    {"wx": "m/s", "wy": "m/s", "wz": "m/s", "cd": "N/(m/s)^2"}, True, (), {}),
-        NamedEffect("com_offset", {"cx": 0.00612}, {"cx": 0.0002}, {"cx": "m"}, False, (), {"share": 0.2}),
+        NamedEffect(
+            "wind",
+            {"wx": 1.234, "wy": -0.004, "wz": math.nan, "cd": 0.02},
+            {"wx": 0.05, "wy": 0.3, "cd": 0.0},
+            {"wx": "m/s", "wy": "m/s", "wz": "m/s", "cd": "N/(m/s)^2"},
+            True,
+            (),
+            {},
+        ),
+        NamedEffect(
+            "com_offset", {"cx": 0.00612}, {"cx": 0.0002}, {"cx": "m"}, False, (), {"share": 0.2}
+        ),
     ]
     trace, signature = diagnosis.traces[0], diagnosis.signatures[0]
     return replace(
-        diagnosis, verdict="partly explained", remainder="structured", effects=tuple(effects), logs=(rude, "second"),
+        diagnosis,
+        verdict="partly explained",
+        remainder="structured",
+        effects=tuple(effects),
+        logs=(rude, "second"),
         traces=(replace(trace, log=rude), replace(trace, log="second", before=3 * trace.before)),
-        test_logs=("third",), held_out_segments=(*diagnosis.held_out_segments, ("second", 1.0, 2.5), (rude, 4.0, 5.0)),
-        signatures=(*diagnosis.signatures,
-                    replace(signature, effect="wind", channel="tau_z", regressor=5 * "$x_{ <b>speed</b> (m/s) "),
-                    replace(signature, effect="com_offset", fitted=0 * signature.fitted)),
-        after=Errors(math.nan, math.inf, math.nan, math.nan), notes=(rude,),
-        candidates=(*diagnosis.candidates, *(Candidate(n, -0.4, n == "wind") for n in ("wind", "battery_sag")),
-                    Candidate("fan_jet", math.nan, False)),
-        structure=(Structure("a wave at 1.1 Hz", "Fx", 0.31), Structure("a dependence on height", "Fz over height", 0.084)))
+        test_logs=("third",),
+        held_out_segments=(*diagnosis.held_out_segments, ("second", 1.0, 2.5), (rude, 4.0, 5.0)),
+        signatures=(
+            *diagnosis.signatures,
+            replace(
+                signature, effect="wind", channel="tau_z", regressor=5 * "$x_{ <b>speed</b> (m/s) "
+            ),
+            replace(signature, effect="com_offset", fitted=0 * signature.fitted),
+        ),
+        after=Errors(math.nan, math.inf, math.nan, math.nan),
+        notes=(rude,),
+        candidates=(
+            *diagnosis.candidates,
+            *(Candidate(n, -0.4, n == "wind") for n in ("wind", "battery_sag")),
+            Candidate("fan_jet", math.nan, False),
+        ),
+        structure=(
+            Structure("a wave at 1.1 Hz", "Fx", 0.31),
+            Structure("a dependence on height", "Fz over height", 0.084),
+        ),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +226,10 @@ def reports(diagnosis, tmp_path_factory):
     """The diagnosis, plain and hard, with the paths of its report."""
     made = {"plain": diagnosis, "hard": hard(diagnosis)}
     folder = tmp_path_factory.mktemp("report") / "new"
-    return {kind: (d, write_report(d, folder / kind, f"windwrench diagnose '{kind} log.csv'")) for kind, d in made.items()}
+    return {
+        kind: (d, write_report(d, folder / kind, f"windwrench diagnose '{kind} log.csv'"))
+        for kind, d in made.items()
+    }
 
 
 def strict(path):
@@ -138,20 +242,37 @@ def strict(path):
 def test_the_numbers(reports):
     diagnosis, paths = reports["plain"]
     assert [p.name for p in paths] == ["report.json", "report.html", "vehicle.yaml"]
-    assert sorted(p.name for p in paths[0].parent.iterdir()) == ["report.html", "report.json", "vehicle.yaml"]
+    assert sorted(p.name for p in paths[0].parent.iterdir()) == [
+        "report.html",
+        "report.json",
+        "vehicle.yaml",
+    ]
     data = strict(paths[0])
     assert list(data)[:5] == ["verdict", "remainder", "effects", "error", "advice"]
     assert (data["verdict"], data["remainder"]) == ("explained", "random")
     (effect,) = data["effects"]
-    assert list(effect) == ["name", "coefficients", "std", "units", "tentative", "indistinguishable_from", "evidence"]
+    assert list(effect) == [
+        "name",
+        "coefficients",
+        "std",
+        "units",
+        "tentative",
+        "indistinguishable_from",
+        "evidence",
+    ]
     assert effect["name"] == "rotor_drag"
     assert effect["coefficients"] == pytest.approx(DRAG, rel=0.2)
-    assert effect["coefficients"] == pytest.approx(dict(diagnosis.effects[0].coefficients), rel=1e-5)
+    assert effect["coefficients"] == pytest.approx(
+        dict(diagnosis.effects[0].coefficients), rel=1e-5
+    )
     error = data["error"]
     assert set(error) == {"held_out_segments", "before", "after", "floor"}
     assert error["held_out_segments"] == [pytest.approx(s[1:]) for s in diagnosis.held_out_segments]
-    assert set(error["before"]) == set(error["after"]) == {"force_rms_N", "torque_rms_Nm", "nis_without_wrench_state",
-                                                           "rollout_1s_position_rms_m"}
+    assert (
+        set(error["before"])
+        == set(error["after"])
+        == {"force_rms_N", "torque_rms_Nm", "nis_without_wrench_state", "rollout_1s_position_rms_m"}
+    )
     assert error["before"]["force_rms_N"] == pytest.approx(diagnosis.before.force_rms, rel=1e-5)
     assert error["after"]["rollout_1s_position_rms_m"] is None
     assert error["floor"] == {"force_rms_N": 0.0123, "torque_rms_Nm": 0.00094}
@@ -183,58 +304,107 @@ def test_a_folder_that_cannot_be_written(diagnosis, tmp_path):
 
 
 def test_names_that_are_no_text(diagnosis, tmp_path):
-    numbers, html, _ = write_report(replace(diagnosis, logs=("log\udcff",)), tmp_path, command="windwrench diagnose log\udcff")
+    numbers, html, _ = write_report(
+        replace(diagnosis, logs=("log\udcff",)), tmp_path, command="windwrench diagnose log\udcff"
+    )
     assert strict(numbers)["logs"] == ["log?"]
     assert "windwrench diagnose log?" in html.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("value", "std", "text"), [
-    (2.4312e-4, 3.14e-6, "(2.431 ± 0.031) × 10⁻⁴"), (1.2345, 0.05, "1.234 ± 0.050"), (-0.004, 0.3, "−0.00 ± 0.30"),
-    (0.02, 0.0, "0.0200"), (0.02, math.nan, "0.0200"), (math.nan, 1.0, "–"), (123456.0, 1000.0, "(1.235 ± 0.010) × 10⁵"),
-    (0.0, 1e-6, "(0.0 ± 1.0) × 10⁻⁶"), (0.0, 0.0, "0"), (5.0, 40.0, "5 ± 40"),
-])
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (2.4312e-4, 3.14e-6, "(2.431 ± 0.031) × 10⁻⁴"),
+        (1.2345, 0.05, "1.234 ± 0.050"),
+        (-0.004, 0.3, "−0.00 ± 0.30"),
+        (0.02, 0.0, "0.0200"),
+        (0.02, math.nan, "0.0200"),
+        (math.nan, 1.0, "–"),
+        (123456.0, 1000.0, "(1.235 ± 0.010) × 10⁵"),
+        (0.0, 1e-6, "(0.0 ± 1.0) × 10⁻⁶"),
+        (0.0, 0.0, "0"),
+        (5.0, 40.0, "5 ± 40"),
+    ],
+)
 def test_a_coefficient_is_as_precise_as_it_is_known(value, std, text):
     assert with_std(value, std) == text
 
 
-@pytest.mark.parametrize(("value", "digits", "text"), [
-    (0.03049, 2, "0.030"), (0.0999, 2, "0.10"), (12345.6, 3, "12300"), (0.0, 3, "0"), (-1.5, 3, "−1.50"), (math.inf, 3, "–"),
-])
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.03049, 2, "0.030"),
+        (0.0999, 2, "0.10"),
+        (12345.6, 3, "12300"),
+        (0.0, 3, "0"),
+        (-1.5, 3, "−1.50"),
+        (math.inf, 3, "–"),
+    ],
+)
 def test_significant_digits(value, digits, text):
     assert rounded(value, digits) == text
 
 
 def test_shares():
-    told = [percent(x).replace("\N{NO-BREAK SPACE}", " ") for x in (0.874, 0.0312, -0.4, math.nan, -0.0003)]
+    told = [
+        percent(x).replace("\N{NO-BREAK SPACE}", " ")
+        for x in (0.874, 0.0312, -0.4, math.nan, -0.0003)
+    ]
     assert told == ["87 %", "3.1 %", "−40 %", "–", "0 %"]
 
 
 def test_verdicts_in_one_sentence(diagnosis):
     wind = NamedEffect("wind", {}, {}, {}, True, (), {})
     several = (*diagnosis.effects, replace(diagnosis.effects[0], name="mass"), wind)
-    told = [headline(replace(diagnosis, verdict=v, remainder=r, effects=e)) for v, r, e in [
-        ("explained", "none", diagnosis.effects), ("explained", "random", several), ("explained", "none", (wind,)),
-        ("partly explained", "structured", diagnosis.effects), ("unexplained", "structured", ()),
-        ("unexplained", "random", ()), ("nothing to explain", "none", ())]]
+    told = [
+        headline(replace(diagnosis, verdict=v, remainder=r, effects=e))
+        for v, r, e in [
+            ("explained", "none", diagnosis.effects),
+            ("explained", "random", several),
+            ("explained", "none", (wind,)),
+            ("partly explained", "structured", diagnosis.effects),
+            ("unexplained", "structured", ()),
+            ("unexplained", "random", ()),
+            ("nothing to explain", "none", ()),
+        ]
+    ]
     assert told == [
-        "The model lacked rotor_drag.", "The model lacked rotor_drag and mass, and perhaps wind.",
-        "The model perhaps lacked wind.", "The model lacked rotor_drag, but that is not all.",
+        "The model lacked rotor_drag.",
+        "The model lacked rotor_drag and mass, and perhaps wind.",
+        "The model perhaps lacked wind.",
+        "The model lacked rotor_drag, but that is not all.",
         "The model is wrong in a way that no effect in the library explains.",
         "The model errs, but at random: no effect in the library explains it.",
-        "The model explains these logs: nothing needs to be added to it."]
+        "The model explains these logs: nothing needs to be added to it.",
+    ]
 
 
 def test_what_is_declared_is_not_said_to_be_lacking(diagnosis):
     (drag,) = diagnosis.effects
     mass, wind = replace(drag, name="mass"), replace(drag, name="wind", tentative=True)
-    known = replace(diagnosis, declared=diagnosis.declared.with_effects(EffectSetting("rotor_drag", drag.coefficients)))
-    told = [headline(replace(known, effects=effects)) for effects in [
-        (drag,), (mass, drag), (mass, drag, wind), (drag, wind), (mass, wind), (replace(drag, tentative=True),)]]
+    known = replace(
+        diagnosis,
+        declared=diagnosis.declared.with_effects(EffectSetting("rotor_drag", drag.coefficients)),
+    )
+    told = [
+        headline(replace(known, effects=effects))
+        for effects in [
+            (drag,),
+            (mass, drag),
+            (mass, drag, wind),
+            (drag, wind),
+            (mass, wind),
+            (replace(drag, tentative=True),),
+        ]
+    ]
     assert told == [
-        "The model has rotor_drag other than declared.", "The model lacked mass and has rotor_drag other than declared.",
+        "The model has rotor_drag other than declared.",
+        "The model lacked mass and has rotor_drag other than declared.",
         "The model lacked mass and has rotor_drag other than declared, and perhaps lacked wind.",
-        "The model has rotor_drag other than declared, and perhaps lacked wind.", "The model lacked mass, and perhaps wind.",
-        "The model perhaps has rotor_drag other than declared."]
+        "The model has rotor_drag other than declared, and perhaps lacked wind.",
+        "The model lacked mass, and perhaps wind.",
+        "The model perhaps has rotor_drag other than declared.",
+    ]
 
 
 class Page(HTMLParser):
@@ -277,17 +447,33 @@ def test_the_page_says_it(reports):
     before, after = (rounded(e.force_rms, 2) for e in (diagnosis.before, diagnosis.after))
     assert f"falls from {before} N to {after} N; the floor is 0.012 N." in page.text
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
-    for words in ("The model lacked rotor_drag.", kdx, "per rotor, along body x", "looks random", diagnosis.advice[0],
-                  diagnosis.notes[0], "windwrench diagnose 'plain log.csv'", "41.3", "20 s of flight"):
+    for words in (
+        "The model lacked rotor_drag.",
+        kdx,
+        "per rotor, along body x",
+        "looks random",
+        diagnosis.advice[0],
+        diagnosis.notes[0],
+        "windwrench diagnose 'plain log.csv'",
+        "41.3",
+        "20 s of flight",
+    ):
         assert words in page.text
 
 
 def test_the_page_says_what_is_in_doubt(reports):
     made, (_, path, _) = reports["hard"]
     page = Page(path.read_text("utf-8"))
-    for words in ("The model lacked rotor_drag and com_offset, and perhaps wind, but that is not all.",
-                  "cannot tell rotor_drag from body_drag or attitude_gain", "wind is tentative", "could not be worked out",
-                  "a wave at 1.1 Hz explains 31 % of what is left", "1.234 ± 0.050", made.logs[0], "nan"):
+    for words in (
+        "The model lacked rotor_drag and com_offset, and perhaps wind, but that is not all.",
+        "cannot tell rotor_drag from body_drag or attitude_gain",
+        "wind is tentative",
+        "could not be worked out",
+        "a wave at 1.1 Hz explains 31 % of what is left",
+        "1.234 ± 0.050",
+        made.logs[0],
+        "nan",
+    ):
         assert (words in page.text) == (words != "nan"), words
 
 
@@ -304,7 +490,11 @@ def test_long_flights_stay_small(diagnosis, tmp_path):
     noise = np.random.default_rng(0).standard_normal((n, 6))
     long = replace(trace, t=t, before=noise, after=0.1 * noise, held_out=t % 20 < 5)
     signature = replace(diagnosis.signatures[0], x=t, residual=noise[:, 0], fitted=noise[:, 1])
-    made = replace(diagnosis, traces=(long, replace(long, log="b"), replace(long, log="c")), signatures=12 * (signature,))
+    made = replace(
+        diagnosis,
+        traces=(long, replace(long, log="b"), replace(long, log="c")),
+        signatures=12 * (signature,),
+    )
     assert write_report(made, tmp_path)[1].stat().st_size < 2_000_000
 
 
@@ -312,10 +502,17 @@ def test_a_spike_is_not_thinned_away(diagnosis, tmp_path):
     n = 200 * 100
     before = np.zeros((n, 6))
     before[12345, 0] = 7.0
-    trace = Trace("flight", 0.005, np.arange(n) * 0.005, before, 0 * before, np.zeros(n, dtype=bool))
+    trace = Trace(
+        "flight", 0.005, np.arange(n) * 0.005, before, 0 * before, np.zeros(n, dtype=bool)
+    )
     made = draw_over_time(replace(diagnosis, traces=(trace,)))[0]
-    heights = [float(y) for d in re.findall(r' d="(M[^"]+)"', made.svg) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", d)]
-    # an axis of +-1.08 times the spike: it stands by half its length above zero, the figure being 126 points high
+    heights = [
+        float(y)
+        for d in re.findall(r' d="(M[^"]+)"', made.svg)
+        for y in re.findall(r"[ML][\d.]+ ([\d.]+)", d)
+    ]
+    # an axis of +-1.08 times the spike: it stands by half its length above zero, the figure being
+    # 126 points high
     assert min(y for y in heights if y > 17.3) < 25.0
 
 
@@ -328,13 +525,26 @@ def test_an_axis_of_powers_of_ten_has_plain_numbers(diagnosis, decades):
     trace = Trace("flight", 0.04, t, sine + noise, noise, np.zeros(len(t), dtype=bool))
     for picture in draw_over_frequency(replace(diagnosis, traces=(trace,))):
         labels = re.findall(r">([^<>]*)</text>", picture.svg)
-        assert len([label for label in labels if re.fullmatch(r"[\d.]+(e[-+]\d+)?", label)]) >= 6 + 2
+        assert (
+            len([label for label in labels if re.fullmatch(r"[\d.]+(e[-+]\d+)?", label)]) >= 6 + 2
+        )
         assert not [label for label in labels if set("{$\\") & set(label)]
 
 
 def test_nothing_to_draw(diagnosis, tmp_path):
-    bare = replace(diagnosis, verdict="nothing to explain", remainder="none", effects=(), traces=(), signatures=(),
-                   candidates=(), advice=(), notes=(), held_out_segments=(), after=diagnosis.before)
+    bare = replace(
+        diagnosis,
+        verdict="nothing to explain",
+        remainder="none",
+        effects=(),
+        traces=(),
+        signatures=(),
+        candidates=(),
+        advice=(),
+        notes=(),
+        held_out_segments=(),
+        after=diagnosis.before,
+    )
     page = Page(write_report(bare, tmp_path)[1].read_text("utf-8"))
     assert "The model explains these logs" in page.text
     assert "svg" not in {tag for tag, _ in page.tags}
@@ -345,8 +555,11 @@ class TestInABrowser:
     """What chromium makes of the page at the width of a telephone and of a desk."""
 
     def test_the_looking_finds_faults(self, tmp_path):
-        page = ("<!DOCTYPE html><p style='width:400px'>wide</p><img src='data:image/png;base64,AA'>"
-                "<svg width=50 height=20><text x=40 y=10>far too long</text></svg><script>console.error('ouch')</script>")
+        page = (
+            "<!DOCTYPE html><p style='width:400px'>wide</p><img src='data:image/png;base64,AA'>"
+            "<svg width=50 height=20><text x=40 y=10>far too "
+            "long</text></svg><script>console.error('ouch')</script>"
+        )
         found = look(page, 360, tmp_path)
         assert found["width"] == 360
         assert found["scroll_width"] > 360
@@ -374,6 +587,9 @@ class TestInABrowser:
     def test_dark(self, reports, tmp_path):
         page = reports["plain"][1][1].read_text("utf-8")
         looks = [look(page, 360, tmp_path, dark) for dark in (False, True)]
-        shades = [[sum(map(int, re.findall(r"\d+", found[what])[:3])) for what in ("background", "ink")] for found in looks]
+        shades = [
+            [sum(map(int, re.findall(r"\d+", found[what])[:3])) for what in ("background", "ink")]
+            for found in looks
+        ]
         assert shades[0][0] > 600 > 200 > shades[0][1]
         assert shades[1][0] < 200 < 600 < shades[1][1]
