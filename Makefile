@@ -25,7 +25,9 @@ $(VENV)/built: $(VENV)/.tested
 	rm -rf $@
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --target $@ .
 
+# the studies, which no wheel holds, beside the package
 types: $(VENV)/built
+	cp -r studies $(VENV)/built/windwrench/
 	cd $(VENV)/built && MYPYPATH=. $(abspath $(BIN))/mypy --config-file $(CURDIR)/pyproject.toml -p windwrench
 
 docs: $(VENV)/built

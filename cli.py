@@ -1,6 +1,7 @@
 """The ``windwrench`` command."""
 
 import sys
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -64,7 +65,7 @@ def windwrench(
     """
 
 
-for command in (
+_COMMANDS: tuple[Callable[..., Any], ...] = (
     fly,
     benchmark,
     estimate,
@@ -77,10 +78,11 @@ for command in (
     train,
     imitate,
     tune,
-):
-    app.command(command_name(command))(as_command(command))
-for command in (trials, real_flights, close_loop, leaderboard):
-    app.command(command_name(command), hidden=not has_studies())(as_command(command))
+)
+_STUDIES: tuple[Callable[..., Any], ...] = (trials, real_flights, close_loop, leaderboard)
+for command in (*_COMMANDS, *_STUDIES):
+    hidden = command in _STUDIES and not has_studies()
+    app.command(command_name(command), hidden=hidden)(as_command(command))
 
 
 def main() -> None:

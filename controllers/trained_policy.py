@@ -160,9 +160,8 @@ def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
     bytes.
     """
     buffer = io.BytesIO()
-    np.savez(
-        buffer, **{name: np.asarray(w, dtype=np.float32) for name, w in sorted(weights.items())}
-    )  # type: ignore[arg-type]
+    arrays: Any = {name: np.asarray(w, dtype=np.float32) for name, w in sorted(weights.items())}
+    np.savez(buffer, **arrays)
     data = buffer.getvalue()
     full = {"format": FORMAT, **card, "sha256": hashlib.sha256(data).hexdigest()}
     with replaced(path) as partial:

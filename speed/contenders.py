@@ -15,13 +15,22 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 from ..dynamics import load_vehicle
 from ..estimator import ConstantGainFilter, NonlinearObserver, UKFTuning, WrenchEKF, WrenchUKF
 from ..runtime.whole_files import replaced
-from .filter_step import PERIOD, PeerFilter, compiled_loop, make_run, time_batch, time_step
+from .filter_step import (
+    PERIOD,
+    ModelRun,
+    PeerFilter,
+    compiled_loop,
+    make_run,
+    time_batch,
+    time_step,
+)
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,11 @@ class Figure:
     contender: Contender
     value: tuple[float, float, float]
     ratio: tuple[float, float, float]
+
+
+def _peer_step(peer: PeerFilter, run: ModelRun) -> float:
+    """Return the time of a peer's step in us."""
+    return 1e6 * time_step(peer, run, 60)
 
 
 def filters() -> list[Contender]:
@@ -96,9 +110,9 @@ def filters() -> list[Contender]:
                     f"filterpy {version('filterpy')} UKF, {words}",
                     "us a step",
                     "the same state and model",
-                    lambda p=peer: 1e6 * time_step(p, run, 60),
+                    partial(_peer_step, peer, run),
                 )
-            )  # type: ignore[misc]
+            )
     return out
 
 
