@@ -21,10 +21,10 @@ from pathlib import Path
 
 from ..dynamics import load_vehicle
 from ..estimator import ConstantGainFilter, NonlinearObserver, UKFTuning, WrenchEKF, WrenchUKF
+from ..estimator.consistency import ModelRun
 from ..runtime.whole_files import replaced
 from .filter_step import (
     PERIOD,
-    ModelRun,
     PeerFilter,
     compiled_loop,
     make_run,
