@@ -101,8 +101,8 @@ def reset_model(record: np.void) -> None:
 
 @compiled
 def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Work out what the rotors deliver over a step of ``dt`` s at the logged turn
-    rates (4,) rad/s.
+    """Work out what the rotors deliver over a step of ``dt`` s at the logged rotor
+    speeds (4,) rad/s.
     """
     f.voltage = voltage
     for i in range(4):

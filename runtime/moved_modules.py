@@ -97,7 +97,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "identification.turning": ("identification.inference.turning_delay",),
     "identification.whitening": ("identification.inference.whitening",),
     "identification.wrench_plot": ("identification.report.wrench_picture",),
-    "training.benchmark": ("evaluation.benchmark",),
+    "training.benchmark": ("evaluation.benchmark", "envs.watched_fan_tracking"),
     "training.cluster": ("training.sweep", "training.rllib", "runtime.cluster"),
     "training.evaluate": ("evaluation.episodes",),
     "training.extras": ("runtime.extras",),
@@ -113,6 +113,11 @@ MOVED: dict[str, tuple[str, ...]] = {
     "training.worlds": ("training.training_envs",),
 }
 
+# names that have another one in their new place
+RENAMED: dict[str, str] = {
+    "training.benchmark.world_for": "scenario_env",
+}
+
 
 class _Forwarder(ModuleType):
     """A module of an old name: it has what the modules have that took its place."""
@@ -120,11 +125,13 @@ class _Forwarder(ModuleType):
     def __init__(self, name: str, places: tuple[ModuleType, ...]) -> None:
         super().__init__(name, f"Moved to {', '.join(place.__name__ for place in places)}.")
         self.__dict__["_places"] = places
+        self.__path__: list[str] = []  # what lies below an old name has moved as well
 
     def __getattr__(self, name: str) -> object:
+        new = RENAMED.get(f"{self.__name__.partition('.')[2]}.{name}", name)
         for place in self.__dict__["_places"]:
-            if hasattr(place, name):
-                return getattr(place, name)
+            if hasattr(place, new):
+                return getattr(place, new)
         raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
 
     def __dir__(self) -> list[str]:
@@ -150,10 +157,9 @@ class _MovedFinder(MetaPathFinder, Loader):
         it.
         """
         places = [f"{_PACKAGE}.{new}" for new in MOVED[spec.name.partition(".")[2]]]
-        # the warning points at the import statement: above it are this and five frames of the
-        # import system
+        # it points at the import statement: Python passes over its import system's own frames
         warnings.warn(
-            f"{spec.name} is now {' and '.join(places)}", DeprecationWarning, stacklevel=7
+            f"{spec.name} is now {' and '.join(places)}", DeprecationWarning, stacklevel=2
         )
         return _Forwarder(spec.name, tuple(import_module(place) for place in places))
 

@@ -26,8 +26,8 @@ def with_effects(strength):
 
 @pytest.fixture(scope="module")
 def samples():
-    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and turn
-    rates missing.
+    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and rotor
+    speeds missing.
     """
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)
