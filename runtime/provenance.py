@@ -12,8 +12,8 @@ _ROOT = Path(__file__).resolve().parent.parent
 
 @cache
 def commit(root: Path = _ROOT) -> str | None:
-    """Return the short hash of the checkout's commit, with ``-dirty`` where files differ from it;
-    None where the package is no checkout.
+    """Return the short hash of the checkout's commit, with ``-dirty`` where code differs from it;
+    None where the package is no checkout. Pages are no code: one is made after the other.
 
     A process asks once, and long runs ask before they begin: a commit made meanwhile is not the
     code that runs.
@@ -24,17 +24,23 @@ def commit(root: Path = _ROOT) -> str | None:
     if not (root / ".git").exists():  # an installed package may lie inside another's checkout
         return None
     try:
-        done = subprocess.run(
-            ["git", "--no-optional-locks", "describe", "--always", "--dirty", "--exclude=*"],
-            cwd=root,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=30,
-        )
+        name = _git(root, "rev-parse", "--short", "HEAD")
+        changed = _git(root, "diff", "--name-only", "HEAD", "--", ".", ":!docs", ":!*.md")
     except (OSError, subprocess.SubprocessError):
         return None
-    return done.stdout.strip() or None
+    return f"{name}-dirty" if changed else name
+
+
+def _git(root: Path, *words: str) -> str:
+    done = subprocess.run(
+        ["git", "--no-optional-locks", *words],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30,
+    )
+    return done.stdout.strip()
 
 
 def made_by(command: str, commits: Iterable[str | None], version: str = __version__) -> str:

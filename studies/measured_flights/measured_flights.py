@@ -387,6 +387,8 @@ def page(result: Mapping[str, Any], folder: str) -> str:
         "## Slung payload",
         "",
         *_payload_lines(result["slung_payload"]),
+        "",
+        f"Data: [real_flights.json]({folder}/real_flights.json).",
     ]
     return "\n".join(lines) + "\n"
 
