@@ -27,6 +27,8 @@ def reproduce(
 ) -> dict[str, Any]:
     """Reproduce the paper's figures; what a run has finished, the next does not repeat.
 
+    Each gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
+
     Example: windwrench reproduce fig6 --out results/reproduction
     """
     import json

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_figure, write_json, write_text
+from ..runtime.provenance import commit, made_by
 from ..runtime.workers import shared_dict, workers
 from . import NAMES
 from .result import Result
@@ -49,7 +50,7 @@ def reproduce(
 
     Args:
         names: of the experiments.
-        folder: for NAME.json, NAME.csv, NAME.png and NAME.svg.
+        folder: for NAME.json, NAME.csv.gz, NAME.png and NAME.svg.
         seeds: for every experiment; default: each one's own number.
         jobs: processes; default: one a core.
         report: called a few times a second with the share that is done of each experiment.
@@ -93,12 +94,15 @@ def numbers_of_seeds(names: Sequence[str], seeds: int | None = None) -> dict[str
 
 
 def is_done(folder: Path, name: str, seeds: int) -> bool:
-    """Return whether an experiment's files of this version and number of seeds lie in a folder."""
+    """Return whether an experiment's files of this version and number of seeds lie in a folder.
+
+    The SVG, which no page shows, may be missing.
+    """
     try:
         kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    files = all((folder / f"{name}.{kind}").is_file() for kind in ("csv", "png", "svg"))
+    files = all((folder / f"{name}.{kind}").is_file() for kind in ("csv.gz", "png"))
     return bool(
         files
         and isinstance(kept, dict)
@@ -110,6 +114,7 @@ def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
     """Run one experiment and write its files; the JSON comes last and says that the others are
     whole.
     """
+    commit()  # asked before the run: it is the code that runs
     module = _module(name)
     result: Result = module.run(
         seeds, lambda share: shares.__setitem__(name, min(float(share), 0.99))
@@ -119,36 +124,26 @@ def _run_and_write(name: str, seeds: int, folder: Path, shares: Any) -> None:
 
 
 def write_result(name: str, title: str, seeds: int, result: Result, folder: Path) -> None:
-    """Write NAME.png, NAME.svg, NAME.csv and then NAME.json, the same bytes for the same result;
+    """Write NAME.png, NAME.svg, NAME.csv.gz and then NAME.json, the same bytes for the same result;
     times go beside them.
     """
-    import matplotlib
-
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.json").unlink(missing_ok=True)
-    with matplotlib.rc_context({"svg.hashsalt": "windwrench"}):
-        for kind, stamp in (("png", "Software"), ("svg", "Date")):
-            with replaced(folder / f"{name}.{kind}") as partial:
-                result.picture.savefig(partial, format=kind, dpi=110, metadata={stamp: None})
-    with replaced(folder / f"{name}.csv") as partial:
-        partial.write_text(_csv(result.data), encoding="utf-8")
+    write_figure(result.picture, folder, name)
+    write_text(_csv(result.data), folder / f"{name}.csv.gz")
     summary = {
         "experiment": name,
         "title": title,
         "version": __version__,
+        "commit": commit(),
         "seeds": seeds,
         "figures": _plain(result.figures),
         "comparison": [asdict(row) for row in result.comparison],
         "remarks": result.remarks,
     }
     if result.timing:
-        with replaced(folder / f"{name}.timing.json") as partial:
-            partial.write_text(
-                json.dumps([asdict(row) for row in result.timing], indent=1) + "\n",
-                encoding="utf-8",
-            )
-    with replaced(folder / f"{name}.json") as partial:
-        partial.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+        write_json([asdict(row) for row in result.timing], folder / f"{name}.timing.json")
+    write_json(summary, folder / f"{name}.json")
 
 
 def _csv(columns: Mapping[str, NDArray[np.generic]]) -> str:
@@ -185,7 +180,8 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
         "",
         "C. D. McKinnon and A. P. Schoellig, *Unscented External Force and Torque Estimation for "
         "Quadrotors*, IROS 2016.",
-        "Every number and picture on this page was written by the command beside it.",
+        "Every number and picture on this page was written by the command beside it, which also "
+        "writes the picture as SVG.",
         "",
     ]
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
@@ -197,7 +193,11 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
         parts += [
             f"## {kept['title']}",
             "",
-            f"`windwrench reproduce {name} --seeds {kept['seeds']}`",
+            made_by(
+                f"windwrench reproduce {name} --seeds {kept['seeds']}",
+                [kept.get("commit")],
+                kept["version"],
+            ),
             "",
             f"![{kept['title']}]({where}/{name}.png)",
             "",
@@ -213,10 +213,8 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
             parts += ["", remark]
         parts += [
             "",
-            f"Data: [{name}.csv]({where}/{name}.csv), figures of merit: "
-            f"[{name}.json]({where}/{name}.json), "
-            f"[picture as SVG]({where}/{name}.svg).",
+            f"Data: [{name}.csv.gz]({where}/{name}.csv.gz), figures of merit: "
+            f"[{name}.json]({where}/{name}.json).",
             "",
         ]
-    with replaced(page) as partial:
-        partial.write_text("\n".join(parts), encoding="utf-8")
+    write_text("\n".join(parts), page)

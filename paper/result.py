@@ -28,7 +28,7 @@ class Result:
     """
 
     figures: Mapping[str, Any]  # figures of merit, as JSON
-    data: Mapping[str, NDArray[np.generic]]  # columns (rows,) of the CSV, numbers or text
+    data: Mapping[str, NDArray[np.generic]]  # columns (rows,) of the table, numbers or text
     picture: Figure
     comparison: list[Comparison]
     remarks: list[str] = field(

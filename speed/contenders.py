@@ -22,7 +22,8 @@ from pathlib import Path
 from ..dynamics import load_vehicle
 from ..estimator import ConstantGainFilter, NonlinearObserver, UKFTuning, WrenchEKF, WrenchUKF
 from ..estimator.consistency import ModelRun
-from ..runtime.whole_files import replaced
+from ..runtime.page_files import write_text
+from ..runtime.provenance import commit, made_by
 from .filter_step import (
     PERIOD,
     PeerFilter,
@@ -231,8 +232,9 @@ def write_markdown(
     lines = [
         "# Speed",
         "",
-        f"One run of `windwrench speed --rounds {rounds}{hour} --markdown docs/speed.md`: one "
-        f"process, all "
+        made_by(f"windwrench speed --rounds {rounds}{hour} --markdown docs/speed.md", [commit()]),
+        "",
+        "One run: one process, all "
         "contenders in turn in every round; medians, with ratios taken round by round. One thread, "
         "where no other number "
         "is given. Peers are measured where they are installed (`pip install "
@@ -258,8 +260,7 @@ def write_markdown(
     for section in sections:
         lines += [f"## {section.title}", "", *_table(section.header, section.rows), ""]
         lines += [section.words, ""] if section.words else []
-    with replaced(path) as partial:
-        partial.write_text("\n".join(lines), encoding="utf-8")
+    write_text("\n".join(lines), path)
 
 
 def _table(header: list[str], rows: list[list[str]]) -> list[str]:

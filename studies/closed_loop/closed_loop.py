@@ -31,7 +31,8 @@ from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
 from windwrench.identification.diagnosis import diagnose
 from windwrench.paper.result import Progress
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json
+from windwrench.runtime.provenance import commit
 from windwrench.runtime.workers import shared_dict, workers
 from windwrench.studies.code_stamp import code_stamp
 from windwrench.studies.trials.practice_flights import fly_practice, shown_in
@@ -399,9 +400,9 @@ def _close_and_share(request: Request, folder: Path, shared: Any) -> None:
 
 
 def _close_and_keep(request: Request, folder: Path, progress: Progress) -> None:
-    result = close_loop(request, progress)
-    with replaced(folder / f"{request.name}.json") as partial:
-        partial.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    code = commit()  # before the flights: the code that flies
+    result = {"commit": code, **close_loop(request, progress)}
+    write_json(result, folder / f"{request.name}.json")
 
 
 def _kept(request: Request, folder: Path) -> dict[str, Any] | None:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_text
+from windwrench.runtime.provenance import made_by
 from windwrench.studies.closed_loop.closed_loop import DEFAULT_EFFECTS, MARGIN, MEASURES, Measure
 
 Result = Mapping[str, Any]  # as ``close_loop`` returns it
@@ -178,7 +179,11 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
     lines = [
         "# The loop closed in flight",
         "",
-        f"`{command(results)} --out {out} --markdown {markdown}`",
+        made_by(
+            f"{command(results)} --out {out} --markdown {markdown}",
+            [r.get("commit") for r in results],
+            results[0]["request"]["version"],
+        ),
         "",
         *_what_was_done(results[0]["request"]),
         f"![Wrench error and tracking before and after]({where}/close_loop.png)",
@@ -194,9 +199,11 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
     ]
     for sentence in conclusions(results):
         lines += [sentence, ""]
-    lines += [f"[Picture as SVG]({where}/close_loop.svg)", ""]
-    with replaced(page) as partial:
-        partial.write_text("\n".join(lines), encoding="utf-8")
+    lines += [
+        "The command also writes the picture as SVG, beside the results.",
+        "",
+    ]
+    write_text("\n".join(lines), page)
 
 
 def _what_was_done(request: Mapping[str, Any]) -> list[str]:

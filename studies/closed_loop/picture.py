@@ -6,7 +6,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_figure
 from windwrench.studies.closed_loop.closed_loop import MEASURES, Measure
 
 Result = Mapping[str, Any]  # as ``close_loop`` returns it
@@ -102,11 +102,4 @@ def write_picture(results: Sequence[Result], folder: Path) -> Path:
     """Write ``close_loop.png`` and ``.svg``, the same bytes for the same results; return the
     first's path.
     """
-    import matplotlib
-
-    figure = draw(results)
-    with matplotlib.rc_context({"svg.hashsalt": "windwrench"}):
-        for kind, stamp in (("png", "Software"), ("svg", "Date")):
-            with replaced(folder / f"close_loop.{kind}") as partial:
-                figure.savefig(partial, format=kind, dpi=110, metadata={stamp: None})
-    return folder / "close_loop.png"
+    return write_figure(draw(results), folder, "close_loop")

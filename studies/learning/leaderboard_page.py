@@ -6,7 +6,8 @@ from typing import Any
 
 from windwrench.evaluation.leaderboard import Line, Result, Row, aggregate, lines_of, rows_of
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_text
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.learning.leaderboard_pictures import (
     draw_curves,
     draw_intervals,
@@ -59,9 +60,9 @@ def write_page(
         _ablations(results, plan),
         _training(results, lines),
         _how(plan, results, places),
+        made_by("windwrench leaderboard", [commit()]),
     ]
-    with replaced(path) as partial:
-        partial.write_text("\n\n".join(part for part in parts if part) + "\n", encoding="utf-8")
+    write_text("\n\n".join(part for part in parts if part) + "\n", path)
     return [path, *pictures]
 
 

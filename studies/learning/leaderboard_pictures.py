@@ -15,7 +15,7 @@ from windwrench.evaluation.episodes import FIRST_TEST_SEED, fly_episode
 from windwrench.evaluation.leaderboard import Line, Result, Row, normalised
 from windwrench.evaluation.pictures import COLOURS
 from windwrench.evaluation.statistics import performance_profile, stratified_bootstrap
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_png
 from windwrench.training.training_envs import make_world
 
 _LEARNED = {
@@ -205,5 +205,4 @@ def _known(name: str) -> bool:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    with replaced(path) as partial:
-        figure.savefig(partial, dpi=110, format="png")
+    write_png(figure, path)

@@ -21,9 +21,10 @@ from windwrench.envs.watched_fan_tracking import scenario_env
 from windwrench.evaluation.benchmark import make_pilot
 from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
 from windwrench.runtime.errors import InputError, unknown_name
+from windwrench.runtime.page_files import write_json
 from windwrench.runtime.workers import shared_dict, workers
 from windwrench.training.configuration import load_config
-from windwrench.training.train import Progress, read_progress, write_json
+from windwrench.training.train import Progress, read_progress
 
 Advance = Callable[[str, float], None]  # what is being done, and the share of it that is
 

@@ -7,7 +7,6 @@ Forces are stated as accelerations by the declared mass, through a 4 Hz low-pass
 over the time in the air.
 """
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
+from windwrench import __version__
 from windwrench.dynamics.effects import get
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
@@ -31,7 +31,8 @@ from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
 from windwrench.identification.motion.signals import Signals, log_signals, low_pass
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json, write_png
+from windwrench.runtime.provenance import commit, made_by
 
 Array = NDArray[np.float64]
 
@@ -267,6 +268,7 @@ def run(
     Raises:
         InputError: flights are missing or a file cannot be written.
     """
+    code = commit()  # before the diagnoses: the code that makes them
     vehicle = load_vehicle("crazyflie")
     flights = nanobench_flights(nanobench, vehicle)
     folds: list[dict[str, Any]] = []
@@ -314,10 +316,14 @@ def run(
                 "swing": {log.name: swing(log, diagnosis) for log in logs},
             }
         )
-    result = {"cutoff_hz": CUTOFF_HZ, "nanobench": folds, "slung_payload": loads}
-    out.mkdir(parents=True, exist_ok=True)
-    with replaced(out / "real_flights.json") as partial:
-        partial.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    result = {
+        "version": __version__,
+        "commit": code,
+        "cutoff_hz": CUTOFF_HZ,
+        "nanobench": folds,
+        "slung_payload": loads,
+    }
+    write_json(result, out / "real_flights.json", allow_nan=True)
     _picture(kept, out / "nanobench.png")
     return result
 
@@ -350,8 +356,7 @@ def _picture(kept: Mapping[str, tuple[FlightLog, Diagnosis]], path: Path) -> Non
     panels[0, 0].legend(fontsize=8)
     figure.supylabel("residual (m/s2)")
     figure.supxlabel("time in the air (s)")
-    with replaced(path) as partial:
-        figure.savefig(partial, format="png", dpi=110)
+    write_png(figure, path)
     plt.close(figure)
 
 
@@ -366,8 +371,9 @@ def page(result: Mapping[str, Any], folder: str) -> str:
     lines = [
         "# The diagnosis on measured flights",
         "",
-        "Made by `windwrench real-flights`. Residuals are accelerations by the declared mass "
-        "(m/s2) through a "
+        made_by("windwrench real-flights", [result["commit"]], result["version"]),
+        "",
+        "Residuals are accelerations by the declared mass (m/s2) through a "
         f"{result['cutoff_hz']:g} Hz low-pass, of flights that the fit never saw, with one thrust "
         f"scale for all "
         "flights.",
@@ -381,6 +387,8 @@ def page(result: Mapping[str, Any], folder: str) -> str:
         "## Slung payload",
         "",
         *_payload_lines(result["slung_payload"]),
+        "",
+        f"Data: [real_flights.json]({folder}/real_flights.json).",
     ]
     return "\n".join(lines) + "\n"
 

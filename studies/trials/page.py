@@ -1,6 +1,5 @@
-"""The trials of the diagnosis as a JSON file, a page and a picture."""
+"""The trials of the diagnosis as a compressed JSON file, a page and a picture."""
 
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -13,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from windwrench import __version__
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json, write_png, write_text
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.trials.rotorpy_flights import available
 from windwrench.studies.trials.scores import (
     COEFFICIENT_BAR,
@@ -60,8 +60,8 @@ def write_results(
     first: int = 0,
     groups: Sequence[str] = (),
 ) -> list[Path]:
-    """Write ``trials.json`` and ``trials.png`` into a folder, and the page that shows them; return
-    the three paths.
+    """Write ``trials.json.gz`` and ``trials.png`` into a folder, and the page that shows them;
+    return the three paths.
 
     Args:
         outcomes: of ``trials.run_trials``.
@@ -76,9 +76,10 @@ def write_results(
         InputError: a file cannot be written.
     """
     judged = [j for outcome in outcomes for j in judge(outcome)]
-    data, picture = folder / "trials.json", folder / "trials.png"
+    data, picture = folder / "trials.json.gz", folder / "trials.png"
     kept = {
         "version": __version__,
+        "commit": commit(),
         "code": stamp(),
         "seed": first,
         "seeds": seeds,
@@ -86,10 +87,8 @@ def write_results(
         "rules": [asdict(rule) for rule in rules(judged)],
         "trials": outcomes,
     }
-    with replaced(data) as partial:
-        partial.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    with replaced(picture) as partial:
-        draw(judged).savefig(partial, format="png", dpi=110, metadata={"Software": None})
+    write_json(kept, data, allow_nan=True)
+    write_png(draw(judged), picture)
     command = " ".join(
         [
             f"windwrench trials --seed {first} --seeds {seeds}",
@@ -98,8 +97,7 @@ def write_results(
         ]
     )
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
-    with replaced(page) as partial:
-        partial.write_text(page_text(outcomes, judged, command, where), encoding="utf-8")
+    write_text(page_text(outcomes, judged, made_by(command, [commit()]), where), page)
     return [data, picture, page]
 
 
@@ -108,15 +106,17 @@ def write_results(
 
 
 def page_text(
-    outcomes: Sequence[Mapping[str, Any]], judged: Sequence[Judgement], command: str, where: str
+    outcomes: Sequence[Mapping[str, Any]], judged: Sequence[Judgement], made: str, where: str
 ) -> str:
-    """Return the page, in Markdown, of trials whose files lie in the folder ``where``."""
+    """Return the page, in Markdown, of trials whose files lie in the folder ``where``; ``made``
+    says how they came about.
+    """
     full = [j for j in judged if not j.without]
     seconds = [j.seconds for j in judged]
     parts = [
         "# The diagnosis on flights whose cause is known",
         "",
-        f"`{command}`",
+        made,
         "",
         f"{len(outcomes)} flights, {len(judged)} diagnoses. Flights are of 60 s, one log each, of "
         f"the declared vehicle and "
@@ -219,7 +219,7 @@ def page_text(
         f"A diagnosis took {np.median(seconds or 0):.0f} s in the median and "
         f"{max(seconds, default=0):.0f} s at most.",
         "",
-        f"Data: [trials.json]({where}/trials.json).",
+        f"Data: [trials.json.gz]({where}/trials.json.gz).",
         "",
     ]
     return "\n".join(parts)

@@ -29,6 +29,7 @@ from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import rollout_error
 from windwrench.runtime.errors import InputError, unknown_name
+from windwrench.runtime.provenance import commit
 from windwrench.runtime.whole_files import replaced
 from windwrench.runtime.workers import workers
 from windwrench.studies.code_stamp import code_stamp
@@ -368,6 +369,7 @@ def run_trials(
     Raises:
         InputError: the folder cannot be written.
     """
+    commit()  # asked before the flights: it is the code that flies
     wanted = {trial.key: trial for trial in trials}
     path = folder / "trials.jsonl"
     done = {

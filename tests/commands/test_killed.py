@@ -2,6 +2,7 @@
 they give the same result.
 """
 
+import gzip
 import json
 import os
 import random
@@ -90,6 +91,8 @@ def assert_whole(folder):
             continue
         if path.suffix == ".json":
             json.loads(path.read_text(encoding="utf-8"))
+        elif path.suffix == ".gz":
+            assert gzip.decompress(path.read_bytes()).endswith(b"\n"), path
         elif path.suffix == ".png":
             assert path.read_bytes().endswith(b"IEND\xaeB`\x82"), path
         elif path.suffix in (".svg", ".html"):

@@ -2,6 +2,7 @@
 on where it stopped.
 """
 
+import gzip
 import json
 
 import numpy as np
@@ -12,6 +13,7 @@ from windwrench.dynamics import InputError
 from windwrench.paper import NAMES
 from windwrench.paper.reproduce import _module, chosen, reproduce, write_page, write_result
 from windwrench.paper.result import Comparison, Result
+from windwrench.runtime.provenance import commit, made_by
 
 
 def small_result(value=1.0):
@@ -39,14 +41,16 @@ def test_the_same_result_gives_the_same_bytes(tmp_path):
     for folder in ("one", "two"):
         write_result("fig0", "A title", 3, small_result(), tmp_path / folder)
     names = sorted(p.name for p in (tmp_path / "one").iterdir())
-    assert names == ["fig0.csv", "fig0.json", "fig0.png", "fig0.svg", "fig0.timing.json"]
+    assert names == ["fig0.csv.gz", "fig0.json", "fig0.png", "fig0.svg", "fig0.timing.json"]
     for name in names:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
             name
         )
     kept = json.loads((tmp_path / "one" / "fig0.json").read_text())
     assert kept["figures"] == {"value": 1.0, "gone": None}
-    assert (tmp_path / "one" / "fig0.csv").read_text() == "x,name\n0,a\n1,b\n2,c\n"
+    assert kept["commit"] == commit()
+    table = gzip.decompress((tmp_path / "one" / "fig0.csv.gz").read_bytes())
+    assert table == b"x,name\n0,a\n1,b\n2,c\n"
 
 
 def test_the_page_shows_the_table_and_the_picture(tmp_path):
@@ -55,7 +59,8 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
     page = (tmp_path / "page.md").read_text()
     assert "| a value (m) | about 1 | 1.00 |" in page
     assert "![A title](out/fig3.png)" in page
-    assert "`windwrench reproduce fig3 --seeds 3`" in page
+    assert "[fig3.csv.gz](out/fig3.csv.gz)" in page
+    assert made_by("windwrench reproduce fig3 --seeds 3", [commit()]) in page.splitlines()
     assert "A remark." in page
     assert "fig4" not in page
 
@@ -63,6 +68,8 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
 def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
     assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": True}
     first = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
+    (tmp_path / "fig6.svg").unlink()  # what no page shows need not be there
     assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": False}
     (tmp_path / "fig6.png").unlink()
     shares = []

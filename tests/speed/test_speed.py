@@ -2,6 +2,7 @@
 
 import pytest
 
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.speed.contenders import (
     HEADER,
     Contender,
@@ -30,6 +31,8 @@ def test_medians_and_ratios_are_taken_round_by_round(tmp_path):
     assert figures[1].ratio == (10.0, 5.0, 20.0)
     write_markdown(figures, 3, tmp_path / "speed.md")
     page = (tmp_path / "speed.md").read_text()
+    command = "windwrench speed --rounds 3 --markdown docs/speed.md"
+    assert made_by(command, [commit()]) in page.splitlines()
     assert "| two | 10.00 s | 10.00 - 60.00 | 10 (5 - 20) | y |" in page
     assert all(len(row) == len(HEADER) for row in rows_of(figures))
 

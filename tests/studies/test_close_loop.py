@@ -1,6 +1,8 @@
 """The loop closed in flight: in short, and what resumes, pairs and refuses."""
 
 import json
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.episodes import fly_episode
 from windwrench.runtime.errors import InputError
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.closed_loop import closed_loop as close_loop
 from windwrench.studies.closed_loop.closed_loop import (
     Request,
@@ -83,10 +86,19 @@ def test_page_and_picture_hold_the_results(short, tmp_path):
     assert write_picture(results, tmp_path / "pictures").stat().st_size > 10_000
     write_page(results, tmp_path / "pictures", tmp_path / "page.md")
     page = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert (
+    command = (
         "windwrench close-loop --effect mass:dm=0.06 --effect com_offset --episodes 2 --seed 0"
-        in page
     )
+    out, markdown = (
+        Path(os.path.relpath(tmp_path / name)).as_posix() for name in ("pictures", "page.md")
+    )
+    made = made_by(f"{command} --out {out} --markdown {markdown}", [commit()])
+    assert made in page.splitlines()
+    assert all(result["commit"] == commit() for result in results)
+    assert sorted(p.name for p in (tmp_path / "pictures").iterdir()) == [
+        "close_loop.png",
+        "close_loop.svg",
+    ]
     assert "](pictures/close_loop.png)" in page
     for result in results:
         assert f"x{result['summary']['force_error_N']['ratio']:.3f}" in page

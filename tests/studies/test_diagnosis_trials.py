@@ -2,6 +2,7 @@
 stopped.
 """
 
+import gzip
 import json
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.page import write_results
@@ -340,7 +342,9 @@ def test_the_page_lists_every_miss(tmp_path):
     assert "(../trials.png)" in text
     assert "RotorPy" in text
     assert image.imread(picture).shape[2] == 4
-    kept = json.loads(data.read_text(encoding="utf-8"))
+    assert made_by("windwrench trials --seed 0 --seeds 1 --quick", [commit()]) in text.splitlines()
+    kept = json.loads(gzip.decompress(data.read_bytes()))
+    assert kept["commit"] == commit()
     assert len(kept["trials"]) == 5
     assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. one effect")] == [True]
     assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. every coef")] == [False]
@@ -422,7 +426,7 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
     )
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "run.json",
-        "trials.json",
+        "trials.json.gz",
         "trials.jsonl",
         "trials.png",
     }

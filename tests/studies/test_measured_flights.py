@@ -192,7 +192,17 @@ def test_page_of_a_result():
         "effects": [effect],
         "swing": {"log202": {"law_std": [0.01, 0.02], "tracked_std": [0.01, 0.03]}},
     }
-    text = page({"cutoff_hz": 4.0, "nanobench": [fold], "slung_payload": [load]}, "pictures")
+    result = {
+        "version": "0.1.0",
+        "commit": "abc1234",
+        "cutoff_hz": 4.0,
+        "nanobench": [fold],
+        "slung_payload": [load],
+    }
+    text = page(result, "pictures")
+    made = "Made by `windwrench real-flights`, windwrench 0.1.0, commit abc1234."
+    assert made in text.splitlines()
+    assert "[real_flights.json](pictures/real_flights.json)" in text
     assert (
         "| B | all others | 6.00 | 0.125 | 0.100 | 0.200 | 2.0 | 4.0 | 3.0 | 0.100 / 0.200 |"
         in text

@@ -11,6 +11,7 @@ import yaml
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.evaluation.leaderboard import aggregate, lines_of, rows_of
+from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.learning.leaderboard_page import write_page
 from windwrench.studies.learning.study import (
     Places,
@@ -152,6 +153,7 @@ def test_the_page_names_what_is_missing_and_where_learning_loses(places, tmp_pat
     text = (tmp_path / "board.md").read_text(encoding="utf-8")
     assert all(p.read_bytes().startswith(b"\x89PNG") for p in written if p.suffix == ".png")
     assert len([p for p in written if p.suffix == ".png"]) == 4
+    assert text.splitlines()[-1] == made_by("windwrench leaderboard", [commit()])
     assert "Not finished" not in text
     assert "worse than" in text  # nobody learns to track in 200 decisions
     assert "| truth instead | 1 |" in text

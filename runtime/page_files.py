@@ -1,0 +1,81 @@
+"""The files that a page shows and that are kept with it: compact JSON, compressed tables, and one
+small picture a figure. The same content gives the same bytes.
+"""
+
+import gzip
+import io
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .whole_files import replaced
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DPI = 110
+_COLOURS = 256  # of a picture; lines and their soft edges need no more
+
+
+def write_json(data: Any, path: Path, allow_nan: bool = False) -> None:
+    """Write JSON without spaces, whole or not at all; compressed where the name ends in ``.gz``.
+
+    Raises:
+        InputError: the file cannot be written.
+        ValueError: a number is not finite, and ``allow_nan`` is not given.
+    """
+    write_text(json.dumps(data, separators=(",", ":"), allow_nan=allow_nan) + "\n", path)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write a text, whole or not at all; compressed where the name ends in ``.gz``.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    data = text.encode()
+    with replaced(path) as partial:
+        # no time and no name in the header
+        partial.write_bytes(gzip.compress(data, 9, mtime=0) if path.suffix == ".gz" else data)
+
+
+def write_png(figure: "Figure", path: Path) -> None:
+    """Write a figure as a PNG of at most 256 colours, whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI)
+    picture = Image.open(buffer).convert("RGB")
+    with replaced(path) as partial:
+        with_few_colours(picture).save(partial, format="png", optimize=True)
+
+
+def with_few_colours(picture: Any) -> Any:
+    """Return a picture (a PIL image, RGB) with the 256 colours that come nearest to its own."""
+    from PIL import Image
+
+    return picture.quantize(
+        _COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=3, dither=Image.Dither.NONE
+    )
+
+
+def write_figure(figure: "Figure", folder: Path, name: str) -> Path:
+    """Write NAME.png, which pages show, and NAME.svg, which git ignores; return the first's path.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    import matplotlib
+
+    path = folder / f"{name}.png"
+    write_png(figure, path)
+    with (
+        matplotlib.rc_context({"svg.hashsalt": "windwrench"}),
+        replaced(path.with_suffix(".svg")) as partial,
+    ):
+        figure.savefig(partial, format="svg", dpi=_DPI, metadata={"Date": None})
+    return path

@@ -1,0 +1,56 @@
+"""How a page or a result came about: the command, the version and the commit of the code."""
+
+import subprocess
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from .. import __version__
+
+_ROOT = Path(__file__).resolve().parent.parent
+
+
+@cache
+def commit(root: Path = _ROOT) -> str | None:
+    """Return the short hash of the checkout's commit, with ``-dirty`` where code differs from it;
+    None where the package is no checkout. Pages are no code: one is made after the other.
+
+    A process asks once, and long runs ask before they begin: a commit made meanwhile is not the
+    code that runs.
+
+    Args:
+        root: the checkout; default: this package's folder.
+    """
+    if not (root / ".git").exists():  # an installed package may lie inside another's checkout
+        return None
+    try:
+        name = _git(root, "rev-parse", "--short", "HEAD")
+        changed = _git(root, "diff", "--name-only", "HEAD", "--", ".", ":!docs", ":!*.md")
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return f"{name}-dirty" if changed else name
+
+
+def _git(root: Path, *words: str) -> str:
+    done = subprocess.run(
+        ["git", "--no-optional-locks", *words],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30,
+    )
+    return done.stdout.strip()
+
+
+def made_by(command: str, commits: Iterable[str | None], version: str = __version__) -> str:
+    """Return the line of a page that says how it was made.
+
+    Args:
+        command: the whole command line.
+        commits: of the code that made what the page shows, as ``commit`` returned them.
+        version: of that code; default: this one's.
+    """
+    known = list(dict.fromkeys(name for name in commits if name))
+    words = f", commit{'s' * (len(known) > 1)} {', '.join(known)}" if known else ""
+    return f"Made by `{command}`, windwrench {version}{words}."

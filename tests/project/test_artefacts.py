@@ -1,0 +1,115 @@
+"""What is kept of results: little, in one form each, shown by a page that says what made it."""
+
+import re
+import subprocess
+
+import pytest
+
+from tests.support.paths import ROOT
+
+MOST = 6_000_000  # bytes, of all that git keeps of docs/
+MOST_OF_A_FILE = 50_000  # bytes, of what should have been compressed
+PICTURES = {".png", ".gif", ".jpg", ".webp", ".mp4", ".svg"}
+PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a section
+    "reproduction.md",
+    "close-loop.md",
+    "diagnosis-trials.md",
+    "real-flights.md",
+    "leaderboard.md",
+    "speed.md",
+)
+MADE = re.compile(
+    r"^Made by `windwrench [^`]+`, windwrench \d[\w.]*, commits? ([0-9a-f, ]+)\.$", re.M
+)
+
+
+def git(*words):
+    return subprocess.run(
+        ["git", *words], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+
+
+@pytest.fixture(scope="module")
+def tracked():
+    """What git keeps of docs/, and what lies there that it does not ignore."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("needs a checkout: what is kept is what git tracks")
+    names = git("ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", "docs")
+    return [path for name in names.split("\0") if name and (path := ROOT / name).is_file()]
+
+
+def test_docs_are_small(tracked):
+    sizes = {path: path.stat().st_size for path in tracked}
+    largest = sorted(sizes, key=sizes.__getitem__, reverse=True)[:5]
+    assert sum(sizes.values()) <= MOST, [f"{p.name}: {sizes[p]}" for p in largest]
+
+
+def test_large_text_is_compressed(tracked):
+    found = [
+        path.relative_to(ROOT).as_posix()
+        for path in tracked
+        if path.suffix in (".svg", ".csv", ".jsonl") and path.stat().st_size > MOST_OF_A_FILE
+    ]
+    assert not found
+
+
+def test_a_figure_is_kept_once(tracked):
+    pictures = [path for path in tracked if path.suffix in PICTURES]
+    kept = [path.with_suffix("").as_posix() for path in pictures]
+    assert len(kept) == len(set(kept))
+    contents = [path.read_bytes() for path in pictures]
+    assert len(contents) == len(set(contents))
+    assert {path.suffix for path in pictures} <= {".png", ".gif"}
+
+
+def test_data_is_compact(tracked):
+    for path in tracked:
+        if path.suffix == ".json":
+            assert not re.search(rb"\n\s|[,:\]}]\n.", path.read_bytes()), path
+
+
+def test_every_picture_and_data_file_is_used(tracked):
+    """By a page or README with its name, or as a whole folder by a command."""
+    pages = [ROOT / "README.md", *(path for path in tracked if path.suffix == ".md")]
+    linked = {
+        (page.parent / target).resolve()
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
+        if "://" not in target
+    }
+    folders = {ROOT / "docs" / "results" / "learning"}  # `windwrench leaderboard` reads it
+    text = (ROOT / "commands" / "studies.py").read_text(encoding="utf-8")
+    assert all(f'Path("{folder.relative_to(ROOT).as_posix()}")' in text for folder in folders)
+    unused = [
+        path.relative_to(ROOT).as_posix()
+        for path in tracked
+        if path.suffix not in (".md", ".py")
+        and path not in linked
+        and path.parent not in folders
+        and not belongs(path, linked)
+    ]
+    assert not unused
+
+
+def belongs(path, linked):
+    """A part of a result that its page's command keeps in a file of its own: fig5.timing.json is
+    read with fig5.json.
+    """
+    name, _, ending = path.name.partition(".")
+    return ending == "timing.json" and path.with_name(f"{name}.json") in linked
+
+
+@pytest.mark.parametrize("name", PAGES_OF_COMMANDS)
+def test_a_page_says_the_commit_that_made_it(tracked, name):
+    found = MADE.findall((ROOT / "docs" / name).read_text(encoding="utf-8"))
+    assert found
+    if git("rev-parse", "--is-shallow-repository").strip() == "true":
+        pytest.skip("a shallow clone does not have the commits")
+    for commit in {one for line in found for one in line.split(", ")}:
+        git("merge-base", "--is-ancestor", commit, "HEAD")
+
+
+def test_every_page_with_a_command_s_line_is_listed(tracked):
+    pages = [path for path in tracked if path.suffix == ".md"]
+    made = {path.name for path in pages if MADE.search(path.read_text(encoding="utf-8"))}
+    assert made == set(PAGES_OF_COMMANDS)
