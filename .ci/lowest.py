@@ -9,7 +9,12 @@ from pathlib import Path
 
 project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 extras = project["optional-dependencies"]
-for requirement in [*project["dependencies"], *extras["parquet"], *extras["logs"], *extras["paper"]]:
+for requirement in [
+    *project["dependencies"],
+    *extras["parquet"],
+    *extras["logs"],
+    *extras["paper"],
+]:
     found = re.fullmatch(r"([\w.-]+)(?:\[[\w,-]+\])?>=([\d.]+)", requirement)
     if found is None:
         raise SystemExit(f"pyproject.toml: {requirement}: expected NAME>=VERSION")
