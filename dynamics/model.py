@@ -32,7 +32,7 @@ MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
 _SENSE_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
 _OWN_ROW = (
     MAX_EFFECTS + MAX_SENSING
-)  # the model's: whether it has delivered turn rates yet, and those
+)  # the model's: whether it has delivered rotor speeds yet, and those
 
 MODEL_FIELDS: list[tuple[object, ...]] = [
     ("body", BODY),
@@ -54,7 +54,7 @@ MODEL_FIELDS: list[tuple[object, ...]] = [
     ("time", "f8"),
     ("voltage", "f8"),
     ("wind", "f8", (3,)),
-    ("rotors", "f8", (ROTORS_SIZE,)),  # delivered turn rates
+    ("rotors", "f8", (ROTORS_SIZE,)),  # delivered rotor speeds
     ("rotor_wrench", "f8", (4,)),  # their thrust and torques about the centre of mass
     ("effect_state", "f8", (STATE_SIZE,)),
     ("effect_wrench", "f8", (6,)),  # force in the world, torque in the body frame
@@ -101,8 +101,8 @@ def reset_model(record: np.void) -> None:
 
 @compiled
 def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Work out what the rotors deliver over a step of ``dt`` s at the logged turn
-    rates (4,) rad/s.
+    """Work out what the rotors deliver over a step of ``dt`` s at the logged rotor
+    speeds (4,) rad/s.
     """
     f.voltage = voltage
     for i in range(4):
@@ -180,10 +180,10 @@ def apply_effects(
 
 @compiled
 def rewrite_sample(f: Record, dt: float, parts: int, direction: float) -> None:
-    """Change turn rates and pose, the first 11 of ``f.sample``, from truth to report (``direction``
-    +1) or back (-1).
+    """Change rotor speeds and pose, the first 11 of ``f.sample``, from truth to report
+    (``direction`` +1) or back (-1).
 
-    ``parts``: 1 position, 2 attitude, 4 turn rates. Where the attitude is no part of it, it must
+    ``parts``: 1 position, 2 attitude, 4 rotor speeds. Where the attitude is no part of it, it must
     still be readable.
     """
     if f.sense_count > 0:

@@ -234,10 +234,10 @@ class ClosedLoop:
         self.applied: Array = loop["plant"][
             "applied"
         ]  # (6,) and that a user applies; zero after a reset
-        self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
+        self.sample: Array = loop["plant"]["z"]  # (11,) rotor speeds, position, quaternion
         self.unrounded: Array = loop["plant"]["sample"][
             :4
-        ]  # (4,) these turn rates before they are rounded
+        ]  # (4,) these rotor speeds before they are rounded
         loop["mj_step"], loop["model"], loop["data"] = (
             mj_step_address(),
             self.model._address,

@@ -35,7 +35,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Description
 
     A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of it, at the
-    height of its axis, and faces it. An unscented Kalman filter turns motor rates and motion-capture pose into the
+    height of its axis, and faces it. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
     external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back; off the axis it also turns it,
     because its drag falls off across the vehicle's span. The agent sees the estimate, 12.5 times a second, and commands
     a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.

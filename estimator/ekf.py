@@ -220,7 +220,7 @@ def model_jacobian(f: Record, dt: float, A: Array) -> None:
 
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s."""
+    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s."""
     x, P, A, G = f.x, f.P, f.S, f.H
     drive(f, rotor_speeds, dt, voltage)
     propagate(f, x, dt, f.centre)

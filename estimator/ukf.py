@@ -77,7 +77,7 @@ def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weigh
 
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
+    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(26)."""
     drive(f, rotor_speeds, dt, voltage)
     if f.wrench_count == 0:
         quaternion_to_matrix(f.x[3:7], f.rotation)
@@ -234,8 +234,8 @@ class WrenchUKF:
 
     Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct``
     with measurements that come at their own times. A measurement, or a part of it, that is None or
-    not finite was not made. The sign of a quaternion means nothing. Turn rates that are not finite
-    are taken to be the last ones that were.
+    not finite was not made. The sign of a quaternion means nothing. Rotor speeds that are not
+    finite are taken to be the last ones that were.
 
     Args:
         vehicle: the declared vehicle; its declared effects are part of the prediction model, and
@@ -376,8 +376,8 @@ class WrenchUKF:
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Predict over one period with the turn rates of that period, then take in the pose at its
-        end.
+        """Predict over one period with the rotor speeds of that period, then take in the pose at
+        its end.
 
         Args:
             rotor_speeds: (4,) rad/s.

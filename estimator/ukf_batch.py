@@ -229,8 +229,8 @@ class WrenchUKFBatch:
         quaternion: ArrayLike | None = None,
         voltage: ArrayLike | None = None,
     ) -> WrenchEstimates:
-        """Predict over one period with the turn rates of that period, then take in the poses at its
-        end.
+        """Predict over one period with the rotor speeds of that period, then take in the poses at
+        its end.
 
         Args:
             rotor_speeds: (n, 4) rad/s.

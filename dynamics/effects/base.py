@@ -8,7 +8,7 @@ There are four kinds:
 
 ``rotor input``
     changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four
-    turn rates in ``rotors``, once a step, in the order in which the vehicle lists the effects.
+    rotor speeds in ``rotors``, once a step, in the order in which the vehicle lists the effects.
 ``wrench``
     adds force (world frame) and torque (body frame, about the centre of mass). Law
     ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is asked many times a
@@ -63,7 +63,7 @@ TIME = 30  # s
 ROTOR_ACCELERATION = 31  # 4, rad/s2, delivered, mean over the step
 STATE_SIZE = 35
 
-# rotors: the turn rates that a rotor-input law rewrites, and what it may know
+# rotors: the rotor speeds that a rotor-input law rewrites, and what it may know
 SPEED = 0  # 4, rad/s
 STEP = 4  # s, since the law was last called
 ROTOR_VOLTAGE = 5  # V; 0: not known

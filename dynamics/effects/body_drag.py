@@ -58,6 +58,6 @@ EFFECT = Effect(
     confused_with=("rotor_drag", "inflow_thrust", "wind"),
     excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads "
     "(climbs, hard turns) to tell "
-    "it from rotor drag, whose force grows with the turn rates",
+    "it from rotor drag, whose force grows with the rotor speeds",
     law=law,
 )

@@ -64,7 +64,7 @@ def deliver(
     voltage: float,
     rotors: Array,
 ) -> None:
-    """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
+    """Rewrite the rotor speeds ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
 
     ``rotors`` is (ROTORS_SIZE,) with its time filled in.
     """
@@ -112,7 +112,7 @@ def report(
     """Rewrite ``sample`` (SAMPLE_SIZE,) from truth to report (``direction`` +1), or back (-1), in
     the reverse order.
 
-    ``parts``: 1 position, 2 attitude, 4 turn rates.
+    ``parts``: 1 position, 2 attitude, 4 rotor speeds.
     """
     sample[SAMPLE_STEP], sample[DIRECTION] = dt, direction
     sample[HAS_POSITION] = 1.0 if parts & 1 != 0 else 0.0

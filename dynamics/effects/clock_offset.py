@@ -1,8 +1,8 @@
-"""Clock offset: pose and turn rates of one row of the log are not of the same instant.
+"""Clock offset: pose and rotor speeds of one row of the log are not of the same instant.
 
-With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those
-of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays the
-other of the two, and so estimates the flight of dt ago.
+With dt > 0 the pose is that of dt earlier than the rotor speeds; with dt < 0 the rotor speeds are
+those of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays
+the other of the two, and so estimates the flight of dt ago.
 """
 
 from numba import cfunc
@@ -57,7 +57,7 @@ EFFECT = Effect(
             "dt",
             "s",
             (0.03, 0.02),
-            "by which the pose is older than the turn rates",
+            "by which the pose is older than the rotor speeds",
             minimum=-0.06,
             maximum=0.06,
         ),

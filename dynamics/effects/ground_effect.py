@@ -1,4 +1,4 @@
-"""Ground effect: a rotor near the floor delivers more thrust at the same turn rate.
+"""Ground effect: a rotor near the floor delivers more thrust at the same rotor speed.
 
 Thrust of a rotor at height z above the floor is multiplied by 1 / (1 - rho (R / (4 z))^2),
 Cheeseman and Bennett's law for rho = 1; rho of about 3 was measured for whole quadrotors. Applied

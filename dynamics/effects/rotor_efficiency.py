@@ -1,6 +1,6 @@
-"""Rotor efficiency: single rotors deliver more or less than declared at the same turn rate.
+"""Rotor efficiency: single rotors deliver more or less than declared at the same rotor speed.
 
-Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered turn rate is W_i sqrt(1 +
+Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered rotor speed is W_i sqrt(1 +
 e_i).
 """
 

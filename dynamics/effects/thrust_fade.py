@@ -1,8 +1,8 @@
-"""Thrust fade: thrust at a given turn rate falls steadily with flight time, as motors and battery
+"""Thrust fade: thrust at a given rotor speed falls steadily with flight time, as motors and battery
 warm up.
 
-Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered turn rate is W
-times the root of that. The time t runs from the start of the flight; in an estimator from its
+Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered rotor speed is
+W times the root of that. The time t runs from the start of the flight; in an estimator from its
 ``reset``.
 """
 

@@ -1,6 +1,6 @@
-"""Thrust scale: all rotors deliver more or less than declared at the same turn rate.
+"""Thrust scale: all rotors deliver more or less than declared at the same rotor speed.
 
-Thrust and reaction torque scale by 1 + s: the delivered turn rate is W sqrt(1 + s).
+Thrust and reaction torque scale by 1 + s: the delivered rotor speed is W sqrt(1 + s).
 """
 
 import math

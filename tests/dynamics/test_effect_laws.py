@@ -357,7 +357,9 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
 
 
 class Pendulum:
-    """A slung payload's own state, carried on under a vehicle of given attitude and turn rates."""
+    """A slung payload's own state, carried on under a vehicle whose attitude and rotor speeds are
+    given.
+    """
 
     def __init__(self, **coefficients):
         self.bundle = compile_effects(setting("slung_payload", **coefficients))

@@ -18,8 +18,8 @@ from windwrench.envs.suspended_load import SuspendedLoad
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import estimate_log
 
-# nothing but the effect comes between model and flight: no disturbance, no lag, no quantised turn
-# rates, no noise
+# nothing but the effect comes between model and flight: no disturbance, no lag, no quantised
+# rotor speeds, no noise
 QUIET = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0, motor_lag=0.0, sensor_noise=False
 )

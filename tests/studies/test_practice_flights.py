@@ -307,7 +307,7 @@ def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
         assert without[:, :3].std(axis=0).max() > 0.02
 
 
-def test_rotorpy_s_turn_rates_are_those_at_the_instant_of_the_pose(flights):
+def test_rotorpy_s_rotor_speeds_are_those_at_the_instant_of_the_pose(flights):
     log, vehicle = flights[False], hummingbird_vehicle()
     up = np.array([matrix_of(q)[:, 2] for q in log.quaternion[1:-1]])
     acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [
