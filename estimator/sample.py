@@ -128,7 +128,7 @@ def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
     sample: Array = f.sample[0:11]
     for i in range(11):
         sample[i] = z[i]
-    if f.sense_count > 0:
+    if f.sensing_count > 0:
         if parts & 2 == 0:
             for i in range(4):
                 sample[7 + i] = f.x[3 + i]
@@ -140,7 +140,7 @@ def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
 def undo_first_pose(record: Record) -> None:
     """Bring the pose of a new estimate to what it was before the declared sensing effects."""
     f = record[0]
-    if f.sense_count > 0:
+    if f.sensing_count > 0:
         for i in range(7):
             f.sample[4 + i] = f.x[i]
         rewrite_sample(f, 0.0, 3, -1.0)

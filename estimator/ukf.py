@@ -28,8 +28,7 @@ from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
-from ..runtime.compiled import Record, compiled
-from ..runtime.direct_call import direct
+from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose
 from .covariance import (
@@ -436,7 +435,7 @@ class WrenchUKF:
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         call = self._call
         if call is None:
-            call = self._call = direct(self._compiled_step, self.record, parts, dt, 0.0)
+            call = self._call = specialised(self._compiled_step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return WrenchEstimate(self._now.copy())

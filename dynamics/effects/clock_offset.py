@@ -9,10 +9,10 @@ from numba import cfunc
 
 from .base import (
     DIRECTION,
+    EFFECT_MODEL,
     HAS_POSITION,
     HAS_QUATERNION,
     HAS_SPEED,
-    LAW,
     SAMPLE_POSITION,
     SAMPLE_QUATERNION,
     SAMPLE_SPEED,
@@ -26,8 +26,8 @@ _POSES = 13  # kept, 0.06 s at 200 Hz
 _SPEEDS = 22
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     wanted = c[0] * sample[DIRECTION]
     memory[1] += sample[SAMPLE_STEP]
     if wanted > 0.0:
@@ -66,6 +66,6 @@ EFFECT = Effect(
     confused_with=("latency", "motor_lag"),
     excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency "
     "leave the same log",
-    law=law,
+    model=effect_model,
     memory=2 + max(8 * _POSES, 5 * _SPEEDS),
 )

@@ -6,14 +6,14 @@ of the first sample the first one holds.
 
 from numba import cfunc
 
-from .base import LAW, STEP, Coefficient, Effect
+from .base import EFFECT_MODEL, STEP, Coefficient, Effect
 from .parts import delay
 
 _KEPT = 22  # samples, 0.105 s at 200 Hz
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     memory[1] += rotors[STEP]
     delay(memory, 4, _KEPT, c[0], rotors, 0)
 
@@ -27,6 +27,6 @@ EFFECT = Effect(
     excitation="quick manoeuvres: a lag smooths what a latency only moves. A log of rotor speeds "
     "and poses cannot tell it from poses that are stamped late (clock_offset): that takes a "
     "second clock",
-    law=law,
+    model=effect_model,
     memory=2 + 5 * _KEPT,
 )

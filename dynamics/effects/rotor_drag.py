@@ -10,7 +10,7 @@ from numba import cfunc
 from .base import (
     CENTRAL,
     COM,
-    LAW,
+    EFFECT_MODEL,
     RATE,
     ROTATION,
     ROTOR_POSITION,
@@ -22,8 +22,8 @@ from .base import (
 )
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     ax = state[VELOCITY] - state[WIND]
     ay = state[VELOCITY + 1] - state[WIND + 1]
     az = state[VELOCITY + 2] - state[WIND + 2]
@@ -69,5 +69,5 @@ EFFECT = Effect(
     excitation="horizontal flight at 1 m/s and more along both body axes, at several loads "
     "(climbs, hard turns): rotor drag "
     "grows with the rotor speeds, body drag does not",
-    law=law,
+    model=effect_model,
 )

@@ -10,11 +10,11 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_TIME, Coefficient, Effect
+from .base import EFFECT_MODEL, ROTOR_TIME, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     scale = math.sqrt(max(1.0 - c[0] * rotors[ROTOR_TIME], 0.1))
     for i in range(4):
         rotors[i] *= scale
@@ -33,5 +33,5 @@ EFFECT = Effect(
     excitation="a minute and more of flight with the battery voltage logged: loads that come and "
     "go move the voltage, and "
     "with it sag, but not time",
-    law=law,
+    model=effect_model,
 )
