@@ -1,4 +1,4 @@
-"""The inner flight loop: from a position, velocity and yaw set point to rotor turn rates.
+"""The inner flight loop: from a position, velocity and yaw set point to rotor speeds.
 
 A cascade on the estimated state: position, velocity and integral to a thrust vector; its direction
 to body rates and torques; torques and thrust through the inverse of the rotor mixing. The defaults
@@ -47,7 +47,7 @@ FLIGHT = np.dtype(
         ("sum", "f8", (3,)),
         ("yaw_sum", "f8"),
         ("rotation", "f8", (3, 3)),
-        ("command", "f8", (4,)),  # turn rates, rad/s
+        ("command", "f8", (4,)),  # rotor speeds, rad/s
     ]
 )
 
@@ -84,7 +84,7 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
 
 @compiled
 def fly(c: Record, x: Array, dt: float) -> None:
-    """Write the turn rates (4,) rad/s that steer the estimated state ``x`` to the set point into
+    """Write the rotor speeds (4,) rad/s that steer the estimated state ``x`` to the set point into
     ``c.command``.
 
     ``x`` is laid out as in ``estimator.estimate``: position 0-2, quaternion 3-6, velocity 7-9, body

@@ -29,32 +29,32 @@ from .vehicle import Vehicle
 MAX_EFFECTS = 16  # of a kind
 MAX_SENSING = 4
 MEMORY = 112  # numbers that a rotor-input or sensing effect may keep
-_SENSE_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
+_SENSING_ROW = MAX_EFFECTS  # first row of the sensing effects' memory
 _OWN_ROW = (
     MAX_EFFECTS + MAX_SENSING
-)  # the model's: whether it has delivered turn rates yet, and those
+)  # the model's: whether it has delivered rotor speeds yet, and those
 
 MODEL_FIELDS: list[tuple[object, ...]] = [
     ("body", BODY),
     ("constants", "f8", (VEHICLE_SIZE,)),
-    ("wrench_laws", "i8", (MAX_EFFECTS,)),
+    ("wrench_models", "i8", (MAX_EFFECTS,)),
     ("wrench_coefficients", "f8", (MAX_EFFECTS, ROW_SIZE)),
     ("wrench_hooks", "i8", (MAX_EFFECTS,)),
     ("wrench_count", "i8"),
-    ("hooked", "i8"),  # whether any law has a state of its own
+    ("hooked", "i8"),  # whether any effect has a state of its own
     ("waiting", "i8"),  # whether those states are still to be carried over the step in hand
-    ("rotor_laws", "i8", (MAX_EFFECTS,)),
+    ("rotor_models", "i8", (MAX_EFFECTS,)),
     ("rotor_coefficients", "f8", (MAX_EFFECTS, PARAMETERS)),
     ("rotor_count", "i8"),
-    ("sense_laws", "i8", (MAX_SENSING,)),
-    ("sense_coefficients", "f8", (MAX_SENSING, PARAMETERS)),
-    ("sense_count", "i8"),
+    ("sensing_models", "i8", (MAX_SENSING,)),
+    ("sensing_coefficients", "f8", (MAX_SENSING, PARAMETERS)),
+    ("sensing_count", "i8"),
     ("sample", "f8", (SAMPLE_SIZE,)),  # on its way through the sensing effects
     ("memory", "f8", (_OWN_ROW + 1, MEMORY)),
     ("time", "f8"),
     ("voltage", "f8"),
     ("wind", "f8", (3,)),
-    ("rotors", "f8", (ROTORS_SIZE,)),  # delivered turn rates
+    ("rotors", "f8", (ROTORS_SIZE,)),  # delivered rotor speeds
     ("rotor_wrench", "f8", (4,)),  # their thrust and torques about the centre of mass
     ("effect_state", "f8", (STATE_SIZE,)),
     ("effect_wrench", "f8", (6,)),  # force in the world, torque in the body frame
@@ -69,25 +69,25 @@ def load_model(record: np.void, vehicle: Vehicle) -> Vehicle:
     """
     bundle = compile_effects(vehicle)
     if (
-        max(len(bundle.wrench_laws), len(bundle.rotor_laws)) > MAX_EFFECTS
-        or len(bundle.sense_laws) > MAX_SENSING
+        max(len(bundle.wrench_models), len(bundle.rotor_models)) > MAX_EFFECTS
+        or len(bundle.sensing_models) > MAX_SENSING
     ):
         raise InputError(
             f"{vehicle.name}: effects: a model holds at most {MAX_EFFECTS} of a kind, and "
             f"{MAX_SENSING} of "
             "sensing"
         )
-    assert max(bundle.rotor_memory, bundle.sense_memory) <= MEMORY
+    assert max(bundle.rotor_memory, bundle.sensing_memory) <= MEMORY
     record["body"] = body_record(bundle.vehicle)[0]
     record["constants"] = bundle.constants
-    for kind, laws, coefficients in (
-        ("wrench", bundle.wrench_laws, bundle.wrench_coefficients),
-        ("rotor", bundle.rotor_laws, bundle.rotor_coefficients),
-        ("sense", bundle.sense_laws, bundle.sense_coefficients),
+    for kind, models, coefficients in (
+        ("wrench", bundle.wrench_models, bundle.wrench_coefficients),
+        ("rotor", bundle.rotor_models, bundle.rotor_coefficients),
+        ("sensing", bundle.sensing_models, bundle.sensing_coefficients),
     ):
-        record[f"{kind}_count"] = len(laws)
-        record[f"{kind}_laws"][: len(laws)] = laws
-        record[f"{kind}_coefficients"][: len(laws)] = coefficients
+        record[f"{kind}_count"] = len(models)
+        record[f"{kind}_models"][: len(models)] = models
+        record[f"{kind}_coefficients"][: len(models)] = coefficients
     record["wrench_hooks"][: len(bundle.wrench_hooks)] = bundle.wrench_hooks
     record["hooked"] = int(np.any(bundle.wrench_hooks != 0))
     return bundle.vehicle
@@ -110,7 +110,7 @@ def drive(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     f.rotors[STEP], f.rotors[ROTOR_TIME] = dt, f.time
     if f.rotor_count > 0:
         deliver(
-            f.rotor_laws[: f.rotor_count],
+            f.rotor_models[: f.rotor_count],
             f.rotor_coefficients,
             f.constants,
             f.memory,
@@ -161,7 +161,7 @@ def apply_effects(
                 f.rotors,
             )
         effect_wrench(
-            f.wrench_laws[: f.wrench_count],
+            f.wrench_models[: f.wrench_count],
             f.wrench_coefficients,
             f.constants,
             f.body,
@@ -180,18 +180,18 @@ def apply_effects(
 
 @compiled
 def rewrite_sample(f: Record, dt: float, parts: int, direction: float) -> None:
-    """Change turn rates and pose, the first 11 of ``f.sample``, from truth to report (``direction``
-    +1) or back (-1).
+    """Change rotor speeds and pose, the first 11 of ``f.sample``, from truth to report
+    (``direction`` +1) or back (-1).
 
-    ``parts``: 1 position, 2 attitude, 4 turn rates. Where the attitude is no part of it, it must
+    ``parts``: 1 position, 2 attitude, 4 rotor speeds. Where the attitude is no part of it, it must
     still be readable.
     """
-    if f.sense_count > 0:
+    if f.sensing_count > 0:
         report(
-            f.sense_laws[: f.sense_count],
-            f.sense_coefficients,
+            f.sensing_models[: f.sensing_count],
+            f.sensing_coefficients,
             f.constants,
-            f.memory[_SENSE_ROW:],
+            f.memory[_SENSING_ROW:],
             dt,
             parts,
             direction,

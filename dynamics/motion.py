@@ -129,7 +129,7 @@ def accelerations(
 
 @compiled
 def effect_wrench(
-    laws: np.ndarray,
+    models: np.ndarray,
     coefficients: Array,
     constants: Array,
     body: Record,
@@ -152,7 +152,7 @@ def effect_wrench(
     fill_state(body, position, rotation, velocity, omega, rotor_speeds, wind, voltage, time, state)
     for i in range(6):
         out[i] = 0.0
-    add_wrenches(laws, coefficients, constants, state, out)
+    add_wrenches(models, coefficients, constants, state, out)
 
 
 @compiled
@@ -168,8 +168,8 @@ def fill_state(
     time: float,
     state: Array,
 ) -> None:
-    """Lay a state of the flight out for the laws in ``state`` (STATE_SIZE,), all but the rotors'
-    acceleration.
+    """Lay a state of the flight out for the effect models in ``state`` (STATE_SIZE,), all but the
+    rotors' acceleration.
     """
     for i in range(3):
         state[POSITION + i] = position[i]

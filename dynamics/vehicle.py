@@ -53,8 +53,8 @@ class Vehicle:
     k: Array  # (4,) N/(rad/s)^2, thrust
     p: Array  # (4,) Nm/(rad/s)^2, reaction torque
     rotor_radius: float = 0.1  # m
-    omega_lsb: float = 0.0  # rad/s, step of the logged turn rates; 0: not quantised
-    omega_max: float = math.inf  # rad/s, fastest turn rate
+    omega_lsb: float = 0.0  # rad/s, step of the logged rotor speeds; 0: not quantised
+    omega_max: float = math.inf  # rad/s, fastest rotor speed
     omega_source: str = "measured"  # or "commanded"
     voltage_ref: float = 0.0  # V, battery voltage at which k and p hold; 0: not stated
     gravity: float = 9.81  # m/s2
@@ -75,7 +75,7 @@ class Vehicle:
 
     @property
     def mixing(self) -> Array:
-        """Matrix (4, 4) from the squared turn rates to total thrust and body torques about the
+        """Matrix (4, 4) from the squared rotor speeds to total thrust and body torques about the
         centre, (1), (8)-(10).
         """
         x, y = self.positions[:, 0], self.positions[:, 1]
@@ -88,20 +88,20 @@ class Vehicle:
 
     @property
     def hover_rate(self) -> float:
-        """Turn rate in rad/s at which four equal rotors carry the weight."""
+        """Rotor speed in rad/s at which four equal rotors carry the weight."""
         return math.sqrt(self.weight / float(np.sum(self.k)))
 
     def rotor_wrench(self, rotor_speeds: Array) -> Array:
-        """Return total thrust (N) and body torques (Nm), shape (..., 4), of turn rates (..., 4) in
-        rad/s, (1).
+        """Return total thrust (N) and body torques (Nm), shape (..., 4), of rotor speeds (..., 4)
+        in rad/s, (1).
         """
         return np.square(rotor_speeds) @ self.mixing.T
 
     def rotor_speeds(self, thrust: float, torque: Array) -> Array:
-        """Return the turn rates (4,) in rad/s that give a thrust (N) and body torques (3,) in Nm,
+        """Return the rotor speeds (4,) in rad/s that give a thrust (N) and body torques (3,) in Nm,
         the inverse of (1).
 
-        What no non-negative turn rate can give is clipped at zero and at ``omega_max``.
+        What no non-negative rotor speed can give is clipped at zero and at ``omega_max``.
         """
         square = np.linalg.solve(self.mixing, np.concatenate([[thrust], torque]))
         return np.minimum(np.sqrt(np.maximum(square, 0.0)), self.omega_max)

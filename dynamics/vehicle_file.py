@@ -15,7 +15,7 @@ from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
 from .vehicle import Array, EffectSetting, Mocap, Vehicle
 
-_ROTOR_STEPS = 255  # an 8-bit turn rate
+_ROTOR_STEPS = 255  # an 8-bit rotor speed
 _LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow
 
 

@@ -22,8 +22,14 @@ from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF, correct_parts
 from ..runtime.addresses import address_of, call_at, call_step, numbers_at, pointer_to
-from ..runtime.compiled import Record, announced, compiled, compiled_meanwhile
-from ..runtime.direct_call import direct, released
+from ..runtime.compiled import (
+    Record,
+    announced,
+    compiled,
+    compiled_meanwhile,
+    compiled_without_gil,
+    specialised,
+)
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, Fan, fan_record, jet_table
 from .native_functions import clock_address, mj_step_address
@@ -134,7 +140,7 @@ def run_address() -> int:
     return address_of(_run, _RUN)
 
 
-@released
+@compiled_without_gil
 def _run_rows(run: int, loop: int, noise: Array, fan_y: Array, first: int) -> None:
     """Run one tick for each row of ``noise``."""
     call_at(run, loop, noise.ctypes.data, len(noise), fan_y.ctypes.data, len(fan_y), first)
@@ -144,7 +150,7 @@ def compile_run() -> None:
     """Compile the correction, which the filter's step compiles last, and the loop: half of what a
     first flight needs.
     """
-    direct(correct_parts, np.zeros(1, dtype=FILTER)[0], np.zeros(1), 3)
+    specialised(correct_parts, np.zeros(1, dtype=FILTER)[0], np.zeros(1), 3)
     run_address()
 
 
@@ -212,7 +218,7 @@ class ClosedLoop:
                 self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
                 loop["step"] = self.ukf.step_address
             self._run = run_address()
-            self._call = direct(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
+            self._call = specialised(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
         loop["filter"] = self.ukf.record[0]
         self._views()
 
@@ -234,10 +240,10 @@ class ClosedLoop:
         self.applied: Array = loop["plant"][
             "applied"
         ]  # (6,) and that a user applies; zero after a reset
-        self.sample: Array = loop["plant"]["z"]  # (11,) turn rates, position, quaternion
+        self.sample: Array = loop["plant"]["z"]  # (11,) rotor speeds, position, quaternion
         self.unrounded: Array = loop["plant"]["sample"][
             :4
-        ]  # (4,) these turn rates before they are rounded
+        ]  # (4,) these rotor speeds before they are rounded
         loop["mj_step"], loop["model"], loop["data"] = (
             mj_step_address(),
             self.model._address,

@@ -10,9 +10,8 @@ from numba import carray
 from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
 from ..dynamics.motion import Array
 from ..runtime.addresses import call_at, numbers_at, pointer_to
-from ..runtime.compiled import Record, compiled
-from ..runtime.direct_call import released
-from ..runtime.work_sharing import leave, more_turns, take_turn, turn_done
+from ..runtime.compiled import Record, compiled, compiled_without_gil
+from ..runtime.work_sharing import next_task, stop_looking, task_done, tasks_open
 from .closed_loop import FASTEST, LOOP, has_been_reset
 from .plant import NOISE, TICK
 
@@ -116,13 +115,13 @@ def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
     out.reward_change = -CHANGE_COST * change * change
 
 
-@released
+@compiled_without_gil
 def decide(
     episodes: np.ndarray,
     commands: Array,
     resting: np.ndarray,
     ticks: int,
-    turns: np.ndarray,
+    tasks: np.ndarray,
     patience: int,
 ) -> None:
     """Fly ``ticks`` ticks of each episode that does not rest, at its command in m/s, and write its
@@ -136,16 +135,16 @@ def decide(
         commands: (n,) m/s.
         resting: (n,) booleans.
         ticks: of ``TICK`` s.
-        turns: of the episodes, open (``turns.open_turns``).
-        patience: looks at the turns after the last, should they open again meanwhile.
+        tasks: of the episodes, open (``work_sharing.open_tasks``).
+        patience: looks at the tasks after the last, should they open again meanwhile.
     """
     noise = np.empty((ticks, NOISE))
     while True:
-        n = take_turn(turns)
+        n = next_task(tasks)
         if n < len(episodes):
             if not resting[n]:
                 _decide(episodes[n], commands[n], ticks, noise)
-            turn_done(turns)
-        elif not more_turns(turns, len(episodes), patience):
-            leave(turns)
+            task_done(tasks)
+        elif not tasks_open(tasks, len(episodes), patience):
+            stop_looking(tasks)
             break

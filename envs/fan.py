@@ -1,5 +1,5 @@
 """The fan of the environment: its jet with gusts, and what it does to a vehicle in it. The mean
-jet: ``dynamics.jet``.
+jet: ``dynamics.mean_jet``.
 """
 
 import math

@@ -14,7 +14,7 @@ from ..dynamics.effects import check_setting
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
-from ..runtime.direct_call import direct
+from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, run_address
 from .decision import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
@@ -35,7 +35,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ## Description
 
     A drum fan stands at the origin, blows along +x and moves along y. A quadrotor hovers 2.3 m in front of it, at the
-    height of its axis, and faces it. An unscented Kalman filter turns motor rates and motion-capture pose into the
+    height of its axis, and faces it. An unscented Kalman filter turns rotor speeds and motion-capture pose into the
     external force and torque, at 200 Hz. On the axis the jet pushes the vehicle back; off the axis it also turns it,
     because its drag falls off across the vehicle's span. The agent sees the estimate, 12.5 times a second, and commands
     a velocity along y; an inner flight loop does the rest. The task follows McKinnon and Schoellig, IROS 2016, V-C.
@@ -153,7 +153,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._addressed: tuple[
             object, ...
         ] = ()  # what the episode has the addresses of, beside its generator
-        self._turns = np.zeros(3, dtype=np.int64)
+        self._tasks = np.zeros(3, dtype=np.int64)
         self._call: Callable[..., None] | None = None
 
     def _make_loop(self, vehicle: Vehicle, fan: Fan) -> ClosedLoop:
@@ -292,11 +292,11 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _decide(self, ticks: int) -> None:
         """Fly some ticks at ``_command`` and write the outcome."""
-        turns = self._turns
+        tasks = self._tasks
         if self._call is None:
-            self._call = direct(decide, self.episode, self._command, _FLYING, ticks, turns, 0)
-        turns[0] = 0
-        self._call(self.episode, self._command, _FLYING, ticks, turns, 0)
+            self._call = specialised(decide, self.episode, self._command, _FLYING, ticks, tasks, 0)
+        tasks[0] = 0
+        self._call(self.episode, self._command, _FLYING, ticks, tasks, 0)
 
     def _observation(self) -> NDArray[np.float32]:
         observation: NDArray[np.float32] = self.episode["outcome"]["observation"][0].copy()

@@ -44,7 +44,7 @@ NOISE = _DROPOUT + 1
 class PlantSettings:
     """What the plant does that its vehicle file does not say."""
 
-    motor_lag: float = 0.04  # s, of a first-order motor whose true turn rate is logged
+    motor_lag: float = 0.04  # s, of a first-order motor whose true rotor speed is logged
     disturbance_force: float = (
         0.03  # N, standard deviation of the unmodelled part of the actuation, each axis
     )
@@ -81,7 +81,8 @@ PLANT = np.dtype(
         ("battery_life", "f8"),
         ("battery", "f8"),  # V now; 0: not modelled
         ("speeds", "f8", (4,)),  # of the motors, rad/s
-        ("z", "f8", (11,)),  # the sample: logged turn rates of the last tick, position, quaternion
+        # the sample: logged rotor speeds of the last tick, position, quaternion
+        ("z", "f8", (11,)),
         ("seen", "i8"),
         ("disturbance", "f8", (6,)),
         ("external", "f8", (6,)),  # true external force and torque about the centre of mass, world

@@ -274,10 +274,10 @@ def record_flight(
                 f"large for its "
                 "flight loop"
             )
-    # A turn rate is logged as it is at the instant of the pose, between the ticks before and after.
-    # That is no even mean: with semi-implicit steps of half a tick the pose is a quarter of a tick
-    # ahead of the clock. It is rounded once: rounding what lies between two rounded rates would
-    # bring the later one back.
+    # A rotor speed is logged as it is at the instant of the pose, between the ticks before and
+    # after. That is no even mean: with semi-implicit steps of half a tick the pose is a quarter of
+    # a tick ahead of the clock. It is rounded once: rounding what lies between two rounded rates
+    # would bring the later one back.
     samples[:-1, :4] = 0.25 * samples[:-1, :4] + 0.75 * samples[1:, :4]
     if vehicle.omega_lsb > 0:
         samples[:, :4] = vehicle.omega_lsb * np.round(samples[:, :4] / vehicle.omega_lsb)

@@ -10,9 +10,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from ..runtime.direct_call import direct
+from ..runtime.compiled import specialised
 from ..runtime.errors import InputError
-from ..runtime.work_sharing import PATIENCE, open_turns, watch
+from ..runtime.work_sharing import PATIENCE, all_done, open_tasks
 from .decision import DECISION_TICKS, EPISODE, INFO, decide
 from .fan_tracking import FanTrackingEnv
 
@@ -74,7 +74,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self._all = np.ones(num_envs, dtype=np.bool_)
         # what threads read; one that comes late works for the step that it finds
         self._commands, self._resting = np.zeros(num_envs), np.zeros(num_envs, dtype=np.bool_)
-        self._turns = np.array([0, 0, self.threads])  # all of them have left
+        self._tasks = np.array([0, 0, self.threads])  # all of them have left
         self._call: Callable[[], None] | None = None
         self._help: Callable[[], None] | None = None  # the same, and to look for more
         self._helpers: list[Future[None]] = []
@@ -141,10 +141,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
     def _fly(self) -> None:
         """Fly a decision of all environments that do not rest."""
         if self._call is None or self._help is None:
-            given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._turns
-            entry = direct(decide, *given, PATIENCE)
+            given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._tasks
+            entry = specialised(decide, *given, PATIENCE)
             self._call, self._help = partial(entry, *given, 0), partial(entry, *given, PATIENCE)
-        left = open_turns(self._turns) - 1  # without this thread
+        left = open_tasks(self._tasks) - 1  # without this thread
         if left:
             self._helpers = [
                 *(h for h in self._helpers if not h.done()),
@@ -152,13 +152,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             ]
         try:
             self._call()
-            while not watch(self._turns, self.num_envs):
+            while not all_done(self._tasks, self.num_envs):
                 for helper in self._helpers:
                     if helper.done():
                         helper.result()
         except BaseException:
             wait(self._helpers)  # what they have in hand must not be flown by two
-            self._turns[2] = self.threads
+            self._tasks[2] = self.threads
             raise
 
     def _call_others(self, work: Callable[[], None], count: int) -> list[Future[None]]:
@@ -178,21 +178,21 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._motions[i] = self.envs[i].fan_motion
 
     def _spread(self, work: Callable[[int, int], None]) -> None:
-        """Call ``work`` with the bounds of some environments, until all had their turn; this thread
+        """Call ``work`` with the bounds of some environments, until all were in hand; this thread
         works, too.
 
         Whoever is done takes the next few, so that nobody waits for a thread that the machine held
         up.
         """
-        turns = iter(range(self.num_envs))
+        firsts = iter(range(self.num_envs))
 
-        def take_turns() -> None:
-            for n in turns:
+        def take_tasks() -> None:
+            for n in firsts:
                 work(n, n + 1)
 
-        others = self._call_others(take_turns, self.threads - 1)
+        others = self._call_others(take_tasks, self.threads - 1)
         try:
-            take_turns()
+            take_tasks()
         finally:
             others = [
                 other for other in others if not other.cancel()

@@ -23,7 +23,7 @@ class _Watched(ClosedLoop):
     """
 
     observer: NonlinearObserver | None = None
-    _speeds: Array = np.zeros(4)  # turn rates of the tick before
+    _speeds: Array = np.zeros(4)  # rotor speeds of the tick before
 
     def run(self, noise: Array, fan_y: Array | None = None, first: int = 0) -> None:
         """Run as ``ClosedLoop`` does, and show the observer every sample."""

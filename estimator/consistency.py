@@ -281,7 +281,7 @@ def simulate_model(
         covariance: (18, 18) of (rho, omega, x, v, torque, force); default
             ``default_covariance(vehicle, tuning)``.
         rate_gain: 1/s, of a loop on the true body rate about ``angular_velocity``, without which a
-            walk of the torque spins the vehicle up; the turn rates that it asks for are those of
+            walk of the torque spins the vehicle up; the rotor speeds that it asks for are those of
             the result. Position and attitude drift.
 
     Raises:

@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import Record, compiled
-from ..runtime.direct_call import released
+from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import NIS, Array, WrenchEstimate
@@ -164,7 +163,7 @@ class ConstantGainFilter(WrenchUKF):
         raise InputError("ConstantGainFilter: correct_imu needs a covariance; use WrenchUKF")
 
 
-@released
+@compiled_without_gil
 def _hover(record: np.ndarray, z: Array, steps: int, voltage: float) -> None:
     f = record[0]
     for _ in range(steps):

@@ -7,13 +7,12 @@ keep their order.
 
 import math
 
-from ..runtime.compiled import Record
-from ..runtime.vector_loops import inlined, side_by_side
+from ..runtime.compiled import Record, compiled_for_vectors, compiled_inline
 from .estimate import Array
 from .filter_record import N
 
 
-@side_by_side
+@compiled_for_vectors
 def root_of_six(f: Record) -> None:
     """Factor P: the first six columns of its lower root into ``S``, the Schur complement of the
     others into ``M``.
@@ -26,7 +25,7 @@ def root_of_six(f: Record) -> None:
     _take_off(S, 0, M)
 
 
-@side_by_side
+@compiled_for_vectors
 def root_of_twelve(f: Record) -> None:
     """Do the same with the first twelve columns, x and v among them: nothing is left of those in
     ``M``.
@@ -53,7 +52,7 @@ def root_of_twelve(f: Record) -> None:
             M[j, i] = 0.0
 
 
-@inlined
+@compiled_inline
 def _take_off(S: Array, first: int, M: Array) -> None:
     """Take the squares of six columns off their Schur complement."""
     for i in range(0, 12, 2):
@@ -68,7 +67,7 @@ def _take_off(S: Array, first: int, M: Array) -> None:
             M[i + 1, j] -= (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
 
 
-@inlined
+@compiled_inline
 def _six_columns(f: Record, rows: Array, first: int) -> None:
     """Write six columns of the root, from ``first`` on, into ``S``; from ``rows`` (6, 18) those
     before are taken off.
@@ -93,7 +92,7 @@ def _six_columns(f: Record, rows: Array, first: int) -> None:
             S[first + j, i] = 0.0
 
 
-@inlined
+@compiled_inline
 def _substitute(L: Array, scales: Array, rows: Array, out: Array) -> None:
     """Solve ``L out = rows`` for six rows (18,); the diagonal of the lower triangular L is
     ``1 / scales``.
@@ -112,7 +111,7 @@ def _substitute(L: Array, scales: Array, rows: Array, out: Array) -> None:
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = s0, s1, s2, s3, s4, s5
 
 
-@inlined
+@compiled_inline
 def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) -> None:
     """Apply the linear part of the model to the rows (x, v, torque, force) of ``source`` (12, n):
     ``out`` (18, n).
@@ -169,7 +168,7 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
         out[15, j], out[16, j], out[17, j] = f0, f1, f2
 
 
-@side_by_side
+@compiled_for_vectors
 def carry_linear_part(f: Record, dt: float) -> None:
     """Write ``A M A'`` into P, where A is the linear part of the model at ``f.centre_rotation``."""
     Y, Z = f.Y, f.Z
@@ -183,7 +182,7 @@ def carry_linear_part(f: Record, dt: float) -> None:
     _linear_rows(f, dt, f.Z, f.P, N)
 
 
-@inlined
+@compiled_inline
 def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
     """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for
     speed.
@@ -207,19 +206,19 @@ def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
             P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
 
 
-@side_by_side
+@compiled_for_vectors
 def add_pairs(f: Record) -> None:
     """Add ``H' H + E' E`` of the first six pairs of sigma points to P."""
     _add_pairs(f.P, f.H, f.E, 0)
 
 
-@side_by_side
+@compiled_for_vectors
 def add_more_pairs(f: Record) -> None:
     """Do the same with the next six."""
     _add_pairs(f.P, f.H, f.E, 6)
 
 
-@inlined
+@compiled_inline
 def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
     add_squares(P, H, k, 1.0)
     # only the first 12 rows of the model are nonlinear
@@ -247,7 +246,7 @@ def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
             P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
 
 
-@side_by_side
+@compiled_for_vectors
 def add_noise(f: Record, rotation: Array, dt: float) -> None:
     """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (16)."""
     P, J, c, B = f.P, f.body.inverse_inertia, f.body.com, f.B
@@ -285,7 +284,7 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
             P[i, j] += B[3, i] * B[3, j] + (B[4, i] * B[4, j] + B[5, i] * B[5, j])
 
 
-@side_by_side
+@compiled_for_vectors
 def whiten(f: Record) -> None:
     """Write the whitened cross covariance of the measurement (rho, x) into ``f.W`` and its part in
     the mean into ``f.mean``.
@@ -305,7 +304,7 @@ def whiten(f: Record) -> None:
         )
 
 
-@side_by_side
+@compiled_for_vectors
 def subtract_squares(f: Record) -> None:
     """Take ``W' W`` off P."""
     add_squares(f.P, f.W, 0, -1.0)

@@ -39,7 +39,7 @@ def _effects_at(
     f: Record, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array
 ) -> None:
     effect_wrench(
-        f.wrench_laws[: f.wrench_count],
+        f.wrench_models[: f.wrench_count],
         f.wrench_coefficients,
         f.constants,
         f.body,
@@ -61,7 +61,7 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
     """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into
     ``out`` (12, 6).
 
-    By central differences: a law is a black box behind an address.
+    By central differences: an effect model is a black box behind an address.
     """
     x, point, turned, minus = f.x, f.point, f.L[0:3, 0:3], f.W[0]
     for i in range(NIS):
@@ -220,7 +220,7 @@ def model_jacobian(f: Record, dt: float, A: Array) -> None:
 
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s."""
+    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s."""
     x, P, A, G = f.x, f.P, f.S, f.H
     drive(f, rotor_speeds, dt, voltage)
     propagate(f, x, dt, f.centre)

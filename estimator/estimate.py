@@ -91,7 +91,7 @@ class WrenchEstimator(Protocol):
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Predict over one period with the turn rates (4,) of that period, then take in the pose at
-        its end.
+        """Predict over one period with the rotor speeds (4,) of that period, then take in the pose
+        at its end.
         """
         ...

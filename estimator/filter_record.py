@@ -35,7 +35,7 @@ FILTER = np.dtype(
             "z",
             "f8",
             (11,),
-        ),  # turn rates, position and quaternion, for a step that is called from elsewhere
+        ),  # rotor speeds, position and quaternion, for a step that is called from elsewhere
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand
         ("centre_rotation", "f8", (3, 3)),

@@ -205,7 +205,7 @@ class NonlinearObserver:
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Go one period on with the turn rates of that period and the pose at its end.
+        """Go one period on with the rotor speeds of that period and the pose at its end.
 
         Args:
             rotor_speeds: (4,) rad/s.

@@ -1,4 +1,4 @@
-"""One sample on its way into an estimator: turn rates and pose, checked, and the estimate on its
+"""One sample on its way into an estimator: rotor speeds and pose, checked, and the estimate on its
 way out.
 """
 
@@ -17,7 +17,7 @@ POSITION, ATTITUDE = 1, 2  # the parts of a pose; their sum is both
 
 
 class Sample:
-    """A buffer (11,) of turn rates, position and quaternion that compiled code reads.
+    """A buffer (11,) of rotor speeds, position and quaternion that compiled code reads.
 
     Args:
         z: the buffer, contiguous; default: one of its own.
@@ -36,7 +36,7 @@ class Sample:
     def read(
         self, rotor_speeds: ArrayLike, position: ArrayLike | None, quaternion: ArrayLike | None
     ) -> int:
-        """Take in turn rates (4,) and what there is of a pose, (3,) and (4,); return its parts.
+        """Take in rotor speeds (4,) and what there is of a pose, (3,) and (4,); return its parts.
 
         Raises:
             InputError: a shape is wrong.
@@ -96,7 +96,7 @@ class Sample:
 def check_sample(f: Record, z: Array, parts: int) -> int:
     """Return the ``parts`` of ``z`` (11,) that can be used, or -1 if the quaternion is no rotation.
 
-    Turn rates that are not finite become the last ones that were; the quaternion is brought to
+    Rotor speeds that are not finite become the last ones that were; the quaternion is brought to
     length 1.
     """
     usable = 0
@@ -122,13 +122,13 @@ def check_sample(f: Record, z: Array, parts: int) -> int:
 def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
     """Return the checked ``parts`` of ``z`` (11,) as they were before the declared sensing effects.
 
-    Turn rates count where ``dt`` is positive. Where the attitude was not measured, the estimated
+    Rotor speeds count where ``dt`` is positive. Where the attitude was not measured, the estimated
     one stands in for it.
     """
     sample: Array = f.sample[0:11]
     for i in range(11):
         sample[i] = z[i]
-    if f.sense_count > 0:
+    if f.sensing_count > 0:
         if parts & 2 == 0:
             for i in range(4):
                 sample[7 + i] = f.x[3 + i]
@@ -140,7 +140,7 @@ def undo_sensing(f: Record, z: Array, parts: int, dt: float) -> Array:
 def undo_first_pose(record: Record) -> None:
     """Bring the pose of a new estimate to what it was before the declared sensing effects."""
     f = record[0]
-    if f.sense_count > 0:
+    if f.sensing_count > 0:
         for i in range(7):
             f.sample[4 + i] = f.x[i]
         rewrite_sample(f, 0.0, 3, -1.0)

@@ -8,15 +8,14 @@ for each number and a column for each point.
 
 import math
 
-from ..runtime.compiled import Record
+from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import any_of, choose
-from ..runtime.vector_loops import side_by_side
 
 PAIRS = 6  # columns of the root that turn or spin the vehicle
 POINTS = 2 * PAIRS  # forwards along each, then backwards
 
 
-@side_by_side
+@compiled_for_vectors
 def spread_points(f: Record, spread: float) -> None:
     """Write the points ``spread`` along the first columns of the root into ``f.points`` (19, 12),
     as ``displace`` does.
@@ -52,7 +51,7 @@ def spread_points(f: Record, spread: float) -> None:
             X[16 + i, k] = x[16 + i] + D[15 + i, k]
 
 
-@side_by_side
+@compiled_for_vectors
 def propagate_points(f: Record, dt: float) -> None:
     """Carry ``f.points`` (19, 12) ``dt`` s ahead, in place, as ``propagate`` does: (2)-(5),
     (11)-(14).
@@ -152,7 +151,7 @@ def propagate_points(f: Record, dt: float) -> None:
             X[10 + i, k] += dt * A[3 + i, k]
 
 
-@side_by_side
+@compiled_for_vectors
 def errors_of_points(f: Record) -> None:
     """Write the error states of ``f.points`` seen from ``f.centre`` into ``f.errors`` (18, 12), as
     ``error_from``, (24).
@@ -176,7 +175,7 @@ def errors_of_points(f: Record) -> None:
             D[15 + i, k] = X[16 + i, k] - c[16 + i]
 
 
-@side_by_side
+@compiled_for_vectors
 def halve_pairs(f: Record, scale: float, weight: float) -> None:
     """Write scaled half differences and half sums of each pair's errors, and their mean, into
     ``f.H``, ``f.E``, ``f.mean``.

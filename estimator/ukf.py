@@ -28,8 +28,7 @@ from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
-from ..runtime.compiled import Record, compiled
-from ..runtime.direct_call import direct
+from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose
 from .covariance import (
@@ -77,7 +76,7 @@ def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weigh
 
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at turn rates (4,) rad/s: (18)-(26)."""
+    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(26)."""
     drive(f, rotor_speeds, dt, voltage)
     if f.wrench_count == 0:
         quaternion_to_matrix(f.x[3:7], f.rotation)
@@ -234,8 +233,8 @@ class WrenchUKF:
 
     Call ``reset`` with a first pose, then ``step`` once a period; or ``predict`` and ``correct``
     with measurements that come at their own times. A measurement, or a part of it, that is None or
-    not finite was not made. The sign of a quaternion means nothing. Turn rates that are not finite
-    are taken to be the last ones that were.
+    not finite was not made. The sign of a quaternion means nothing. Rotor speeds that are not
+    finite are taken to be the last ones that were.
 
     Args:
         vehicle: the declared vehicle; its declared effects are part of the prediction model, and
@@ -376,8 +375,8 @@ class WrenchUKF:
         quaternion: ArrayLike | None = None,
         voltage: float | None = None,
     ) -> WrenchEstimate:
-        """Predict over one period with the turn rates of that period, then take in the pose at its
-        end.
+        """Predict over one period with the rotor speeds of that period, then take in the pose at
+        its end.
 
         Args:
             rotor_speeds: (4,) rad/s.
@@ -436,7 +435,7 @@ class WrenchUKF:
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         call = self._call
         if call is None:
-            call = self._call = direct(self._compiled_step, self.record, parts, dt, 0.0)
+            call = self._call = specialised(self._compiled_step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return WrenchEstimate(self._now.copy())

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import announced
-from ..runtime.direct_call import released
+from ..runtime.compiled import announced, compiled_without_gil
 from ..runtime.errors import InputError
 from .estimate import FORCE, NIS, POSITION, QUATERNION, RATE, STATE_SIZE, TORQUE, VELOCITY, Array
 from .filter_record import N
@@ -23,7 +22,7 @@ from .ukf import WrenchUKF, step
 from .ukf_lanes import Blocks
 
 
-@released
+@compiled_without_gil
 def _first_bad_quaternion(z: Array) -> int:
     """Return the first row of ``z`` (n, 11) whose quaternion is measured and no rotation, or -1."""
     for n in range(len(z)):
@@ -33,7 +32,7 @@ def _first_bad_quaternion(z: Array) -> int:
     return -1
 
 
-@released
+@compiled_without_gil
 def _step_records(
     records: np.ndarray, z: Array, parts: int, dt: float, voltage: Array, out: Array
 ) -> None:
@@ -229,8 +228,8 @@ class WrenchUKFBatch:
         quaternion: ArrayLike | None = None,
         voltage: ArrayLike | None = None,
     ) -> WrenchEstimates:
-        """Predict over one period with the turn rates of that period, then take in the poses at its
-        end.
+        """Predict over one period with the rotor speeds of that period, then take in the poses at
+        its end.
 
         Args:
             rotor_speeds: (n, 4) rad/s.

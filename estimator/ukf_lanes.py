@@ -1,5 +1,5 @@
 """Wrench filters side by side: the single filter's own functions, compiled for lanes
-(``dynamics.lanes``).
+(``runtime.vector_lanes``).
 
 Eight filters of one vehicle without effects make a block. Between steps a block is its estimates
 and covariances; what it works on in a step lies in one record for all blocks, so that a few hundred
@@ -13,8 +13,7 @@ import numpy as np
 
 from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
-from ..runtime.compiled import Record, compiled
-from ..runtime.direct_call import released
+from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
 from .estimate import STATE_SIZE, Array
 from .filter_record import FILTER, N
@@ -101,7 +100,7 @@ def _move_estimate(source: Record, target: Record) -> None:
     target.refused = source.refused
 
 
-@released
+@compiled_without_gil
 def _step_blocks(
     work: int, work_z: Array, blocks: int, estimates: Array, z: Array, dt: float, out: Array
 ) -> None:

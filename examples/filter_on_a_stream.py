@@ -34,7 +34,7 @@ class WrenchNode:
         self.now = None  # s, up to where the filter is; None before the first pose
 
     def on_motor_speeds(self, stamp, speeds):
-        """Keep turn rates (4,) rad/s; where no pose comes for too long, go on without."""
+        """Keep rotor speeds (4,) rad/s; where no pose comes for too long, go on without."""
         if not self.waiting or stamp > self.waiting[-1][0]:
             self.waiting.append((stamp, speeds))
         if self.now is not None:

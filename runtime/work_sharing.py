@@ -1,11 +1,11 @@
-"""Work that threads share out among themselves in compiled code: whoever is free takes the next
-piece.
+"""Tasks that threads share out among themselves in compiled code: whoever is free takes the next
+one.
 
-The turns of a piece of work are an array (3,) of whole numbers: pieces that were taken in hand,
-pieces that are done, and threads that no longer look whether there is more to do. A thread that
-sleeps takes 0.15 ms to wake, the work of one or two environments; so a helper looks for a while
-before it sleeps. Turns that open in the very moment in which it gives up do without it, and it is
-called back for the next.
+``tasks`` is an array (3,) of whole numbers, counted atomically: the tasks that were taken, the
+tasks that are done, and the threads that no longer look for tasks. A thread that sleeps takes
+0.15 ms to wake, as long as the work of one or two environments; so a helping thread looks for a
+while before it sleeps. Tasks that open in the very moment in which it gives up do without it, and
+it is called back for the next.
 """
 
 from typing import Any
@@ -15,10 +15,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from .compiled import compiled
-from .direct_call import released
+from .compiled import compiled, compiled_without_gil
 
-_LOOKS = 100_000  # at a number, some 0.2 ms: about as long as the last piece takes
+_LOOKS = 100_000  # at a number, some 0.2 ms: about as long as the last task takes
 PATIENCE = (
     5 * _LOOKS
 )  # of a helper, until the next work: a step's Python takes 0.1 ms, a small policy some tenths
@@ -59,54 +58,52 @@ def _take(_typing_context: Any, address: Any) -> Any:
 
 
 @compiled
-def take_turn(turns: np.ndarray) -> int:
-    """Return the number of the next piece of work, which nobody else has; beyond the last there is
-    none.
+def next_task(tasks: np.ndarray) -> int:
+    """Return the number of the next task, which no other thread has; a number beyond the last task
+    says that none is left.
     """
-    return _add_one(turns.ctypes.data)  # type: ignore[no-any-return]
+    return _add_one(tasks.ctypes.data)  # type: ignore[no-any-return]
 
 
 @compiled
-def turn_done(turns: np.ndarray) -> None:
-    """Say that a piece is done, and with it all that was written for it."""
-    _add_one(turns.ctypes.data + 8)
+def task_done(tasks: np.ndarray) -> None:
+    """Say that a task is done, and with it all that was written for it."""
+    _add_one(tasks.ctypes.data + 8)
 
 
 @compiled
-def more_turns(turns: np.ndarray, count: int, patience: int) -> bool:
-    """Return whether turns for ``count`` pieces open, and are not all taken, within ``patience``
-    looks.
-    """
+def tasks_open(tasks: np.ndarray, count: int, patience: int) -> bool:
+    """Return whether one of ``count`` tasks is, or comes to be, free within ``patience`` looks."""
     for _ in range(patience):  # noqa: SIM110  # slower as a generator
-        if _read(turns.ctypes.data) < count:
+        if _read(tasks.ctypes.data) < count:
             return True
     return False
 
 
 @compiled
-def leave(turns: np.ndarray) -> None:
-    """Say that this thread no longer looks for turns."""
-    _add_one(turns.ctypes.data + 16)
+def stop_looking(tasks: np.ndarray) -> None:
+    """Say that this thread no longer looks for tasks."""
+    _add_one(tasks.ctypes.data + 16)
 
 
-@released
-def open_turns(turns: np.ndarray) -> int:
-    """Let turns be taken from the first on; return how many threads had left, which are called back
-    now.
+@compiled_without_gil
+def open_tasks(tasks: np.ndarray) -> int:
+    """Let tasks be taken from the first on; return how many threads no longer look, which the
+    caller calls back.
 
-    Who takes a turn sees all that was written before this.
+    Who takes a task sees all that was written before this.
     """
-    _take(turns.ctypes.data + 8)
-    _take(turns.ctypes.data)
-    return _take(turns.ctypes.data + 16)  # type: ignore[no-any-return]
+    _take(tasks.ctypes.data + 8)
+    _take(tasks.ctypes.data)
+    return _take(tasks.ctypes.data + 16)  # type: ignore[no-any-return]
 
 
-@released
-def watch(turns: np.ndarray, count: int) -> bool:
-    """Return whether ``count`` pieces are done within a moment; this thread keeps its processor
+@compiled_without_gil
+def all_done(tasks: np.ndarray, count: int) -> bool:
+    """Return whether ``count`` tasks are done within a moment; this thread keeps its processor
     busy meanwhile.
     """
     for _ in range(_LOOKS):  # noqa: SIM110  # slower as a generator
-        if _read(turns.ctypes.data + 8) >= count:
+        if _read(tasks.ctypes.data + 8) >= count:
             return True
     return False

@@ -15,20 +15,20 @@ from ..envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
 from ..envs.native_functions import bits_address, normals_address
 from ..envs.plant import NOISE, SUBSTEPS, TICK, actuate, sense
 from ..runtime.addresses import call_at, call_step
-from ..runtime.direct_call import released
+from ..runtime.compiled import compiled_without_gil
 from .contenders import Section
 
 _REPEATS = 2000  # ticks
 
 
-@released
+@compiled_without_gil
 def _filter(loops: np.ndarray, count: int) -> None:
     loop = loops[0]
     for _ in range(count):
         call_step(loop.step, loop.filter, 3, TICK, loop.plant.battery)
 
 
-@released
+@compiled_without_gil
 def _jet(
     loops: np.ndarray,
     axial: Array,
@@ -56,7 +56,7 @@ def _jet(
         )
 
 
-@released
+@compiled_without_gil
 def _plant(
     loops: np.ndarray,
     axial: Array,
@@ -76,14 +76,14 @@ def _plant(
         actuate(plant, flight.command, loop.fan, axial, radial, qpos, qvel, noise, xfrc)
 
 
-@released
+@compiled_without_gil
 def _mujoco(loops: np.ndarray, count: int) -> None:
     loop = loops[0]
     for _ in range(count * SUBSTEPS):
         call_at(loop.mj_step, loop.model, loop.data)
 
 
-@released
+@compiled_without_gil
 def _normals(function: int, bits: int, out: Array, count: int) -> None:
     for _ in range(count):
         call_at(function, bits, out.size, out.ctypes.data)

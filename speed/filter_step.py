@@ -31,7 +31,7 @@ from ..estimator.estimate import Array
 from ..estimator.observer import NonlinearObserver
 from ..estimator.ukf import default_covariance
 from ..estimator.ukf import step as ukf_step
-from ..runtime.direct_call import released
+from ..runtime.compiled import compiled_without_gil
 
 Estimator = WrenchUKF | NonlinearObserver  # WrenchEKF and ConstantGainFilter are WrenchUKFs
 
@@ -233,7 +233,7 @@ def compiled_loop(run: ModelRun) -> Callable[[], float]:
     return measure
 
 
-@released
+@compiled_without_gil
 def _step_through(record: np.ndarray, samples: Array, dt: float) -> None:
     f = record[0]
     for k in range(len(samples)):

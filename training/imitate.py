@@ -23,7 +23,7 @@ from .configuration import Config, features_of
 from .learners import dense_weights
 from .seeds import training_seed, validation_seeds
 from .train import Progress, card_of, claim, read_progress, take_stock, write_json
-from .training_envs import check_world, make_world
+from .training_envs import check_training_env, make_training_env
 
 Array = NDArray[np.float32]
 
@@ -43,7 +43,7 @@ def imitate(
     Raises:
         InputError: as ``train``.
     """
-    check_world(scenario)
+    check_training_env(scenario)
     features = features_of(config)
     claim(folder, config, scenario, seed)
     done = read_progress(folder)
@@ -51,9 +51,9 @@ def imitate(
         return folder / "best.npz"
     torch.set_num_threads(1)
     torch.manual_seed(seed)
-    world = make_world(scenario, config["estimator"], features.sources)
+    env = make_training_env(scenario, config["estimator"], features.sources)
     judge, seeds = (
-        make_world(scenario, sources=features.sources),
+        make_training_env(scenario, sources=features.sources),
         validation_seeds(config["validation"]["episodes"]),
     )
     network = _network(features.size, config)
@@ -71,7 +71,7 @@ def imitate(
         )
         until = min(flown + per_round, config["steps"])
         while flown < until:
-            seen, said = _fly(world, pilot, oracle, config, training_seed(seed, 0, episode))
+            seen, said = _fly(env, pilot, oracle, config, training_seed(seed, 0, episode))
             inputs.append(seen)
             labels.append(said)
             flown += len(said)
@@ -104,14 +104,14 @@ def _weights(network: torch.nn.Sequential) -> Weights:
 
 
 def _fly(
-    world: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config, seed: int
+    env: Any, pilot: TrainedPolicy | None, oracle: Oracle, config: Config, seed: int
 ) -> tuple[Array, Array]:
     """Fly one episode (the oracle where there is no pilot); return what a policy saw (n, size) and
     was told (n,).
     """
     features = features_of(config)
     history = History(features, 1)
-    observation, info = world.reset(seed=seed)
+    observation, info = env.reset(seed=seed)
     if pilot is not None:
         pilot.reset()
     seen, said = [], []
@@ -131,7 +131,7 @@ def _fly(
             command = best
         if pilot is not None:
             command = pilot(observation, info)
-        observation, _, lost, _, info = world.step(command)
+        observation, _, lost, _, info = env.step(command)
         if lost:
             break
     return np.array(seen, dtype=np.float32), np.array(said, dtype=np.float32)

@@ -19,7 +19,7 @@ from ..runtime.errors import InputError
 from ..runtime.whole_files import replaced
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
-from .training_envs import check_world, make_world, make_worlds
+from .training_envs import check_training_env, make_training_env, make_training_envs
 
 _PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
 
@@ -75,11 +75,11 @@ def card_of(config: Config, scenario: str, seed: int, steps: int, squash: bool) 
     }
 
 
-def validate(policy: TrainedPolicy, world: Any, seeds: Sequence[int]) -> tuple[float, int]:
+def validate(policy: TrainedPolicy, env: Any, seeds: Sequence[int]) -> tuple[float, int]:
     """Fly validation episodes with the full filter; return the mean RMSE (m) and how many were
     lost.
     """
-    flown = [fly_episode(world, policy, seed) for seed in seeds]
+    flown = [fly_episode(env, policy, seed) for seed in seeds]
     return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
 
 
@@ -87,7 +87,7 @@ def take_stock(
     policy: TrainedPolicy,
     card: dict[str, Any],
     progress: Progress,
-    world: Any,
+    env: Any,
     seeds: Sequence[int],
     folder: Path,
 ) -> tuple[float, int]:
@@ -97,7 +97,7 @@ def take_stock(
     Returns:
         Its mean RMSE (m) and how many episodes were lost, as of ``validate``.
     """
-    rmse, lost = validate(policy, world, seeds)
+    rmse, lost = validate(policy, env, seeds)
     progress.steps.append(card["steps"])
     progress.rmse_m.append(rmse)
     progress.lost.append(lost)
@@ -173,19 +173,19 @@ def train(
     from .learners import make_learner, squashes, weights_of
     from .vec_env import FeatureVecEnv
 
-    check_world(scenario)
+    check_training_env(scenario)
     claim(folder, config, scenario, seed)
     features, algorithm = features_of(config), config["algorithm"]
-    worlds = make_worlds(
+    envs = make_training_envs(
         scenario, config["environments"], config["estimator"], config["repeat"], features.sources
     )
     env = FeatureVecEnv(
-        worlds, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
+        envs, features, lambda i, episode: training_seed(seed, i, episode), config["reward"]
     )
     learner = make_learner(config, env, seed)
     learner.set_logger(_logger(folder))
     judge, seeds = (
-        make_world(scenario, sources=features.sources),
+        make_training_env(scenario, sources=features.sources),
         validation_seeds(config["validation"]["episodes"]),
     )
     progress, checkpoint = Progress(), folder / "checkpoint.pt"

@@ -1,4 +1,4 @@
-"""The worlds that policies are trained in: a scenario, or a tier that mixes several."""
+"""The environments that policies are trained in: a scenario, or a tier that mixes several."""
 
 from typing import Any
 
@@ -34,8 +34,8 @@ TIERS: dict[str, tuple[str, ...]] = {
 }
 
 
-def check_world(name: str) -> None:
-    """Check the name of a training world.
+def check_training_env(name: str) -> None:
+    """Check the name of a training environment.
 
     Raises:
         InputError: neither a scenario nor a tier.
@@ -90,10 +90,10 @@ class Repeat(gym.Wrapper[Frame, Frame, Frame, Frame]):
         return frame, float(mean[0]), lost, over, info
 
 
-def make_world(
+def make_training_env(
     name: str, estimator: str = "ukf", sources: frozenset[str] = frozenset()
 ) -> gym.Env[Frame, Frame]:
-    """Return a training world.
+    """Return a training environment.
 
     Args:
         name: scenario or tier.
@@ -104,7 +104,7 @@ def make_world(
     Raises:
         InputError: a name that does not exist.
     """
-    check_world(name)
+    check_training_env(name)
     if name not in TIERS:
         return scenario_env(name, sources, estimator)
     if sources - TRUTH:
@@ -115,26 +115,30 @@ def make_world(
     return MixedFanTracking(TIERS[name], estimator=estimator)
 
 
-def make_worlds(
+def make_training_envs(
     name: str,
     count: int,
     estimator: str = "ukf",
     repeat: int = 1,
     sources: frozenset[str] = frozenset(),
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Return ``count`` training worlds side by side; whoever steps them resets those whose episode
-    has ended.
+    """Return ``count`` training environments side by side; whoever steps them resets those whose
+    episode has ended.
     """
     if DECISIONS % repeat:
         raise InputError(
             f"training: repeat must divide the {DECISIONS} decisions of an episode, got {repeat}"
         )
-    check_world(name)
+    check_training_env(name)
     if name in SCENARIOS and repeat == 1 and not sources - TRUTH:
         return FanTrackingVectorEnv(count, DECISIONS, scenario=name, estimator=estimator)
 
     def make() -> gym.Env[Frame, Frame]:
-        env = make_world(name, estimator, sources)
+        env = make_training_env(name, estimator, sources)
         return TimeLimit(Repeat(env, repeat) if repeat > 1 else env, DECISIONS // repeat)
 
     return SyncVectorEnv([make] * count, autoreset_mode=AutoresetMode.DISABLED)
+
+
+# their older names
+check_world, make_world, make_worlds = check_training_env, make_training_env, make_training_envs

@@ -12,7 +12,7 @@ from ..evaluation.episodes import fly_episode
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from .seeds import validation_seeds
-from .training_envs import check_world, make_world
+from .training_envs import check_training_env, make_training_env
 
 # the ranges searched, each on a logarithmic scale: far beyond what was seen to work
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
@@ -62,11 +62,11 @@ def tune(
     import optuna
 
     check_law(law)
-    check_world(scenario)
+    check_training_env(scenario)
     if trials < 1:
         raise InputError(f"tune: --trials must be at least 1, got {trials}")
     seeds = validation_seeds(episodes)
-    world: Any = make_world(scenario)
+    env: Any = make_training_env(scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:
@@ -76,7 +76,7 @@ def tune(
         }
         controller, rmse, lost = _LAWS[law](**gains), [], 0
         for k, one in enumerate(seeds):
-            episode = fly_episode(world, controller, one)
+            episode = fly_episode(env, controller, one)
             rmse.append(episode.rmse)
             lost += episode.lost
             if k + 1 == _PRUNE_AFTER:

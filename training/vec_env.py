@@ -1,4 +1,4 @@
-"""The training worlds as stable-baselines3 wants them, with the policy's features
+"""The training environments as stable-baselines3 wants them, with the policy's features
 for observations.
 """
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float32]
 
 
 class FeatureVecEnv(VecEnv):  # type: ignore[misc]
-    """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking worlds.
+    """An SB3 ``VecEnv`` over a Gymnasium vector environment of fan-tracking environments.
 
     Each environment on its own: where an episode ends, ``infos[i]["terminal_observation"]`` holds
     the features that ended it, ``infos[i]["TimeLimit.truncated"]`` says that only the clock ended

@@ -29,6 +29,7 @@ __all__ = [
     "compile_effects",
     "get",
     "law_in_words",
+    "model_in_words",
     "names",
     "parse_setting",
 ]
@@ -115,9 +116,12 @@ def get(name: str) -> Effect:
     return effect
 
 
-def law_in_words(name: str) -> str:
-    """Return what an effect's file says of its law, its docstring."""
+def model_in_words(name: str) -> str:
+    """Return what an effect's file says of its equation: its docstring."""
     return (_module(name).__doc__ or "").strip()
+
+
+law_in_words = model_in_words  # its older name
 
 
 def _module(name: str) -> ModuleType:
@@ -178,23 +182,23 @@ def parse_setting(text: str, vehicle: Vehicle | None = None) -> EffectSetting:
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A vehicle's effects, ready for compiled code: the addresses of laws and their coefficients,
-    kind by kind.
+    """A vehicle's effects, ready for compiled code: the addresses of effect models and their
+    coefficients, kind by kind.
     """
 
     vehicle: Vehicle  # with the body effects applied
-    constants: Array  # (VEHICLE_SIZE,) what laws may know of it
-    wrench_laws: np.ndarray  # (n,) int64 addresses
+    constants: Array  # (VEHICLE_SIZE,) what effect models may know of it
+    wrench_models: np.ndarray  # (n,) int64 addresses
     wrench_coefficients: Array  # (n, ROW_SIZE)
     wrench_hooks: (
         np.ndarray
-    )  # (n,) int64 addresses of what carries a law's own state on; 0: it has none
-    rotor_laws: np.ndarray  # (m,) int64 addresses
+    )  # (n,) int64 addresses of what carries an effect's own state on; 0: it has none
+    rotor_models: np.ndarray  # (m,) int64 addresses
     rotor_coefficients: Array  # (m, 8)
-    rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor laws need
-    sense_laws: np.ndarray  # (k,) int64 addresses
-    sense_coefficients: Array  # (k, 8)
-    sense_memory: int  # columns of the memory (k, sense_memory) that the sensing laws need
+    rotor_memory: int  # columns of the memory (m, rotor_memory) that the rotor models need
+    sensing_models: np.ndarray  # (k,) int64 addresses
+    sensing_coefficients: Array  # (k, 8)
+    sensing_memory: int  # columns of the memory (k, sensing_memory) that the sensing models need
 
 
 def compile_effects(vehicle: Vehicle) -> Bundle:
@@ -205,7 +209,7 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
         effect = get(setting.name)
         if effect.amend is not None:
             amended = effect.amend(amended, setting.coefficients)
-        if effect.law is not None:
+        if effect.model is not None:
             rows[effect.kind].append((effect, effect.vector(setting.coefficients)))
     rows["wrench"].sort(key=lambda row: not row[0].sets_wind)
     constants = np.concatenate(
@@ -228,14 +232,14 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
     assert constants.size == VEHICLE_SIZE
 
     def stack(kind: str, width: int) -> tuple[np.ndarray, Array, int]:
-        """Return addresses, coefficients (n, width) and the largest memory of a kind's laws."""
+        """Return addresses, coefficients (n, width) and the largest memory of a kind's models."""
         coefficients = np.zeros((len(rows[kind]), width))
         for i, (_, vector) in enumerate(rows[kind]):
             coefficients[i, : len(vector)] = vector
-        addresses = np.array([effect.law.address for effect, _ in rows[kind]], dtype=np.int64)
+        addresses = np.array([effect.model.address for effect, _ in rows[kind]], dtype=np.int64)
         return addresses, coefficients, max([1, *(effect.memory for effect, _ in rows[kind])])
 
-    laws, coefficients, _ = stack("wrench", ROW_SIZE)
+    models, coefficients, _ = stack("wrench", ROW_SIZE)
     hooks = np.array(
         [effect.advance.address if effect.advance else 0 for effect, _ in rows["wrench"]],
         dtype=np.int64,
@@ -243,7 +247,7 @@ def compile_effects(vehicle: Vehicle) -> Bundle:
     return Bundle(
         amended,
         constants,
-        laws,
+        models,
         coefficients,
         hooks,
         *stack("rotor input", PARAMETERS),

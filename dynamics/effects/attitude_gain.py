@@ -9,12 +9,12 @@ import math
 
 from numba import cfunc
 
-from .base import DIRECTION, HAS_QUATERNION, LAW, SAMPLE_QUATERNION, Coefficient, Effect
+from .base import DIRECTION, EFFECT_MODEL, HAS_QUATERNION, SAMPLE_QUATERNION, Coefficient, Effect
 from .parts import turn_attitude
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     if sample[HAS_QUATERNION] > 0.0:
         q = SAMPLE_QUATERNION
         w, x, y, z = sample[q], sample[q + 1], sample[q + 2], sample[q + 3]
@@ -41,5 +41,5 @@ EFFECT = Effect(
     confused_with=("rotor_drag", "body_drag", "thrust_scale", "mass"),
     excitation="horizontal accelerations of 2 m/s2 and more: its force goes with the tilt, that of "
     "drag with the velocity",
-    law=law,
+    model=effect_model,
 )

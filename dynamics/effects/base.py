@@ -1,24 +1,25 @@
 """The form of a physical effect, written once and used by the plant, the estimator and the residual
 of a log.
 
-An effect is one file in this folder with an ``EFFECT``. Its law is compiled to a C function that is
-called through its address, so that every user of it (a tick of the plant, a sigma point of the
-filter, a sample of a log) runs the same machine code and a new effect recompiles none of them.
-There are four kinds:
+An effect is one file in this folder with an ``EFFECT``. Its equation, the effect model, is compiled
+to a C function that is called through its address, so that every user of it (a tick of the plant, a
+sigma point of the filter, a sample of a log) runs the same machine code and a new effect recompiles
+none of them. There are four kinds:
 
 ``rotor input``
-    changes what the rotors really deliver. Law ``(c, vehicle, rotors, memory)``: rewrites the four
-    turn rates in ``rotors``, once a step, in the order in which the vehicle lists the effects.
+    changes what the rotors really deliver. Model ``(c, vehicle, rotors, memory)``: rewrites the
+    four rotor speeds in ``rotors``, once a step, in the order in which the vehicle lists the
+    effects.
 ``wrench``
-    adds force (world frame) and torque (body frame, about the centre of mass). Law
+    adds force (world frame) and torque (body frame, about the centre of mass). Model
     ``(c, vehicle, state, wrench)``: adds to the six numbers in ``wrench``. It is asked many times a
     step. One that has a state of its own keeps it in ``c`` from ``HIDDEN`` on, all zero at the
     start, and carries it on in ``advance(c, vehicle, state, rotors)``, called once a step before
-    the law is asked; ``rotors[STEP]`` is the step's length.
+    the model is asked; ``rotors[STEP]`` is the step's length.
 ``body``
     changes the rigid body itself. ``amend(vehicle, coefficients)`` returns the changed vehicle.
 ``sensing``
-    changes what the log holds. Law ``(c, vehicle, sample, memory)``: rewrites the parts of
+    changes what the log holds. Model ``(c, vehicle, sample, memory)``: rewrites the parts of
     ``sample`` that are there, from the truth to what is reported where ``sample[DIRECTION]`` is +1
     (the plant), and back where it is -1 (an estimator that knows of the effect).
 
@@ -40,9 +41,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
-LAW = types.void(_POINTER, _POINTER, _POINTER, _POINTER)
+EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
+LAW = EFFECT_MODEL  # its older name, in effects that users have written
 
-# vehicle: what a law may know of it
+# vehicle: what a model may know of it
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
 COM = 7  # 3, m
 ROTOR_POSITION = 10  # 4 x 3, m, from the geometric centre
@@ -50,7 +52,7 @@ SPIN = 22  # 4, turning sense about body +z
 REACTION = 26  # 4, Nm/(rad/s)^2
 VEHICLE_SIZE = 30
 
-# state of the flight at which a wrench law is asked
+# state of the flight at which a wrench model is asked
 POSITION = 0  # 3, m, world, of the geometric centre
 ROTATION = 3  # 3 x 3, body to world
 VELOCITY = 12  # 3, m/s, world
@@ -63,18 +65,18 @@ TIME = 30  # s
 ROTOR_ACCELERATION = 31  # 4, rad/s2, delivered, mean over the step
 STATE_SIZE = 35
 
-# rotors: the turn rates that a rotor-input law rewrites, and what it may know
+# rotors: the rotor speeds that a rotor-input model rewrites, and what it may know
 SPEED = 0  # 4, rad/s
-STEP = 4  # s, since the law was last called
+STEP = 4  # s, since the model was last called
 ROTOR_VOLTAGE = 5  # V; 0: not known
 ROTOR_TIME = 6  # s, since the start
 ROTORS_SIZE = 7
 
-# sample: what a sensing law rewrites, and what it may know
+# sample: what a sensing model rewrites, and what it may know
 SAMPLE_SPEED = 0  # 4, rad/s
 SAMPLE_POSITION = 4  # 3, m, world
 SAMPLE_QUATERNION = 7  # 4, body to world
-SAMPLE_STEP = 11  # s, since the law was last called
+SAMPLE_STEP = 11  # s, since the model was last called
 HAS_SPEED, HAS_POSITION, HAS_QUATERNION = (
     12,
     13,
@@ -83,12 +85,12 @@ HAS_SPEED, HAS_POSITION, HAS_QUATERNION = (
 DIRECTION = 15  # +1: from truth to report, -1: back
 SAMPLE_SIZE = 16
 
-PARAMETERS = 8  # coefficients that a law may have
-HIDDEN = 8  # where a wrench law's own state starts in ``c``
-ROW_SIZE = 16  # of ``c`` of a wrench law
+PARAMETERS = 8  # coefficients that an effect may have
+HIDDEN = 8  # where a wrench effect's own state starts in ``c``
+ROW_SIZE = 16  # of ``c`` of a wrench effect
 
 
-# what the coefficient ``central`` means in laws that act rotor by rotor: it draws the rotors
+# what the coefficient ``central`` means in effects that act rotor by rotor: it draws the rotors
 # towards the centre
 CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the geometric centre"
 
@@ -109,8 +111,8 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its law, coefficients and source. The docstring of its file states the
-    law.
+    """A physical effect: its model, coefficients and source. The docstring of its file states the
+    equation.
 
     ``confused_with`` names the effects that can leave much the same traces in a log, and
     ``excitation`` says what flight tells them apart.
@@ -122,15 +124,22 @@ class Effect:
     source: str
     confused_with: tuple[str, ...]
     excitation: str
-    law: Any = None  # compiled C function, for rotor input, wrench and sensing
+    model: Any = None  # compiled C function, for rotor input, wrench and sensing
     advance: Any = None  # compiled C function, for a wrench that has a state of its own
-    # numbers that a rotor-input or sensing law keeps from step to step; all zero before its first
+    # numbers that a rotor-input or sensing model keeps from step to step; all zero before its first
     memory: int = 0
     sets_wind: bool = (
-        False  # a wrench law that changes the wind in ``state``: asked before all others
+        False  # a wrench effect that changes the wind in ``state``: asked before all others
     )
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
+    law: Any = None  # the older name of ``model``, in effects that users have written
+
+    def __post_init__(self) -> None:
+        """Let ``model`` and ``law`` be the same, whichever was given."""
+        model = self.law if self.model is None else self.model
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "law", model)
 
     def vector(self, coefficients: Mapping[str, float]) -> Array:
-        """Return the coefficients in the law's order; those not given are zero."""
+        """Return the coefficients in the model's order; those not given are zero."""
         return np.array([float(coefficients.get(c.name, 0.0)) for c in self.coefficients])

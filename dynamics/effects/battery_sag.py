@@ -1,17 +1,17 @@
-"""Battery sag: at a given logged turn rate the rotors deliver less as the battery voltage falls.
+"""Battery sag: at a given logged rotor speed the rotors deliver less as the battery voltage falls.
 
-Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered turn rate is W (V /
-voltage_ref)^(n/2). It applies where the turn rates are commands, or worked out from commands at the
-reference voltage. Nothing changes where the voltage is not known.
+Thrust and reaction torque scale by (V / voltage_ref)^n: the delivered rotor speed is W (V /
+voltage_ref)^(n/2). It applies where the rotor speeds are commands, or worked out from commands at
+the reference voltage. Nothing changes where the voltage is not known.
 """
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect
+from .base import EFFECT_MODEL, ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     if rotors[ROTOR_VOLTAGE] > 0.0 and vehicle[VOLTAGE_REF] > 0.0:
         scale = (rotors[ROTOR_VOLTAGE] / vehicle[VOLTAGE_REF]) ** (0.5 * c[0])
         for i in range(4):
@@ -30,5 +30,5 @@ EFFECT = Effect(
     "a regulated drive",
     confused_with=("thrust_scale", "thrust_fade", "mass"),
     excitation="a whole battery, with loads that come and go, and the voltage in the log",
-    law=law,
+    model=effect_model,
 )

@@ -9,15 +9,15 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, Coefficient, Effect
-from .parts import air_velocity, push
+from .base import EFFECT_MODEL, Coefficient, Effect
+from .parts import add_force_at, air_velocity
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     x, y, z = air_velocity(state, 0.0, 0.0, 0.0)
     speed = math.sqrt(x * x + y * y + z * z)
-    push(
+    add_force_at(
         vehicle,
         state,
         wrench,
@@ -58,6 +58,6 @@ EFFECT = Effect(
     confused_with=("rotor_drag", "inflow_thrust", "wind"),
     excitation="several speeds up to 2 m/s and more for the quadratic part, at several loads "
     "(climbs, hard turns) to tell "
-    "it from rotor drag, whose force grows with the turn rates",
-    law=law,
+    "it from rotor drag, whose force grows with the rotor speeds",
+    model=effect_model,
 )

@@ -1,4 +1,4 @@
-"""Calling compiled effect laws by address, from compiled code."""
+"""Calling compiled effect models by address, from compiled code."""
 
 from typing import Any
 
@@ -39,14 +39,14 @@ def _call(typing_context: Any, address: Any, a: Any, b: Any, c: Record, d: Any) 
 
 @compiled
 def add_wrenches(
-    laws: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array
+    models: np.ndarray, coefficients: Array, vehicle: Array, state: Array, wrench: Array
 ) -> None:
-    """Add what every wrench law says at ``state`` to ``wrench`` (6,): force in the world, torque in
-    the body frame.
+    """Add what every wrench effect says at ``state`` to ``wrench`` (6,): force in the world, torque
+    in the body frame.
     """
-    for i in range(len(laws)):
+    for i in range(len(models)):
         _call(
-            laws[i],
+            models[i],
             coefficients[i].ctypes.data,
             vehicle.ctypes.data,
             state.ctypes.data,
@@ -56,7 +56,7 @@ def add_wrenches(
 
 @compiled
 def deliver(
-    laws: np.ndarray,
+    models: np.ndarray,
     coefficients: Array,
     vehicle: Array,
     memory: Array,
@@ -64,15 +64,15 @@ def deliver(
     voltage: float,
     rotors: Array,
 ) -> None:
-    """Rewrite the turn rates ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
+    """Rewrite the rotor speeds ``rotors[:4]`` (rad/s) to those that the rotors really deliver.
 
     ``rotors`` is (ROTORS_SIZE,) with its time filled in.
     """
     rotors[STEP] = dt
     rotors[ROTOR_VOLTAGE] = voltage
-    for i in range(len(laws)):
+    for i in range(len(models)):
         _call(
-            laws[i],
+            models[i],
             coefficients[i].ctypes.data,
             vehicle.ctypes.data,
             rotors.ctypes.data,
@@ -84,7 +84,7 @@ def deliver(
 def advance(
     hooks: np.ndarray, coefficients: Array, vehicle: Array, state: Array, rotors: Array
 ) -> None:
-    """Carry the own states of the wrench laws on by ``rotors[STEP]`` s in a ``state`` that is
+    """Carry the own states of the wrench effects on by ``rotors[STEP]`` s in a ``state`` that is
     filled in.
     """
     for i in range(len(hooks)):
@@ -100,7 +100,7 @@ def advance(
 
 @compiled
 def report(
-    laws: np.ndarray,
+    models: np.ndarray,
     coefficients: Array,
     vehicle: Array,
     memory: Array,
@@ -112,16 +112,16 @@ def report(
     """Rewrite ``sample`` (SAMPLE_SIZE,) from truth to report (``direction`` +1), or back (-1), in
     the reverse order.
 
-    ``parts``: 1 position, 2 attitude, 4 turn rates.
+    ``parts``: 1 position, 2 attitude, 4 rotor speeds.
     """
     sample[SAMPLE_STEP], sample[DIRECTION] = dt, direction
     sample[HAS_POSITION] = 1.0 if parts & 1 != 0 else 0.0
     sample[HAS_QUATERNION] = 1.0 if parts & 2 != 0 else 0.0
     sample[HAS_SPEED] = 1.0 if parts & 4 != 0 else 0.0
-    for n in range(len(laws)):
-        i = n if direction > 0.0 else len(laws) - 1 - n
+    for n in range(len(models)):
+        i = n if direction > 0.0 else len(models) - 1 - n
         _call(
-            laws[i],
+            models[i],
             coefficients[i].ctypes.data,
             vehicle.ctypes.data,
             sample.ctypes.data,

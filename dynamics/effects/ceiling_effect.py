@@ -1,4 +1,4 @@
-"""Ceiling effect: a rotor near the ceiling delivers more thrust at the same turn rate.
+"""Ceiling effect: a rotor near the ceiling delivers more thrust at the same rotor speed.
 
 Thrust of a rotor at distance d below ``ceiling_z`` is multiplied by 1 / (1 - rho (R / (4 d))^2),
 the mirror image of the ``ground_effect``. Applied rotor by rotor, so a tilted vehicle feels a
@@ -11,7 +11,7 @@ from numba import cfunc
 from .base import (
     CEILING,
     CENTRAL,
-    LAW,
+    EFFECT_MODEL,
     POSITION,
     ROTATION,
     ROTOR_POSITION,
@@ -20,11 +20,11 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .parts import push
+from .parts import add_force_at
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     if not vehicle[CEILING] < 1e6:
         return
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
@@ -35,7 +35,7 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         distance = vehicle[CEILING] - state[POSITION + 2]
         distance -= state[ROTATION + 6] * x + state[ROTATION + 7] * y + state[ROTATION + 8] * z
         ratio = min(scale / (distance * distance), 0.5) if distance > 1e-3 else 0.5
-        push(
+        add_force_at(
             vehicle,
             state,
             wrench,
@@ -61,5 +61,5 @@ EFFECT = Effect(
     "ground",
     confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several distances from the ceiling, the nearest of one to two rotor diameters",
-    law=law,
+    model=effect_model,
 )

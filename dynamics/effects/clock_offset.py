@@ -1,18 +1,18 @@
-"""Clock offset: pose and turn rates of one row of the log are not of the same instant.
+"""Clock offset: pose and rotor speeds of one row of the log are not of the same instant.
 
-With dt > 0 the pose is that of dt earlier than the turn rates; with dt < 0 the turn rates are those
-of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays the
-other of the two, and so estimates the flight of dt ago.
+With dt > 0 the pose is that of dt earlier than the rotor speeds; with dt < 0 the rotor speeds are
+those of -dt earlier than the pose. Between samples by a cubic. An estimator that knows of it delays
+the other of the two, and so estimates the flight of dt ago.
 """
 
 from numba import cfunc
 
 from .base import (
     DIRECTION,
+    EFFECT_MODEL,
     HAS_POSITION,
     HAS_QUATERNION,
     HAS_SPEED,
-    LAW,
     SAMPLE_POSITION,
     SAMPLE_QUATERNION,
     SAMPLE_SPEED,
@@ -26,8 +26,8 @@ _POSES = 13  # kept, 0.06 s at 200 Hz
 _SPEEDS = 22
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     wanted = c[0] * sample[DIRECTION]
     memory[1] += sample[SAMPLE_STEP]
     if wanted > 0.0:
@@ -57,7 +57,7 @@ EFFECT = Effect(
             "dt",
             "s",
             (0.03, 0.02),
-            "by which the pose is older than the turn rates",
+            "by which the pose is older than the rotor speeds",
             minimum=-0.06,
             maximum=0.06,
         ),
@@ -66,6 +66,6 @@ EFFECT = Effect(
     confused_with=("latency", "motor_lag"),
     excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency "
     "leave the same log",
-    law=law,
+    model=effect_model,
     memory=2 + max(8 * _POSES, 5 * _SPEEDS),
 )

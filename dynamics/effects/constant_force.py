@@ -2,11 +2,11 @@
 
 from numba import cfunc
 
-from .base import LAW, Coefficient, Effect
+from .base import EFFECT_MODEL, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[i] += c[i]
 
@@ -22,5 +22,5 @@ EFFECT = Effect(
     excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; "
     "in hover fz is a mass or a "
     "thrust scale",
-    law=law,
+    model=effect_model,
 )

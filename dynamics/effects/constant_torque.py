@@ -4,11 +4,11 @@ propellers).
 
 from numba import cfunc
 
-from .base import LAW, Coefficient, Effect
+from .base import EFFECT_MODEL, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[3 + i] += c[i]
 
@@ -23,5 +23,5 @@ EFFECT = Effect(
     confused_with=("com_offset", "rotor_efficiency"),
     excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows "
     "with thrust",
-    law=law,
+    model=effect_model,
 )

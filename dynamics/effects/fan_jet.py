@@ -1,11 +1,11 @@
 """Fan jet: the jet of a drum fan, and the drag of a vehicle in it.
 
-The mean wind is that of ``dynamics.jet``: ``u^2 = u0^2 (annular disc) * Gaussian``, with the inflow
-that continuity asks for. The fan stands at (x, y, z) m and blows horizontally, along world x turned
-by ``heading`` about the vertical. Drag acts at stations, each in its own wind, which is why a
-symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F = 0.6 kg/m3 * area / 8
-|u| u at each of eight points of a ring on the hull, u being the wind relative to the station. It is
-the law of the fan-tracking environment without its gusts.
+The mean wind is that of ``dynamics.mean_jet``: ``u^2 = u0^2 (annular disc) * Gaussian``, with the
+inflow that continuity asks for. The fan stands at (x, y, z) m and blows horizontally, along world x
+turned by ``heading`` about the vertical. Drag acts at stations, each in its own wind, which is why
+a symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F = 0.6 kg/m3 * area /
+8 |u| u at each of eight points of a ring on the hull, u being the wind relative to the station. It
+is the jet of the fan-tracking environment without its gusts.
 """
 
 import math
@@ -14,8 +14,17 @@ import numpy as np
 from numba import cfunc
 
 from ..mean_jet import AIR_DENSITY, FIRST_X, HULL_RADIUS, HULL_STATIONS, STEP_R, STEP_X, jet_table
-from .base import LAW, POSITION, RATE, ROTATION, ROTOR_POSITION, VELOCITY, Coefficient, Effect
-from .parts import push
+from .base import (
+    EFFECT_MODEL,
+    POSITION,
+    RATE,
+    ROTATION,
+    ROTOR_POSITION,
+    VELOCITY,
+    Coefficient,
+    Effect,
+)
+from .parts import add_force_at
 
 _AXIAL, _RADIAL = jet_table(0.45, 0.10)
 _ROWS, _COLUMNS = _AXIAL.shape
@@ -23,8 +32,8 @@ _ANGLES = np.arange(HULL_STATIONS) * math.pi / 4
 _RING_X, _RING_Y = HULL_RADIUS * np.cos(_ANGLES), HULL_RADIUS * np.sin(_ANGLES)
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     cosine, sine = math.cos(c[4]), math.sin(c[4])
     hull = 0.5 * AIR_DENSITY * c[6] / HULL_STATIONS
     R = ROTATION
@@ -61,10 +70,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         by = state[R + 1] * ax + state[R + 4] * ay + state[R + 7] * az - (wz * sx - wx * sz)
         bz = state[R + 2] * ax + state[R + 5] * ay + state[R + 8] * az - (wx * sy - wy * sx)
         if n < 4:
-            push(vehicle, state, wrench, sx, sy, sz, c[5] * bx, c[5] * by, 0.0)
+            add_force_at(vehicle, state, wrench, sx, sy, sz, c[5] * bx, c[5] * by, 0.0)
         else:
             scale = hull * math.sqrt(bx * bx + by * by + bz * bz)
-            push(vehicle, state, wrench, sx, sy, sz, scale * bx, scale * by, scale * bz)
+            add_force_at(vehicle, state, wrench, sx, sy, sz, scale * bx, scale * by, scale * bz)
 
 
 EFFECT = Effect(
@@ -95,5 +104,5 @@ EFFECT = Effect(
     excitation="flight across the jet and out of it: force and torque depend on the place; its "
     "still-air drag is like "
     "rotor and body drag",
-    law=law,
+    model=effect_model,
 )

@@ -7,12 +7,12 @@ body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``r
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .base import EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
 from .parts import air_velocity
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
         x = vehicle[ROTOR_POSITION + 3 * i]
         y = vehicle[ROTOR_POSITION + 3 * i + 1]
@@ -32,5 +32,5 @@ EFFECT = Effect(
     confused_with=("com_offset", "rotor_drag"),
     excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and "
     "changes sign with it",
-    law=law,
+    model=effect_model,
 )

@@ -1,9 +1,9 @@
-"""Ground effect: a rotor near the floor delivers more thrust at the same turn rate.
+"""Ground effect: a rotor near the floor delivers more thrust at the same rotor speed.
 
 Thrust of a rotor at height z above the floor is multiplied by 1 / (1 - rho (R / (4 z))^2),
-Cheeseman and Bennett's law for rho = 1; rho of about 3 was measured for whole quadrotors. Applied
-rotor by rotor, so a tilted vehicle feels a torque. The height is taken as no less than where the
-factor reaches 2, as the law has a pole below it.
+Cheeseman and Bennett's equation for rho = 1; rho of about 3 was measured for whole quadrotors.
+Applied rotor by rotor, so a tilted vehicle feels a torque. The height is taken as no less than
+where the factor reaches 2, as the equation has a pole below it.
 """
 
 from numba import cfunc
@@ -11,8 +11,8 @@ from numba import cfunc
 from .base import (
     CENTRAL,
     COM,
+    EFFECT_MODEL,
     FLOOR,
-    LAW,
     POSITION,
     ROTATION,
     ROTOR_POSITION,
@@ -23,8 +23,8 @@ from .base import (
 )
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     if not vehicle[FLOOR] > -1e6:
         return
     scale = c[0] * (0.25 * vehicle[ROTOR_RADIUS]) ** 2
@@ -63,5 +63,5 @@ EFFECT = Effect(
     "Aerospace Eng. 2017",
     confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several heights, the lowest of one to two rotor diameters",
-    law=law,
+    model=effect_model,
 )

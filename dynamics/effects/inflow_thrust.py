@@ -7,18 +7,18 @@ applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of 
 
 from numba import cfunc
 
-from .base import CENTRAL, LAW, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
-from .parts import air_velocity, push
+from .base import CENTRAL, EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .parts import add_force_at, air_velocity
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
         x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
         y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
         z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         uz = air_velocity(state, x, y, z)[2]
-        push(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
+        add_force_at(vehicle, state, wrench, x, y, z, 0.0, 0.0, -c[0] * state[ROTOR_SPEED + i] * uz)
 
 
 EFFECT = Effect(
@@ -34,5 +34,5 @@ EFFECT = Effect(
     confused_with=("body_drag", "rate_damping"),
     excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping "
     "torque",
-    law=law,
+    model=effect_model,
 )

@@ -9,8 +9,8 @@ from numba import cfunc
 
 from .base import (
     DIRECTION,
+    EFFECT_MODEL,
     HAS_POSITION,
-    LAW,
     SAMPLE_POSITION,
     SAMPLE_QUATERNION,
     Coefficient,
@@ -18,8 +18,8 @@ from .base import (
 )
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     if sample[HAS_POSITION] > 0.0:
         q = SAMPLE_QUATERNION
         w, x, y, z = sample[q], sample[q + 1], sample[q + 2], sample[q + 3]
@@ -43,5 +43,5 @@ EFFECT = Effect(
     excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the "
     "point swings about "
     "the centre. An offset centre of mass also makes a torque in hover; this does not",
-    law=law,
+    model=effect_model,
 )

@@ -1,4 +1,4 @@
-"""Motor lag: the rotors follow the logged (commanded) turn rates as a first-order system.
+"""Motor lag: the rotors follow the logged (commanded) rotor speeds as a first-order system.
 
 dW/dt = (W_logged - W) / tau, integrated exactly over a step at constant W_logged; the rotors start
 at the first W_logged.
@@ -8,12 +8,12 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, STEP, Coefficient, Effect
+from .base import EFFECT_MODEL, STEP, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
-    # memory: 0 whether the rotors have started, 1-4 their turn rates
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+    # memory: 0 whether the rotors have started, 1-4 their rotor speeds
     blend = 1.0 - math.exp(-rotors[STEP] / c[0]) if c[0] > 0.0 and memory[0] > 0.0 else 1.0
     memory[0] = 1.0
     for i in range(4):
@@ -32,6 +32,6 @@ EFFECT = Effect(
     confused_with=("latency", "clock_offset", "rotor_inertia"),
     excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight "
     "shows neither",
-    law=law,
+    model=effect_model,
     memory=5,
 )

@@ -1,4 +1,4 @@
-"""Parts that several laws share, on the pointers that a law is given."""
+"""Parts that several effect models share, on the pointers that a model is given."""
 
 import math
 from typing import Any
@@ -45,7 +45,7 @@ def air_velocity(state: Pointer, x: float, y: float, z: float) -> tuple[float, f
 
 
 @compiled
-def push(
+def add_force_at(
     vehicle: Pointer,
     state: Pointer,
     wrench: Pointer,

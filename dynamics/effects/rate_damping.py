@@ -2,11 +2,11 @@
 
 from numba import cfunc
 
-from .base import LAW, RATE, Coefficient, Effect
+from .base import EFFECT_MODEL, RATE, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[3 + i] -= c[i] * state[RATE + i]
 
@@ -22,5 +22,5 @@ EFFECT = Effect(
     confused_with=("inflow_thrust", "rotor_drag", "inertia", "motor_lag"),
     excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little "
     "translation",
-    law=law,
+    model=effect_model,
 )

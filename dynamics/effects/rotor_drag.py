@@ -1,5 +1,5 @@
 """Rotor drag: a force in the rotor plane against the motion of each rotor through the air, times
-its turn rate.
+its rotor speed.
 
 At rotor i, at body velocity u_i = R'(v - wind) + omega x r_i: F_i = -W_i diag(kdx, kdy, 0) u_i,
 applied at the rotor.
@@ -10,7 +10,7 @@ from numba import cfunc
 from .base import (
     CENTRAL,
     COM,
-    LAW,
+    EFFECT_MODEL,
     RATE,
     ROTATION,
     ROTOR_POSITION,
@@ -22,8 +22,8 @@ from .base import (
 )
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     ax = state[VELOCITY] - state[WIND]
     ay = state[VELOCITY + 1] - state[WIND + 1]
     az = state[VELOCITY + 2] - state[WIND + 2]
@@ -68,6 +68,6 @@ EFFECT = Effect(
     confused_with=("body_drag", "attitude_gain", "flapping_moment", "wind"),
     excitation="horizontal flight at 1 m/s and more along both body axes, at several loads "
     "(climbs, hard turns): rotor drag "
-    "grows with the turn rates, body drag does not",
-    law=law,
+    "grows with the rotor speeds, body drag does not",
+    model=effect_model,
 )

@@ -1,6 +1,6 @@
-"""Rotor efficiency: single rotors deliver more or less than declared at the same turn rate.
+"""Rotor efficiency: single rotors deliver more or less than declared at the same rotor speed.
 
-Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered turn rate is W_i sqrt(1 +
+Thrust and reaction torque of rotor i scale by 1 + e_i: the delivered rotor speed is W_i sqrt(1 +
 e_i).
 """
 
@@ -8,11 +8,11 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, Coefficient, Effect
+from .base import EFFECT_MODEL, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     for i in range(4):
         rotors[i] *= math.sqrt(max(1.0 + c[i], 0.0))
 
@@ -36,5 +36,5 @@ EFFECT = Effect(
     excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady "
     "torque stays, and an offset "
     "centre of mass makes no yaw torque",
-    law=law,
+    model=effect_model,
 )

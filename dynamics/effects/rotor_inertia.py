@@ -1,16 +1,16 @@
 """Rotor inertia: the torque that it takes to spin rotors up and to turn them with the body.
 
 With the angular momentum h = jr sum spin_i W_i along body z: tau = -dh/dt e_z - omega x h e_z in
-body axes, W being delivered turn rates and dW/dt their mean over the step.
+body axes, W being delivered rotor speeds and dW/dt their mean over the step.
 """
 
 from numba import cfunc
 
-from .base import LAW, RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect
+from .base import EFFECT_MODEL, RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     momentum = 0.0
     for i in range(4):
         momentum += c[0] * vehicle[SPIN + i] * state[ROTOR_SPEED + i]
@@ -31,5 +31,5 @@ EFFECT = Effect(
     confused_with=("motor_lag", "inertia", "latency"),
     excitation="quick changes of yaw rate: rotors that speed up turn the body at once, before "
     "their drag does",
-    law=law,
+    model=effect_model,
 )

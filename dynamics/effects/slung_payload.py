@@ -4,13 +4,13 @@ The load is a point mass m on a massless cable of length l that stays taut. With
 from vehicle to load, f = (sum of thrusts) R e_z / M the specific force of the rotors and a =
 damping (v + l n' - wind) the load's drag in the air by its mass, the cable's tension is T = (l
 |n'|^2 - n (f + a)) / (1/m + 1/M), no less than zero. It pulls the vehicle with T n, and the load
-swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the law's own state, carried on once a
+swings by l n'' = -f - a - T n (1/m + 1/M). n and n' are the effect's own state, carried on once a
 step; they start at rest, straight down. In hover it pulls with the load's weight.
 
 It holds while the cable is taut. Forces on the vehicle other than thrust and weight (its drag, say)
 are left out of the swing. No measurement corrects the swing: how it was at the start is forgotten,
 and an error of its phase dies out, at half the damping. With a damping well below 1/s a real load
-drifts out of phase with the law, which then may explain less than ``mass`` with the same mass.
+drifts out of phase with the equation, which then may explain less than ``mass`` with the same mass.
 """
 
 import math
@@ -18,8 +18,8 @@ import math
 from numba import cfunc
 
 from .base import (
+    EFFECT_MODEL,
     HIDDEN,
-    LAW,
     MASS,
     ROTATION,
     ROTOR_THRUST,
@@ -29,14 +29,14 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .parts import push
+from .parts import add_force_at
 
-# the law's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
+# the effect's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
 _N, _RATE = HIDDEN + 1, HIDDEN + 4
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     if not (c[0] > 0.0 and c[1] > 0.0):
         return
     specific = 0.0
@@ -56,10 +56,10 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     bx = state[ROTATION] * nx + state[ROTATION + 3] * ny + state[ROTATION + 6] * nz
     by = state[ROTATION + 1] * nx + state[ROTATION + 4] * ny + state[ROTATION + 7] * nz
     bz = state[ROTATION + 2] * nx + state[ROTATION + 5] * ny + state[ROTATION + 8] * nz
-    push(vehicle, state, wrench, 0.0, 0.0, 0.0, tension * bx, tension * by, tension * bz)
+    add_force_at(vehicle, state, wrench, 0.0, 0.0, 0.0, tension * bx, tension * by, tension * bz)
 
 
-@cfunc(LAW, cache=True)
+@cfunc(EFFECT_MODEL, cache=True)
 def advance(c, vehicle, state, rotors):  # type: ignore[no-untyped-def]
     if not (c[0] > 0.0 and c[1] > 0.0):
         return
@@ -113,6 +113,6 @@ EFFECT = Effect(
     excitation="horizontal starts and stops, then hover: the load goes on swinging at its own "
     "frequency, which gives the "
     "cable's length",
-    law=law,
+    model=effect_model,
     advance=advance,
 )

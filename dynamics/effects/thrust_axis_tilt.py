@@ -10,7 +10,7 @@ import math
 from numba import cfunc
 
 from .base import (
-    LAW,
+    EFFECT_MODEL,
     REACTION,
     ROTOR_POSITION,
     ROTOR_SPEED,
@@ -19,11 +19,11 @@ from .base import (
     Coefficient,
     Effect,
 )
-from .parts import push
+from .parts import add_force_at
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     angle = math.sqrt(c[0] * c[0] + c[1] * c[1])
     if angle < 1e-12:
         return
@@ -36,7 +36,7 @@ def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         tz -= vehicle[SPIN + i] * vehicle[REACTION + i] * speed * speed
     # Rodrigues' formula about the axis (x, y, 0)
     x, y, sine, rest = c[0] / angle, c[1] / angle, math.sin(angle), 1.0 - math.cos(angle)
-    push(
+    add_force_at(
         vehicle, state, wrench, 0.0, 0.0, 0.0, thrust * sine * y, -thrust * sine * x, -thrust * rest
     )
     along = rest * (x * tx + y * ty)
@@ -59,5 +59,5 @@ EFFECT = Effect(
     excitation="yaw through half a turn and more: this force turns with the body, that of a tilted "
     "world or a steady force "
     "stays; vertical accelerations, with which it grows",
-    law=law,
+    model=effect_model,
 )

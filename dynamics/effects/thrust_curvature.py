@@ -1,19 +1,19 @@
-"""Thrust curvature: thrust does not grow exactly with the square of the turn rate.
+"""Thrust curvature: thrust does not grow exactly with the square of the rotor speed.
 
 Thrust and reaction torque are those declared times 1 + a (W^2 / W_hover^2 - 1), no less than zero,
-so that nothing changes at the turn rate of hover. The delivered turn rate is W times the root of
-that.
+so that nothing changes at the rotor speed of hover. The delivered rotor speed is W times the root
+of that.
 """
 
 import math
 
 from numba import cfunc
 
-from .base import HOVER_RATE, LAW, Coefficient, Effect
+from .base import EFFECT_MODEL, HOVER_RATE, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     for i in range(4):
         ratio = rotors[i] / vehicle[HOVER_RATE]
         rotors[i] *= math.sqrt(max(1.0 + c[0] * (ratio * ratio - 1.0), 0.0))
@@ -37,5 +37,5 @@ EFFECT = Effect(
     "the Crazyflie 2.0, ETH Zurich 2015",
     confused_with=("thrust_scale", "inertia", "mass"),
     excitation="thrusts from half to one and a half times hover: fast climbs, drops and turns",
-    law=law,
+    model=effect_model,
 )

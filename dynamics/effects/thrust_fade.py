@@ -1,8 +1,8 @@
-"""Thrust fade: thrust at a given turn rate falls steadily with flight time, as motors and battery
+"""Thrust fade: thrust at a given rotor speed falls steadily with flight time, as motors and battery
 warm up.
 
-Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered turn rate is W
-times the root of that. The time t runs from the start of the flight; in an estimator from its
+Thrust and reaction torque scale by 1 - rate * t, no less than a tenth: the delivered rotor speed is
+W times the root of that. The time t runs from the start of the flight; in an estimator from its
 ``reset``.
 """
 
@@ -10,11 +10,11 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, ROTOR_TIME, Coefficient, Effect
+from .base import EFFECT_MODEL, ROTOR_TIME, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     scale = math.sqrt(max(1.0 - c[0] * rotors[ROTOR_TIME], 0.1))
     for i in range(4):
         rotors[i] *= scale
@@ -33,5 +33,5 @@ EFFECT = Effect(
     excitation="a minute and more of flight with the battery voltage logged: loads that come and "
     "go move the voltage, and "
     "with it sag, but not time",
-    law=law,
+    model=effect_model,
 )

@@ -1,17 +1,17 @@
-"""Thrust scale: all rotors deliver more or less than declared at the same turn rate.
+"""Thrust scale: all rotors deliver more or less than declared at the same rotor speed.
 
-Thrust and reaction torque scale by 1 + s: the delivered turn rate is W sqrt(1 + s).
+Thrust and reaction torque scale by 1 + s: the delivered rotor speed is W sqrt(1 + s).
 """
 
 import math
 
 from numba import cfunc
 
-from .base import LAW, Coefficient, Effect
+from .base import EFFECT_MODEL, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, rotors, memory):  # type: ignore[no-untyped-def]
     scale = math.sqrt(max(1.0 + c[0], 0.0))
     for i in range(4):
         rotors[i] *= scale
@@ -28,5 +28,5 @@ EFFECT = Effect(
     excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
     "hover) and a steady force; "
     "a whole battery tells it from sag",
-    law=law,
+    model=effect_model,
 )

@@ -6,18 +6,18 @@ z, applied at the rotor. It is the k_h of RotorPy.
 
 from numba import cfunc
 
-from .base import CENTRAL, LAW, ROTOR_POSITION, Coefficient, Effect
-from .parts import air_velocity, push
+from .base import CENTRAL, EFFECT_MODEL, ROTOR_POSITION, Coefficient, Effect
+from .parts import add_force_at, air_velocity
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(4):
         x = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i]
         y = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 1]
         z = (1.0 - c[1]) * vehicle[ROTOR_POSITION + 3 * i + 2]
         ux, uy, _ = air_velocity(state, x, y, z)
-        push(vehicle, state, wrench, x, y, z, 0.0, 0.0, c[0] * (ux * ux + uy * uy))
+        add_force_at(vehicle, state, wrench, x, y, z, 0.0, 0.0, c[0] * (ux * ux + uy * uy))
 
 
 EFFECT = Effect(
@@ -32,5 +32,5 @@ EFFECT = Effect(
     "in proportion to the disc area for 0.03 kg",
     confused_with=("thrust_scale", "mass"),
     excitation="level flight at several speeds up to 2 m/s and more; in hover it does nothing",
-    law=law,
+    model=effect_model,
 )

@@ -1,6 +1,6 @@
 """Wind: a steady wind, fixed in the world frame.
 
-Every declared law that asks for the wind (rotor_drag, body_drag, inflow_thrust ...) feels it.
+Every declared effect that asks for the wind (rotor_drag, body_drag, inflow_thrust ...) feels it.
 ``cd`` is a drag of its own, for a vehicle that declares none: with w the wind and u = w - v, F = cd
 |u| u + cd |v| v at the centre of mass, that is the change against the same drag in still air. So
 nothing happens without wind, and what differs from a constant force is how the force changes with
@@ -11,11 +11,11 @@ import math
 
 from numba import cfunc
 
-from .base import LAW, VELOCITY, WIND, Coefficient, Effect
+from .base import EFFECT_MODEL, VELOCITY, WIND, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     air, ground = 0.0, 0.0
     for i in range(3):
         state[WIND + i] += c[i]
@@ -41,6 +41,6 @@ EFFECT = Effect(
     excitation="flight with and against the wind at 1 m/s and more; in hover it is a constant "
     "force. Declared drag makes it "
     "identifiable",
-    law=law,
+    model=effect_model,
     sets_wind=True,
 )

@@ -8,12 +8,20 @@ import math
 
 from numba import cfunc
 
-from .base import DIRECTION, HAS_POSITION, HAS_QUATERNION, LAW, SAMPLE_POSITION, Coefficient, Effect
+from .base import (
+    DIRECTION,
+    EFFECT_MODEL,
+    HAS_POSITION,
+    HAS_QUATERNION,
+    SAMPLE_POSITION,
+    Coefficient,
+    Effect,
+)
 from .parts import turn_attitude
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, sample, memory):  # type: ignore[no-untyped-def]
     ax, ay = sample[DIRECTION] * c[0], sample[DIRECTION] * c[1]
     if sample[HAS_POSITION] > 0.0:
         angle = math.sqrt(ax * ax + ay * ay)
@@ -44,5 +52,5 @@ EFFECT = Effect(
     excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady "
     "force nothing does: a level "
     "frame that is tilted leaves just a constant force, of the weight times the tilt",
-    law=law,
+    model=effect_model,
 )

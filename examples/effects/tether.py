@@ -6,13 +6,20 @@ origin.
 
 from numba import cfunc
 
-from windwrench.dynamics.effects.base import COM, LAW, POSITION, ROTATION, Coefficient, Effect
+from windwrench.dynamics.effects.base import (
+    COM,
+    EFFECT_MODEL,
+    POSITION,
+    ROTATION,
+    Coefficient,
+    Effect,
+)
 
 HOOK = (0.0, 0.0, 2.5)  # m, world
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):
+@cfunc(EFFECT_MODEL, cache=True)
+def effect_model(c, vehicle, state, wrench):
     """Add force (world) and torque (body, about the centre of mass) to ``wrench`` (6,)."""
     fx = c[0] * (HOOK[0] - state[POSITION])
     fy = c[0] * (HOOK[1] - state[POSITION + 1])
@@ -36,5 +43,5 @@ EFFECT = Effect(
     source="Hooke's law; size: a thread that pulls with 5 % of the weight at 2 m",
     confused_with=("constant_force", "wind"),
     excitation="flight over a metre and more along every axis; in one place it is a constant force",
-    law=law,
+    model=effect_model,
 )

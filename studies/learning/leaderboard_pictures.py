@@ -16,7 +16,7 @@ from windwrench.evaluation.leaderboard import Line, Result, Row, normalised
 from windwrench.evaluation.pictures import COLOURS
 from windwrench.evaluation.statistics import performance_profile, stratified_bootstrap
 from windwrench.runtime.page_files import write_png
-from windwrench.training.training_envs import make_world
+from windwrench.training.training_envs import make_training_env
 
 _LEARNED = {
     "sac": "#1b7f5c",
@@ -161,7 +161,7 @@ def draw_tracking(policies: Mapping[str, Path], path: Path) -> None:
     """
     pilots: dict[str, Any] = {name: make_pilot(name) for name in _TRACKED if _known(name)}
     pilots |= {name: make_pilot(str(file)) for name, file in policies.items()}
-    world: Any = make_world(_WORLD)
+    world: Any = make_training_env(_WORLD)
     columns = 3
     figure = Figure(figsize=(11, 0.5 + 2.2 * -(-len(pilots) // columns)), layout="constrained")
     panels = figure.subplots(

@@ -108,7 +108,7 @@ def compare(log: FlightLog, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def linear_drag(diagnosis: Diagnosis) -> list[float]:
-    """Return the linear drag along body x and y in N per m/s; rotor drag at the turn rates of
+    """Return the linear drag along body x and y in N per m/s; rotor drag at the rotor speeds of
     hover.
     """
     for e in diagnosis.effects:

@@ -18,7 +18,7 @@ from windwrench.envs.plant import TICK
 from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import unknown_name
-from windwrench.studies.trials.outsiders import Law, Maker, Moment, pushing
+from windwrench.studies.trials.outsiders import ModelMaker, Moment, WrenchModel, wrench_input
 from windwrench.studies.trials.practice_flights import SIZES, Practice
 from windwrench.studies.trials.unseen_outsiders import UNSEEN
 
@@ -31,27 +31,27 @@ def _wrench(force: Array, torque: Array) -> Array:
     return np.concatenate([force, torque])
 
 
-def wind_shear(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def wind_shear(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A wind that grows with height, by 1.2 m/s a metre from the lowest point on, on a linear drag
     of 0.05 weights at 1 m/s.
     """
     low, heading = float(path[:, 2].min()), rng.uniform(-math.pi, math.pi)
     along = np.array([math.cos(heading), math.sin(heading), 0.0])
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         air = 1.2 * (m.position[2] - low) * along
         return _wrench(-0.05 * vehicle.weight * (m.velocity - air), np.zeros(3))
 
-    return law
+    return model
 
 
-def lifted_cable(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def lifted_cable(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A supply cable hangs from the tail: 0.1 weights for each metre off the floor, and it drags,
     0.04 weights at 1 m/s.
     """
     tail = np.array([-0.5, 0.0, -0.2]) * vehicle.arm_l
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         force = -0.04 * vehicle.weight * m.velocity - [
             0.0,
             0.0,
@@ -59,10 +59,10 @@ def lifted_cable(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
         ]
         return _wrench(force, np.cross(m.rotation @ tail, force))
 
-    return law
+    return model
 
 
-def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A magnet on board in a strong field: it turns the nose into one direction of the room, 0.03
     weights times the arm.
     """
@@ -74,19 +74,19 @@ def compass_torque(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
         * np.array([math.cos(heading), math.sin(heading), -0.5])
     )
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         return _wrench(np.zeros(3), np.cross(m.rotation[:, 0], field))
 
-    return law
+    return model
 
 
-def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A battery cell fails and comes back: every rotor loses 6 % of its thrust for 2 to 6 s,
     several times.
     """
     change, weak = 0.0, False
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal change, weak
         if m.t >= change:
             weak, change = not weak, m.t + rng.uniform(2.0, 6.0)
@@ -96,23 +96,23 @@ def failing_cell(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
         torque = np.array([0.0, 0.0, -(vehicle.spin * vehicle.p / vehicle.k) @ thrust])
         return _wrench(m.rotation[:, 2] * thrust.sum(), m.rotation @ torque)
 
-    return law
+    return model
 
 
-def high_hull(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def high_hull(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A tall hull: quadratic drag, 0.03 weights at 1 m/s, 0.25 weights at most, that acts half an
     arm above the centre.
     """
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         speed = math.sqrt(m.velocity @ m.velocity)
         force = -vehicle.weight * min(0.03 * speed, 0.25 / max(speed, 1e-6)) * m.velocity
         return _wrench(force, np.cross(m.rotation[:, 2] * 0.5 * vehicle.arm_l, force))
 
-    return law
+    return model
 
 
-def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """One arm twists under its rotor's load: that thrust leans aside by 0.08 rad at hover, in
     proportion to itself.
     """
@@ -120,15 +120,15 @@ def soft_arm(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     arm = vehicle.positions[rotor] - vehicle.com
     aside = np.cross([0.0, 0.0, 1.0], arm) / np.linalg.norm(arm[:2])
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         thrust = vehicle.k[rotor] * m.speeds[rotor] ** 2
         force = thrust * 0.08 * thrust / (vehicle.weight / 4.0) * aside
         return _wrench(m.rotation @ force, m.rotation @ np.cross(arm, force))
 
-    return law
+    return model
 
 
-def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A camera turns about the pitch axis on a soft mount of 2 Hz; it adds 0.3 of the vehicle's
     inertia there.
 
@@ -138,7 +138,7 @@ def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
     inertia, w, zeta = 0.3 * float(vehicle.inertia[1, 1]), 2.0 * math.pi * 2.0, 0.05
     angle, speed, last = 0.0, 0.0, 0.0
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal angle, speed, last
         turning, last = (float(m.rate[1]) - last) / TICK, float(m.rate[1])
         spring = w * w * angle + 2.0 * zeta * w * speed
@@ -146,16 +146,16 @@ def loose_gimbal(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
         angle += TICK * speed
         return _wrench(np.zeros(3), inertia * spring * m.rotation[:, 1])
 
-    return law
+    return model
 
 
-def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A cord winds up as the nose turns, and turns it back: 0.02 weights times the arm for each
     radian from the start.
     """
     turned, last = 0.0, math.nan
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal turned, last
         heading = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
         if not math.isnan(last):
@@ -165,10 +165,10 @@ def winding_cord(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
             np.zeros(3), np.array([0.0, 0.0, -0.02 * vehicle.weight * vehicle.arm_l * turned])
         )
 
-    return law
+    return model
 
 
-def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """Another vehicle crosses above, every 6 s in the mean, at 1 m/s: its wash, 0.3 m in radius,
     weighs up to 0.15 weights.
 
@@ -178,7 +178,7 @@ def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
     rotors, speed = vehicle.positions - vehicle.com, 1.0
     when, through, along = -10.0, np.zeros(2), np.array([1.0, 0.0])
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal when, through, along
         if m.t > when + 2.0:
             when = m.t + 2.0 + rng.exponential(2.0)
@@ -192,12 +192,12 @@ def passing_wash(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
         push = -0.15 / 4.0 * vehicle.weight * np.exp(-0.5 / 0.3**2 * (away * away).sum(axis=1))
         return np.array([0.0, 0.0, push.sum(), arms[:, 1] @ push, -(arms[:, 0] @ push), 0.0])
 
-    return law
+    return model
 
 
-HELD_BACK: dict[str, Maker] = {
-    law.__name__: law
-    for law in (
+HELD_BACK: dict[str, ModelMaker] = {
+    model.__name__: model
+    for model in (
         wind_shear,
         lifted_cable,
         compass_torque,
@@ -246,8 +246,10 @@ def practise_held_back(
     )
     t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
     path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
-    push = pushing(HELD_BACK[name](vehicle, rng, path), SIZES[size])
-    c = record_flight(flown, (), trajectory, seconds, seed, background(vehicle, turbulence), push)
+    disturbance = wrench_input(HELD_BACK[name](vehicle, rng, path), SIZES[size])
+    c = record_flight(
+        flown, (), trajectory, seconds, seed, background(vehicle, turbulence), disturbance
+    )
     log = FlightLog(
         c["t"],
         c["position"],

@@ -1,9 +1,9 @@
 """Disturbances outside the effect library: what a diagnosis must not blame on a named effect.
 
-Each is a small law of time, state and rotors that gives a force and a torque. Sizes are in
-proportion to the vehicle: a force in its weight, a torque in its weight times the arm. Where a law
-has a place (a wall, a column of rising air), the place is chosen from the set points of the flight,
-so that the vehicle comes there.
+Each is a small model of time, state and rotors that gives a force and a torque. Sizes are in
+proportion to the vehicle: a force in its weight, a torque in its weight times the arm. Where a
+model has a place (a wall, a column of rising air), the place is chosen from the set points of the
+flight, so that the vehicle comes there.
 """
 
 import math
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Moment(NamedTuple):
-    """The true state at which a law is asked."""
+    """The true state at which a model is asked."""
 
     t: float  # s
     position: Array  # (3,) m, world, of the geometric centre
@@ -34,8 +34,8 @@ class Moment(NamedTuple):
 
 
 # a wrench (6,): force in N and torque in Nm about the centre of mass, world frame
-Law = Callable[[Moment], Array]
-Maker = Callable[[Vehicle, np.random.Generator, Array], Law]
+WrenchModel = Callable[[Moment], Array]
+ModelMaker = Callable[[Vehicle, np.random.Generator, Array], WrenchModel]
 
 
 def _at(force: Array, arm: Array) -> Array:
@@ -68,13 +68,13 @@ def _thrust_change(vehicle: Vehicle, m: Moment, change: Array) -> Array:
     return np.concatenate([m.rotation[:, 2] * change.sum(), m.rotation @ torque])
 
 
-def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Irregular pushes of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in the mean,
-    anywhere on the hull.
+def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
+    """Irregular transient disturbances of 0.05 to 0.13 weights, 0.2 to 1 s long and 1.5 s apart in
+    the mean, anywhere on the hull.
     """
     start, end, force, point = 0.0, 0.0, np.zeros(3), np.zeros(3)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal start, end, force, point
         if m.t >= end:
             start = m.t + rng.exponential(1.5)
@@ -84,10 +84,10 @@ def contact_pushes(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
             point = rng.uniform(-0.3, 0.3, 3) * vehicle.arm_l
         return _at(force, m.rotation @ point) if m.t >= start else np.zeros(6)
 
-    return law
+    return model
 
 
-def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """An elastic tether from a point on the floor to a leg: slack up to a length, then 0.25 weights
     a metre, 0.25 at most.
     """
@@ -95,22 +95,22 @@ def tether(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     slack = float(np.quantile(np.linalg.norm(path - anchor, axis=1), 0.3))
     leg = np.array([-0.3, 0.3, 0.0]) * vehicle.arm_l
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         reach = anchor - m.position
         length = math.sqrt(reach @ reach)
         pull = vehicle.weight * min(max(0.25 * (length - slack), 0.0), 0.25)
         return _at(pull / max(length, 1e-6) * reach, m.rotation @ leg)
 
-    return law
+    return model
 
 
-def wall_attraction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def wall_attraction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A wall across x just beyond the flight draws the vehicle on with 0.02 weights m2 / d^2, as
     from d = 0.4 m within it.
     """
     wall = float(path[:, 0].max()) + 0.4
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         away = wall - m.position[0]
         return _force(
             np.array(
@@ -118,54 +118,54 @@ def wall_attraction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> 
             )
         )
 
-    return law
+    return model
 
 
-def dry_friction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def dry_friction(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A force of 0.04 weights against the direction of travel, whatever the speed; it fades in up
     to 5 cm/s.
     """
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         return _force(
             -0.04 * vehicle.weight / math.sqrt(m.velocity @ m.velocity + 0.05**2) * m.velocity
         )
 
-    return law
+    return model
 
 
-def cubic_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def cubic_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A drag that grows with the cube of the speed: 0.006 weights at 1 m/s, a quarter of the weight
     at most.
     """
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         square = float(m.velocity @ m.velocity)
         scale = min(0.006 * square, 0.25 / max(math.sqrt(square), 1e-6))
         return _force(-scale * vehicle.weight * m.velocity)
 
-    return law
+    return model
 
 
-def magnus_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def magnus_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A side force on a body that turns in yaw as it moves: 0.02 weights at 1 rad/s and 1 m/s,
     along yaw rate x velocity.
     """
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         turn = 0.02 * vehicle.weight * float(m.rotation[2] @ m.rate)
         return _force(np.array([-turn * m.velocity[1], turn * m.velocity[0], 0.0]))
 
-    return law
+    return model
 
 
-def patchy_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def patchy_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A linear drag in one half of the room only, and most with the nose along one wall: 0.08
     weights at 1 m/s at most.
     """
     middle, heading = float(np.median(path[:, 0])), rng.uniform(-math.pi, math.pi)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         yaw = math.atan2(m.rotation[1, 0], m.rotation[0, 0])
         share = (
             0.25
@@ -174,38 +174,38 @@ def patchy_drag(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
         )
         return _force(-0.08 * vehicle.weight * share * m.velocity)
 
-    return law
+    return model
 
 
-def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def thermal_column(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A column of rising air, 0.35 m in radius (one sigma), lifts with up to 0.12 weights, each
     rotor in its own draught.
     """
     centre, rotors = path[rng.integers(len(path)), :2], vehicle.positions - vehicle.com
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         arms = rotors @ m.rotation.T
         away = m.position[:2] + arms[:, :2] - centre
         lift = 0.03 * vehicle.weight * np.exp(-0.5 / 0.35**2 * (away * away).sum(axis=1))
         return np.array([0.0, 0.0, lift.sum(), arms[:, 1] @ lift, -(arms[:, 0] @ lift), 0.0])
 
-    return law
+    return model
 
 
-def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def flywheel(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A flywheel about body z: the torque -omega x h of its precession, 0.015 weights times the arm
     at 1 rad/s of roll.
     """
     spin = 0.015 * vehicle.weight * vehicle.arm_l * rng.choice([-1.0, 1.0])
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         torque = np.array([-m.rate[1] * spin, m.rate[0] * spin, 0.0])
         return np.concatenate([np.zeros(3), m.rotation @ torque])
 
-    return law
+    return model
 
 
-def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A long level tank along the nose holds a tenth of the mass in liquid, already weighed, that
     sloshes at 1.2 Hz.
 
@@ -216,7 +216,7 @@ def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     mass, w, zeta = 0.1 * vehicle.mass, 2.0 * math.pi * 1.2, 0.05
     place, speed, last = 0.0, 0.0, np.zeros(3)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal place, speed, last
         ahead = np.array([m.rotation[0, 0], m.rotation[1, 0], 0.0])
         ahead /= max(math.hypot(ahead[0], ahead[1]), 1e-6)
@@ -226,14 +226,14 @@ def sloshing(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
         last = m.velocity
         return _at(mass * spring * ahead, m.rotation @ np.array([0.0, 0.0, -0.3 * vehicle.arm_l]))
 
-    return law
+    return model
 
 
-def rotor_dropouts(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def rotor_dropouts(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """Rotor 2 now and then loses a tenth of its thrust for 0.3 s, 0.8 s apart in the mean."""
     start = rng.exponential(0.8)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal start
         if m.t >= start + 0.3:
             start = m.t + rng.exponential(0.8)
@@ -243,49 +243,49 @@ def rotor_dropouts(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
             vehicle, m, np.array([0.0, -0.1 * vehicle.k[1] * m.speeds[1] ** 2, 0.0, 0.0])
         )
 
-    return law
+    return model
 
 
-def vortex_ring(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def vortex_ring(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A descent faster than 0.3 m/s into the own wash costs thrust, 15 % for each m/s beyond, up to
     10 %, and buffets.
     """
     buffet = np.zeros(4)
     keep = math.exp(-TICK / 0.1)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal buffet
         buffet = keep * buffet + math.sqrt(1.0 - keep * keep) * 0.4 * rng.standard_normal(4)
         loss = min(max(0.15 * (-m.velocity[2] - 0.3), 0.0), 0.1)
         return _thrust_change(vehicle, m, -loss * (1.0 + buffet) * vehicle.k * m.speeds**2)
 
-    return law
+    return model
 
 
-def periodic_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def periodic_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """A sine of 0.5 Hz and 0.05 weights along one direction of the world."""
     direction, phase = rng.standard_normal(3), rng.uniform(0.0, 2.0 * math.pi)
     force = 0.05 * vehicle.weight * direction / np.linalg.norm(direction)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         return _force(math.sin(math.pi * m.t + phase) * force)
 
-    return law
+    return model
 
 
-def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its turn rate
+def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
+    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its rotor speed
     promises.
     """
     knee = 1.1 * vehicle.weight / 4.0
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         return _thrust_change(vehicle, m, -0.3 * np.maximum(vehicle.k * m.speeds**2 - knee, 0.0))
 
-    return law
+    return model
 
 
-def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
+def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> WrenchModel:
     """The trim walks at random as things warm up: in 20 s by 0.02 weights times the arm in roll and
     pitch, a third in yaw.
     """
@@ -294,17 +294,17 @@ def torque_drift(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law
     )
     torque = np.zeros(3)
 
-    def law(m: Moment) -> Array:
+    def model(m: Moment) -> Array:
         nonlocal torque
         torque = torque + step * rng.standard_normal(3)
         return np.concatenate([np.zeros(3), m.rotation @ torque])
 
-    return law
+    return model
 
 
-OUTSIDERS: dict[str, Maker] = {
-    law.__name__: law
-    for law in (
+OUTSIDERS: dict[str, ModelMaker] = {
+    model.__name__: model
+    for model in (
         contact_pushes,
         tether,
         wall_attraction,
@@ -324,7 +324,7 @@ OUTSIDERS: dict[str, Maker] = {
 }
 
 
-def outside_push(
+def outside_disturbance(
     name: str, vehicle: Vehicle, rng: np.random.Generator, path: Array, size: float = 1.0
 ) -> Callable[[ClosedLoop], Array]:
     """Return what gives a loop its wrench (6,) of a disturbance at each tick.
@@ -341,14 +341,14 @@ def outside_push(
     """
     if name not in OUTSIDERS:
         raise unknown_name("disturbance", name, OUTSIDERS)
-    return pushing(OUTSIDERS[name](vehicle, rng, path), size)
+    return wrench_input(OUTSIDERS[name](vehicle, rng, path), size)
 
 
-def pushing(law: Law, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
-    """Return what gives a loop its wrench (6,) of a law at each tick, times ``size``."""
+def wrench_input(model: WrenchModel, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
+    """Return what gives a loop its wrench (6,) of a model at each tick, times ``size``."""
 
-    def push(loop: ClosedLoop) -> Array:
-        return size * law(
+    def wrench_of(loop: ClosedLoop) -> Array:
+        return size * model(
             Moment(
                 loop.time,
                 loop.position,
@@ -359,4 +359,4 @@ def pushing(law: Law, size: float = 1.0) -> Callable[[ClosedLoop], Array]:
             )
         )
 
-    return push
+    return wrench_of

@@ -18,7 +18,7 @@ from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import TRAJECTORIES, background, draw_trajectory, record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
-from windwrench.studies.trials.outsiders import OUTSIDERS, outside_push
+from windwrench.studies.trials.outsiders import OUTSIDERS, outside_disturbance
 
 Array = NDArray[np.float64]
 
@@ -171,14 +171,14 @@ def fly_practice(
         # the filter that flies cannot believe in a perfect pose
         flown = vehicle
     settings = replace(background(vehicle, turbulence), sensor_noise=sensor > 0.0)
-    push = None
+    disturbance = None
     if outsider is not None:
         t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
         path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
-        push = outside_push(
+        disturbance = outside_disturbance(
             outsider, vehicle, np.random.default_rng((seed, 1)), path, outsider_size
         )
-    c = record_flight(flown, effects, trajectory, seconds, seed, settings, push)
+    c = record_flight(flown, effects, trajectory, seconds, seed, settings, disturbance)
     added = "+".join([*(e.name for e in effects), *([outsider] if outsider else [])]) or "nothing"
     return FlightLog(
         c["t"],

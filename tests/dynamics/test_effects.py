@@ -79,21 +79,21 @@ def test_an_effect_says_what_it_is(name):
 def test_an_effect_has_the_function_of_its_kind(name):
     effect = get(name)
     functions = {
-        "rotor input": effect.law,
-        "wrench": effect.law,
+        "rotor input": effect.model,
+        "wrench": effect.model,
         "body": effect.amend,
-        "sensing": effect.law,
+        "sensing": effect.model,
     }
     assert functions[effect.kind] is not None
-    if effect.law is not None:
-        assert effect.law.address != 0
+    if effect.model is not None:
+        assert effect.model.address != 0
         bundle = compile_effects(VEHICLE.with_effects(parse_setting(name)))
-        laws = {
-            "wrench": bundle.wrench_laws,
-            "rotor input": bundle.rotor_laws,
-            "sensing": bundle.sense_laws,
+        models = {
+            "wrench": bundle.wrench_models,
+            "rotor input": bundle.rotor_models,
+            "sensing": bundle.sensing_models,
         }
-        assert effect.law.address in laws[effect.kind]
+        assert effect.model.address in models[effect.kind]
 
 
 @pytest.mark.parametrize("name", names())
@@ -112,7 +112,7 @@ def test_the_estimator_explains_an_effect_once_it_is_declared(name):
 
 
 def test_a_slung_payload_explains_a_load_that_hangs_in_mujoco():
-    """The load and its thread there share nothing with the effect's law."""
+    """The load and its thread there share nothing with the effect's equation."""
     load, rng = (
         SuspendedLoad(mass=0.03, length=0.3, anchor=(0.0, 0.0, 0.0), drag=0.03),
         np.random.default_rng(1),

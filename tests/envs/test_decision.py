@@ -16,10 +16,10 @@ from windwrench.envs.plant import NOISE
 from windwrench.envs.vector import FanTrackingVectorEnv
 from windwrench.envs.watched_fan_tracking import SensingFanTracking
 from windwrench.runtime.addresses import call_at
-from windwrench.runtime.direct_call import released
+from windwrench.runtime.compiled import compiled_without_gil
 
 
-@released
+@compiled_without_gil
 def fill(function, bits, out):
     call_at(function, bits, out.size, out.ctypes.data)
 

@@ -35,7 +35,7 @@ HOVER = VEHICLE.hover_rate
 
 
 class Bench:
-    """A plant driven by turn rates, without filter and flight loop."""
+    """A plant driven by rotor speeds, without filter and flight loop."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Bench:
         self.table = jet_table(0.45, 0.10)
 
     def run(self, command, ticks, noise=None):
-        """Hold turn rates (4,) for some ticks; return position, attitude, velocity and body rate
+        """Hold rotor speeds (4,) for some ticks; return position, attitude, velocity and body rate
         after each (n, 13).
         """
         rows = np.empty((ticks, 13))
@@ -161,7 +161,7 @@ def test_logged_rates_are_multiples_of_the_sensor_s_step_and_true_ones_are_not()
     assert bench.plant["z"][0] != 401.0
 
 
-def test_a_recorded_turn_rate_is_rounded_once():
+def test_a_recorded_rotor_speed_is_rounded_once():
     vehicle = replace(load_vehicle("ardrone2"), omega_lsb=4.0)
     late = EffectSetting("clock_offset", {"dt": -0.013})
     reported = []

@@ -9,14 +9,14 @@ import pytest
 
 import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError
-from windwrench.runtime.direct_call import released
+from windwrench.runtime.compiled import compiled_without_gil
 from windwrench.runtime.work_sharing import (
-    leave,
-    more_turns,
-    open_turns,
-    take_turn,
-    turn_done,
-    watch,
+    all_done,
+    next_task,
+    open_tasks,
+    stop_looking,
+    task_done,
+    tasks_open,
 )
 
 NAME = "windwrench/FanTracking-v0"
@@ -169,49 +169,49 @@ def test_too_few_are_refused(count):
         make(count)
 
 
-def test_turns_are_taken_once_each_by_however_many_threads():
-    turns, taken = np.zeros(3, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
+def test_tasks_are_taken_once_each_by_however_many_threads():
+    tasks, taken = np.zeros(3, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
     for _ in range(3):
         taken[:] = 0
-        open_turns(turns)
-        assert not watch(turns, len(taken))
+        open_tasks(tasks)
+        assert not all_done(tasks, len(taken))
         with ThreadPoolExecutor(4) as pool:
-            for done in [pool.submit(take_all, turns, taken) for _ in range(4)]:
+            for done in [pool.submit(take_all, tasks, taken) for _ in range(4)]:
                 done.result()
         assert (taken == 1).all()
-        assert watch(turns, len(taken))
+        assert all_done(tasks, len(taken))
 
 
-@released
-def take_all(turns, taken):
+@compiled_without_gil
+def take_all(tasks, taken):
     while True:
-        n = take_turn(turns)
+        n = next_task(tasks)
         if n >= len(taken):
             break
         taken[n] += 1
-        turn_done(turns)
+        task_done(tasks)
 
 
-def test_turns_open_for_a_thread_that_looks_and_say_who_has_left():
-    turns = np.zeros(3, dtype=np.int64)
-    assert open_turns(turns) == 0
-    assert look(turns, 1, 1)
-    turns[0] = 1
-    assert not look(turns, 1, 1000)
-    go(turns)
-    go(turns)
-    assert open_turns(turns) == 2
-    assert turns.tolist() == [0, 0, 0]
+def test_tasks_open_for_a_thread_that_looks_and_say_who_has_left():
+    tasks = np.zeros(3, dtype=np.int64)
+    assert open_tasks(tasks) == 0
+    assert look(tasks, 1, 1)
+    tasks[0] = 1
+    assert not look(tasks, 1, 1000)
+    go(tasks)
+    go(tasks)
+    assert open_tasks(tasks) == 2
+    assert tasks.tolist() == [0, 0, 0]
 
 
-@released
-def look(turns, count, patience):
-    return more_turns(turns, count, patience)
+@compiled_without_gil
+def look(tasks, count, patience):
+    return tasks_open(tasks, count, patience)
 
 
-@released
-def go(turns):
-    leave(turns)
+@compiled_without_gil
+def go(tasks):
+    stop_looking(tasks)
 
 
 def test_helpers_sleep_and_are_called_back_and_the_bits_stay(monkeypatch):
@@ -246,12 +246,12 @@ def test_a_thread_that_fails_with_a_turn_in_hand_is_not_waited_for():
     decide, help_on = envs._call, envs._help
 
     def wait_and_decide():
-        while envs._turns[0] == 0:
+        while envs._tasks[0] == 0:
             time.sleep(0.001)
         decide()
 
     def fail():
-        take_turn(envs._turns)
+        next_task(envs._tasks)
         raise RuntimeError("a thread's own fault")
 
     envs._call, envs._help = wait_and_decide, fail

@@ -16,7 +16,7 @@ FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.01, -0.015, 0.02])
 
 
 def lap(vehicle):
-    """Turn rates, positions and quaternions of a flight that closes after 20 s, by inverse
+    """Rotor speeds, positions and quaternions of a flight that closes after 20 s, by inverse
     dynamics.
 
     The vehicle turns six times in a lap at a rate that swings between 1 and 3 rad/s, and

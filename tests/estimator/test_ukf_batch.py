@@ -17,7 +17,7 @@ NAMES = ("rotors", "position", "quaternion")
 
 def with_effects(strength):
     """A vehicle whose effects remember: the motors' lag, and drag, which keeps its
-    own turn rates."""
+    own rotor speeds."""
     return VEHICLE.with_effects(
         EffectSetting("rotor_drag", {"kdx": strength, "kdy": strength}),
         EffectSetting("motor_lag", {"tau": 0.04}),
@@ -26,8 +26,8 @@ def with_effects(strength):
 
 @pytest.fixture(scope="module")
 def samples():
-    """Turn rates, positions and quaternions of some flights (STEPS, COUNT, .), with poses and rotor
-    speeds missing.
+    """Rotor speeds, positions and quaternions of some flights (STEPS, COUNT, .), with poses and
+    rotor speeds missing.
     """
     flights = [yawing_flight(VEHICLE, STEPS, seed=seed) for seed in range(COUNT)]
     rotors, position, quaternion = (np.stack([f[name] for f in flights], axis=1) for name in NAMES)

@@ -175,7 +175,7 @@ def _ulog() -> bytes:
 
 @cache
 def _bag(kind: str) -> dict[str, bytes]:
-    """Return the files of a bag with a pose and turn rates: one of ROS 1, or a
+    """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a
     folder's of ROS 2."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore

@@ -134,7 +134,7 @@ def test_a_folder_s_files_join_the_library(folder):
     assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)
     setting = parse_setting("own_spring")
     assert setting.coefficients == {"k": 0.1}
-    assert compile_effects(load_vehicle("ardrone2").with_effects(setting)).wrench_laws[0] != 0
+    assert compile_effects(load_vehicle("ardrone2").with_effects(setting)).wrench_models[0] != 0
     assert effect_summary("own_spring") == "A pull along x, in proportion to x."
     effects.add_folder(folder)  # once more changes nothing
     assert os.environ["WINDWRENCH_EFFECTS"] == str(folder)

@@ -141,7 +141,7 @@ def test_only_the_time_in_the_air_counts(vehicle):
     signals = log_signals(flight)[0]
     thin = thinned(signals)
     assert thin.period == pytest.approx(0.02, rel=1e-3)
-    # a log's turn rate is that at the instant of its row
+    # a log's rotor speed is that at the instant of its row
     same = np.interp(thin.t, signals.t, signals.rotor_speeds[:, 0])
     late = np.interp(thin.t - 0.01, signals.t, signals.rotor_speeds[:, 0])
     assert (

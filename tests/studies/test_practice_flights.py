@@ -55,7 +55,7 @@ def left_over(log, vehicle):
     return tuple(low_pass(x, CUTOFF, signals.period)[EDGE:-EDGE] for x in (r, truth))
 
 
-def law(name, vehicle=VEHICLE, seed=0):
+def model(name, vehicle=VEHICLE, seed=0):
     return OUTSIDERS[name](vehicle, np.random.default_rng(seed), PATH)
 
 
@@ -88,7 +88,7 @@ def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
 @pytest.mark.parametrize("name", sorted(OUTSIDERS))
 def test_a_disturbance_is_in_proportion_to_the_vehicle(name):
     heavy = replace(VEHICLE, mass=2 * VEHICLE.mass, k=2 * VEHICLE.k, p=2 * VEHICLE.p)
-    one, two = law(name), law(name, heavy)
+    one, two = model(name), model(name, heavy)
     for i in range(400):
         t = TICK * i
         m = moment(
@@ -105,11 +105,11 @@ def test_a_disturbance_is_in_proportion_to_the_vehicle(name):
 def test_friction_has_one_size_and_drag_grows_with_the_cube():
     slow, fast = moment(velocity=(0.5, 0, 0)), moment(velocity=(1.0, 0, 0))
     np.testing.assert_allclose(
-        law("dry_friction")(fast)[:3], [-0.04 * WEIGHT, 0, 0], rtol=2e-3, atol=1e-15
+        model("dry_friction")(fast)[:3], [-0.04 * WEIGHT, 0, 0], rtol=2e-3, atol=1e-15
     )
-    assert law("dry_friction")(slow)[0] == pytest.approx(law("dry_friction")(fast)[0], rel=0.01)
-    assert law("cubic_drag")(fast)[0] == pytest.approx(8.0 * law("cubic_drag")(slow)[0])
-    assert np.all(law("dry_friction")(moment()) == 0.0)
+    assert model("dry_friction")(slow)[0] == pytest.approx(model("dry_friction")(fast)[0], rel=0.01)
+    assert model("cubic_drag")(fast)[0] == pytest.approx(8.0 * model("cubic_drag")(slow)[0])
+    assert np.all(model("dry_friction")(moment()) == 0.0)
 
 
 def test_side_force_and_precession_do_no_work():
@@ -118,7 +118,7 @@ def test_side_force_and_precession_do_no_work():
         rate=(0.5, -0.3, 0.8),
         rotation=matrix_of(np.array([0.8, 0.36, 0.0, 0.48])),
     )
-    side, turn = law("magnus_force")(m), law("flywheel")(m)
+    side, turn = model("magnus_force")(m), model("flywheel")(m)
     assert np.linalg.norm(side[:3]) > 1e-3
     assert side[:3] @ m.velocity == pytest.approx(0.0, abs=1e-15)
     assert np.linalg.norm(turn[3:]) > 1e-4
@@ -126,7 +126,7 @@ def test_side_force_and_precession_do_no_work():
 
 
 def test_a_tether_is_slack_within_its_length_and_pulls_down_and_back_beyond():
-    pull = law("tether")
+    pull = model("tether")
     assert np.all(pull(moment(position=(0, 0, 1.4))) == 0.0)
     wrench = pull(moment(position=(1.0, 0, 1.5)))
     assert wrench[0] < 0
@@ -135,14 +135,14 @@ def test_a_tether_is_slack_within_its_length_and_pulls_down_and_back_beyond():
 
 
 def test_a_wall_draws_by_the_inverse_square():
-    wall = law("wall_attraction")  # at x = 1.4 m
+    wall = model("wall_attraction")  # at x = 1.4 m
     near, far = (wall(moment(position=(x, 0, 1.5)))[0] for x in (0.9, 0.4))
     assert near == pytest.approx(4.0 * far)
     assert near > 0
 
 
 def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
-    dropouts = law("rotor_dropouts")
+    dropouts = model("rotor_dropouts")
     wrenches = [dropouts(moment(TICK * i)) for i in range(4000)]
     lost = [wrench for wrench in wrenches if np.any(wrench)]
     assert 0.1 < len(lost) / 4000 < 0.5
@@ -158,10 +158,10 @@ def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
 
 
 def test_wash_costs_thrust_only_in_a_descent_and_saturation_only_at_high_rates():
-    assert np.all(law("vortex_ring")(moment(velocity=(1.0, 0.0, -0.29))) == 0.0)
-    assert law("vortex_ring")(moment(velocity=(0.0, 0.0, -0.8)))[2] < -0.02 * WEIGHT
-    assert np.all(law("thrust_saturation")(moment(speeds=1.04 * HOVER)) == 0.0)
-    assert law("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(
+    assert np.all(model("vortex_ring")(moment(velocity=(1.0, 0.0, -0.29))) == 0.0)
+    assert model("vortex_ring")(moment(velocity=(0.0, 0.0, -0.8)))[2] < -0.02 * WEIGHT
+    assert np.all(model("thrust_saturation")(moment(speeds=1.04 * HOVER)) == 0.0)
+    assert model("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(
         -0.3 * (1.44 - 1.1) * WEIGHT
     )
 
@@ -169,7 +169,7 @@ def test_wash_costs_thrust_only_in_a_descent_and_saturation_only_at_high_rates()
 def test_the_liquid_sloshes_most_at_its_own_frequency():
     force = {}
     for hertz in (0.3, 1.2, 4.0):
-        slosh, w = law("sloshing"), 2 * np.pi * hertz
+        slosh, w = model("sloshing"), 2 * np.pi * hertz
         run = [
             slosh(moment(TICK * i, velocity=(np.sin(w * TICK * i) / w, 0, 0)))[0]
             for i in range(4000)
@@ -307,7 +307,7 @@ def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
         assert without[:, :3].std(axis=0).max() > 0.02
 
 
-def test_rotorpy_s_turn_rates_are_those_at_the_instant_of_the_pose(flights):
+def test_rotorpy_s_rotor_speeds_are_those_at_the_instant_of_the_pose(flights):
     log, vehicle = flights[False], hummingbird_vehicle()
     up = np.array([matrix_of(q)[:, 2] for q in log.quaternion[1:-1]])
     acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [

@@ -12,7 +12,7 @@ START = 1_700_000_000_000_000_000  # ns
 
 
 def write_ulog(log, path):
-    """Motion capture and turn rates as PX4 logs them: north, east, down, and its own order of
+    """Motion capture and rotor speeds as PX4 logs them: north, east, down, and its own order of
     motors.
     """
     stamps = np.round(1e6 * (log.t + 10.0)).astype(np.uint64)
@@ -38,7 +38,7 @@ def write_ulog(log, path):
 
 
 def write_bag(log, path):
-    """A ROS 2 bag (a folder) with the pose on /vicon/drone and turn rates on /motors."""
+    """A ROS 2 bag (a folder) with the pose on /vicon/drone and rotor speeds on /motors."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     types = store.types
     pose_name, array_name = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/Float32MultiArray"

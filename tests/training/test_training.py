@@ -26,7 +26,7 @@ from windwrench.training.configuration import features_of
 from windwrench.training.imitate import imitate
 from windwrench.training.learners import make_learner, squashes, weights_of
 from windwrench.training.train import card_of, read_progress, train
-from windwrench.training.training_envs import make_worlds
+from windwrench.training.training_envs import make_training_envs
 from windwrench.training.vec_env import FeatureVecEnv
 
 LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
@@ -62,7 +62,7 @@ def tiny(algorithm, *more):
 
 def make_env(config, seed=0):
     return FeatureVecEnv(
-        make_worlds("base", config["environments"]),
+        make_training_envs("base", config["environments"]),
         features_of(config),
         lambda i, e: seed + 10 * i + e,
     )

@@ -8,7 +8,7 @@ import pytest
 from windwrench.controllers.features import Features, History
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.vector import FanTrackingVectorEnv
-from windwrench.training.training_envs import make_worlds
+from windwrench.training.training_envs import make_training_envs
 
 pytest.importorskip("stable_baselines3")
 from windwrench.training.vec_env import FeatureVecEnv
@@ -110,7 +110,7 @@ def test_rewards_are_weighted_terms():
 @pytest.mark.parametrize("repeat", [1, 2])
 def test_recall_flies_back_to_where_memory_was_taken(repeat):
     def fresh():
-        return FeatureVecEnv(make_worlds("static", 3, repeat=repeat), FEATURES, seed_of)
+        return FeatureVecEnv(make_training_envs("static", 3, repeat=repeat), FEATURES, seed_of)
 
     env, rng, direction = fresh(), np.random.default_rng(0), away(seed_of(1, 0))
     env.reset()
@@ -133,7 +133,7 @@ def test_recall_flies_back_to_where_memory_was_taken(repeat):
 
 def test_mixed_worlds_repeat_with_their_seeds():
     def flight():
-        env = FeatureVecEnv(make_worlds("wide", 2), FEATURES, seed_of)
+        env = FeatureVecEnv(make_training_envs("wide", 2), FEATURES, seed_of)
         rows = [env.reset()]
         for _ in range(10):
             rows.append(env.step(np.full((2, 1), 0.1, dtype=np.float32))[0])

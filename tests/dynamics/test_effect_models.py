@@ -1,4 +1,4 @@
-"""The law of each effect against its formula, written out here once more."""
+"""The model of each effect against its formula, written out here once more."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.dynamics.effects.base import (
-    LAW,
+    EFFECT_MODEL,
     ROTOR_ACCELERATION,
     ROTOR_TIME,
     ROTORS_SIZE,
@@ -40,7 +40,7 @@ def wrench(
     out, state = np.full(6, np.nan), np.full(STATE_SIZE, np.nan)
     state[ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = acceleration
     effect_wrench(
-        bundle.wrench_laws,
+        bundle.wrench_models,
         bundle.wrench_coefficients,
         bundle.constants,
         body_record(bundle.vehicle)[0],
@@ -63,13 +63,13 @@ class Rotors:
 
     def __init__(self, vehicle):
         self.bundle = compile_effects(vehicle)
-        self.memory = np.zeros((len(self.bundle.rotor_laws), self.bundle.rotor_memory))
+        self.memory = np.zeros((len(self.bundle.rotor_models), self.bundle.rotor_memory))
 
     def __call__(self, speeds, voltage=0.0, dt=PERIOD, time=0.0):
         rotors = np.zeros(ROTORS_SIZE)
         rotors[:4], rotors[ROTOR_TIME] = speeds, time
         deliver(
-            self.bundle.rotor_laws,
+            self.bundle.rotor_models,
             self.bundle.rotor_coefficients,
             self.bundle.constants,
             self.memory,
@@ -85,14 +85,14 @@ class Sensing:
 
     def __init__(self, vehicle, direction):
         self.bundle, self.direction = compile_effects(vehicle), direction
-        self.memory = np.zeros((len(self.bundle.sense_laws), self.bundle.sense_memory))
+        self.memory = np.zeros((len(self.bundle.sensing_models), self.bundle.sensing_memory))
 
     def __call__(self, speeds, position, quaternion, parts=7, dt=PERIOD):
         sample = np.zeros(SAMPLE_SIZE)
         sample[:11] = np.concatenate([speeds, position, quaternion])
         report(
-            self.bundle.sense_laws,
-            self.bundle.sense_coefficients,
+            self.bundle.sensing_models,
+            self.bundle.sensing_coefficients,
             self.bundle.constants,
             self.memory,
             dt,
@@ -127,7 +127,7 @@ def test_rotor_drag_does_nothing_to_a_vehicle_that_drifts_with_the_air():
     still = compile_effects(setting("rotor_drag", kdx=1e-4, kdy=1e-4))
     out = np.full(6, np.nan)
     effect_wrench(
-        still.wrench_laws,
+        still.wrench_models,
         still.wrench_coefficients,
         still.constants,
         body_record(VEHICLE)[0],
@@ -281,7 +281,7 @@ def test_a_tilted_frame_of_the_rotors_turns_their_thrust_and_their_torque():
         ("ground_effect", {"rho": 3.0}),
     ],
 )
-def test_a_central_law_is_that_of_rotors_drawn_into_the_centre(name, size):
+def test_a_central_model_is_that_of_rotors_drawn_into_the_centre(name, size):
     drawn = replace(VEHICLE, rotor_positions=np.zeros((4, 3)))
     vehicle = setting(name, **size)
     expected = wrench(drawn.with_effects(*vehicle.effects))
@@ -357,7 +357,9 @@ def test_the_fan_jet_is_that_of_the_environment_without_gusts(heading):
 
 
 class Pendulum:
-    """A slung payload's own state, carried on under a vehicle of given attitude and turn rates."""
+    """A slung payload's own state, carried on under a vehicle whose attitude and rotor speeds are
+    given.
+    """
 
     def __init__(self, **coefficients):
         self.bundle = compile_effects(setting("slung_payload", **coefficients))
@@ -380,7 +382,7 @@ class Pendulum:
         self.rotors[STEP] = dt
         advance(self.bundle.wrench_hooks, self.row, self.bundle.constants, self.state, self.rotors)
         out = np.zeros(6)
-        add_wrenches(self.bundle.wrench_laws, self.row, self.bundle.constants, self.state, out)
+        add_wrenches(self.bundle.wrench_models, self.row, self.bundle.constants, self.state, out)
         return out[:3]
 
     @property
@@ -669,17 +671,17 @@ def test_a_vehicle_cannot_lose_more_than_its_mass():
         compile_effects(setting("mass", dm=-1.0))
 
 
-@cfunc(LAW)
-def _users_law(c, vehicle, state, wrench):
+@cfunc(EFFECT_MODEL)
+def _users_model(c, vehicle, state, wrench):
     wrench[0] -= c[0] * state[VELOCITY]
     wrench[5] += c[1]
 
 
-def test_a_user_s_own_law_is_called_by_its_address():
+def test_a_user_s_own_model_is_called_by_its_address():
     state, out = np.zeros(STATE_SIZE), np.ones(6)
     state[VELOCITY] = 2.0
     coefficients = np.zeros((2, 8))
     coefficients[0, :2], coefficients[1, :2] = (0.5, 0.25), (0.0, 1.0)
-    laws = np.array([_users_law.address, _users_law.address])
-    add_wrenches(laws, coefficients, compile_effects(VEHICLE).constants, state, out)
+    models = np.array([_users_model.address, _users_model.address])
+    add_wrenches(models, coefficients, compile_effects(VEHICLE).constants, state, out)
     np.testing.assert_array_equal(out, [0.0, 1, 1, 1, 1, 2.25])
