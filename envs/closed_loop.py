@@ -26,6 +26,7 @@ from ..runtime.compiled import Record, announced, compiled, compiled_meanwhile
 from ..runtime.direct_call import direct, released
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, Fan, fan_record, jet_table
+from .plain_steps import step_of
 from .plant import (
     NOISE,
     PLANT,
@@ -38,7 +39,6 @@ from .plant import (
     reset_plant,
     sense,
 )
-from .plain_steps import step_of
 from .suspended_load import SuspendedLoad, hang, pull, set_down
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not

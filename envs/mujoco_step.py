@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import mujoco
 
-from ..runtime.addresses import MissingFunction, as_c_function, library_function
+from ..runtime.addresses import MissingFunctionError, as_c_function, library_function
 
 
 class Step(NamedTuple):
@@ -24,24 +24,24 @@ def mj_step_address() -> int:
     Python package has loaded.
 
     Raises:
-        MissingFunction: the package does not hold its library, or its objects their addresses,
+        MissingFunctionError: the package does not hold its library, or its objects their addresses,
             where they always did.
     """
     folder = Path(mujoco.__file__).parent
     for kind in (mujoco.MjModel, mujoco.MjData):
         if not hasattr(kind, "_address"):
-            raise MissingFunction(f"the address of {kind.__name__}")
+            raise MissingFunctionError(f"the address of {kind.__name__}")
     for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):
         for path in sorted(folder.glob(pattern)):
             return library_function(path, "mj_step")
-    raise MissingFunction(f"mj_step (no libmujoco in {folder})")
+    raise MissingFunctionError(f"mj_step (no libmujoco in {folder})")
 
 
 def step_in_c(model: "mujoco.MjModel", data: "mujoco.MjData") -> Step:
     """Return MuJoCo's own step in C.
 
     Raises:
-        MissingFunction: as ``mj_step_address``.
+        MissingFunctionError: as ``mj_step_address``.
     """
     return Step(mj_step_address(), model._address, data._address, (model, data))
 

@@ -25,7 +25,7 @@ STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
 _WITHOUT_ARGUMENTS = ctypes.CFUNCTYPE(None)
 
 
-class MissingFunction(LookupError):
+class MissingFunctionError(LookupError):
     """A library does not hold a function where it always did; the message says what is missing."""
 
 
@@ -33,12 +33,12 @@ def library_function(library: Path, name: str) -> int:
     """Return the address of a C function in a shared library.
 
     Raises:
-        MissingFunction: it is not there, or the library cannot be loaded.
+        MissingFunctionError: it is not there, or the library cannot be loaded.
     """
     try:
         function = getattr(ctypes.CDLL(str(library)), name)
     except (OSError, AttributeError):
-        raise MissingFunction(f"{name} in {library.name}") from None
+        raise MissingFunctionError(f"{name} in {library.name}") from None
     return _address(function)
 
 

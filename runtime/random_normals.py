@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .addresses import MissingFunction, as_c_function, library_function
+from .addresses import MissingFunctionError, as_c_function, library_function
 
 
 class Normals(NamedTuple):
@@ -30,13 +30,13 @@ def normals_address() -> int:
     Its numbers are those of ``Generator.standard_normal``, which calls it, bit for bit.
 
     Raises:
-        MissingFunction: this build of NumPy does not export it.
+        MissingFunctionError: this build of NumPy does not export it.
     """
     name = "random_standard_normal_fill"
     try:
         library = Path(str(import_module("numpy.random._generator").__file__))
     except ImportError:
-        raise MissingFunction(f"{name} (no numpy.random._generator)") from None
+        raise MissingFunctionError(f"{name} (no numpy.random._generator)") from None
     return library_function(library, name)
 
 
@@ -49,7 +49,7 @@ def normals_in_c(generator: np.random.Generator) -> Normals:
     """Return a generator's normals, drawn by NumPy's function in C.
 
     Raises:
-        MissingFunction: as ``normals_address``.
+        MissingFunctionError: as ``normals_address``.
     """
     return Normals(normals_address(), bits_address(generator), 0, generator)
 
