@@ -64,7 +64,7 @@ def _choose() -> _Plain:
         )
         print(
             f"windwrench: {reason}: flights call {called} through Python, which takes some 15 % "
-            f"longer; the results are the same",
+            f"longer, more on several threads; the results are the same",
             file=sys.stderr,
             flush=True,
         )
