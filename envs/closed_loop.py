@@ -32,7 +32,7 @@ from ..runtime.compiled import (
 )
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, Fan, fan_record, jet_table
-from .native_functions import clock_address, mj_step_address
+from .plain_steps import step_of
 from .plant import (
     NOISE,
     PLANT,
@@ -59,7 +59,7 @@ LOOP = np.dtype(
         ("fan", FAN),
         ("ticks", "i8"),  # since the reset
         # addresses: of the jet's tables, of MuJoCo's step and its arguments, and of arrays in its
-        # data
+        # data; ``counted`` is its user's array, in which the ticks are counted once more
         *[
             (name, "i8")
             for name in (
@@ -71,7 +71,7 @@ LOOP = np.dtype(
                 "qpos",
                 "qvel",
                 "xfrc",
-                "clock",
+                "counted",
             )
         ],
     ]
@@ -121,10 +121,12 @@ def _run(address: int, noise: int, count: int, fan_y: int, fan_count: int, first
         numbers_at(loop.qvel, (6,)),
         numbers_at(loop.xfrc, (6,)),
     )
+    counted = numbers_at(loop.counted, (1,))
     normals, path = numbers_at(noise, (count, NOISE)), numbers_at(fan_y, (fan_count,))
     for k in range(count):
         loop.fan.y = path[min(first + k, fan_count - 1)]
         tick(loop, axial, radial, qpos, qvel, xfrc, normals[k])
+        counted[0] += 1.0
         for _ in range(SUBSTEPS):
             call_at(loop.mj_step, loop.model, loop.data)
 
@@ -157,9 +159,9 @@ def compile_run() -> None:
 @compiled
 def has_been_reset(loop: Record) -> bool:
     """Return whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a
-    state is not finite.
+    state is not finite, and sets the ticks that its data count to zero with everything else.
     """
-    late: bool = numbers_at(loop.clock, (1,))[0] < (loop.ticks - 0.5) * TICK
+    late: bool = numbers_at(loop.counted, (1,))[0] < loop.ticks
     return late
 
 
@@ -199,6 +201,7 @@ class ClosedLoop:
             declared if true is None else true, settings or PlantSettings()
         )
         self.model, self.data = load_world(self._body, load, drawn)
+        self._step = step_of(self.model, self.data)
         self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else _STILL_AIR
         self.record = np.zeros(1, dtype=LOOP)
         self.address = int(
@@ -244,16 +247,12 @@ class ClosedLoop:
         self.unrounded: Array = loop["plant"]["sample"][
             :4
         ]  # (4,) these rotor speeds before they are rounded
-        loop["mj_step"], loop["model"], loop["data"] = (
-            mj_step_address(),
-            self.model._address,
-            self.data._address,
-        )
-        loop["clock"] = clock_address(self.data)
+        loop["mj_step"], loop["model"], loop["data"] = self._step[:3]
         for name, array in (
             ("qpos", self._qpos),
             ("qvel", self._qvel),
             ("xfrc", self._xfrc),
+            ("counted", self.data.userdata),
             ("axial", self.jet_table[0]),
             ("radial", self.jet_table[1]),
         ):

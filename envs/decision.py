@@ -48,8 +48,9 @@ INFO = OUTCOME.names[1:]  # type: ignore[index]
 EPISODE = np.dtype(
     [
         # addresses: of the closed loop's record and of what runs it, of NumPy's normals and their
-        # bits, of the fan's path
-        *[(name, "i8") for name in ("loop", "run", "normals", "bits", "path")],
+        # bits, of where these normals are written if not where the caller says (or 0), of the
+        # fan's path
+        *[(name, "i8") for name in ("loop", "run", "normals", "bits", "drawn", "path")],
         ("path_count", "i8"),  # of that path's places (m), one a tick
         ("ticks", "i8"),  # since its start
         ("distance", "f8"),  # m, where the vehicle started
@@ -106,8 +107,9 @@ def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
     change = value - e.command
     e.command = loop.flight.setpoint[4] = value
     if ticks > 0:
-        call_at(e.normals, e.bits, noise.size, noise.ctypes.data)
-        call_at(e.run, e.loop, noise.ctypes.data, ticks, e.path, e.path_count, e.ticks)
+        drawn = e.drawn if e.drawn != 0 else noise.ctypes.data
+        call_at(e.normals, e.bits, noise.size, drawn)
+        call_at(e.run, e.loop, drawn, ticks, e.path, e.path_count, e.ticks)
         e.ticks += ticks
     look(loop, e)
     out = e.outcome

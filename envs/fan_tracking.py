@@ -19,7 +19,7 @@ from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, run_address
 from .decision import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
 from .fan import Fan
-from .native_functions import bits_address, normals_address
+from .plain_steps import normals_of
 from .plant import NOISE, TICK, PlantSettings
 from .scenarios import Scenario, draw_fan_path, get_scenario
 
@@ -274,11 +274,8 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _draw_from(self, generator: np.random.Generator) -> None:
         e = self.episode[0]
-        e["normals"], e["bits"], self._generator = (
-            normals_address(),
-            bits_address(generator),
-            generator,
-        )
+        self._normals = normals_of(generator, DECISION_TICKS * NOISE)
+        e["normals"], e["bits"], e["drawn"] = self._normals[:3]
 
     @property
     def np_random(self) -> np.random.Generator:

@@ -5,8 +5,10 @@ So one compiled call works for environments that each have their own arrays, and
 once, not once for each of its callers.
 """
 
+import ctypes
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,42 @@ from .compiled import compiled
 
 Array = NDArray[np.float64]
 STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
+_WITHOUT_ARGUMENTS = ctypes.CFUNCTYPE(None)
+
+
+class MissingFunctionError(LookupError):
+    """A library does not hold a function where it always did; the message says what is missing."""
+
+
+def library_function(library: Path, name: str) -> int:
+    """Return the address of a C function in a shared library.
+
+    Raises:
+        MissingFunctionError: it is not there, or the library cannot be loaded.
+    """
+    try:
+        function = getattr(ctypes.CDLL(str(library)), name)
+    except (OSError, AttributeError):
+        raise MissingFunctionError(f"{name} in {library.name}") from None
+    return _address(function)
+
+
+def as_c_function(function: Callable[[], object]) -> tuple[int, object]:
+    """Return the address of a C function that calls a Python one, and what must live as long as
+    the address is used.
+
+    Compiled code may call it with arguments, which are ignored, and without the interpreter's lock.
+    ``function`` should be a built-in one (or a ``partial`` of it): while Python's own code runs,
+    an interrupt could raise its exception, and no exception gets through compiled code.
+    """
+    kept = _WITHOUT_ARGUMENTS(function)
+    return _address(kept), kept
+
+
+def _address(function: Any) -> int:
+    address = ctypes.cast(function, ctypes.c_void_p).value
+    assert address is not None
+    return address
 
 
 @cache

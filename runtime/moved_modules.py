@@ -33,7 +33,7 @@ MOVED: dict[str, tuple[str, ...]] = {
     "envs.jet": ("envs.fan",),
     "envs.marks": ("envs.scene_shapes",),
     "envs.outcome": ("envs.decision",),
-    "envs.stepping": ("envs.native_functions",),
+    "envs.stepping": ("envs.mujoco_step", "runtime.random_normals"),
     "envs.turns": ("runtime.work_sharing",),
     "estimator.by_address": ("runtime.addresses",),
     "estimator.direct": ("runtime.compiled",),

@@ -12,7 +12,7 @@ from ..dynamics.motion import Array
 from ..envs.closed_loop import ESTIMATORS, ClosedLoop
 from ..envs.fan import gust, jet_wrench
 from ..envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
-from ..envs.native_functions import bits_address, normals_address
+from ..envs.plain_steps import normals_of
 from ..envs.plant import NOISE, SUBSTEPS, TICK, actuate, sense
 from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import compiled_without_gil
@@ -109,6 +109,7 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     copy["plant"]["seen"] = 3
     twin = ClosedLoop(env.vehicle, drawn=False)  # for MuJoCo alone
     twin.reset(rng, q[:3])
+    normals = normals_of(rng, noise.size)
 
     def look_on() -> None:
         for _ in range(100):
@@ -127,7 +128,7 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
         ),
         "MuJoCo": lambda: _per_tick(lambda: _mujoco(twin.record, _REPEATS), _REPEATS),
         "random numbers": lambda: _per_tick(
-            lambda: _normals(normals_address(), bits_address(rng), noise, _REPEATS), _REPEATS
+            lambda: _normals(normals.function, normals.bits, noise, _REPEATS), _REPEATS
         ),
         "reward, info, Python": lambda: _per_tick(look_on, 100 * DECISION_TICKS),
         "motors, sensors, flight loop": lambda: _per_tick(

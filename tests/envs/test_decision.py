@@ -1,37 +1,16 @@
 """A decision is one compiled call: the numbers are those of the same steps taken from Python."""
 
 import copy
-import ctypes
 import pickle
-from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv
-from windwrench.envs.native_functions import bits_address, clock_address, normals_address
 from windwrench.envs.plant import NOISE
 from windwrench.envs.vector import FanTrackingVectorEnv
 from windwrench.envs.watched_fan_tracking import SensingFanTracking
-from windwrench.runtime.addresses import call_at
-from windwrench.runtime.compiled import compiled_without_gil
-
-
-@compiled_without_gil
-def fill(function, bits, out):
-    call_at(function, bits, out.size, out.ctypes.data)
-
-
-@pytest.mark.parametrize("kind", [np.random.PCG64, np.random.MT19937, np.random.SFC64])
-def test_the_normals_are_numpy_s(kind):
-    compiled, plain = np.random.Generator(kind(3)), np.random.Generator(kind(3))
-    for count in (1, 49, 784):
-        out = np.zeros(count)
-        fill(normals_address(), bits_address(compiled), out)
-        np.testing.assert_array_equal(out, plain.standard_normal(count))
-    assert compiled.uniform() == plain.uniform()
 
 
 @pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
@@ -130,18 +109,6 @@ def test_many_environments_want_a_reset_of_all_first():
     envs.reset(seed=0, options={"reset_mask": np.array([True, False])})
     with pytest.raises(InputError, match="reset before step"):
         envs.step(np.zeros((2, 1), np.float32))
-
-
-def test_another_build_of_numpy_or_mujoco_is_named(monkeypatch):
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    data = mujoco.MjData(model)
-    data.time = 2.5
-    assert ctypes.c_double.from_address(clock_address(data)).value == 2.5
-    with pytest.raises(InputError, match="the time before the energies"):
-        clock_address(SimpleNamespace(energy=np.zeros(3)[1:], time=0.0))
-    monkeypatch.setattr("numpy.random._generator.__file__", np.random.bit_generator.__file__)
-    with pytest.raises(InputError, match="random_standard_normal_fill"):
-        normals_address.__wrapped__()
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
