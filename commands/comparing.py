@@ -111,8 +111,8 @@ def benchmark(
         )
     console.print(table)
     console.print(
-        f"{episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over "
-        f"admittance",
+        f"{episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = oracle; "
+        "*over admittance",
         highlight=False,
     )
     say(path, folder / "leaderboard.png")
