@@ -36,8 +36,8 @@ def read_log(
         reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with
             that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
             for the kit's own.
-        vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust into
-            rotor speeds.
+        vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
+            into rotor speeds.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
