@@ -50,7 +50,7 @@ EXTRA_MASS = 0.053  # kg
 
 @dataclass(frozen=True)
 class Samples:
-    """One flight's samples: turn rates (n, 4), position, quaternion, gyro, accelerometer."""
+    """One flight's samples: rotor speeds (n, 4), position, quaternion, gyro, accelerometer."""
 
     speeds: Array
     position: Array
@@ -84,7 +84,7 @@ def fly_step(vehicle: Vehicle, seed: int, seconds: float = SECONDS) -> Samples:
             loop.applied[:3], loop.applied[3:] = FORCE, TORQUE
         plant = loop.record[0]["plant"]
         out["speeds"][k] = loop.sample[:4]
-        # what the sensors feel at the end of the interval whose turn rates these are
+        # what the sensors feel at the end of the interval whose rotor speeds these are
         specific = (
             plant["rotation"].T @ loop.external[:3] + [0.0, 0.0, plant["rotor_wrench"][0]]
         ) / vehicle.mass

@@ -37,7 +37,7 @@ _START_YAW = np.deg2rad(120.0)
 class Flight:
     """What was measured in one flight, and the truth; row k is at k times 5 ms."""
 
-    # (n, 11) turn rates (rad/s) of the interval that ends at the row, position (m), quaternion
+    # (n, 11) rotor speeds (rad/s) of the interval that ends at the row, position (m), quaternion
     samples: Array
     wrench: Array  # (n, 6) true external force (N) and torque (Nm) over that interval, world
 
@@ -48,7 +48,7 @@ def window(limits: tuple[float, float]) -> slice:
 
 
 def vehicle_at(noise: str) -> Vehicle:
-    """Return the AR.Drone 2.0 as declared for a noise level, its turn rates in 8 bits."""
+    """Return the AR.Drone 2.0 as declared for a noise level, its rotor speeds in 8 bits."""
     return replace(load_vehicle("ardrone2"), mocap=NOISES[noise])
 
 

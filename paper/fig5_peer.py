@@ -7,7 +7,7 @@ Set up here through its functional core, as ``KalmanFilter`` does it, with
 
 * crazyflow's ``first_principles`` model with this vehicle's mass, inertia, rotors and mixing,
 without drag and rotor inertia,
-  commanded with the logged turn rates (in RPM), so that it predicts with the very same forces as
+  commanded with the logged rotor speeds (in RPM), so that it predicts with the very same forces as
   ``WrenchUKF``;
 * Q of the same four noises as ``UKFTuning``, mapped to velocity and position, body rate, torque and
 force, at the start's
@@ -189,7 +189,7 @@ def _start(vehicle: Vehicle, tuning: UKFTuning, samples: Array) -> Any:
 
 
 def _measured(data: Any, sample: Array) -> Any:
-    """Return ``data`` with the turn rates and the pose of a sample (..., 11)."""
+    """Return ``data`` with the rotor speeds and the pose of a sample (..., 11)."""
     q = np.roll(sample[..., 7:11], -1, axis=-1)
     near = np.sum(q * np.asarray(data.quat), axis=-1, keepdims=True)
     return data.replace(

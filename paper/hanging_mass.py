@@ -77,7 +77,7 @@ def hover(
     estimate.
 
     Args:
-        vehicle: as declared, and as it is; its motion capture and logged turn rates are the
+        vehicle: as declared, and as it is; its motion capture and logged rotor speeds are the
             flight's.
         load: None: nothing is hung on.
         seconds: length of the flight.

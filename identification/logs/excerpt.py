@@ -37,7 +37,7 @@ def _windows(log: FlightLog, seconds: float, count: int) -> FlightLog:
     for begin in begins:
         keep |= (log.t >= log.t[0] + begin) & (log.t <= log.t[0] + begin + _WINDOW)
     note = (
-        f"of {seconds:.0f} s, {count} evenly spaced windows of {_WINDOW:.0f} s were used; the rest "
-        "was left out"
+        f"of {seconds:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
+        "rest was left out"
     )
     return replace(with_rows(log, keep), notes=(*log.notes, note))

@@ -179,7 +179,7 @@ def page_text(
         "## Left out of the library",
         "",
         "The same flights, diagnosed with a library that lacks the cause: the right answer is a "
-        "doubt. *The flight "
+        "tentative name. *The flight "
         "cannot tell* where the whole library, on that flight, says so of the truth and of what is "
         "named here. These leave the "
         "same log as another effect, whatever is flown, and go out together with it: "

@@ -5,8 +5,9 @@ What differs from the kit's own format:
 
 * **Commands, not rotor speeds.** The log has the collective thrust (N) and the body torques (Nm)
   that the controller asked for. They become rotor speeds through the inverse of
-  the declared vehicle's rotor mixing, clipped at zero and at its ``omega_max``. That is not what the firmware's own mixer and thrust
-  curve made of them: motors that lag, sag or were exchanged (logs 100, 130, 140) show up as wrench.
+  the declared vehicle's rotor mixing, clipped at zero and at its ``omega_max``. That is not what
+  the firmware's own mixer and thrust curve made of them: motors that lag, sag or were exchanged
+  (logs 100, 130, 140) show up as wrench.
 * **Attitude** is the onboard filter's, R = Rz(yaw) Ry(pitch) Rx(roll): motion capture saw a
   single marker.
 * **Position** is OptiTrack's where it was logged (payload flights), sampled and held: a row
