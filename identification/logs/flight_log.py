@@ -59,7 +59,7 @@ class FlightLog:
     extra: Mapping[str, Array] = field(
         default_factory=dict
     )  # (N,) or (N, ...) SI; what a reader found besides
-    # rotor speeds are worked out from commands: scale of thrust unknown, moments not to be trusted
+    # rotor speeds are computed from commands: scale of thrust unknown, moments not to be trusted
     commanded: bool = False
 
     def __post_init__(self) -> None:

@@ -214,11 +214,11 @@ def _disturbances(diagnosis: Diagnosis) -> str:
 
 def _transient(diagnosis: Diagnosis) -> str:
     """Return when the clearest transient disturbance was, and how strong."""
-    push = diagnosis.pushes[0]
-    factor, unit = scale_of([push.peak], "Nm" if push.channel.startswith("tau") else "N")
-    where = f" of {push.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    size = f"{rounded(factor * push.peak, 2)}{_SPACE}{unit}"
-    return f"{size} in {push.channel} at {rounded(push.t)}{_SPACE}s{where}"
+    largest = diagnosis.pushes[0]
+    factor, unit = scale_of([largest.peak], "Nm" if largest.channel.startswith("tau") else "N")
+    where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
+    size = f"{rounded(factor * largest.peak, 2)}{_SPACE}{unit}"
+    return f"{size} in {largest.channel} at {rounded(largest.t)}{_SPACE}s{where}"
 
 
 def doubt_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -274,7 +274,7 @@ def periodic_force(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> L
 
 
 def thrust_saturation(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
-    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its turn rate
+    """Beyond 1.1 of its share of the weight a rotor delivers 30 % less of what its rotor speed
     promises.
     """
     knee = 1.1 * vehicle.weight / 4.0

@@ -68,7 +68,7 @@ def _parameters() -> dict[str, Any]:
 def hummingbird_vehicle(eight_bit: bool = False) -> Vehicle:
     """Return RotorPy's Hummingbird as its parameter file states it, without aerodynamics.
 
-    ``eight_bit``: turn rates are logged in 255 steps.
+    ``eight_bit``: rotor speeds are logged in 255 steps.
 
     Raises:
         InputError: RotorPy is not installed.
@@ -140,11 +140,11 @@ def rotorpy_flight(
         seed: of the trajectory and the noise; the same arguments give the same log.
         aero: whether RotorPy's aerodynamics act.
         noise: factor on 1 mm and 5 mrad of one pose.
-        eight_bit: log turn rates in 255 steps.
+        eight_bit: log rotor speeds in 255 steps.
         wind: m/s, steady, world; it blows only where ``aero`` is on.
 
     Returns:
-        The log. Pose, the true turn rates, and force and torque beyond rotors and weight are all
+        The log. Pose, the true rotor speeds, and force and torque beyond rotors and weight are all
             those at the instant of
         the sample.
 

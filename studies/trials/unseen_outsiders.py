@@ -55,7 +55,7 @@ def room_swirl(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
 
 def beating_rotors(vehicle: Vehicle, rng: np.random.Generator, path: Array) -> Law:
     """Two rotors that are out of balance beat: 0.04 weights along body z at the difference of the
-    turn rates of 1 and 3.
+    rotor speeds of 1 and 3.
     """
     phase = rng.uniform(-math.pi, math.pi)
 
