@@ -49,7 +49,7 @@ def benchmark(
     ] = None,
     out: Out = Path("results/benchmark"),
 ) -> dict[str, Any]:
-    """Fly controllers through the same episodes; write the leaderboard.
+    """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
 
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast
     --episodes 40
@@ -129,8 +129,8 @@ def speed(
     ] = False,
     markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
 ) -> dict[str, Any]:
-    """Measure the time of a filter step, of simulated flight and of start-up, and how it grows;
-    compare with other packages that are installed.
+    """Measure speed beside other packages. A filter step, a simulated flight, start-up, and how
+    they grow. Packages that are not installed are left out.
 
     Example: windwrench speed --rounds 7
     """

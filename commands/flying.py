@@ -186,7 +186,8 @@ def record(
     seconds: Annotated[float, typer.Option(help="Duration of the flight, s.")] = 60.0,
     seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
 ) -> dict[str, Any]:
-    """Fly a simulated vehicle with effects that its model does not declare; write a flight log.
+    """Simulate a flight and write its log. The vehicle may have effects that its model does not
+    declare.
 
     Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out
     drag.csv

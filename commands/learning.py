@@ -85,7 +85,7 @@ def train(
     ] = None,
     out: Out = Path("results/train"),
 ) -> dict[str, Any]:
-    """Train a policy; an interrupted run resumes from its last checkpoint.
+    """Train a policy. An interrupted run resumes from its last checkpoint.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
@@ -161,8 +161,8 @@ def imitate(
     config: ConfigFile = None,
     out: Out = Path("results/imitate"),
 ) -> dict[str, Any]:
-    """Train a policy to imitate the oracle (DAgger); its score bounds what imitation reaches with
-    this observation.
+    """Train a policy to imitate the oracle. With DAgger; its score bounds what imitation
+    reaches with this observation.
 
     Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
     """
@@ -252,7 +252,7 @@ def tune(
     seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
     out: Out = Path("results/tune"),
 ) -> dict[str, Any]:
-    """Tune the gains of a designed controller on validation episodes; write tuned.yaml.
+    """Tune the gains of a designed controller. Search on validation episodes, write tuned.yaml.
 
     Example: windwrench tune admittance --scenario fast --trials 30 --episodes 60
     """

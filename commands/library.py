@@ -16,7 +16,7 @@ def effects(
         typer.Option(help="Markdown file for the page of all effects, instead of the list."),
     ] = None,
 ) -> dict[str, Any]:
-    """List the effect library: names, kinds, coefficients, units and typical values.
+    """List the effect library. Names, kinds, coefficients, units and typical values.
 
     Example: windwrench effects --markdown docs/effects.md
     """

@@ -44,7 +44,7 @@ def estimate(
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/estimate"),
 ) -> dict[str, Any]:
-    """Estimate the external wrench on a logged flight; write wrench.csv and a picture.
+    """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
@@ -113,8 +113,8 @@ def diagnose(
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/diagnose"),
 ) -> dict[str, Any]:
-    """Find the physical effects that a vehicle's model lacks from flight logs; write report.json,
-    report.html and vehicle.yaml.
+    """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
+    and vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
@@ -204,8 +204,8 @@ def replay(
     ] = 30.0,
     out: Out = Path("results/replay"),
 ) -> dict[str, Any]:
-    """Draw a logged flight with its estimated external wrench as arrows; write its last frame, and
-    video or animation on request.
+    """Draw a logged flight and its wrench. The external wrench is drawn as arrows; write the last
+    frame, and video or animation on request.
 
     Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
     """

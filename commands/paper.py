@@ -28,7 +28,7 @@ def reproduce(
         typer.Option(help="Markdown file for the page; default: reproduction.md in the folder."),
     ] = None,
 ) -> dict[str, Any]:
-    """Reproduce the paper's figures; a repeated command resumes and keeps finished figures.
+    """Reproduce the paper's figures. A repeated command resumes and keeps finished figures.
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """

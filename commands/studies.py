@@ -78,7 +78,7 @@ def trials(
     ] = None,
     out: Out = Path("results/trials"),
 ) -> dict[str, Any]:
-    """Diagnose simulated flights whose true effects are known, and score the diagnoses; a repeated
+    """Diagnose flights with known effects. Simulate the flights and score the diagnoses; a repeated
     command resumes.
 
     Example: windwrench trials --quick --out results/trials
@@ -135,7 +135,7 @@ def real_flights(
         ),
     ] = Path("results/real-flights.md"),
 ) -> dict[str, Any]:
-    """Diagnose measured flights, test each on flights left out of its fit, and write the page.
+    """Diagnose measured flights. Test each on flights left out of its fit, and write the page.
 
     Example: windwrench real-flights --data ../shared/data --markdown docs/real-flights.md
     """
@@ -174,8 +174,8 @@ def close_loop(
     markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
     out: Out = Path("results/close-loop"),
 ) -> dict[str, Any]:
-    """Fly with an undeclared effect, diagnose the log, declare what was found, and compare fan
-    tracking before and after.
+    """Compare tracking before and after diagnosis. Fly with an undeclared effect, diagnose the log,
+    and declare what was found.
 
     A repeated command resumes and keeps what is finished.
 
@@ -276,8 +276,8 @@ def leaderboard(
         Path, typer.Option("--out", help="Folder for training runs and their checkpoints.")
     ] = Path("results/leaderboard"),
 ) -> dict[str, Any]:
-    """Write the leaderboard page from its result files; with --train, first train and score what is
-    missing.
+    """Write the leaderboard page. From its result files; with --train, first train and score what
+    is missing.
 
     A repeated command keeps what is finished, and an interrupted training run resumes.
 
