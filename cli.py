@@ -38,9 +38,8 @@ app = typer.Typer(
     add_completion=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    epilog="Exit codes: 0 done; 1 a fault of windwrench itself, with its traceback; 2 a mistake in "
-    "what was asked or in a "
-    "file, with one line that names it; 130 interrupted. NO_COLOR=1 switches colours off.",
+    epilog="Exit codes: 0 success; 1 internal error, with its traceback; 2 invalid option or input "
+    "file, with a one-line message; 130 interrupted. NO_COLOR=1 disables colours.",
 )
 _INTERRUPTED = 130
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
@@ -55,11 +54,14 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def windwrench(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_version, help="Print the version.")
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_version, help="Print the version and exit."
+        ),
     ] = False,
 ) -> None:
-    """A quadrotor that feels the wind: fly it in a fan's jet, benchmark controllers, estimate the
-    wrench on a flight log.
+    """Quadrotor wrench estimation: simulate flights in a fan's jet, compare controllers, estimate
+    the external wrench on a flight log, and find what a vehicle's model lacks.
 
     Example: windwrench fly --scenario base --seed 4
     """

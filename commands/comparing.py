@@ -1,4 +1,4 @@
-"""Comparing: controllers on the same episodes, and the speed of it all."""
+"""Comparisons: controllers on the same episodes, and speed beside that of other packages."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,22 +26,30 @@ def benchmark(
     controllers: Annotated[
         str,
         typer.Option(
-            help="Names, paths of trained policies, or FILE.py:CLASS, with commas.",
+            help="Controllers, comma-separated: names, paths of trained policies, or "
+            "FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
     ] = "hover,admittance,ratio,oracle",
     scenarios: Annotated[
-        str, typer.Option(help="Names, with commas.", autocompletion=offering(scenario_names))
+        str,
+        typer.Option(
+            help="Scenario names, comma-separated.", autocompletion=offering(scenario_names)
+        ),
     ] = "static,base",
-    episodes: Annotated[int, typer.Option(min=1, help="Paired episodes a scenario.")] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    episodes: Annotated[
+        int, typer.Option(min=1, help="Number of paired episodes per scenario.")
+    ] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
     cluster: Annotated[
-        str | None, typer.Option(help="Fly on a Ray cluster: its address, or local.")
+        str | None, typer.Option(help="Address of a Ray cluster to fly on, or local.")
     ] = None,
     out: Out = Path("results/benchmark"),
 ) -> dict[str, Any]:
-    """Fly controllers through the same episodes; write the leaderboard.
+    """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
 
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast
     --episodes 40
@@ -103,8 +111,8 @@ def benchmark(
         )
     console.print(table)
     console.print(
-        f"{episodes} paired episodes a scenario, seed {seed}; score: 0 = hover, 1 = oracle; *over "
-        f"admittance",
+        f"{episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = oracle; "
+        "*over admittance",
         highlight=False,
     )
     say(path, folder / "leaderboard.png")
@@ -112,14 +120,17 @@ def benchmark(
 
 
 def speed(
-    rounds: Annotated[int, typer.Option(min=1, help="Over which medians are taken.")] = 7,
+    rounds: Annotated[
+        int, typer.Option(min=1, help="Number of measurements whose median is reported.")
+    ] = 7,
     hour: Annotated[
-        bool, typer.Option("--hour", help="Also diagnose a log of an hour (some minutes).")
+        bool,
+        typer.Option("--hour", help="Also time the diagnosis of a one-hour log (takes minutes)."),
     ] = False,
-    markdown: Annotated[Path | None, typer.Option(help="Also write the run as a page.")] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
 ) -> dict[str, Any]:
-    """Measure a filter step, flights against real time, growth and start-up, beside peers that are
-    installed.
+    """Measure speed beside other packages. A filter step, a simulated flight, start-up, and how
+    they grow. Packages that are not installed are left out.
 
     Example: windwrench speed --rounds 7
     """

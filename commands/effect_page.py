@@ -1,26 +1,26 @@
 """The effect library as a page of documentation, made from the library itself."""
 
-from ..dynamics.effects import get, law_in_words, names
+from ..dynamics.effects import get, model_in_words, names
 
 _HEAD = """# The effects
 
-One effect, three uses: the plant flies it, the estimator's model includes it once it is declared, and the residual wrench of
-a log is taken against it. Each is one file in `dynamics/effects/`, in which its law is written once. This page is made from
+One effect, three uses: the simulator applies it, the estimator's model includes it once it is declared, and the diagnosis fits it
+to the residual of a log. Each is one file in `dynamics/effects/`, which holds its model, the equation, once. This page is made from
 those files:
 
     windwrench effects --markdown docs/effects.md
 
 A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coefficients: {kdx: 1.2e-4, kdy: 1.2e-4}}]`;
-`windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4` flies one that nobody declared. Coefficients not given are
-zero. Kinds: *rotor input* changes what the rotors really deliver, *wrench* adds force and torque, *body* changes the rigid
+`windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4` flies one that the vehicle does not declare. Coefficients not given are
+zero. Kinds: *rotor input* changes what the rotors deliver, *wrench* adds force and torque, *body* changes the rigid
 body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
 
 """
 
 
 def effects_page() -> str:
-    """Return the page (Markdown) of all effects: law, coefficients, sizes, sources, and what tells
-    them apart.
+    """Return the page (Markdown) of all effects: model, coefficients, sizes, sources, and what
+    distinguishes them.
     """
     parts = [
         _HEAD,
@@ -35,9 +35,9 @@ def effects_page() -> str:
         )
     for name in names():
         effect = get(name)
-        law = law_in_words(name).replace("``", "`")
+        model = model_in_words(name).replace("``", "`")
         parts.append(
-            f"\n## {name}\n\n{law}\n\nKind: {effect.kind}.\n\n"
+            f"\n## {name}\n\n{model}\n\nKind: {effect.kind}.\n\n"
             "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
             "| --- | --- | --- | --- | --- | --- |\n"
         )
@@ -50,7 +50,7 @@ def effects_page() -> str:
         parts.append(
             f"\nSource: {effect.source}.\n\nEasily confused with: "
             f"{', '.join(effect.confused_with)}.\n\n"
-            f"What tells it apart: {effect.excitation}.\n"
+            f"Distinguished by: {effect.excitation}.\n"
         )
     return "".join(parts)
 

@@ -29,40 +29,47 @@ def fly(
     scenario: Annotated[
         str,
         typer.Option(
-            help="static, base, fast, slow-filter, noisy, gusty, far or varied.",
+            help="Scenario: static, base, fast, slow-filter, noisy, gusty, far or varied.",
             autocompletion=offering(scenario_names),
         ),
     ] = "base",
     controller: Annotated[
         str,
         typer.Option(
-            help="hover, admittance, ratio, oracle ..., a policy's path, or FILE.py:CLASS.",
+            help="Controller: hover, admittance, ratio, oracle ..., the path of a trained policy, "
+            "or FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
     ] = "admittance",
-    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
     vehicle: VehicleOption = "ardrone2",
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            help="Undeclared effect NAME:coef=value of the true vehicle.",
+            help="Effect of the simulated vehicle that its model does not declare, "
+            "NAME:coef=value,...; may be repeated.",
             autocompletion=offering(effect_names),
         ),
     ] = None,
     video: Annotated[
         bool,
-        typer.Option("--video", help="Also write fly.mp4 (video extra), and the last picture."),
+        typer.Option(
+            "--video", help="Also write a video, fly.mp4 (video extra), and its last frame."
+        ),
     ] = False,
     gif: Annotated[
-        bool, typer.Option("--gif", help="Also write fly.gif, and the last picture.")
+        bool, typer.Option("--gif", help="Also write an animation, fly.gif, and its last frame.")
     ] = False,
-    film_seconds: Annotated[float, typer.Option(min=0.1, help="Longest film.")] = 20.0,
+    film_seconds: Annotated[
+        float, typer.Option(min=0.1, help="Longest duration of video or animation, s.")
+    ] = 20.0,
     rrd: Annotated[
-        bool, typer.Option("--rrd", help="Also write fly.rrd for the Rerun viewer (rerun extra).")
+        bool,
+        typer.Option(
+            "--rrd", help="Also write a recording for the Rerun viewer, fly.rrd (rerun extra)."
+        ),
     ] = False,
-    view: Annotated[
-        bool, typer.Option("--view", help="Show it in a window while it flies.")
-    ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
     """Fly one episode in the jet; write a picture of it.
@@ -157,28 +164,30 @@ def fly(
 
 
 def record(
-    out: Annotated[Path, typer.Option("--out", help="The log: .csv, .csv.gz or .parquet.")] = Path(
-        "results/flight.csv"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", help="Flight log to write: .csv, .csv.gz or .parquet.")
+    ] = Path("results/flight.csv"),
     vehicle: VehicleOption = "ardrone2",
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            help="Undeclared effect, NAME or NAME:coef=value,...",
+            help="Effect of the simulated vehicle that its model does not declare, NAME or "
+            "NAME:coef=value,...; may be repeated.",
             autocompletion=offering(effect_names),
         ),
     ] = None,
     trajectory: Annotated[
         str,
         typer.Option(
-            help="hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, shake or "
-            "jet."
+            help="Trajectory: hover, gentle, excite, ground, yaw, circle, ceiling, vertical, fast, "
+            "shake or jet."
         ),
     ] = "excite",
-    seconds: Annotated[float, typer.Option(help="Length of the flight.")] = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything random on the flight.")] = 0,
+    seconds: Annotated[float, typer.Option(help="Duration of the flight, s.")] = 60.0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
 ) -> dict[str, Any]:
-    """Fly a vehicle with effects that it does not declare; write a flight log.
+    """Simulate a flight and write its log. The vehicle may have effects that its model does not
+    declare.
 
     Example: windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4 --trajectory excite --out
     drag.csv

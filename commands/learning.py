@@ -1,4 +1,4 @@
-"""Learning: policies trained, tuned, and compared with the laws that were designed."""
+"""Learning: policies trained, and the gains of designed controllers tuned."""
 
 import shlex
 import sys
@@ -31,24 +31,28 @@ Scenario = Annotated[
     str,
     typer.Option(
         "--scenario",
-        help="A scenario, or the tier wide, which mixes them all.",
+        help="Training scenario, or wide: all scenarios mixed.",
         autocompletion=offering(world_names),
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the training run.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Random seed.")]
 Steps = Annotated[
     int | None,
-    typer.Option("--steps", min=1, help="Decisions to fly; default: the configuration's."),
+    typer.Option(
+        "--steps",
+        min=1,
+        help="Number of decisions (environment steps); default: the configuration's.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", help="KEY=VALUE of the configuration, such as learner.gamma=0.98; may be repeated."
+        "--set", help="Configuration value KEY=VALUE, such as learner.gamma=0.98; may be repeated."
     ),
 ]
 ConfigFile = Annotated[
     Path | None,
-    typer.Option("--config", help="YAML file of keys in place of the configuration's own."),
+    typer.Option("--config", help="YAML file of configuration values that replace the defaults."),
 ]
 
 
@@ -57,7 +61,8 @@ def train(
     algorithm: Annotated[
         str,
         typer.Argument(
-            help="sac, ppo, recurrent-ppo or td3.", autocompletion=offering(algorithm_names)
+            help="Learning algorithm: sac, ppo, recurrent-ppo or td3.",
+            autocompletion=offering(algorithm_names),
         ),
     ],
     scenario: Scenario = "base",
@@ -68,18 +73,19 @@ def train(
     seeds: Annotated[
         int,
         typer.Option(
-            min=1, help="Runs, with this many seeds from --seed on, each in a folder of its own."
+            min=1, help="Number of runs, with seeds counted from --seed, each in its own folder."
         ),
     ] = 1,
     search: Annotated[
-        list[str] | None, typer.Option(help="KEY=VALUE|VALUE|...: a run for each; may be repeated.")
+        list[str] | None,
+        typer.Option(help="Values to compare, KEY=VALUE|VALUE|..., one run each; may be repeated."),
     ] = None,
     cluster: Annotated[
-        str | None, typer.Option(help="Spread the runs over a Ray cluster: its address, or local.")
+        str | None, typer.Option(help="Address of a Ray cluster to train on, or local.")
     ] = None,
     out: Out = Path("results/train"),
 ) -> dict[str, Any]:
-    """Train a policy; a run that was killed goes on where its last checkpoint is.
+    """Train a policy. An interrupted run resumes from its last checkpoint.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
@@ -121,9 +127,9 @@ def _sweep(
 ) -> dict[str, Any]:
     from ..runtime.extras import need
     from ..training.sweep import jobs_of, run_job, run_jobs
-    from ..training.training_envs import check_world
+    from ..training.training_envs import check_training_env
 
-    check_world(scenario)
+    check_training_env(scenario)
     if cluster:
         need("ray", "cluster")
     overrides = [*(setting or []), *([f"steps={steps}"] if steps else [])]
@@ -155,8 +161,8 @@ def imitate(
     config: ConfigFile = None,
     out: Out = Path("results/imitate"),
 ) -> dict[str, Any]:
-    """Learn what the oracle commands from what a policy may see (DAgger): the bound on this
-    observation.
+    """Train a policy to imitate the oracle. With DAgger; its score bounds what imitation
+    reaches with this observation.
 
     Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
     """
@@ -180,9 +186,9 @@ def _learn(
 ) -> dict[str, Any]:
     from ..training.configuration import load_config
     from ..training.train import Progress, read_progress
-    from ..training.training_envs import check_world
+    from ..training.training_envs import check_training_env
 
-    check_world(scenario)
+    check_training_env(scenario)
     given = load_config(
         algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config
     )
@@ -223,37 +229,43 @@ def _learn(
     }
 
 
-def law_names() -> list[str]:
-    """Return the laws that have gains to tune."""
+def tunable_names() -> list[str]:
+    """Return the controllers that have gains to tune."""
     return ["admittance", "ratio"]
 
 
 @expensive
 def tune(
     law: Annotated[
-        str, typer.Argument(help="admittance or ratio.", autocompletion=offering(law_names))
+        str,
+        typer.Argument(
+            help="Controller: admittance or ratio.",
+            metavar="CONTROLLER",
+            autocompletion=offering(tunable_names),
+        ),
     ],
     scenario: Scenario = "base",
-    trials: Annotated[int, typer.Option(min=1, help="Gains to try.")] = 30,
-    episodes: Annotated[int, typer.Option(min=1, help="Validation episodes of each.")] = 60,
-    seed: Annotated[int, typer.Option(min=0, help="Of the search.")] = 0,
+    trials: Annotated[int, typer.Option(min=1, help="Number of sets of gains to try.")] = 30,
+    episodes: Annotated[
+        int, typer.Option(min=1, help="Number of validation episodes per set of gains.")
+    ] = 60,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
     out: Out = Path("results/tune"),
 ) -> dict[str, Any]:
-    """Search the gains of a hand-designed law on validation episodes; add them to tuned.yaml in the
-    folder.
+    """Tune the gains of a designed controller. Search on validation episodes, write tuned.yaml.
 
     Example: windwrench tune admittance --scenario fast --trials 30 --episodes 60
     """
     from ..runtime.extras import need
     from ..training.seeds import validation_seeds
-    from ..training.training_envs import check_world
+    from ..training.training_envs import check_training_env
 
     need("optuna", "rl")
     from ..training.tune import check_law, keep_gains
     from ..training.tune import tune as search
 
     check_law(law)
-    check_world(scenario)
+    check_training_env(scenario)
     validation_seeds(episodes)
     folder = results_folder(out, law=law, scenario=scenario, trials=trials, episodes=episodes)
     with progress_bar() as progress:
@@ -271,7 +283,7 @@ def tune(
     console.print(
         f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
         f"episodes "
-        f"(as it comes: {found['default_rmse_m']:.3f} m)",
+        f"(default gains: {found['default_rmse_m']:.3f} m)",
         highlight=False,
     )
     say(folder / "tuned.yaml")

@@ -12,10 +12,11 @@ from .terminal import console, say
 
 def effects(
     markdown: Annotated[
-        Path | None, typer.Option(help="Write the page of all effects to this file instead.")
+        Path | None,
+        typer.Option(help="Markdown file for the page of all effects, instead of the list."),
     ] = None,
 ) -> dict[str, Any]:
-    """List the physical effects that plant and estimator know.
+    """List the effect library. Names, kinds, coefficients, units and typical values.
 
     Example: windwrench effects --markdown docs/effects.md
     """

@@ -1,4 +1,6 @@
-"""Measured flights: the wrench on a log, and what the model of its vehicle lacks."""
+"""Flight logs: the external wrench on a flight, the effects that its vehicle's model lacks, and the
+flight drawn again.
+"""
 
 import shlex
 import sys
@@ -42,7 +44,7 @@ def estimate(
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/estimate"),
 ) -> dict[str, Any]:
-    """Estimate the external wrench on a logged flight; write wrench.csv and a picture.
+    """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
@@ -95,21 +97,24 @@ def diagnose(
     ],
     test: Annotated[
         list[Path] | None,
-        typer.Option(help="Log on which alone the error is reported; may be repeated."),
+        typer.Option(
+            help="Test log: kept out of the fit, the error is reported on test logs alone; may be "
+            "repeated."
+        ),
     ] = None,
     reader: ReaderOption = None,
     without: Annotated[
         list[str] | None,
         typer.Option(
-            help="Effect to take out of the library; may be repeated.",
+            help="Effect to leave out of the library; may be repeated.",
             autocompletion=offering(effect_names),
         ),
     ] = None,
     vehicle: VehicleOption = "ardrone2",
     out: Out = Path("results/diagnose"),
 ) -> dict[str, Any]:
-    """Find the physical effects that a vehicle's model lacks; write report.json, report.html and
-    vehicle.yaml.
+    """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
+    and vehicle.yaml.
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
@@ -144,7 +149,7 @@ def diagnose(
                     title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
                 )
         console.print(table)
-    table = Table("held-out", "before", "after", "floor", box=box.SIMPLE_HEAD)
+    table = Table("error on held-out data", "before", "after", "noise floor", box=box.SIMPLE_HEAD)
     before, after = found.before, found.after
     table.add_row(
         "force (N)",
@@ -175,21 +180,32 @@ def replay(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
     vehicle: VehicleOption = "ardrone2",
-    video: Annotated[bool, typer.Option("--video", help="Write replay.mp4 (video extra).")] = False,
-    gif: Annotated[bool, typer.Option("--gif", help="Write replay.gif.")] = False,
-    rrd: Annotated[
-        bool, typer.Option("--rrd", help="Write replay.rrd for the Rerun viewer (rerun extra).")
+    video: Annotated[
+        bool, typer.Option("--video", help="Also write a video, replay.mp4 (video extra).")
     ] = False,
-    view: Annotated[bool, typer.Option("--view", help="Show it in a window.")] = False,
+    gif: Annotated[
+        bool, typer.Option("--gif", help="Also write an animation, replay.gif.")
+    ] = False,
+    rrd: Annotated[
+        bool,
+        typer.Option(
+            "--rrd", help="Also write a recording for the Rerun viewer, replay.rrd (rerun extra)."
+        ),
+    ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
     begin: Annotated[
         float,
-        typer.Option("--from", min=0.0, help="Time in the log at which the film begins, in s."),
+        typer.Option(
+            "--from", min=0.0, help="Start time of the replay, s from the start of the log."
+        ),
     ] = 0.0,
-    film_seconds: Annotated[float, typer.Option(min=0.1, help="Longest film.")] = 30.0,
+    film_seconds: Annotated[
+        float, typer.Option(min=0.1, help="Longest duration of the replay, s.")
+    ] = 30.0,
     out: Out = Path("results/replay"),
 ) -> dict[str, Any]:
-    """Draw a logged flight again, with its residual wrench as arrows; write its last picture, and
-    films if asked for.
+    """Draw a logged flight and its wrench. The external wrench is drawn as arrows; write the last
+    frame, and video or animation on request.
 
     Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
     """
@@ -219,8 +235,8 @@ def replay(
     )
     if len(shown) < 2:
         raise InputError(
-            f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected "
-            f"more time"
+            f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected a "
+            f"longer duration"
         )
     # where motion capture lost the vehicle, the filter's own pose goes on
     whole = Flight(

@@ -13,19 +13,22 @@ from .terminal import Out, console, results_folder, say, share_bars
 @expensive
 def reproduce(
     figure: Annotated[
-        str, typer.Argument(help="fig3, fig4, fig5, fig6, fig7, extension or all.")
+        str, typer.Argument(help="Figure: fig3, fig4, fig5, fig6, fig7, extension or all.")
     ] = "all",
     out: Out = Path("results/reproduction"),
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="For every figure; default: each one's own number.")
+        int | None,
+        typer.Option(min=1, help="Number of seeds per figure; default: that of each figure."),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
     page: Annotated[
         Path | None,
-        typer.Option(help="Where to write the page; default: reproduction.md in the folder."),
+        typer.Option(help="Markdown file for the page; default: reproduction.md in the folder."),
     ] = None,
 ) -> dict[str, Any]:
-    """Reproduce the paper's figures; what a run has finished, the next does not repeat.
+    """Reproduce the paper's figures. A repeated command resumes and keeps finished figures.
 
     Each gives NAME.json (figures of merit), NAME.csv.gz (data), NAME.png and NAME.svg.
 
@@ -65,7 +68,7 @@ def reproduce(
             "kept": not fresh[name],
         }
         console.print(
-            f"\n{kept['title']}" + ("" if fresh[name] else " (kept from before)"),
+            f"\n{kept['title']}" + ("" if fresh[name] else " (finished in an earlier run)"),
             style="bold",
             highlight=False,
         )

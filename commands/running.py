@@ -25,12 +25,14 @@ Work = TypeVar("Work", bound=Callable[..., Any])
 
 JsonOption = Annotated[
     bool,
-    typer.Option("--json", help="Print one JSON object, and nothing else, on standard output."),
+    typer.Option(
+        "--json", help="Print the result as one JSON object on standard output, nothing else."
+    ),
 ]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 DryRunOption = Annotated[
     bool,
-    typer.Option("--dry-run", help="Check the request and say what would be done; do nothing."),
+    typer.Option("--dry-run", help="Check the request and print the plan; run and write nothing."),
 ]
 
 # what a result depends on

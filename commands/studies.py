@@ -59,23 +59,27 @@ def from_a_checkout(work: Work) -> Work:
 @from_a_checkout
 def trials(
     seeds: Annotated[
-        int, typer.Option(min=1, help="How often everything is flown, each time anew.")
+        int, typer.Option(min=1, help="Number of seeds: every flight is flown once with each.")
     ] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="First random seed.")] = 0,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A part of it only, some minutes long.")
+        bool, typer.Option("--quick", help="Fly a subset only (takes minutes).")
     ] = False,
     group: Annotated[
-        list[str] | None, typer.Option(help="Fly this group alone, such as pair; again for more.")
+        list[str] | None,
+        typer.Option(help="Group of flights to run, such as pair; may be repeated."),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
     markdown: Annotated[
-        Path | None, typer.Option(help="Where to write the page; default: trials.md in the folder.")
+        Path | None,
+        typer.Option(help="Markdown file for the page; default: trials.md in the folder."),
     ] = None,
     out: Out = Path("results/trials"),
 ) -> dict[str, Any]:
-    """Diagnose flights whose cause is known, and score it; what a run has finished, the next does
-    not repeat.
+    """Diagnose flights with known effects. Simulate the flights and score the diagnoses; a repeated
+    command resumes.
 
     Example: windwrench trials --quick --out results/trials
     """
@@ -118,14 +122,20 @@ def trials(
 @from_a_checkout
 def real_flights(
     data: Annotated[
-        Path, typer.Option("--data", help="Folder with nanobench/ and crazyswarm2_payload/csv/.")
+        Path,
+        typer.Option(
+            "--data", help="Data folder that holds nanobench/ and crazyswarm2_payload/csv/."
+        ),
     ],
     markdown: Annotated[
         Path,
-        typer.Option(help="The page; pictures and numbers go to a folder of its name beside it."),
+        typer.Option(
+            help="Markdown file for the page; its pictures and numbers go to a folder of its name "
+            "beside it."
+        ),
     ] = Path("results/real-flights.md"),
 ) -> dict[str, Any]:
-    """Diagnose measured flights, each judged on flights that the fit never saw, and write the page.
+    """Diagnose measured flights. Test each on flights left out of its fit, and write the page.
 
     Example: windwrench real-flights --data ../shared/data --markdown docs/real-flights.md
     """
@@ -148,22 +158,26 @@ def close_loop(
     effect: Annotated[
         list[str] | None,
         typer.Option(
-            help="Effect, NAME or NAME:coef=value,...; again for more. Default: ten of typical "
-            "size.",
+            help="Effect, NAME or NAME:coef=value,...; may be repeated. Default: ten effects of "
+            "typical size.",
             autocompletion=offering(effect_names),
         ),
     ] = None,
     vehicle: VehicleOption = "ardrone2",
-    episodes: Annotated[int, typer.Option(min=1, help="Paired episodes an effect and model.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of flights and episodes.")] = 0,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
-    markdown: Annotated[Path | None, typer.Option(help="Also write the results as a page.")] = None,
+    episodes: Annotated[
+        int, typer.Option(min=1, help="Number of paired episodes per effect and model.")
+    ] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
+    markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
     out: Out = Path("results/close-loop"),
 ) -> dict[str, Any]:
-    """Fly an undeclared effect, name it from the log, declare it, and follow the fan before and
-    after.
+    """Compare tracking before and after diagnosis. Fly with an undeclared effect, diagnose the log,
+    and declare what was found.
 
-    What a run has finished, the next does not repeat.
+    A repeated command resumes and keeps what is finished.
 
     Example: windwrench close-loop --effect com_offset --effect mass:dm=0.06 --episodes 20
     """
@@ -214,7 +228,7 @@ def close_loop(
         )
     console.print(table)
     console.print(
-        f"after by before (95 %), {episodes} paired episodes an effect, seed {seed}",
+        f"ratio after / before (95 % interval), {episodes} paired episodes per effect, seed {seed}",
         highlight=False,
     )
     for sentence in conclusions(results):
@@ -230,37 +244,42 @@ def close_loop(
 def leaderboard(
     train: Annotated[
         bool,
-        typer.Option("--train", help="Train and score what is missing, not only write the page."),
+        typer.Option("--train", help="Also train and score what is missing."),
     ] = False,
     only: Annotated[
         str,
         typer.Option(
-            help="Parts of the study, with commas: designed, learned, ablation, or names of lines."
+            help="Parts of the study, comma-separated: designed, learned, ablation, or names of "
+            "entries."
         ),
     ] = "",
     plan: Annotated[
-        Path | None, typer.Option(help="A plan like studies/learning/study.yaml, in its place.")
+        Path | None,
+        typer.Option(help="Plan of the study (YAML); default: studies/learning/study.yaml."),
     ] = None,
     results: Annotated[
-        Path, typer.Option(help="Folder of the result files, one for each line and seed.")
+        Path, typer.Option(help="Folder of the result files, one per entry and seed.")
     ] = Path("docs/results/learning"),
-    policies: Annotated[Path, typer.Option(help="Folder of the policies that are shipped.")] = Path(
+    policies: Annotated[Path, typer.Option(help="Folder for the trained policies.")] = Path(
         "training/policies"
     ),
     markdown: Annotated[
         Path | None,
-        typer.Option(help="The page; its pictures go to a folder of its name beside it."),
+        typer.Option(
+            help="Markdown file for the page; its pictures go to a folder of its name beside it."
+        ),
     ] = Path("docs/leaderboard.md"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
     out: Annotated[
-        Path, typer.Option("--out", help="Folder of the training runs and their checkpoints.")
+        Path, typer.Option("--out", help="Folder for training runs and their checkpoints.")
     ] = Path("results/leaderboard"),
 ) -> dict[str, Any]:
-    """Write the page of the leaderboard from its result files; with --train, first do what is
-    missing of the study.
+    """Write the leaderboard page. From its result files; with --train, first train and score what
+    is missing.
 
-    What a run has finished, the next does not repeat; a training run that was stopped goes on where
-    it was.
+    A repeated command keeps what is finished, and an interrupted training run resumes.
 
     Example: windwrench leaderboard --train --only sac,sac-wide
     """

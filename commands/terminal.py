@@ -98,18 +98,20 @@ def controller_names() -> Iterable[str]:
 
 
 def reader_names() -> Iterable[str]:
-    """Return the readers of logs of other forms."""
+    """Return the readers of other log formats."""
     from ..identification.logs.readers import READERS
 
     return READERS
 
 
-Out = Annotated[Path, typer.Option("--out", help="Folder for the results; it is made if need be.")]
+Out = Annotated[
+    Path, typer.Option("--out", help="Folder for the results; created if it does not exist.")
+]
 VehicleOption = Annotated[
     str,
     typer.Option(
         "--vehicle",
-        help="Preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
+        help="Vehicle: a preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
         autocompletion=offering(vehicle_names),
     ),
 ]
@@ -117,7 +119,7 @@ ReaderOption = Annotated[
     str | None,
     typer.Option(
         "--reader",
-        help="For a log of another form: nanobench, crazyswarm2, px4_ulog, rosbag or "
+        help="Reader for another log format: nanobench, crazyswarm2, px4_ulog, rosbag or "
         "rosbag:TOPICS.yaml.",
         autocompletion=offering(reader_names),
     ),

@@ -157,7 +157,7 @@ class WrenchUKFBatch:
     def _new_memory(self) -> Blocks | _Records:
         first = self._filters[0].record
         if len(self._filters) == 1 and not any(
-            first[f"{kind}_count"][0] for kind in ("wrench", "rotor", "sense")
+            first[f"{kind}_count"][0] for kind in ("wrench", "rotor", "sensing")
         ):
             return Blocks(first, self.count)
         return _Records(np.concatenate([self._of(n).record for n in range(self.count)]))

@@ -47,7 +47,7 @@ def estimate_log(
 ) -> WrenchSeries:
     """Estimate the external force and torque at every row of a log.
 
-    The filter starts at the first pose. Each row's prediction uses the mean of its turn rates and
+    The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
     those of the row before, in steps of at most one median period; a row without a pose is
     prediction alone. After 2 s without a pose the estimate is held, and the filter starts anew at
     the next pose. Rows before the first pose hold the filter's estimate at that pose: no wrench,
@@ -61,7 +61,7 @@ def estimate_log(
         report: called now and then with the share that is done.
 
     Raises:
-        InputError: the log has no pose at all, or its turn rates make the filter's numbers
+        InputError: the log has no pose at all, or its rotor speeds make the filter's numbers
             overflow.
     """
     seen = np.flatnonzero(log.valid)
@@ -94,7 +94,7 @@ def estimate_log(
                 elif log.valid[k]:
                     ukf.reset(log.position[k], log.quaternion[k])
                     notes.append(
-                        f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter starts anew "
+                        f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter restarts "
                         f"there"
                     )
             if log.valid[k]:
@@ -107,8 +107,7 @@ def estimate_log(
         bad = int(np.flatnonzero(~np.isfinite(np.column_stack([state, deviation])).all(axis=1))[0])
         raise InputError(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[bad]:.6g} s; expected "
-            f"turn "
-            f"rates and poses that {vehicle.name} can fly"
+            f"rotor speeds and poses that {vehicle.name} can fly"
         )
     return WrenchSeries(
         t=log.t,

@@ -42,14 +42,14 @@ _COUNTED = 90.0
 _HANG, _SETTLED = 1.0, 12.0  # s; the position integral takes 10 s to trim out the mass
 # What the requirement allows of a cluster: mean off its target, and standard deviation, (N, Nm)
 _MEAN_BOUND, _STD_BOUND = np.array([0.02, 0.003]), np.array([0.05, 0.02])
-# sensor noise, 8-bit turn rates, actuator noise: is it there?
+# sensor noise, 8-bit rotor speeds, actuator noise: is it there?
 SOURCES = {
     "everything": (True, True, True),
     "sensor noise alone": (True, False, False),
-    "8-bit turn rates alone": (False, True, False),
+    "8-bit rotor speeds alone": (False, True, False),
     "actuator noise alone": (False, False, True),
     "without sensor noise": (False, True, True),
-    "without 8-bit turn rates": (True, False, True),
+    "without 8-bit rotor speeds": (True, False, True),
     "without actuator noise": (True, True, False),
 }
 _COLOURS = ("#6f6f6f", "#30638e", "#d1495b")
@@ -220,7 +220,7 @@ def _remarks(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
     plain, rest = np.abs(off).max(axis=0), np.abs(off - added).max(axis=0)
     alone = {
         name: spread[f"{name} alone"]
-        for name in ("sensor noise", "8-bit turn rates", "actuator noise")
+        for name in ("sensor noise", "8-bit rotor speeds", "actuator noise")
     }
     told = "; ".join(
         f"{name} alone {std[0] * 1e3:.1f} mN and {std[1] * 1e3:.2f} mNm"

@@ -288,7 +288,8 @@ def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
         "step response that the filter showed along z, the lateral estimate never had more than "
         f"{max(row['made_up_lateral_N'] for row in rows):.3f} N. The flights use stiffer attitude "
         f"and yaw loops than the "
-        "benchmark's. On a thread of 0.25 m, which swings in 1 s as the position loop does, the "
+        "benchmark's. On a thread of 0.25 m, which oscillates with a "
+        "period of 1 s as the position loop does, the "
         "pull reached 0.24 N and the "
         "estimate tuned to 0.5 s at the higher noise about 0.1 N.",
         "Lateral transients not clearly below "

@@ -317,7 +317,7 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
         "7 to 9.5 s, steady: from "
         "11 s. The standard plant has an unmodelled actuator disturbance (0.03 N, 0.01 Nm, over "
         "0.3 s), the exact one has "
-        "none; both have motor lag (with the true rate logged) and 8-bit turn rates.",
+        "none; both have motor lag (with the true rate logged) and 8-bit rotor speeds.",
         "The paper's comparison, an observer tuned for low noise and then given the high: the "
         "steady-state error is "
         f"{_span(ratios, low, 'high', steady, 'exact')} times that of the filter on the exact "

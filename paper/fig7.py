@@ -32,7 +32,7 @@ SEEDS = 10
 GAINS = (6.0, 12.0, 18.0, 24.0, 36.0)  # m/s per Nm
 SHOWN_GAINS = (6.0, 18.0, 36.0)
 RISE_TIMES = (0.45, 1.0)  # s, of the filter
-FAN_SPEEDS = (0.1, 0.2, 0.4)  # m/s, of the fan that swings
+FAN_SPEEDS = (0.1, 0.2, 0.4)  # m/s, of the fan that moves to and fro
 SWING = 1.0  # m, to either side
 CAPTURED = 0.3  # m, offset below which the jet is caught
 # m, offset beyond which a fan counts as lost. The torque grows up to 0.46 m off the axis: a vehicle
@@ -70,7 +70,7 @@ def ramp(speed: float, start: float = START) -> Path:
 
 
 def triangle(speed: float) -> Path:
-    """Return the path of a fan that swings ``SWING`` m to either side at a steady
+    """Return the path of a fan that moves to and fro ``SWING`` m to either side at a steady
     ``speed`` (m/s).
     """
     return lambda t: SWING * 2 / math.pi * np.arcsin(np.sin(math.pi / 2 * speed / SWING * t))
@@ -305,14 +305,15 @@ def _comparison(
     )
     rows.append(
         Comparison(
-            f"time within the radius of a fan that swings along y, gain {middle:g}",
+            f"time within the radius of a fan that moves to and fro along y, gain {middle:g}",
             "stays in its wind",
             inside,
         )
     )
     rows += [
         Comparison(
-            f"RMSE behind a fan that swings at {t['fan_speed_m_s']:g} m/s, gain {t['gain']:g} (m)",
+            f"RMSE behind a fan that moves to and fro at {t['fan_speed_m_s']:g} m/s, "
+            f"gain {t['gain']:g} (m)",
             "-",
             f"{t['rmse_m']:.2f}",
         )
@@ -354,7 +355,7 @@ def _remarks(
         f"{DISTANCE:g} m, so a command "
         f"k tau_z is at most k times that on average, and at most {MAX_COMMAND:g} m/s, the largest "
         f"command. A faster fan runs "
-        "away from any vehicle that flies by this law.",
+        "away from any vehicle that flies by this control law.",
         f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, {START:g} s "
         f"of which the fan takes to "
         f"gather speed, in at least {HELD_SHARE:.0%} of {seeds} paired seeds. A vehicle that is "

@@ -1,4 +1,4 @@
-"""The picture of tracking a fan: capture, swinging fans, and the fastest fan held
+"""The picture of tracking a fan: capture, moving fans, and the fastest fan held
 beside the bound.
 """
 
@@ -47,7 +47,7 @@ def draw_tracking(
 
     Args:
         captures: flights for each (rise time s, gain), from 0.8 m off a fan that stands still.
-        tracks: flights for each (fan speed m/s, gain), behind a fan that swings.
+        tracks: flights for each (fan speed m/s, gain), behind a fan that moves to and fro.
         fastest: rows of the search for the fastest fan.
         largest: the jet's largest torque, Nm.
         at: the offset where it acts, m.

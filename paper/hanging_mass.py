@@ -29,14 +29,14 @@ MASS = 0.053  # kg, of the paper
 FORCE, TORQUE = -0.52, 0.067  # N along world z, Nm about world y: the paper's targets
 ARM = TORQUE / -FORCE  # m: 0.129, of the paper's two targets; our rotor axes lie at 0.126
 # m. A thread pulls sideways by weight * displacement / length when the vehicle slides from over the
-# mass, in a real flight too. On 0.25 m, whose swing of 1 s the position loop follows, it pulled
+# mass, in a real flight too. On 0.25 m, whose pendulum of 1 s the position loop follows, it pulled
 # sideways by up to 0.24 N.
 THREAD = 1.0
 CENTRE_LOAD = SuspendedLoad(MASS, (0.0, 0.0, -0.02), length=THREAD)
 ROTOR_LOAD = SuspendedLoad(MASS, (ARM, 0.0, -0.02), length=THREAD)
 # A proportional attitude loop tips by torque / (inertia * gain) when the mass is hung on, and flies
 # sideways until its position integral has found the trim; the benchmark's 110 1/s2 tips by 0.2 rad.
-# Its yaw loop of 3.5 rad/s would meet the swing of a thread of 1 m, 3.1 rad/s, through the arm.
+# Its yaw loop of 3.5 rad/s would meet the pendulum of a thread of 1 m, 3.1 rad/s, through the arm.
 GAINS = FlightGains(attitude=300.0, rate=32.0, yaw=30.0, yaw_rate=10.0, yaw_integral=10.0)
 CALM = PlantSettings(
     disturbance_force=0.0, disturbance_torque=0.0

@@ -44,7 +44,7 @@ _GOOD_FORCE, _GOOD = 0.5, 0.4  # shares of force and of torque up to which anoth
 _CLEAR = 0.5  # of the share as declared: leaving less is a clear win
 _WORSE = 0.15  # share by which another reading may be worse in the other balance
 _WORST = 2.0  # a share beyond says no more
-# a share as declared beyond it cannot be made worse: turn rates from commands leave such torques
+# a share as declared beyond it cannot be made worse: rotor speeds from commands leave such torques
 _SAYS_NOTHING = 0.8
 _UPSIDE_DOWN = 1.0  # share of the vertical force alone: more than there was
 _TIE = 1.25, 0.05  # factor and share within which two readings fit alike
@@ -290,8 +290,8 @@ class _Motion:
 
 @dataclass(frozen=True, eq=False)
 class _Rotors:
-    """Squared turn rates (n, 4), low-passed, at the compared times less a delay; NaN outside their
-    piece.
+    """Squared rotor speeds (n, 4), low-passed, at the compared times less a delay; NaN outside
+    their piece.
     """
 
     pieces: Sequence[
@@ -406,7 +406,7 @@ class Balances:
             if reading.conjugate
             else (motion.rate, motion.angular_acceleration)
         )
-        # a turn rate is a pseudovector: a mirrored body frame turns its sign as well
+        # the angular velocity is a pseudovector: a mirrored body frame turns its sign as well
         turn = reading.body * np.linalg.det(reading.body)
         rate, alpha = pair[0] @ turn, pair[1] @ turn
         J = self._vehicle.inertia
@@ -614,10 +614,10 @@ def _wins(fit: Fit, declared: Fit) -> bool:
 
 
 def time_shift(balances: Balances) -> float | None:
-    """Return by how many s the turn rates come late (negative: early) against the pose, where it is
-    clearly over 0.1 s.
+    """Return the time offset of the rotor speeds against the pose (s, positive: they come late),
+    where it is clearly over 0.1 s; None elsewhere.
 
-    Motor lag, latency and radio make turn rates early by less.
+    Motor lag, latency and radio make rotor speeds early by less.
     """
     if balances.samples < _LEAST_SAMPLES:
         return None

@@ -1,5 +1,5 @@
-"""Long flights by an excerpt: minutes spread over an hour say of a vehicle what the hour says, in a
-tenth of the memory.
+"""Excerpts of long flights: evenly spaced minutes of an hour give the same diagnosis as the whole
+hour, in a tenth of the memory.
 """
 
 from collections.abc import Sequence
@@ -36,5 +36,8 @@ def _windows(log: FlightLog, seconds: float, count: int) -> FlightLog:
     )
     for begin in begins:
         keep |= (log.t >= log.t[0] + begin) & (log.t <= log.t[0] + begin + _WINDOW)
-    note = f"of {seconds:.0f} s, {count} windows of {_WINDOW:.0f} s spread evenly were looked at"
+    note = (
+        f"of {seconds:.0f} s, {count} windows of {_WINDOW:.0f} s, evenly spaced, were used; the "
+        "rest was left out"
+    )
     return replace(with_rows(log, keep), notes=(*log.notes, note))

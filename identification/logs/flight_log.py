@@ -6,7 +6,7 @@ One row a sample, time strictly increasing. Columns of the file:
 ``t``                          s        time
 ``px, py, pz``                 m        position of the geometric centre, world, z up
 ``qw, qx, qy, qz``             1        attitude, body to world, scalar first; its sign means nothing
-``omega1 ... omega4``          rad/s    turn rates: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right
+``omega1 ... omega4``          rad/s    rotor speeds: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right
 ``vbat`` (optional)            V        battery voltage
 ``fx, fy, fz`` (optional)      N        true external force, world
 ``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
@@ -52,14 +52,14 @@ class FlightLog:
     source: str = ""  # the file and the reader
     notes: tuple[
         str, ...
-    ] = ()  # gaps, doubts about units, and the thrust model where turn rates were not measured
+    ] = ()  # gaps, doubts about units, and the thrust model where rotor speeds were not measured
     valid: Mask = field(
         default_factory=lambda: np.empty(0, dtype=np.bool_)
     )  # (N,) the pose is there
     extra: Mapping[str, Array] = field(
         default_factory=dict
     )  # (N,) or (N, ...) SI; what a reader found besides
-    # turn rates are worked out from commands: scale of thrust unknown, moments not to be trusted
+    # rotor speeds are computed from commands: scale of thrust unknown, moments not to be trusted
     commanded: bool = False
 
     def __post_init__(self) -> None:

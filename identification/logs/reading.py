@@ -1,4 +1,4 @@
-"""Reading a flight log from a file: this kit's own form here, any other through its reader."""
+"""Reading a flight log from a file: this kit's own format here, any other through its reader."""
 
 import warnings
 from dataclasses import replace
@@ -36,8 +36,8 @@ def read_log(
         reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with
             that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
             for the kit's own.
-        vehicle: the vehicle that flew, for checking units and, in a reader, for turning thrust into
-            turn rates.
+        vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
+            into rotor speeds.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -108,7 +108,7 @@ def _canonical(table: Table) -> FlightLog:
             expected = (
                 "a voltage of"
                 if name == "vbat"
-                else "a turn rate (its sense is the vehicle's spin) of"
+                else "a rotor speed (its direction is the vehicle's spin) of"
             )
             raise InputError(
                 f"{path}: column {name}, {table.row(low[0])}: {columns[name][low[0]]:g} is "
@@ -161,13 +161,13 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
         ratio = float(np.median(turning)) if turning.size else 1.0
         if ratio > 10.0:
             doubts.append(
-                f"the turn rates make a median thrust of {ratio:.0f} times the weight of "
+                f"the rotor speeds make a median thrust of {ratio:.0f} times the weight of "
                 f"{vehicle.name}: "
                 "are omega1..omega4 in rpm? Expected rad/s"
             )
         elif ratio < 0.1:
             doubts.append(
-                f"the turn rates make a median thrust of {ratio:.2g} times the weight of "
+                f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
                 f"{vehicle.name}: "
                 "are omega1..omega4 in revolutions per second? Expected rad/s"
             )

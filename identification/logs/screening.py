@@ -90,7 +90,7 @@ def screen_log(
     if shift is not None:
         late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
         raise InputError(
-            f"{where}: the turn rates come {abs(shift):.2f} s too {late} against the pose; "
+            f"{where}: the rotor speeds come {abs(shift):.2f} s too {late} against the pose; "
             f"expected both on one "
             f"clock: put omega1..omega4 {abs(shift):.2f} s {sooner}"
         )
@@ -98,29 +98,29 @@ def screen_log(
 
 
 def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ...]:
-    """Check that the rotors turned, all four, at rates (rad/s) that carry the vehicle."""
+    """Check that all four rotors turned, at speeds (rad/s) that carry the vehicle."""
     with np.errstate(over="ignore"):
         thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
     most = float(np.quantile(thrust, 0.95))
     if most < _AT_REST:
         raise InputError(
-            f"{where}: omega1..omega4 are at rest all the time, so nothing flew; expected turn "
-            f"rates in rad/s "
+            f"{where}: omega1..omega4 are at rest all the time, so nothing flew; expected "
+            f"rotor speeds in rad/s "
             f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
         )
     turning = thrust > 0.3 * most
     for i, column in enumerate(log.rotor_speeds[turning].T):
         if float(np.max(column)) <= 0.0:
             raise InputError(
-                f"{where}: omega{i + 1} is 0 while the other rotors turn; expected the turn rates "
-                f"of all four"
+                f"{where}: omega{i + 1} is 0 while the other rotors turn; expected the rotor "
+                f"speeds of all four"
             )
     ratio = float(np.median(thrust[turning]))
     if _CARRIES[0] <= ratio <= _CARRIES[1]:
         if _DOUBTFUL[0] <= ratio <= _DOUBTFUL[1]:
             return ()
         return (
-            f"the turn rates make a median thrust of {ratio:.2g} times the weight of "
+            f"the rotor speeds make a median thrust of {ratio:.2g} times the weight of "
             f"{vehicle.name}: is it this "
             "vehicle, and did it fly?",
         )
@@ -133,7 +133,7 @@ def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ..
                 f"of {vehicle.name}; expected rad/s: {what}"
             )
     raise InputError(
-        f"{where}: the turn rates make a median thrust of {ratio:.3g} times the weight of "
+        f"{where}: the rotor speeds make a median thrust of {ratio:.3g} times the weight of "
         f"{vehicle.name}; "
         f"expected about 1: omega1..omega4 in rad/s, and the vehicle that flew"
     )
@@ -232,7 +232,7 @@ def _check_conventions(balances: Balances, where: str) -> None:
     if readings:
         says = "; or ".join(dict.fromkeys(reading.says for reading in readings[:3]))
         raise InputError(
-            f"{where}: {says}. As it stands the motion contradicts the rotors and gravity"
+            f"{where}: {says}. As logged, the motion contradicts the rotor speeds and gravity"
         )
 
 

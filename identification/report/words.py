@@ -87,7 +87,7 @@ def effect_summary(name: str) -> str:
     """Return the library's sentence on an effect, empty for one that is not in it."""
     if name not in library.names():
         return ""
-    return " ".join(library.law_in_words(name).split("\n\n")[0].split()).replace("``", "")
+    return " ".join(library.model_in_words(name).split("\n\n")[0].split()).replace("``", "")
 
 
 def coefficient_meaning(effect: str, coefficient: str) -> str:
@@ -104,8 +104,8 @@ def headline(diagnosis: Diagnosis) -> str:
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
         if diagnosis.remainder == "random":
-            return "The model errs, but at random: no effect in the library explains it."
-        return "The model is wrong in a way that no effect in the library explains."
+            return "The model's error looks random: no effect in the library explains it."
+        return "The model's error has structure that no effect in the library explains."
     lacked = (
         f"The model {_lacked(diagnosis, sure)}"
         + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
@@ -113,7 +113,7 @@ def headline(diagnosis: Diagnosis) -> str:
         else f"The model perhaps {_lacked(diagnosis, unsure)}"
     )
     return (
-        f"{lacked}, but that is not all."
+        f"{lacked}, and an unexplained error is left."
         if diagnosis.verdict == "partly explained"
         else f"{lacked}."
     )
@@ -140,14 +140,14 @@ def _lacked(
     return in_words(
         [
             *([f"lacked {lacked}"] if lacked else []),
-            *([f"has {other} other than declared"] if other else []),
+            *([f"declares {other} with wrong coefficients"] if other else []),
         ]
     )
 
 
 def error_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return how the error on data that the fit never saw changes: force and torque, those that
-    stand out from the floor.
+    """Return how the error on held-out data changes: force and torque, those that stand out from
+    the noise floor.
     """
     before, after = diagnosis.before, diagnosis.after
     rows = [
@@ -156,18 +156,18 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
     ]
     known = [row for row in rows if math.isfinite(row[1]) and math.isfinite(row[2])]
     if not known:
-        return ["The error on data the fit never saw could not be worked out."]
+        return ["The error on held-out data could not be computed."]
     telling = [row for row in known if row[1] > _TELLING * row[3]] or known[:1]
     told: list[str] = []
     for what, old, new, floor, unit in telling:
         factor, unit = scale_of((old, new, floor), unit)
         start, end, least = (f"{rounded(factor * x, 2)}{_SPACE}{unit}" for x in (old, new, floor))
-        where = f"The {what} error" if told else f"The {what} error on data the fit never saw"
+        where = f"The {what} error" if told else f"The {what} error on held-out data"
         change = f"falls from {start} to {end}" if new < 0.98 * old else f"is {end}"
         if new > 1.02 * old:
             change = f"rises from {start} to {end}"
         told.append(
-            f"{where} {change}; the floor is {least}."
+            f"{where} {change}; the noise floor is {least}."
             if math.isfinite(floor)
             else f"{where} {change}."
         )
@@ -175,31 +175,30 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 def remainder_sentence(diagnosis: Diagnosis) -> str:
-    """Return what is left after the named effects."""
+    """Return what the named effects leave: the residual's sentence."""
     if diagnosis.remainder == "none":
-        return f"What is left is the sensors' noise{_gusts(diagnosis)}."
+        return f"The residual is at the sensors' noise floor{_disturbances(diagnosis)}."
     if diagnosis.remainder == "random":
         if diagnosis.pushes:
             return (
-                f"What is left comes now and then, as pushes do: {_push(diagnosis)}. "
-                "No test found a law in it."
+                "The residual holds transient disturbances; the clearest is "
+                f"{_transient(diagnosis)}. No test found other structure in it."
             )
         return (
-            f"What is left looks random, as turbulence does{_gusts(diagnosis)}: "
-            "no test found a law in it."
+            f"The residual looks random, as turbulence does{_disturbances(diagnosis)}: "
+            "no test found structure in it."
         )
     if not diagnosis.structure:
-        return "What is left still follows a law."
+        return "The residual has structure that no effect in the library explains."
     strongest = diagnosis.structure[0]
     return (
-        f"What is left still follows a law that the model lacks; the strongest sign is in "
-        f"{strongest.where} "
-        f"({percent(strongest.gain)} of what is left)."
+        "The residual has structure that no effect in the library explains; the strongest is in "
+        f"{strongest.where} ({percent(strongest.gain)} of the residual)."
     )
 
 
-def _gusts(diagnosis: Diagnosis) -> str:
-    """Return the largest gusts, of a force and of a torque, as an insertion."""
+def _disturbances(diagnosis: Diagnosis) -> str:
+    """Return the strongest random disturbances, of a force and of a torque, as an insertion."""
     found = []
     for unit, channels in (("N", CHANNELS[:3]), ("Nm", CHANNELS[3:])):
         own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
@@ -207,19 +206,19 @@ def _gusts(diagnosis: Diagnosis) -> str:
             largest = max(own, key=lambda gusts: gusts.rms)
             factor, unit = scale_of([largest.rms], unit)
             found.append(
-                f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} that last "
-                f"{rounded(largest.time, 2)}{_SPACE}s"
+                f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} rms (correlation time "
+                f"{rounded(largest.time, 2)}{_SPACE}s)"
             )
-    return f", with gusts of up to {in_words(found)}" if found else ""
+    return f", with disturbances of up to {in_words(found)}" if found else ""
 
 
-def _push(diagnosis: Diagnosis) -> str:
-    """Return when the plainest push was, and how strong."""
-    push = diagnosis.pushes[0]
-    factor, unit = scale_of([push.peak], "Nm" if push.channel.startswith("tau") else "N")
-    where = f" of {push.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
-    size = f"{rounded(factor * push.peak, 2)}{_SPACE}{unit}"
-    return f"{size} in {push.channel} at {rounded(push.t)}{_SPACE}s{where}"
+def _transient(diagnosis: Diagnosis) -> str:
+    """Return when the clearest transient disturbance was, and how strong."""
+    largest = diagnosis.pushes[0]
+    factor, unit = scale_of([largest.peak], "Nm" if largest.channel.startswith("tau") else "N")
+    where = f" of {largest.log}" if len(diagnosis.logs) + len(diagnosis.test_logs) > 1 else ""
+    size = f"{rounded(factor * largest.peak, 2)}{_SPACE}{unit}"
+    return f"{size} in {largest.channel} at {rounded(largest.t)}{_SPACE}s{where}"
 
 
 def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
@@ -230,9 +229,8 @@ def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
     unsure = [effect.name for effect in diagnosis.effects if effect.tentative]
     if unsure:
         told.append(
-            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: what "
-            f"{'it explains' if len(unsure) == 1 else 'they explain'} may come from something that "
-            f"the library lacks."
+            f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: the true cause "
+            "may be an effect that the library lacks."
         )
     return told
 
@@ -240,7 +238,7 @@ def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
 def confusion(effect: NamedEffect) -> str:
     """Return which other effects would explain these logs as well as this one."""
     return (
-        f"These logs cannot tell {effect.name} from "
-        f"{in_words(effect.indistinguishable_from, 'or')}, which would explain "
-        "them as well."
+        f"These logs cannot distinguish {effect.name} from "
+        f"{in_words(effect.indistinguishable_from, 'or')}, which explain "
+        "them equally well."
     )

@@ -67,7 +67,7 @@ def conclusions(results: Sequence[Result]) -> list[str]:
             summary = result["summary"][measure.key]
             text = f"x{summary['ratio']:.2f}"
             if summary["verdict"] == "rises":
-                # whether the diagnosis is to blame, or the effect's own law
+                # whether the diagnosis is to blame, or the effect's own model
                 exact = summary["exact"]["mean"] / summary["declared"]["mean"]
                 text += f", with the exact coefficients x{exact:.2f}"
             groups[summary["verdict"]].append(f"{result['name']} ({text})")
@@ -97,9 +97,10 @@ def conclusions(results: Sequence[Result]) -> list[str]:
             text += (
                 " The filter now gives the torque about the true centre of mass, where the jet's "
                 "force has an arm; the "
-                "admittance law steers to where that torque vanishes, and that is no longer the "
+                "admittance controller steers to where that torque vanishes, "
+                "and that is no longer the "
                 "axis. A better estimate "
-                "is not a better command here, because the law reads torque as offset."
+                "is not a better command here, because the controller reads torque as offset."
             )
         out.append(text)
     wrong = [
@@ -138,7 +139,8 @@ def _in_short(results: Sequence[Result]) -> str:
         f"with "
         f"{count(wrench, 'rises')}; it improves tracking with {count(tracking, 'falls')} and makes "
         f"it worse with "
-        f"{count(tracking, 'rises')}. The admittance law reads the yaw torque alone: what an "
+        f"{count(tracking, 'rises')}. The admittance controller reads "
+        f"the yaw torque alone: what an "
         f"undeclared effect adds to the "
         "other five components of the estimate does not reach its command."
     )
@@ -236,7 +238,8 @@ def _what_is_measured(request: Mapping[str, Any]) -> list[str]:
         "own share is no part of this "
         "truth in either case, so what of it is left in the estimate counts as error. RMS over the "
         "three axes (yaw torque: the "
-        "vertical one, the only one that the admittance law reads) and an episode, then the mean "
+        "vertical one, the only one that the admittance controller "
+        "reads) and an episode, then the mean "
         "over episodes. What is left "
         "even with the exact model is mostly the filter's rise time: gusts and disturbance change "
         "faster than it follows. "

@@ -77,9 +77,9 @@ def _middle_policy(rows: Sequence[Row], name: str, places: Places) -> Path | Non
 
 
 def _head(plan: Mapping[str, Any]) -> str:
-    return f"""# Leaderboard: learned policies against designed laws
+    return f"""# Leaderboard: learned policies against designed controllers
 
-Who holds a quadrotor best in the jet of a moving fan that it can only feel? Every number below is from the result
+Who holds a quadrotor best in the jet of a moving fan that it knows only by the estimated wrench? Every number below is from the result
 files in `docs/results/learning`; `windwrench leaderboard` writes this page from them, and
 `windwrench leaderboard --train` does whatever is missing. {plan["episodes"]} paired test episodes a world, on seeds that
 neither training nor tuning sees; a lost vehicle's remaining time counts at 2.5 m; every policy flies with the full filter.
@@ -132,7 +132,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
             if world == "fast":
                 asked.append(
                     (
-                        f"{who}: better than the best ratio law, interval clear of zero",
+                        f"{who}: better than the best ratio controller, interval clear of zero",
                         row.ratio_interval[1] < 0,
                         f"{_percent(row.ratio_change)} ({_between(row.ratio_interval)})",
                     )
@@ -152,9 +152,9 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
 def _tables(rows: Sequence[Row]) -> str:
     parts = [
         "## Base and fast",
-        "Change: of the mean RMSE against the admittance law with the gain that is best in that "
-        "very world (chosen on the test episodes, which favours the law), likewise against the "
-        "best ratio law; interval: "
+        "Change: of the mean RMSE against the admittance controller with the gain that is best in that "
+        "very world (chosen on the test episodes, which favours the controller), likewise against the "
+        "best ratio controller; interval: "
         "paired bootstrap over episodes and seeds. Wins: paired episodes with a smaller RMSE than "
         "that admittance. P: "
         "probability of improvement over it.",
@@ -259,7 +259,7 @@ def _aggregates(lines: Sequence[Line], worlds: Sequence[str]) -> str:
     return f"""## Over all scenarios
 
 Interquartile mean of the score over the {len(worlds)} scenarios, each between hover (0) and oracle (1), with its stratified
-bootstrap interval (Agarwal and others, 2021); for laws that were designed the interval is over episodes.
+bootstrap interval (Agarwal and others, 2021); for designed controllers the interval is over episodes.
 
 | controller | IQM | 95 % |
 | - | - | - |
@@ -294,7 +294,7 @@ def _losses(rows: Sequence[Row]) -> str:
         return "## Where learning does not win\n\nNowhere in these worlds."
     return (
         "## Where learning does not win\n\nEvery world in which a learned policy is not clearly "
-        "better than both laws with "
+        "better than both controllers with "
         "their best gains, or loses a vehicle.\n\n| world | policy | |\n| - | - | - |\n"
         + "\n".join(items)
     )
@@ -379,7 +379,7 @@ def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> 
 
 * Seeds of episodes: training below 900 000, validation from there, test from 1 000 000 on. The best of a run's validations,
   not the last, is the policy that is scored.
-* The laws' gains are tuned on 60 validation episodes of base, fast and wide (`windwrench tune`); what was found, and the
+* The designed controllers' gains are tuned on 60 validation episodes of base, fast and wide (`windwrench tune`); what was found, and the
   command, is in `controllers/tuned.yaml`.
 * A policy is a file of weights with a card beside it (`training/policies`) and is flown without a
   deep-learning library: `windwrench benchmark --controllers training/policies/sac-0.npz,admittance --scenarios base,fast`.

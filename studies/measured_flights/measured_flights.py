@@ -1,7 +1,7 @@
 """The diagnosis on measured flights: NanoBench (PWM, battery, motion capture) and slung payloads
 (commanded thrust).
 
-Every fold is one call of ``diagnose`` on some flights, judged on flights that this fit never saw.
+Every fold is one call of ``diagnose`` on some flights, judged on flights left out of this fit.
 The diagnosis of commanded flights itself was developed on these very flights, which the page says.
 Forces are stated as accelerations by the declared mass, through a 4 Hz low-pass with zero phase,
 over the time in the air.
@@ -213,7 +213,7 @@ def payload_logs(folder: Path, numbers: Sequence[str], vehicle: Vehicle) -> list
 
 
 def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None:
-    """Return how strongly the cable pulls sideways (standard deviation, N, x and y): by the law,
+    """Return how strongly the cable pulls sideways (standard deviation, N, x and y): by the model,
     and by the payload's track.
     """
     found = next((e for e in diagnosis.effects if e.name == "slung_payload"), None)
@@ -374,7 +374,7 @@ def page(result: Mapping[str, Any], folder: str) -> str:
         made_by("windwrench real-flights", [result["commit"]], result["version"]),
         "",
         "Residuals are accelerations by the declared mass (m/s2) through a "
-        f"{result['cutoff_hz']:g} Hz low-pass, of flights that the fit never saw, with one thrust "
+        f"{result['cutoff_hz']:g} Hz low-pass, of flights left out of the fit, with one thrust "
         f"scale for all "
         "flights.",
         "",
@@ -476,7 +476,7 @@ def _nanobench_lines(rows: Sequence[Mapping[str, Any]], folder: str) -> list[str
     ]
     lines += [
         "",
-        "The residual before is large because the reader's thrust law belongs to a full battery: "
+        "The residual before is large because the reader's thrust curve belongs to a full battery: "
         "it is the "
         "figure against constant thrust that says what the named effects are worth. What *z after* "
         "has over *own "
@@ -498,7 +498,7 @@ def _nanobench_lines(rows: Sequence[Mapping[str, Any]], folder: str) -> list[str
     return [
         *lines,
         "",
-        "Of the constant offset: a frame that leans (`world_tilt`) and a steady force "
+        "Of the constant offset: a frame that is tilted (`world_tilt`) and a steady force "
         "(`constant_force`) are "
         "the same while yaw hardly changes. Torque is left out: what PWM would make of it hardly "
         "shows in how these "
@@ -524,11 +524,11 @@ def _payload_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     lines += [
         "",
         "How strongly the cable pulls sideways (standard deviation, mN, x and y): by the fitted "
-        "law, and by "
+        "effect model, and by "
         "the payload "
         "that was tracked apart.",
         "",
-        "| fitted on | flight | law | tracked |",
+        "| fitted on | flight | effect model | tracked |",
         "|---|---|---|---|",
     ]
     for load in rows:

@@ -114,7 +114,7 @@ def page_text(
     full = [j for j in judged if not j.without]
     seconds = [j.seconds for j in judged]
     parts = [
-        "# The diagnosis on flights whose cause is known",
+        "# Diagnosis trials: simulated flights whose true effects are known",
         "",
         made,
         "",
@@ -142,9 +142,8 @@ def page_text(
         "axes, sizes and frequencies were looked at while the rules were made, and no other.",
         "",
         "A name counts as right where it is the added effect's, or where the diagnosis says that "
-        "these flights cannot tell it "
-        "from the added effect. It is *confidently wrong* where it is neither, and not called "
-        "tentative.",
+        "these flights cannot distinguish it from the added effect. It is *confidently wrong* "
+        "where it is neither, and not marked tentative.",
         "",
         "## The rules",
         "",
@@ -179,7 +178,7 @@ def page_text(
         "## Left out of the library",
         "",
         "The same flights, diagnosed with a library that lacks the cause: the right answer is a "
-        "doubt. *The flight "
+        "tentative name. *The flight "
         "cannot tell* where the whole library, on that flight, says so of the truth and of what is "
         "named here. These leave the "
         "same log as another effect, whatever is flown, and go out together with it: "

@@ -26,13 +26,13 @@ RIGHT, RIGHT_TENTATIVE, TENTATIVE, WRONG = (
 )
 PARTIAL, UNEXPLAINED, SILENT, FAILED = "partial", "unexplained", "silent", "failed"
 OUTCOMES: Mapping[str, str] = {
-    RIGHT: "every added effect has its name, no other, no doubt; with nothing added, nothing named",
-    RIGHT_TENTATIVE: "the same, but called tentative, or structure seen where nothing is",
-    PARTIAL: "true names only, but not all of them",
-    TENTATIVE: "other names, or too many, and those called tentative",
-    UNEXPLAINED: "nothing named, and said that something is left",
-    SILENT: "nothing named, and nothing missed",
-    WRONG: "a name that is not true, without a doubt",
+    RIGHT: "every added effect named, no other, none tentative; with nothing added, nothing named",
+    RIGHT_TENTATIVE: "the same names, but tentative, or structure reported where there is none",
+    PARTIAL: "true names only, but not all",
+    TENTATIVE: "other names, or too many, and those marked tentative",
+    UNEXPLAINED: "nothing named, and an unexplained error reported",
+    SILENT: "nothing named, and no error reported",
+    WRONG: "a wrong name that is not marked tentative",
     FAILED: "the diagnosis ended in an error",
 }
 COEFFICIENT_BAR = 0.05
@@ -293,7 +293,7 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
         ),
         _share("4. hover: no name confidently wrong", of("hover"), _not_wrong, 1.0),
         _share(
-            "4. hover: the truth is among what is named and what that cannot be told from",
+            "4. hover: the true effect is named, or indistinguishable from one that is named",
             of("hover"),
             lambda j: set(j.truth) <= set(j.classes),
             None,
@@ -321,22 +321,21 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
             None,
         ),
         _share(
-            "5. right answers, or nothing rightly named, that the search for structure casts doubt "
-            "on",
+            "5. right names, or rightly none, that the search for structure marks tentative",
             known,
             lambda j: j.outcome == RIGHT_TENTATIVE,
             0.03,
             at_most=True,
         ),
         _share(
-            "5. right answers with two effects that it casts doubt on",
+            "5. right names of two effects that it marks tentative",
             [j for j in pairs if j.right],
             lambda j: j.outcome == RIGHT_TENTATIVE,
             0.10,
             at_most=True,
         ),
         _floor(
-            "6. residual after, over the sensors' floor, where all is `explained`",
+            "6. residual after, over the noise floor, where the verdict is `explained`",
             [j for j in full if j.verdict == "explained"],
         ),
     ]
@@ -503,7 +502,8 @@ def _gusts(some: Sequence[Judgement]) -> Rule:
         "of ten"
     )
     return Rule(
-        "-. gusts in force as they are found, where names are right and there are any",
+        "-. estimated standard deviation of the force disturbance, where names are right and "
+        "there is one",
         "-",
         measured if ratios else "not flown",
         None,

@@ -59,7 +59,12 @@ def test_every_option_says_what_it_is_for(name):
 def test_help_says_what_exit_codes_mean(call):
     code, text, _ = call("--help")
     assert code == 0
-    for words in ("Exit codes: 0 done", "2 a mistake", "130 interrupted", "NO_COLOR"):
+    for words in (
+        "Exit codes: 0 success",
+        "2 invalid option or input file",
+        "130 interrupted",
+        "NO_COLOR",
+    ):
         assert words in " ".join(text.split())
     assert call("--version")[1].startswith("windwrench ")
 

@@ -140,7 +140,7 @@ def test_after_a_long_gap_the_filter_starts_anew(vehicle, rows_between):
         t[1000:] += 3600.0
     series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
     again = 1500 if rows_between else 1000
-    assert "the filter starts anew" in series.notes[0]
+    assert "the filter restarts" in series.notes[0]
     np.testing.assert_array_equal(series.force[again], 0.0)
     np.testing.assert_allclose(series.force[-100:].mean(axis=0), [0, 0, 0.3], atol=0.05)
     assert finite(series)

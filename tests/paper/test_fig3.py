@@ -37,7 +37,7 @@ def test_the_mixture_finds_the_three_wrenches():
 def test_the_actuator_limits_the_spread(result):
     std = {row["source"]: row["std_Nm"] for row in result.figures["limits"]}
     assert std["actuator noise alone"] > 3 * max(
-        std["sensor noise alone"], std["8-bit turn rates alone"]
+        std["sensor noise alone"], std["8-bit rotor speeds alone"]
     )
     assert std["without actuator noise"] < 0.2 * std["everything"]
 

@@ -240,7 +240,7 @@ def test_the_rules_count_what_they_say():
     # by kind: mass wrong, wind and latency not, the held-back disturbance wrong
     assert {j.cause for j in left_out(judged, "typical")} == {"mass", "wind", "latency", "soft_arm"}
     assert rule(judged, "5. left out of the library, typical").measured == "50.0% (2 of 4 kinds)"
-    doubt = rule(judged, "5. right answers, or")
+    doubt = rule(judged, "5. right names, or")
     assert (doubt.count, doubt.met, doubt.measured) == (3, False, "33.3% (1 of 3)")
     assert rule(judged, "3. no effect").met
     assert rule(judged, "3. outside the library, typical").met is False

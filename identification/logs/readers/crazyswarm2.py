@@ -1,21 +1,20 @@
 """Crazyswarm2 logs from TU Berlin: a Crazyflie 2.1, with and without a slung payload
 (IMRCLab/crazyswarm2-tools).
 
-What differs from the kit's own form:
+What differs from the kit's own format:
 
-* **Commands, not turn rates.** The log has the collective thrust (N) and the body torques (Nm) that
-the controller
-  asked for. They become turn rates through the inverse of the declared vehicle's rotor mixing,
-  clipped at zero and at its ``omega_max``. That is not what the firmware's own mixer and thrust
-  curve made of them: motors that lag, sag or were exchanged (logs 100, 130, 140) show up as wrench.
-* **Attitude** is the onboard filter's, R = Rz(yaw) Ry(pitch) Rx(roll): motion capture saw a single
-marker.
-* **Position** is OptiTrack's where it was logged (payload flights), sampled and held: a row that
-repeats the position
-  before it is not another measurement, so it is not valid. Elsewhere it is the onboard filter's, in
-  steps of 1 mm.
-* **Stray samples**: logs begin with a few samples and then a gap; everything before the gap is
-dropped.
+* **Commands, not rotor speeds.** The log has the collective thrust (N) and the body torques (Nm)
+  that the controller asked for. They become rotor speeds through the inverse of
+  the declared vehicle's rotor mixing, clipped at zero and at its ``omega_max``. That is not what
+  the firmware's own mixer and thrust curve made of them: motors that lag, sag or were exchanged
+  (logs 100, 130, 140) show up as wrench.
+* **Attitude** is the onboard filter's, R = Rz(yaw) Ry(pitch) Rx(roll): motion capture saw a
+  single marker.
+* **Position** is OptiTrack's where it was logged (payload flights), sampled and held: a row
+  that repeats the position before it is not another measurement, so it is not valid. Elsewhere it
+  is the onboard filter's, in steps of 1 mm.
+* **Stray samples**: logs begin with a few samples and then a gap; everything before the gap
+  is dropped.
 
 ``extra`` keeps, where logged: ``onboard_quaternion`` (N, 4), ``angular_velocity`` (N, 3) rad/s
 body, ``onboard_position`` (N, 3) m, ``onboard_velocity`` (N, 3) m/s, ``specific_force`` (N, 3) m/s2
@@ -62,7 +61,7 @@ _STRAY_SAMPLES = 10
 
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """Read a crazyswarm2 CSV; ``vehicle`` (default: the crazyflie preset) turns commanded thrust
-    into turn rates.
+    into rotor speeds.
 
     Raises:
         InputError: the file cannot be read, lacks a column, or holds a number that is not finite.
@@ -93,8 +92,8 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     quaternion: Array = turn[:, [3, 0, 1, 2]]
     speeds, clipped = commanded_speeds(columns["thrust_cmd_N"], _group(columns, _TORQUE), vehicle)
     notes = [
-        "no turn rates in the log: commanded thrust and torques were turned into turn rates by the "
-        "inverse of the rotor "
+        "no rotor speeds in the log: commanded thrust and torques were converted into rotor "
+        "speeds by the inverse of the rotor "
         f"mixing of {vehicle.name}, clipped at zero and at omega_max. What the firmware's thrust "
         f"curve, the battery and "
         "the motors made of the command is not in the log; a constant factor on thrust remains "
@@ -127,8 +126,8 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
 
 
 def commanded_speeds(thrust: Array, torque: Array, vehicle: Vehicle) -> tuple[Array, int]:
-    """Return turn rates (N, 4) in rad/s of commanded thrusts (N,) and torques (N, 3), and how many
-    rows were clipped.
+    """Return rotor speeds (N, 4) in rad/s of commanded thrusts (N,) and torques (N, 3), and how
+    many rows were clipped.
     """
     square = np.linalg.solve(vehicle.mixing, np.column_stack([thrust, torque]).T).T
     limit = vehicle.omega_max**2

@@ -1,12 +1,12 @@
 """NanoBench logs: a Crazyflie 2.1 in a Vicon room (Ullah and Baca, arXiv 2603.09908).
 
-What differs from the kit's own form: quaternions are scalar last, times are of an absolute clock, motors count 1
-front-right, 2 rear-right, 3 rear-left, 4 front-left, and instead of turn rates there are PWM counts (0 to 65535) and
+What differs from the kit's own format: quaternions are scalar last, times are of an absolute clock, motors count 1
+front-right, 2 rear-right, 3 rear-left, 4 front-left, and instead of rotor speeds there are PWM counts (0 to 65535) and
 the battery's voltage.
 
 **Thrust model.** The counts logged are those after the firmware's battery compensation, so the voltage that a motor
 gets is duty times battery voltage, and at the same counts a full battery lifts more than an empty one. The reader does
-not apply the voltage: turn rates are those that the counts would give at the vehicle's ``voltage_ref`` (4.2 V where it
+not apply the voltage: rotor speeds are those that the counts would give at the vehicle's ``voltage_ref`` (4.2 V where it
 states none), and the voltage is passed on, so that ``battery_sag`` can be declared, or named by a diagnosis, with an
 exponent of its own. Without it the wrench of a flight holds what the battery lacked.
 
@@ -78,8 +78,8 @@ _THRUST = (2.130295e-11, 1.032633e-6, 5.484560e-4)  # N per motor, powers 2, 1, 
 
 
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
-    """Read a NanoBench CSV; ``vehicle`` (default: the crazyflie preset) turns thrust into turn
-    rates through its k.
+    """Read a NanoBench CSV; ``vehicle`` (default: the crazyflie preset) converts thrust into
+    rotor speeds through its k.
 
     Raises:
         InputError: the file cannot be read, lacks a column, or holds a number out of range.
@@ -113,11 +113,10 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         "first sample",
         f"thrust model: 2.130e-11 u^2 + 1.033e-6 u + 5.48e-4 N per motor (Foerster 2015) at u = "
         f"PWM * {reference:g} V / 4.2 V; "
-        f"turn rates are sqrt(thrust / k) with the k of {vehicle.name}. The PWM logged is after "
+        f"rotor speeds are sqrt(thrust / k) with the k of {vehicle.name}. The PWM logged is after "
         f"battery compensation, so "
-        f"thrust falls with the voltage: these are turn rates at {reference:g} V, and battery_sag "
-        f"is left to be declared "
-        "or found. A constant factor on thrust remains unknown",
+        f"thrust falls with the voltage: these are rotor speeds at {reference:g} V; declare "
+        "battery_sag or let the diagnosis find it. A constant factor on thrust remains unknown",
         f"battery voltage put {_VOLTAGE_LATE:g} s sooner, by which it is logged late",
     ]
     outside = (pwm < 0) | (pwm > _FULL_COUNT)

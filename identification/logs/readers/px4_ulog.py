@@ -7,7 +7,7 @@ forward, right, down; here the world is north, west, up and the body forward, le
 half a turn about their x axis. Rows are the position's samples, at ``timestamp_sample`` where the
 topic has it.
 
-**Rotors.** Measured turn rates of ``esc_status`` where ESCs report them. Otherwise commands, of
+**Rotors.** Measured rotor speeds of ``esc_status`` where ESCs report them. Otherwise commands, of
 which only the ratio of thrusts is known: ``actuator_motors`` holds relative thrust itself (PX4
 inverts its thrust curve after it), and ``actuator_outputs`` what was sent to the motors, x from 0
 to 1, with relative thrust ``f x^2 + (1 - f) x`` and f the parameter THR_MDL_FAC. The unknown scale
@@ -86,7 +86,7 @@ class _Log:
 
 
 def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
-    """Read a ULog; ``vehicle`` turns commands into turn rates where none were measured.
+    """Read a ULog; ``vehicle`` turns commands into rotor speeds where none were measured.
 
     Raises:
         InputError: pyulog is missing, the file is no ULog, or lacks a pose or four motors.
@@ -256,26 +256,25 @@ def _motor_order(log: _Log) -> tuple[list[int], str]:
 
 
 def _rotors(log: _Log, order: list[int], vehicle: Vehicle | None) -> tuple[Stream, list[str]]:
-    """Return turn rates (N, 4) in rad/s in the kit's order, and notes on where they came from."""
+    """Return rotor speeds (N, 4) in rad/s in the kit's order, and notes on where they came from."""
     for fields in log.topics.get("esc_status", []):
         rpm = _esc_rpm(log, fields)
         if np.any(rpm != 0.0):
             speeds = np.abs(rpm[:, order]) * (2.0 * math.pi / 60.0)
             return Stream(
                 "esc_status", 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64), speeds
-            ), ["turn rates: measured by the ESCs (esc_status)"]
+            ), ["rotor speeds: measured by the ESCs (esc_status)"]
     found = _commands(log)
     if found is None:
         raise InputError(
-            f"{log.path}: no motors: expected esc_status with turn rates, actuator_motors or "
+            f"{log.path}: no motors: expected esc_status with rotor speeds, actuator_motors or "
             f"actuator_outputs of four motors, found "
             f"{', '.join(sorted(log.topics)) or 'none of the topics'}"
         )
     if vehicle is None:
         raise InputError(
-            f"{log.path}: the log has motor commands but no turn rates; expected a vehicle, whose "
-            f"weight and k "
-            "turn them into turn rates"
+            f"{log.path}: the log has motor commands but no rotor speeds; expected a vehicle, "
+            "whose weight and k convert them into rotor speeds"
         )
     name, t, relative, note = found
     total = relative.sum(axis=1)
@@ -285,11 +284,11 @@ def _rotors(log: _Log, order: list[int], vehicle: Vehicle | None) -> tuple[Strea
         raise InputError(f"{log.path}: {name}: no sample in flight; expected motors that run")
     scale = vehicle.weight / middle
     return Stream(name, t, np.sqrt(scale * relative[:, order] / vehicle.k)), [
-        f"thrust model: no turn rates in the log; {note}. The unknown scale is set so that the "
+        f"thrust model: no rotor speeds in the log; {note}. The unknown scale is set so that the "
         f"median thrust in flight is "
         f"the weight of {vehicle.name} ({vehicle.weight:.4g} N): {scale:.4g} N a motor at full "
         f"command. Mass or a factor "
-        "on thrust cannot be found from this log; turn rates are sqrt(thrust / k) of commands, "
+        "on thrust cannot be found from this log; rotor speeds are sqrt(thrust / k) of commands, "
         "without the motors' lag"
     ]
 

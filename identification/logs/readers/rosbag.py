@@ -81,7 +81,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         InputError: rosbags is missing, the bag or the map cannot be read, a topic is missing,
             ambiguous or of another type, or a message cannot be used.
     """
-    del vehicle  # a bag has turn rates; nothing needs to be turned into them
+    del vehicle  # a bag has rotor speeds; nothing needs to be turned into them
     settings, where = _topic_map(path, option)
     with _opened(path) as bag:
         chosen = {
@@ -344,18 +344,18 @@ def _stream(
 
 
 def _rotor_values(message: Any, kind: str, setting: Mapping[str, Any], where: str) -> Array:
-    """Return turn rates (4,) in rad/s in the kit's order."""
+    """Return rotor speeds (4,) in rad/s in the kit's order."""
     speeds: Array = np.asarray(
         message.data if kind == _ARRAY else message.angular_velocities, dtype=np.float64
     )
     order = setting.get("order")
     if order is None and len(speeds) != 4:
         raise InputError(
-            f"{where}: {len(speeds)} turn rate(s); expected 4, or an order in the topic map"
+            f"{where}: {len(speeds)} rotor speed(s); expected 4, or an order in the topic map"
         )
     if order is not None and len(speeds) < max(order):
         raise InputError(
-            f"{where}: {len(speeds)} turn rate(s); expected at least {max(order)} by the order "
+            f"{where}: {len(speeds)} rotor speed(s); expected at least {max(order)} by the order "
             f"{order}"
         )
     chosen: Array = (

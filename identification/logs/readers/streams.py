@@ -15,7 +15,7 @@ from ..flight_log import FlightLog, Mask, time_notes
 Array = NDArray[np.float64]
 
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
-_ROTOR_GAP = 0.5  # s without turn rates that deserves a note
+_ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +82,14 @@ def flight_log(
     voltage: Stream | None,
     notes: tuple[str, ...],
 ) -> FlightLog:
-    """Return the log of a pose (position and scalar-first quaternion), turn rates and, where there
-    is one, a voltage.
+    """Return the log of a pose (position and scalar-first quaternion), rotor speeds and, where
+    there is one, a voltage.
 
-    Rows are the pose's samples within the span of the turn rates; the others are interpolated to
+    Rows are the pose's samples within the span of the rotor speeds; the others are interpolated to
     their times. A pose with a number that is not finite is not valid.
 
     Raises:
-        InputError: too few samples, a turn rate that is not finite, a quaternion that is none, or
+        InputError: too few samples, a rotor speed that is not finite, a quaternion that is none, or
             streams that do not overlap.
     """
     for stream in (pose, rotors):
@@ -102,7 +102,7 @@ def flight_log(
     bad = np.argwhere(~np.isfinite(rotors.values))
     if bad.size:
         raise InputError(
-            f"{path}: {rotors.name}, message {bad[0][0] + 1}: the turn rate of rotor "
+            f"{path}: {rotors.name}, message {bad[0][0] + 1}: the rotor speed of rotor "
             f"{bad[0][1] + 1} is "
             f"{rotors.values[tuple(bad[0])]}; expected a finite number"
         )
@@ -134,13 +134,13 @@ def flight_log(
         notes += (f"{pose.name}: {int(np.sum(~valid))} of {len(t)} rows without a whole pose",)
     if (longest := float(np.diff(rotors.t).max())) > _ROTOR_GAP:
         notes += (
-            f"{rotors.name}: up to {longest:.2g} s between messages; the turn rates there are "
+            f"{rotors.name}: up to {longest:.2g} s between messages; the rotor speeds there are "
             f"interpolated",
         )
     speeds = rotors.at(t)
     if np.any(speeds < 0.0):
         notes += (
-            f"{rotors.name}: negative turn rates (a sense of rotation) were taken as positive",
+            f"{rotors.name}: negative rotor speeds (a sense of rotation) were taken as positive",
         )
     if voltage is not None:
         good = np.isfinite(voltage.values[:, 0]) & (voltage.values[:, 0] > 0.0)

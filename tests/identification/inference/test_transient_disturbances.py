@@ -31,7 +31,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
     assert truth[near].min() == pytest.approx(truth.min(), rel=0.1)
     assert down.peak == pytest.approx(truth.min(), rel=0.3)
     sentence = remainder_sentence(found)
-    assert "comes now and then" in sentence
+    assert "transient disturbances" in sentence
     assert f"in {found.pushes[0].channel} at" in sentence
     assert f"of {flown.log.name}" in remainder_sentence(replace(found, test_logs=("another",)))
 

@@ -102,7 +102,7 @@ def change(rows, k, **fields):
         ("omega1", "fast", "column omega1, row 4 .line 5.: 'fast' is not a number"),
         ("omega1", "1_0", "column omega1, row 4 .line 5.: '1_0' is not a number"),
         ("omega1", " ", "column omega1, row 4 .line 5.: ' ' is not a number"),
-        ("omega4", "-376", "column omega4, row 4 .line 5.: -376 is negative; expected a turn rate"),
+        ("omega4", "-376", "column omega4, row 4 .line 5.: -376 is negative; expected a rotor sp"),
     ],
 )
 def test_a_bad_number_is_named(path, rows, name, value, expected):

@@ -216,7 +216,7 @@ def test_relative_thrust_is_scaled_to_the_weight(write, t, vehicle):
     assert_scaled(read_log(path, "px4_ulog", vehicle), ours, vehicle)
     with pytest.raises(
         InputError,
-        match=r"flight.ulg: the log has motor commands but no turn rates; expected a vehicle",
+        match=r"flight.ulg: the log has motor commands but no rotor speeds; expected a vehicle",
     ):
         read_log(path, "px4_ulog")
 

@@ -249,7 +249,7 @@ def test_an_order_picks_four_of_more(write, vehicle):
     six = np.concatenate([[1.0], OURS[:2], [2.0], OURS[2:]])
     path = write("bag", {"/a": pose_topic(), "/motors": actuator_topic(six)})
     with pytest.raises(
-        InputError, match=r"topic /motors, message 1: 6 turn rate.s.; expected 4, or an order"
+        InputError, match=r"topic /motors, message 1: 6 rotor speed.s.; expected 4, or an order"
     ):
         read_log(path, "rosbag", vehicle)
     path.with_name("flight.topics.yaml").write_text("rotors: {order: [2, 3, 5, 6]}\n")
@@ -349,7 +349,7 @@ def test_a_wrong_map_is_named(write, topic_map, expected, vehicle):
         ({"/a": pose_topic(), "/motors": actuator_topic(times=WIDE + 9)}, "do not overlap"),
         (
             {"/a": pose_topic(), "/motors": actuator_topic([1, 2, np.nan, 3])},
-            "turn rate of rotor 3 is nan; expected a finite",
+            "rotor speed of rotor 3 is nan; expected a finite",
         ),
     ],
 )

@@ -159,11 +159,11 @@ HOSTILE = {
     "us": (lambda log: replace(log, t=1e6 * log.t), "t looks like microseconds"),
     "rotors late": (
         lambda log: shifted(log, 0.3),
-        r"turn rates come 0\.[23]\d s too late .* put omega1..omega4 .* earlier",
+        r"rotor speeds come 0\.[23]\d s too late .* put omega1..omega4 .* earlier",
     ),
     "rotors early": (
         lambda log: shifted(log, -0.5),
-        r"turn rates come 0\.[45]\d s too early .* later",
+        r"rotor speeds come 0\.[45]\d s too early .* later",
     ),
     "Betaflight": (
         lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [2, 3, 1, 0]]),

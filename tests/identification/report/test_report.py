@@ -372,9 +372,9 @@ def test_verdicts_in_one_sentence(diagnosis):
         "The model lacked rotor_drag.",
         "The model lacked rotor_drag and mass, and perhaps wind.",
         "The model perhaps lacked wind.",
-        "The model lacked rotor_drag, but that is not all.",
-        "The model is wrong in a way that no effect in the library explains.",
-        "The model errs, but at random: no effect in the library explains it.",
+        "The model lacked rotor_drag, and an unexplained error is left.",
+        "The model's error has structure that no effect in the library explains.",
+        "The model's error looks random: no effect in the library explains it.",
         "The model explains these logs: nothing needs to be added to it.",
     ]
 
@@ -398,12 +398,13 @@ def test_what_is_declared_is_not_said_to_be_lacking(diagnosis):
         ]
     ]
     assert told == [
-        "The model has rotor_drag other than declared.",
-        "The model lacked mass and has rotor_drag other than declared.",
-        "The model lacked mass and has rotor_drag other than declared, and perhaps lacked wind.",
-        "The model has rotor_drag other than declared, and perhaps lacked wind.",
+        "The model declares rotor_drag with wrong coefficients.",
+        "The model lacked mass and declares rotor_drag with wrong coefficients.",
+        "The model lacked mass and declares rotor_drag with wrong coefficients, and perhaps lacked "
+        "wind.",
+        "The model declares rotor_drag with wrong coefficients, and perhaps lacked wind.",
         "The model lacked mass, and perhaps wind.",
-        "The model perhaps has rotor_drag other than declared.",
+        "The model perhaps declares rotor_drag with wrong coefficients.",
     ]
 
 
@@ -445,7 +446,7 @@ def test_the_page_says_it(reports):
     diagnosis, (_, path, _) = reports["plain"]
     page = Page(path.read_text("utf-8"))
     before, after = (rounded(e.force_rms, 2) for e in (diagnosis.before, diagnosis.after))
-    assert f"falls from {before} N to {after} N; the floor is 0.012 N." in page.text
+    assert f"falls from {before} N to {after} N; the noise floor is 0.012 N." in page.text
     kdx = with_std(diagnosis.effects[0].coefficients["kdx"], diagnosis.effects[0].std["kdx"])
     for words in (
         "The model lacked rotor_drag.",
@@ -465,11 +466,12 @@ def test_the_page_says_what_is_in_doubt(reports):
     made, (_, path, _) = reports["hard"]
     page = Page(path.read_text("utf-8"))
     for words in (
-        "The model lacked rotor_drag and com_offset, and perhaps wind, but that is not all.",
-        "cannot tell rotor_drag from body_drag or attitude_gain",
+        "The model lacked rotor_drag and com_offset, and perhaps wind, and an "
+        "unexplained error is left.",
+        "cannot distinguish rotor_drag from body_drag or attitude_gain",
         "wind is tentative",
-        "could not be worked out",
-        "a wave at 1.1 Hz explains 31 % of what is left",
+        "could not be computed",
+        "a wave at 1.1 Hz explains 31 % of the residual",
         "1.234 ± 0.050",
         made.logs[0],
         "nan",
