@@ -7,7 +7,7 @@ before and after are those of blocks, or logs, that the fit never saw.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,31 +32,39 @@ from .inference.commanded_rotors import shared
 from .inference.equivalence import composites, equivalents, overshadowed, unlisted
 from .inference.innovations import Innovations, at_odds
 from .inference.likelihood_refit import lag_or_delay, lateness, measured, others_late, with_lag
-from .inference.regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
+from .inference.regression import CENTRAL, SHIFT, Flights, coefficient, typical
 from .inference.residual_structure import structure
 from .inference.search import Fit, Gain, Search
 from .inference.stepwise_search import find
 from .inference.transient_disturbances import pushes
-from .inference.turning_delay import COEFFICIENT
+from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
+from .motion.cutoffs import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
 
 Array = NDArray[np.float64]
 
-AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
-CALM = (
-    0.006,
-    0.0015,
-)  # nor have gusts of up to this share of the weight, and of the weight times the arm, below
-CALM_HZ = (
-    2.0  # quicker ones are noise in part: of the pose, of the step to which turn rates are rounded
-)
-LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
-# share of the remainder's energy: a name that explains less beside a large remainder is tentative
-_FAINT = 0.1
-_POINTS = 600  # of a signature
-_LEAST_SHIFT = 0.001  # s, of the turn rates, worth a note
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """What the verdict of a diagnosis goes by."""
+
+    # times the noise floor; a residual up to that is the sensors' noise
+    most_floor_ratio: float = 1.2
+    # shares of the weight, and of the weight times the arm: a weaker disturbance, below the cut-off
+    # ``CUTOFFS.calm_hz``, is none
+    calm_force: float = 0.006
+    calm_torque: float = 0.0015
+    least_seconds_each: float = 3.0  # of flight, where several logs are given together
+    # share of the residual's deviance; a name that explains less beside a large residual is
+    # tentative
+    least_share_of_residual: float = 0.1
+    most_signature_points: int = 600
+    least_rotor_time_offset: float = 0.001  # s, worth a note
+
+
+DIAGNOSIS = DiagnosisSettings()
 
 
 def diagnose(
@@ -87,7 +95,11 @@ def diagnose(
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
     every = (*logs, *test)
-    least = LEAST_SECONDS if len(every) == 1 and not every[0].commanded else LEAST_SECONDS_EACH
+    least = (
+        LEAST_SECONDS
+        if len(every) == 1 and not every[0].commanded
+        else DIAGNOSIS.least_seconds_each
+    )
     doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
@@ -122,7 +134,10 @@ def diagnose(
     held = ~flights.fit
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held]), _rms(after[held])
-    noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
+    noisy = (
+        error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
+        or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
+    )
     gusts = (
         ()
         if flights.commanded
@@ -133,10 +148,12 @@ def diagnose(
             )
         )
     )
-    calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
+    calm = vehicle.weight * np.repeat(
+        [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
+    )
     pushed = () if flights.commanded else tuple(pushes(flights, fit.setting))
     windy = bool(pushed) or any(
-        found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False)
+        found.below(CUTOFFS.calm_hz) > most for found, most in zip(gusts, calm, strict=False)
     )
     remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
     large = noisy if flights.commanded else windy
@@ -160,7 +177,7 @@ def diagnose(
     segments = _segments(flights)
     nuisances = fit.setting.get(SHIFT[0], {})
     shift = nuisances.get(SHIFT[1], 0.0)
-    if abs(shift) > _LEAST_SHIFT and Innovations(
+    if abs(shift) > DIAGNOSIS.least_rotor_time_offset and Innovations(
         flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}
     ).confirm(fit.setting):
         notes.append(
@@ -184,7 +201,7 @@ def diagnose(
         structure=tuple(signs),
         gusts=gusts,
         pushes=pushed,
-        cutoff_hz=CUTOFF_HZ,
+        cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
         amended=amended,
         logs=tuple(log.name for log in logs),
@@ -207,7 +224,7 @@ def _named(
     gain = search.error_without(fit, effect) - error
     std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
     if search.delay is not None and search.held(effect):
-        gain, std = search.delay.evidence, {COEFFICIENT: search.delay.std}
+        gain, std = search.delay.evidence, {LATENCY_COEFFICIENT: search.delay.std}
     # that a law acts at the rotors, as it is written, is nothing to report
     values = {
         k: v
@@ -224,7 +241,7 @@ def _named(
         coefficients=values,
         std={k: std[k] for k in values},
         units={k: coefficient((effect, k)).unit for k in values},
-        tentative=structured or (noisy and gain < _FAINT * error),
+        tentative=structured or (noisy and gain < DIAGNOSIS.least_share_of_residual * error),
         indistinguishable_from=others,
         evidence={
             "energy_explained": gain / (gain + error),
@@ -314,7 +331,7 @@ def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signatu
     name, x = max(
         known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0
     )
-    thin = slice(None, None, max(1, len(y) // _POINTS))
+    thin = slice(None, None, max(1, len(y) // DIAGNOSIS.most_signature_points))
     return Signature(
         effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin]
     )

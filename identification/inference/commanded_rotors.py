@@ -10,6 +10,7 @@ explain.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,35 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases
-from ..motion.signals import WIDE_HZ, Signals, low_pass
+from ..motion.cutoffs import CUTOFFS
+from ..motion.signals import Signals, low_pass
 
 Array = NDArray[np.float64]
 
-_PERIOD = 0.02  # s
-SCALE, LEAN_X, LEAN_Y = "thrust scale", "lean x", "lean y"
+
+@dataclass(frozen=True)
+class CommandedSettings:
+    """What a regression allows for where rotor speeds are worked out from commands."""
+
+    period: float = 0.02  # s, of the samples that are used
+    # factor on what an effect of ``SECOND_CHOICE_EFFECTS`` explains, where it is compared
+    second_choice_factor: float = 0.8
+    # typical size and range of a flight's deviation from the others: relative, and rad
+    thrust_scale_size: tuple[float, float] = (0.02, 0.5)
+    tilt_size: tuple[float, float] = (0.01, 0.2)
+
+
+COMMANDED = CommandedSettings()
+THRUST_SCALE, TILT_X, TILT_Y = "thrust scale", "tilt x", "tilt y"
+DEVIATION_SIZES = {
+    THRUST_SCALE: COMMANDED.thrust_scale_size,
+    TILT_X: COMMANDED.tilt_size,
+    TILT_Y: COMMANDED.tilt_size,
+}
+# of effects that are alike, those that must explain a little more than the others: a force beside
+# an error of measurement, and a mass beside the scale of thrust, which is known to be unknown
+SECOND_CHOICE_EFFECTS = frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"})
+
 # effects of which force alone says nothing, or of which a law of thrust that is itself a guess says
 # nothing
 NOT_FROM_COMMANDS = frozenset(
@@ -47,14 +71,6 @@ _ALIKE = (
 # what bends the law of thrust further, once it is known to follow the battery's voltage: without
 # that they would take up whatever thrust lacks
 AFTER_SAG = frozenset({"thrust_curvature", "thrust_fade"})
-# of those alike, what must explain a little more than the others: a force beside an error of
-# measurement, and a mass beside the scale of thrust, which is known to be unknown
-SECOND, SECOND_SHARE = (
-    frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"}),
-    0.8,
-)
-# typical size and range of a deviation: relative, and rad
-SIZES = {SCALE: (0.02, 0.5), LEAN_X: (0.01, 0.2), LEAN_Y: (0.01, 0.2)}
 
 
 def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
@@ -77,11 +93,11 @@ def thinned(signals: Signals) -> Signals:
     """Return signals at 50 Hz or a little more, with the turn rates through the filter that the
     pose went through.
     """
-    step = max(1, int(_PERIOD / signals.period + 1e-6))
+    step = max(1, int(COMMANDED.period / signals.period + 1e-6))
     if step == 1:
         return signals
     at = np.arange(0, len(signals.t), step)
-    smooth = np.maximum(low_pass(signals.rotor_speeds, WIDE_HZ, signals.period), 0.0)
+    smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
     return Signals(
         signals.t[at],
         step * signals.period,
@@ -114,7 +130,7 @@ def takes_back(setting: Mapping[str, Mapping[str, float]], weight: float) -> boo
 
 def deviations(count: int) -> list[tuple[str, str]]:
     """Return the columns of the deviations of ``count`` flights; none of a single one."""
-    return [("", f"{kind} {i}") for kind in SIZES for i in range(1, count)]
+    return [("", f"{kind} {i}") for kind in DEVIATION_SIZES for i in range(1, count)]
 
 
 def deviation(setting: Mapping[str, Mapping[str, float]], kind: str, log: int, count: int) -> float:
@@ -136,7 +152,9 @@ def deviation(setting: Mapping[str, Mapping[str, float]], kind: str, log: int, c
 
 def size_of(name: str) -> tuple[float, float] | None:
     """Return typical size and range of a deviation, None for any other column."""
-    return next((size for kind, size in SIZES.items() if name.startswith(kind + " ")), None)
+    return next(
+        (size for kind, size in DEVIATION_SIZES.items() if name.startswith(kind + " ")), None
+    )
 
 
 def shared(setting: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:

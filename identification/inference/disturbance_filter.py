@@ -7,6 +7,7 @@ innovations least.
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -16,26 +17,38 @@ from scipy.signal import lfilter, ss2tf
 
 Array = NDArray[np.float64]
 
-STRENGTHS = 2.0 ** np.arange(
-    -10, 47
-)  # variance of gusts, in the acceleration's unit squared, over that of the pose's noise
-TIMES = 0.25 * 1.5 ** np.arange(-6, 6)  # s, of gusts
-_BEGIN = (24, 6)  # where among these the search begins
-_STRIDES = (4, 2, 1)  # of that search
+
+@dataclass(frozen=True, eq=False)
+class DisturbanceSettings:
+    """The grid of disturbances on which the likeliest is searched for."""
+
+    # variances of the disturbance, in the acceleration's unit squared, over that of the pose's noise
+    strengths: Array = field(
+        default_factory=lambda: np.asarray(2.0 ** np.arange(-10, 47), dtype=np.float64)
+    )
+    # s, correlation times
+    times: Array = field(
+        default_factory=lambda: np.asarray(0.25 * 1.5 ** np.arange(-6, 6), dtype=np.float64)
+    )
+    first_point: tuple[int, int] = (24, 6)  # of the grid, where the search begins
+    strides: tuple[int, ...] = (4, 2, 1)  # of that search
+
+
+DISTURBANCE = DisturbanceSettings()
 
 
 def likeliest(loss: Callable[[int, int], float]) -> tuple[int, int]:
     """Return which strength and time of gusts make a loss least, by steps to the best neighbour,
     large ones first.
     """
-    known = {_BEGIN: loss(*_BEGIN)}
-    at = _BEGIN
-    for stride in _STRIDES:
+    known = {DISTURBANCE.first_point: loss(*DISTURBANCE.first_point)}
+    at = DISTURBANCE.first_point
+    for stride in DISTURBANCE.strides:
         while True:
             for i, j in itertools.product((-stride, 0, stride), repeat=2):
                 near = (
-                    int(np.clip(at[0] + i, 0, len(STRENGTHS) - 1)),
-                    int(np.clip(at[1] + j, 0, len(TIMES) - 1)),
+                    int(np.clip(at[0] + i, 0, len(DISTURBANCE.strengths) - 1)),
+                    int(np.clip(at[1] + j, 0, len(DISTURBANCE.times) - 1)),
                 )
                 if near not in known:
                     known[near] = loss(*near)

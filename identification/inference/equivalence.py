@@ -6,31 +6,55 @@ is the energy, in units of the noise, by which the flights can tell the two apar
 """
 
 from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .gram_matrix import BELIEVED, PRIOR, gram
-from .regression import CENTRAL, SHIFT, SHIFT_RANGE, Flights, coefficient
-from .search import COMPLEXITY, LEAST_SIZE, Fit, Search, freedom
-from .turning_delay import ALIKE
+from .gram_matrix import GRAM, gram
+from .regression import CENTRAL, REGRESSION, SHIFT, Flights, coefficient
+from .search import SEARCH, Fit, Search, freedom
+from .turning_delay import SAME_DELAY_EFFECTS
 
 Array = NDArray[np.float64]
 
-APART = 30.0  # whitened energy; five standard deviations and a little
-APART_SHARE = 0.001  # of the effect's own energy: laws are no truer than that
-SHARE_OF_COMMANDS = 0.005  # the same where thrust is a guess
-_HOPEFUL = 0.1  # share of it that another one must explain where it is linear, to be worth a fit
-_HOPEFUL_OF_COMMANDS = 0.3
-_NEAR_OF_COMMANDS = 6.0
-_MOST = 0.4  # of what is left without the effect
-_NEAR = (
-    40.0  # times the limit: what the linear fit leaves of an effect that is worth a fit of its own
-)
-_OUT_OF_STEP = 0.98  # share of what is allowed
-_MOST_SURE = 2  # effects at once
+
+@dataclass(frozen=True)
+class EquivalenceSettings:
+    """From which deviance on, flights tell two explanations apart.
+
+    ``commanded`` marks flights whose rotor speeds are worked out from commands.
+    """
+
+    least_deviance: float = 30.0  # between two explanations; a little over five std deviations
+    least_share: float = 0.001  # of the effect's own deviance: effect models are true to that
+    commanded_least_share: float = 0.005  # the same where thrust is a guess
+    # share of the effect's deviance that another one must explain, linearised, to be worth a refit
+    least_linear_share: float = 0.1
+    commanded_least_linear_share: float = 0.3
+    # times the limit, which the linear fit of another one may leave of it to be worth a refit
+    most_linear_deviance_ratio: float = 40.0
+    commanded_most_linear_deviance_ratio: float = 6.0
+    # share of what is left without the effect, which is the limit for commanded flights at most
+    commanded_most_share_without: float = 0.4
+    largest_size: float = 1.2 * GRAM.prior_std  # typical sizes
+    share_of_bound: float = 0.98  # of a bound, from which a coefficient has reached it
+    most_reliable_effects: int = 2  # at once; aerodynamic ones count as one
+    # share of what an inertia explains, which one that goes with the mass may leave of it
+    most_share_apart: float = 0.1
+    # standard deviations between rotor efficiencies that are the same
+    most_std_apart: float = 3.0
+    least_efficiency: float = 0.01  # relative, below which a rotor is as good as declared
+    least_std: float = 1e-9  # relative; standard deviations are no smaller
+    # share of a thrust scale which a mass may fail to cancel
+    most_share_uncancelled: float = 0.1
+    least_hanging_ratio: float = 5.0  # a centre of mass along z over across it: a load that hangs
+    least_voltage_correlation: float = 0.95  # of voltage and time, where the voltage falls evenly
+
+
+EQUIVALENCE = EquivalenceSettings()
 # a vehicle that is declared without aerodynamics lacks all of these together
-_AERODYNAMICS = frozenset(
+AERODYNAMIC_EFFECTS = frozenset(
     {
         "rotor_drag",
         "body_drag",
@@ -40,21 +64,9 @@ _AERODYNAMICS = frozenset(
         "flapping_moment",
     }
 )
-_COINCIDE = (
-    0.1  # share of what an inertia explains that one which goes with the mass may leave of it
-)
-_SAME, _NOTHING = (
-    3.0,
-    0.01,
-)  # standard deviations between efficiencies that are the same, and one that is as good as zero
-_EXACT = 1e-9  # relative; standard deviations are no smaller
-_CANCEL = 0.1  # of a scale of thrust, which a mass takes back but for that
-_HANGS = 5.0  # times as far along z as across it
-_EVEN = 0.95  # correlation of voltage and time
 # one with as much inertia is the other: thrust and moments scale alike, or neither does
-_MATES = {"mass": "thrust_scale", "thrust_scale": "mass"}
-_AXES = ("jx", "jy", "jz")
-_PLAUSIBLE = 1.2 * PRIOR  # typical sizes
+COUNTERPARTS = {"mass": "thrust_scale", "thrust_scale": "mass"}
+INERTIA_AXES = ("jx", "jy", "jz")
 
 
 def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
@@ -63,7 +75,7 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     """
     flights = search.flights
     if search.held(effect):
-        return [other for other in ALIKE if other in search.library]
+        return [other for other in SAME_DELAY_EFFECTS if other in search.library]
     less = fit.without(effect)
     regression = search.linearise(less)
     whole = flights.residual(fit.setting)
@@ -74,17 +86,30 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         flights.commanded
     ):  # little of such flights is beyond doubt: the other one must explain most of it
         alone = search.refit(less)
-        limit = min(limit, _MOST * search.whitened_energy(flights.residual(alone.setting) - whole))
+        limit = min(
+            limit,
+            EQUIVALENCE.commanded_most_share_without
+            * search.whitened_energy(flights.residual(alone.setting) - whole),
+        )
     # no farther apart than that, by the triangle's inequality
     enough = (np.sqrt(search.whitened_energy(whole)) + np.sqrt(limit)) ** 2
     out = []
     for other in search.gains(less, regression, g):
         near, hopeful = (
-            (_NEAR_OF_COMMANDS, _HOPEFUL_OF_COMMANDS) if flights.commanded else (_NEAR, _HOPEFUL)
+            (
+                EQUIVALENCE.commanded_most_linear_deviance_ratio,
+                EQUIVALENCE.commanded_least_linear_share,
+            )
+            if flights.commanded
+            else (EQUIVALENCE.most_linear_deviance_ratio, EQUIVALENCE.least_linear_share)
         )
         if other.share < hopeful:
             continue
-        if other.effect == effect or other.size > _PLAUSIBLE or other.left > near * limit:
+        if (
+            other.effect == effect
+            or other.size > EQUIVALENCE.largest_size
+            or other.left > near * limit
+        ):
             continue
         # what is far from linear is fitted to the flights themselves
         swapped = search.refit(other.fit, enough)
@@ -105,11 +130,16 @@ def overshadowed(search: Search, fit: Fit, effect: str) -> list[str]:
     less, wider = fit.without(effect), copy(search)
     wider.library = search.hidden
     regression = wider.linearise(less)
-    own = search.error_without(fit, effect) - search.error(fit) - COMPLEXITY * freedom(effect)
+    own = (
+        search.error_without(fit, effect)
+        - search.error(fit)
+        - SEARCH.deviance_per_coefficient * freedom(effect)
+    )
     return [
         x.effect
         for x in wider.gains(less, regression, wider.gram(less, regression))
-        if x.energy - COMPLEXITY * freedom(x.effect) > own and LEAST_SIZE < x.size <= _PLAUSIBLE
+        if x.energy - SEARCH.deviance_per_coefficient * freedom(x.effect) > own
+        and SEARCH.least_size < x.size <= EQUIVALENCE.largest_size
     ]
 
 
@@ -122,7 +152,7 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
     """
     flights = search.flights
     found = []
-    for effect, mate in _MATES.items():
+    for effect, mate in COUNTERPARTS.items():
         if (
             effect not in fit.effects
             or mate in search.library
@@ -138,7 +168,7 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
             )
         )
         whole = flights.residual(fit.setting)
-        turned = flights.residual({**fit.setting, "inertia": dict.fromkeys(_AXES, share)})
+        turned = flights.residual({**fit.setting, "inertia": dict.fromkeys(INERTIA_AXES, share)})
         columns = flights.columns(fit.setting, search.base(fit.effects), 0.1)
         g = gram(flights, fit.setting, search.whiten, columns, turned - whole)
         if g.error(np.arange(len(g.columns))) < _limit(
@@ -158,7 +188,9 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
     heavier = fit.setting.get("mass", {}).get("dm", 0.0) > 0.0
     if heavier and "com_offset" in fit.effects and "slung_payload" not in search.library:
         centre = fit.setting["com_offset"]
-        if abs(centre["cz"]) > _HANGS * max(abs(centre["cx"]), abs(centre["cy"])):
+        if abs(centre["cz"]) > EQUIVALENCE.least_hanging_ratio * max(
+            abs(centre["cx"]), abs(centre["cy"])
+        ):
             found.append(
                 "more mass, and a centre of mass that is off along z alone: a load that hangs may "
                 "be behind them"
@@ -169,8 +201,8 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
 def _limit(search: Search, part: Array) -> float:
     """Return the energy from which two explanations of ``part`` (rows, 6) are apart."""
     return max(
-        APART,
-        (SHARE_OF_COMMANDS if search.flights.commanded else APART_SHARE)
+        EQUIVALENCE.least_deviance,
+        (EQUIVALENCE.commanded_least_share if search.flights.commanded else EQUIVALENCE.least_share)
         * search.whitened_energy(part),
     )
 
@@ -207,8 +239,12 @@ def _three_alike(fit: Fit) -> bool:
     off = np.array([fit.setting["rotor_efficiency"].get(name, 0.0) for name in rotors])
     std = max(fit.std.get(("rotor_efficiency", name), 0.0) for name in rotors)
     middle = float(np.median(off))
-    same = np.abs(off - middle) < max(_SAME * std, _COINCIDE * abs(middle))
-    return np.count_nonzero(same) == len(rotors) - 1 and abs(middle) > max(_SAME * std, _NOTHING)
+    same = np.abs(off - middle) < max(
+        EQUIVALENCE.most_std_apart * std, EQUIVALENCE.most_share_apart * abs(middle)
+    )
+    return np.count_nonzero(same) == len(rotors) - 1 and abs(middle) > max(
+        EQUIVALENCE.most_std_apart * std, EQUIVALENCE.least_efficiency
+    )
 
 
 def composites(flights: Flights, fit: Fit) -> list[str]:
@@ -221,10 +257,13 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     """
     found = []
     names = set(fit.effects)
-    if len(names - _AERODYNAMICS) + bool(names & _AERODYNAMICS) > _MOST_SURE:
+    if (
+        len(names - AERODYNAMIC_EFFECTS) + bool(names & AERODYNAMIC_EFFECTS)
+        > EQUIVALENCE.most_reliable_effects
+    ):
         found.append(f"{len(names)} effects at once may stand for one that the library lacks")
     shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
-    if names and shift < _OUT_OF_STEP * SHIFT_RANGE[0]:
+    if names and shift < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
         found.append(
             "turn rates would act before they are logged, by as much as is allowed: an effect that "
             "is not among these "
@@ -232,7 +271,7 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         )
     if (
         max(fit.setting.get("rotor_efficiency", {"": 0.0}).values())
-        > _OUT_OF_STEP * BELIEVED["rotor_efficiency"]
+        > EQUIVALENCE.share_of_bound * GRAM.plausible_maxima["rotor_efficiency"]
     ):
         found.append(
             "a rotor would have to deliver far more than declared: rotor_efficiency may stand for "
@@ -245,9 +284,11 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         )
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
         values, std = _relative(flights, fit)
-        off = (values - _weighted(values, std)) / np.maximum(std, _EXACT)
-        whole = values[: len(_AXES)] / np.maximum(std[: len(_AXES)], _EXACT)
-        if off @ off < APART + _COINCIDE * whole @ whole:
+        off = (values - _weighted(values, std)) / np.maximum(std, EQUIVALENCE.least_std)
+        whole = values[: len(INERTIA_AXES)] / np.maximum(
+            std[: len(INERTIA_AXES)], EQUIVALENCE.least_std
+        )
+        if off @ off < EQUIVALENCE.least_deviance + EQUIVALENCE.most_share_apart * whole @ whole:
             found.append(
                 "coefficients of inertia and thrust or mass coincide: a single other effect may be "
                 "behind them"
@@ -255,7 +296,7 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
     if {"mass", "thrust_scale"} <= names:
         weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass
         thrust = 1.0 + fit.setting["thrust_scale"].get("s", 0.0)
-        if abs(thrust / weight - 1.0) < _CANCEL * abs(thrust - 1.0):
+        if abs(thrust / weight - 1.0) < EQUIVALENCE.most_share_uncancelled * abs(thrust - 1.0):
             found.append(
                 "more mass and as much more thrust cancel, but for the moments: inertia may be "
                 "behind them"
@@ -271,7 +312,11 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
             for p in flights.pieces({})
             if p.signals.voltage is not None
         ]
-        even = all(abs(float(np.corrcoef(t, v)[0, 1])) > _EVEN for t, v in drop if v.std() > 0)
+        even = all(
+            abs(float(np.corrcoef(t, v)[0, 1])) > EQUIVALENCE.least_voltage_correlation
+            for t, v in drop
+            if v.std() > 0
+        )
         if drop and even:
             found.append(
                 "the battery's voltage falls evenly: thrust that is off and fades may be "

@@ -5,8 +5,8 @@ At one setting of coefficients everything is linear: each column is whitened, an
 selection, removal and comparison ask is in the Gram matrices of the blocks.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,23 @@ from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
-# what a law allows and nobody believes: a rotor that delivers far more than it should (all four
-# together are thrust_scale)
-BELIEVED = {"rotor_efficiency": 0.05}
-_MOST_MISSING = 0.9  # of the declared mass
-_TURNS = 4  # of the search for which bounds hold, a column
-_SMALL_PULL = 1e-6  # in standard deviations
-PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anything is seen
+
+@dataclass(frozen=True)
+class GramSettings:
+    """Priors and bounds of coefficients, and the limits of the bounded least squares."""
+
+    # upper bounds below those of the effect: a rotor that delivers far more than declared is not
+    # plausible (all four together are thrust_scale)
+    plausible_maxima: Mapping[str, float] = field(
+        default_factory=lambda: {"rotor_efficiency": 0.05}
+    )
+    most_missing_mass: float = 0.9  # share of the declared mass
+    iterations_per_column: int = 4  # of the search for the bounds that hold
+    least_gradient: float = 1e-6  # in standard deviations; a smaller one is none
+    prior_std: float = 5.0  # typical sizes, of a coefficient before anything is seen
+
+
+GRAM = GramSettings()
 
 
 def columns_of(effect: str, fitted: bool) -> list[Column]:
@@ -88,12 +98,12 @@ class Gram:
         change = np.zeros(len(index))  # allowed: bounds lie on either side of the value now
         free = np.ones(len(index), dtype=bool)
         scale = 1.0 / np.sqrt(np.diagonal(normal))
-        for _ in range(_TURNS * len(index)):
+        for _ in range(GRAM.iterations_per_column * len(index)):
             if free.any():
                 step = np.linalg.solve(normal[np.ix_(free, free)], (right - normal @ change)[free])
                 room = np.where(step > 0, high[free] - change[free], change[free] - low[free])
                 share = np.where(
-                    np.abs(step) > _SMALL_PULL * scale[free],
+                    np.abs(step) > GRAM.least_gradient * scale[free],
                     room / np.maximum(np.abs(step), 1e-300),
                     np.inf,
                 )
@@ -108,7 +118,7 @@ class Gram:
             pull = (right - normal @ change) * scale
             inwards = np.where(change >= high, -pull, pull)
             inwards[free | (low >= high)] = 0.0
-            if inwards.max(initial=0.0) < _SMALL_PULL:
+            if inwards.max(initial=0.0) < GRAM.least_gradient:
                 break
             free[int(np.argmax(inwards))] = True
         return change, free
@@ -171,14 +181,14 @@ def room(
         elif c[1].startswith(MOMENT):
             low[i], high[i] = -np.inf, np.inf
         elif c[1].startswith(START):
-            low[i], high[i] = 0.0, PRIOR
+            low[i], high[i] = 0.0, GRAM.prior_std
         else:
             low[i], high[i] = (
                 coefficient(c).minimum,
-                min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf)),
+                min(coefficient(c).maximum, GRAM.plausible_maxima.get(c[0], np.inf)),
             )
             if c[0] == "mass":
-                low[i] = max(low[i], -_MOST_MISSING * flights.vehicle.mass)
-    prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
+                low[i] = max(low[i], -GRAM.most_missing_mass * flights.vehicle.mass)
+    prior = 1.0 / np.square(GRAM.prior_std * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return prior, value, low - value, high - value

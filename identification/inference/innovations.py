@@ -11,6 +11,7 @@ errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 19
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -22,24 +23,34 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import get
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.signals import log_signals
-from .disturbance_filter import STRENGTHS, TIMES, innovations, likeliest, strength_of
+from .disturbance_filter import DISTURBANCE, innovations, likeliest, strength_of
 from .gram_matrix import Gram, room
 from .regression import SHIFT, Column, Flights, Piece, Setting, coefficient, typical
 
 Array = NDArray[np.float64]
 
-_SHARE = 0.65  # laws have 0.8 to 1.4, answers -5 to 0.2, one had 0.53
-LEAST_ENERGY = (
-    20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
-)
-_AT_ODDS, _SURELY = (
-    0.1,
-    2.0,
-)  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
-_SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
-_NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
-_STEP = 0.1  # typical sizes, over which slopes are taken
-_TINY = 1e-300
+
+@dataclass(frozen=True)
+class InnovationSettings:
+    """How much of a change of the model the innovations must confirm."""
+
+    # share of the change; effects have 0.8 to 1.4, feedback-induced correlations -5 to 0.2, one had
+    # 0.53
+    least_confirmed_share: float = 0.65
+    # log-likelihood ratio (twice the gain of the log-likelihood); chance alone gives one an axis
+    least_log_likelihood_ratio: float = 20.0
+    # of the confirmed share and one, and the same in its standard deviations, from which an effect
+    # contradicts the innovations; 200 true effects had up to 0.05
+    most_share_error: float = 0.1
+    most_share_error_in_std: float = 2.0
+    settling_time: float = 1.0  # s, from the start of a piece to the first innovation that counts
+    grid_margin: float = 1.0  # in the logarithm, around the best point of a grid
+    derivative_step: float = 0.1  # typical sizes, over which derivatives are taken
+    least_sum: float = 1e-300  # against a division by zero
+
+
+INNOVATIONS = InnovationSettings()
+
 _CLOCK = "clock_offset", "dt"
 
 
@@ -60,10 +71,14 @@ class Innovations:
         for piece, fit in zip(flights.pieces(setting), rows, strict=True):
             t, k = piece.signals.t, np.arange(len(piece.signals.t))
             near = fit[np.searchsorted(piece.rows, k).clip(max=len(fit) - 1)]
-            self._counts.append(near & (t > t[0] + _SETTLED) & (k <= piece.rows[-1]))
+            self._counts.append(
+                near & (t > t[0] + INNOVATIONS.settling_time) & (k <= piece.rows[-1])
+            )
         self._count = sum(int(np.count_nonzero(x)) for x in self._counts)
 
-    def confirm(self, after: Setting, least: float = LEAST_ENERGY) -> bool:
+    def confirm(
+        self, after: Setting, least: float = INNOVATIONS.least_log_likelihood_ratio
+    ) -> bool:
         """Return whether innovations confirm the change to the effects ``after``, with an energy of
         at least ``least``.
         """
@@ -110,8 +125,10 @@ class Innovations:
             ]
             products = self._products([part[..., -1:] for part in parts])
             strength, time = likeliest(lambda *gusts, of=products: float(of(*gusts)[0, 0]))
-            sums = self._sums(parts, float(STRENGTHS[strength]), float(TIMES[time]))
-            total += sums * self._count / max(sums[-1, -1], _TINY)
+            sums = self._sums(
+                parts, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+            )
+            total += sums * self._count / max(sums[-1, -1], INNOVATIONS.least_sum)
         return Gram(
             tuple(columns),
             np.zeros((0, 6, len(total))),
@@ -124,7 +141,10 @@ class Innovations:
         """Return what a unit of a coefficient adds to the motions (2, n, 6)."""
         effect, name = column
         own = self._flights.coefficients(self._setting, effect)
-        value, delta = own.get(name, 0.0), _STEP * typical(column, self._flights.vehicle)
+        value, delta = (
+            own.get(name, 0.0),
+            INNOVATIONS.derivative_step * typical(column, self._flights.vehicle),
+        )
         if (
             effect
             and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum
@@ -155,16 +175,17 @@ class Innovations:
         period = self._flights.pieces(self._setting)[0].signals.period
         products = self._products(motions)
         i, j = likeliest(lambda strength, time: float(products(strength, time)[0, 0]))
-        begun = np.log([STRENGTHS[i], TIMES[j]])
+        begun = np.log([DISTURBANCE.strengths[i], DISTURBANCE.times[j]])
 
         def loss(x: Array) -> float:
             return float(np.log(self._sums(motions, *np.exp(x).tolist())[0, 0]))
 
+        near = INNOVATIONS.grid_margin * np.array([-1.0, 1.0])
         best = minimize(
             loss,
             begun,
             method="Nelder-Mead",
-            bounds=[begun[0] + _NEAR, begun[1] + _NEAR],
+            bounds=[begun[0] + near, begun[1] + near],
             options={"xatol": 0.05, "fatol": 1.0 / self._count},
         )
         strength, time = np.exp(best.x).tolist()
@@ -191,10 +212,16 @@ class Innovations:
             if any(np.any(change[..., axis]) for change in changes)
         ]
         cross, square = (sum(x[row, 1] / _left(x) for x, _ in axes) for row in (0, 1))
-        share = float(cross / max(square, _TINY))
+        share = float(cross / max(square, INNOVATIONS.least_sum))
         rest = np.array([-1.0, share])
         energy = self._count * sum(
-            float(np.log(max(y[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for x, y in axes
+            float(
+                np.log(
+                    max(y[0, 0], INNOVATIONS.least_sum)
+                    / max(rest @ x @ rest, INNOVATIONS.least_sum)
+                )
+            )
+            for x, y in axes
         )
         return share, energy
 
@@ -218,7 +245,9 @@ class Innovations:
 
         @cache
         def products(strength: int, time: int) -> Array:
-            return self._sums(motions, float(STRENGTHS[strength]), float(TIMES[time]))
+            return self._sums(
+                motions, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+            )
 
         return products
 
@@ -298,11 +327,18 @@ class Innovations:
         )
 
 
-def _confirmed(share: float, energy: float, least: float = LEAST_ENERGY) -> bool:
-    return share > _SHARE and energy > least
+def _confirmed(
+    share: float, energy: float, least: float = INNOVATIONS.least_log_likelihood_ratio
+) -> bool:
+    return share > INNOVATIONS.least_confirmed_share and energy > least
 
 
-def adds(flights: Flights, before: Setting, after: Setting, least: float = LEAST_ENERGY) -> bool:
+def adds(
+    flights: Flights,
+    before: Setting,
+    after: Setting,
+    least: float = INNOVATIONS.least_log_likelihood_ratio,
+) -> bool:
     """Return whether innovations confirm what a fit has beyond a smaller one, with an energy of at
     least ``least``.
 
@@ -329,7 +365,12 @@ def at_odds(flights: Flights, setting: Setting) -> list[str]:
         share, energy = Innovations(
             flights, {k: v for k, v in setting.items() if k != effect}
         ).share(setting)
-        if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _TINY))):
+        if abs(share - 1.0) > max(
+            INNOVATIONS.most_share_error,
+            INNOVATIONS.most_share_error_in_std
+            * abs(share)
+            / np.sqrt(max(energy, INNOVATIONS.least_sum)),
+        ):
             out.append(
                 f"{effect}: what no past pose foretells bears out {share:.0%} of it: another "
                 f"effect may be behind it"
@@ -341,4 +382,7 @@ def _left(products: Array) -> float:
     """Return the energy that the best multiple of a change leaves of innovations, of their sums of
     products (2, 2).
     """
-    return max(float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], _TINY)), _TINY)
+    return max(
+        float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], INNOVATIONS.least_sum)),
+        INNOVATIONS.least_sum,
+    )

@@ -8,31 +8,41 @@ past pose foretells has no such noise. (It is less robust: turn rates that are r
 quick gusts.)
 """
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from .innovations import Innovations
-from .regression import LATE, SHIFT, SHIFT_RANGE, TIMING, Column, coefficient
-from .search import LEAST_GAIN, Fit, Search, started
+from .regression import DELAY_EFFECTS, LATE_ROTOR_EFFECTS, REGRESSION, SHIFT, Column, coefficient
+from .search import SEARCH, Fit, Search, started
 
-_BENT = frozenset({"attitude_gain", "motor_lag"})  # effects of which that is known
-_TURNS = 3  # of Gauss-Newton; the second changes little
-_WORSE = 1.05  # of the residual's energy: what is worse for the residual than that is not measured
+
+@dataclass(frozen=True)
+class RefitSettings:
+    """How coefficients are refitted to the innovations, and how a lag is told from a delay."""
+
+    iterations: int = 3  # of Gauss-Newton; the second changes little
+    # times the residual's deviance; a refit that leaves more of the residual is not used
+    most_deviance_ratio: float = 1.05
+    largest_delay: float = 0.1  # s, of the rotors where a latency or a clock_offset is named
+    first_lag_share: float = 0.3  # share of the whole delay that is taken for a lag at the start
+    delay_iterations: int = 5  # of Gauss-Newton, where a lag is told from a delay
+    # standard deviations of a lag, which do not include the rounding of rotor speeds: a delay of
+    # 9 ms has looked like 4 of them
+    least_lag_in_std: float = 6.0
+    # share of the whole delay from which it is a lag, and from which it may be one; behind 34 true
+    # delays it was up to 0.47, and once 0.7
+    least_share_of_lag: float = 0.5
+    least_share_of_possible_lag: float = 0.3
+
+
+REFIT = RefitSettings()
+# effects that least squares of the residual gets wrong
+BIASED_EFFECTS = frozenset({"attitude_gain", "motor_lag"})
+
 _LAG = "motor_lag", "tau"
 _DELAYS = ("latency", "d"), ("clock_offset", "dt")
-_ANY_DELAY = 0.1  # s
-_BEGIN = 0.3  # share of a lag where the search for it begins
-_DELAY_TURNS = 5
-# standard deviations of a lag, which know nothing of rounded turn rates: a delay of 9 ms has looked
-# like 4 of them
-_SURE = 6.0
-_LAGS, _MAY_LAG = (
-    0.5,
-    0.3,
-    # share of a lag, that is one and that may be one; behind 34 delays it was up to 0.47, and once
-    # 0.7
-)
 
 Lateness = Literal["as behind a lag", "as behind a delay", "either way"]
 
@@ -44,11 +54,16 @@ def measured(search: Search, fit: Fit) -> Fit:
     Standard deviations are no smaller than those of the residual.
     """
     late = [(effect, name) for effect, name in _DELAYS if effect in fit.effects]
-    if search.flights.commanded or not _BENT & set(fit.effects) or len(late) > 1:
+    if search.flights.commanded or not BIASED_EFFECTS & set(fit.effects) or len(late) > 1:
         return fit
     # what delays is measured as turn rates that act late: a pose that is moved would take its noise
     # along
-    found = _likeliest(search, _shifted(fit), _ANY_DELAY if late else SHIFT_RANGE[1], _TURNS)
+    found = _likeliest(
+        search,
+        _shifted(fit),
+        REFIT.largest_delay if late else REGRESSION.rotor_time_offset_range[1],
+        REFIT.iterations,
+    )
     for effect, name in late:
         c = coefficient((effect, name))
         delay = {name: float(np.clip(found.setting[SHIFT[0]].pop(SHIFT[1]), c.minimum, c.maximum))}
@@ -66,17 +81,23 @@ def lateness(search: Search, fit: Fit) -> Lateness | None:
     """Return how rotors that a fit has late follow, turn rates being free to act late; None where
     nothing named is late.
     """
-    late = LATE & set(fit.effects)
+    late = LATE_ROTOR_EFFECTS & set(fit.effects)
     if search.flights.commanded or len(late) != 1 or (behind := _behind(fit)) <= 0.0:
         return None
     begun = _shifted(fit)
-    begun.setting[_LAG[0]] = {_LAG[1]: _BEGIN * behind}
-    begun.setting[SHIFT[0]][SHIFT[1]] = (1.0 - _BEGIN) * behind
-    found = _likeliest(search, begun, _ANY_DELAY, _DELAY_TURNS)
+    begun.setting[_LAG[0]] = {_LAG[1]: REFIT.first_lag_share * behind}
+    begun.setting[SHIFT[0]][SHIFT[1]] = (1.0 - REFIT.first_lag_share) * behind
+    found = _likeliest(search, begun, REFIT.largest_delay, REFIT.delay_iterations)
     lag, delay = found.setting[_LAG[0]][_LAG[1]], abs(found.setting[SHIFT[0]][SHIFT[1]])
-    if lag > _SURE * found.std[_LAG] and lag > _LAGS * (lag + delay):
+    if lag > REFIT.least_lag_in_std * found.std[_LAG] and lag > REFIT.least_share_of_lag * (
+        lag + delay
+    ):
         return "as behind a lag"
-    return "either way" if lag > _MAY_LAG * (lag + delay) else "as behind a delay"
+    return (
+        "either way"
+        if lag > REFIT.least_share_of_possible_lag * (lag + delay)
+        else "as behind a delay"
+    )
 
 
 def with_lag(search: Search, fit: Fit) -> Fit:
@@ -85,7 +106,9 @@ def with_lag(search: Search, fit: Fit) -> Fit:
     """
     if _LAG[0] not in search.library or _LAG[0] in fit.effects:
         return fit
-    found = search.refit(Fit({**fit.without(*TIMING).setting, _LAG[0]: {_LAG[1]: _behind(fit)}}))
+    found = search.refit(
+        Fit({**fit.without(*DELAY_EFFECTS).setting, _LAG[0]: {_LAG[1]: _behind(fit)}})
+    )
     return found if _is_close(search, found, fit) else fit
 
 
@@ -96,8 +119,12 @@ def others_late(search: Search, fit: Fit, follow: Lateness | None) -> dict[str, 
     if follow != "either way":
         return {}
     return {
-        e: [x for x in search.library if x in LATE - ({e} if e == _LAG[0] else TIMING)]
-        for e in LATE & set(fit.effects)
+        e: [
+            x
+            for x in search.library
+            if x in LATE_ROTOR_EFFECTS - ({e} if e == _LAG[0] else DELAY_EFFECTS)
+        ]
+        for e in LATE_ROTOR_EFFECTS & set(fit.effects)
     }
 
 
@@ -105,7 +132,7 @@ def lag_or_delay(search: Search, fit: Fit, follow: Lateness | None) -> list[str]
     """Return in words that what is named motor_lag delays as a latency would, or the other way
     round, if so.
     """
-    for effect in LATE & set(fit.effects) if follow else ():
+    for effect in LATE_ROTOR_EFFECTS & set(fit.effects) if follow else ():
         is_it = follow == ("as behind a lag" if effect == _LAG[0] else "as behind a delay")
         if not is_it and not any(others_late(search, fit, follow).values()):
             if effect == _LAG[0]:
@@ -126,7 +153,9 @@ def _behind(fit: Fit) -> float:
 
 def _shifted(fit: Fit) -> Fit:
     """Return the fit with turn rates that act late in place of a latency or a clock_offset."""
-    setting = {effect: dict(values) for effect, values in fit.without(*TIMING).setting.items()}
+    setting = {
+        effect: dict(values) for effect, values in fit.without(*DELAY_EFFECTS).setting.items()
+    }
     nuisances = setting.setdefault(SHIFT[0], {})
     nuisances[SHIFT[1]] = _behind(fit) - fit.setting.get(_LAG[0], {}).get(_LAG[1], 0.0)
     return Fit(setting)
@@ -156,4 +185,7 @@ def _likeliest(search: Search, fit: Fit, latest: float, turns: int) -> Fit:
 
 def _is_close(search: Search, fit: Fit, other: Fit) -> bool:
     """Return whether a fit leaves hardly more of the residual than another one."""
-    return search.energy(fit.setting) < _WORSE * search.energy(other.setting) + LEAST_GAIN
+    return (
+        search.energy(fit.setting)
+        < REFIT.most_deviance_ratio * search.energy(other.setting) + SEARCH.least_deviance_reduction
+    )

@@ -8,7 +8,7 @@ the same filter.
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,16 @@ from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
+from ..motion.cutoffs import CUTOFFS
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import Signals, log_signals, low_pass
 from .commanded_rotors import (
-    LEAN_X,
-    LEAN_Y,
     NOT_FROM_COMMANDS,
-    SCALE,
+    THRUST_SCALE,
+    TILT_X,
+    TILT_Y,
     commanded,
     deviation,
     deviations,
@@ -40,36 +41,43 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-CUTOFF_HZ = 5.0
-_RATE_HZ = 25.0  # of the rows
-_EDGE = 0.6  # s at either end of a piece, where the filters have only half of what they need
-# share of noise in an effect's column that is too much; a gain of the attitude could cancel the
-# attitude's own noise
-_DROWNED = {"attitude_gain": 0.01}
-_DROWNED_ELSE = 0.1
-# rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its
-# own
-_STEPS = 1.4
-# effects of which a flight with less than that says nothing: they would explain the rounding
-_QUICK = frozenset(
+
+@dataclass(frozen=True)
+class RegressionSettings:
+    """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
+
+    row_rate_hz: float = 25.0  # of the samples that are rows: five times the cut-off
+    margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
+    # share of sensor noise in an effect's column, from which the effect is not identifiable. An
+    # attitude_gain could cancel the attitude's own noise
+    most_noise_share: float = 0.1
+    most_noise_shares: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.01})
+    # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
+    # like an effect
+    least_steps_of_rotor_speed: float = 1.4
+    block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
+    short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
+    blocks_per_held_out: int = 4  # one of so many blocks is held out
+    # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
+    held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
+    memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
+    kept_residuals: int = 16  # a fit asks several times for the residual at its setting
+    bytes_per_sample: int = 400  # of a piece
+    rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
+
+
+REGRESSION = RegressionSettings()
+# effects of fast motion; where rotor speeds hardly leave their rounding steps, these would explain
+# the rounding
+FAST_MOTION_EFFECTS = frozenset(
     {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
 )
-TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
-LATE = TIMING | {"motor_lag"}
-DRAGS = frozenset({"rotor_drag", "body_drag"})
+DELAY_EFFECTS = frozenset({"latency", "clock_offset"})  # each contains the rotors' time offset
+LATE_ROTOR_EFFECTS = DELAY_EFFECTS | {"motor_lag"}
+DRAG_EFFECTS = frozenset({"rotor_drag", "body_drag"})
 # effects whose force is no sum over their coefficients
-STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
-SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
-_ROOM = (
-    2**28
-)  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
-_LATEST = 16  # residuals that are kept: a fit asks several times for that of its setting
-_SAMPLE = 400  # bytes of a piece, a sample
-BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
-_HELD_OUT, _GOLDEN = (
-    4,
-    0.5 * (5.0**0.5 - 1.0),
-)  # one block of four; which one changes so that no flight keeps step with it
+NONLINEAR_EFFECTS = frozenset({"slung_payload", "wind", "fan_jet"})
+
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
@@ -78,7 +86,6 @@ Column = tuple[str, str]
 MOMENT = "moment of "
 CENTRAL = "central"  # the coefficient of laws that act rotor by rotor
 START = "start "  # a whole effect at coefficients of its own; the column is a multiple of it
-SHIFT_RANGE = (-0.006, 0.006)  # s
 SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
 LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
 # s, by which the velocity that a law asks for is behind the position's: a simulator that holds its
@@ -118,7 +125,7 @@ def typical(column: Column, vehicle: Vehicle) -> float:
 def range_of(column: Column) -> tuple[float, float]:
     """Return the least and the greatest value of a nuisance's column."""
     size = size_of(column[1])
-    return SHIFT_RANGE if size is None else (-size[1], size[1])
+    return REGRESSION.rotor_time_offset_range if size is None else (-size[1], size[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +173,11 @@ class Flights:
         log, block, fit, start, t = [], [], [], [], []
         count = 0
         seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
-        length = SHORT_BLOCK if self.commanded and seconds < 8 * BLOCK else BLOCK
+        length = (
+            REGRESSION.short_block
+            if self.commanded and seconds < 8 * REGRESSION.block
+            else REGRESSION.block
+        )
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
@@ -175,7 +186,7 @@ class Flights:
             seen = (
                 np.full(len(time), piece.log < len(logs))
                 if test
-                else number % _HELD_OUT != held_out(number)
+                else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             fit.append(seen)
             start.append(np.arange(len(time)) == 0)
@@ -218,7 +229,7 @@ class Flights:
         own: list[Column] = [
             (e, c.name)
             for e in names()
-            if e not in STRANGE
+            if e not in NONLINEAR_EFFECTS
             for c in get(e).coefficients
             if c.name != CENTRAL
         ]
@@ -232,7 +243,10 @@ class Flights:
                 scale = weight * typical(c, self.vehicle) ** 2
                 noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
                 whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
-            if noise > _DROWNED.get(effect, _DROWNED_ELSE) * whole:
+            if (
+                noise
+                > REGRESSION.most_noise_shares.get(effect, REGRESSION.most_noise_share) * whole
+            ):
                 drowned.add(effect)
         if self.commanded:
             drowned |= NOT_FROM_COMMANDS
@@ -248,9 +262,11 @@ class Flights:
         vehicle = self.amended(setting)
         return np.concatenate(
             [
-                low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[
-                    p.rows
-                ]
+                low_pass(
+                    vehicle.rotor_wrench(p.signals.rotor_speeds),
+                    CUTOFFS.residual_hz,
+                    p.signals.period,
+                )[p.rows]
                 for p in self.pieces(setting)
             ]
         )
@@ -259,14 +275,17 @@ class Flights:
     def lively(self) -> bool:
         """Whether the turn rates vary by enough of the steps to which they are rounded."""
         speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in self._first])
-        return float(np.median(speeds.std(axis=0))) > _STEPS * self.vehicle.omega_lsb
+        return (
+            float(np.median(speeds.std(axis=0)))
+            > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
+        )
 
     @property
     def rounded(self) -> frozenset[str]:
         """The effects that would explain the rounding of turn rates, where these hardly leave its
         steps.
         """
-        return frozenset() if self.lively else _QUICK
+        return frozenset() if self.lively else FAST_MOTION_EFFECTS
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
@@ -279,8 +298,11 @@ class Flights:
         if sensing not in self._pieces:
             if (
                 len(self._pieces)
-                * max(_SAMPLE * sum(len(p.signals.t) for p in self._first), _ROOM // 40)
-                > _ROOM
+                * max(
+                    REGRESSION.bytes_per_sample * sum(len(p.signals.t) for p in self._first),
+                    REGRESSION.memory // 40,
+                )
+                > REGRESSION.memory
             ):
                 self._pieces.clear()
                 self._needs.clear()
@@ -340,12 +362,12 @@ class Flights:
             found = np.concatenate(
                 [
                     self._needed(piece)
-                    - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
+                    - low_pass(model, CUTOFFS.residual_hz, piece.signals.period)[piece.rows]
                     for piece, model in pieces
                 ]
             )
             found.setflags(write=False)
-            if len(self._residuals) == _LATEST:
+            if len(self._residuals) == REGRESSION.kept_residuals:
                 self._residuals.pop(next(iter(self._residuals)))
             self._residuals[key] = found
         return self._residuals[key]
@@ -362,7 +384,8 @@ class Flights:
         out = []
         for piece in self.pieces(setting):
             scale, *lean = (
-                deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y)
+                deviation(setting, kind, piece.log, self.own)
+                for kind in (THRUST_SCALE, TILT_X, TILT_Y)
             )
             s = self._shifted(piece, shifts, scale)
             model, _ = acting_wrench(s, vehicle, self.vehicle)
@@ -382,7 +405,7 @@ class Flights:
                 needed[:, 3:] = 0.0
             self._needs[id(piece)] = (
                 piece,
-                low_pass(needed, CUTOFF_HZ, piece.signals.period)[piece.rows],
+                low_pass(needed, CUTOFFS.residual_hz, piece.signals.period)[piece.rows],
             )
         return self._needs[id(piece)][1]
 
@@ -417,7 +440,7 @@ class Flights:
         if key not in self._columns:
             if (
                 len(self._columns) > 12
-                or sum(map(len, self._columns.values())) * 48 * len(self.t) > _ROOM
+                or sum(map(len, self._columns.values())) * 48 * len(self.t) > REGRESSION.memory
             ):
                 self._columns.clear()
             self._columns[key] = {}
@@ -441,7 +464,7 @@ class Flights:
             # what is moved in time takes its noise along: to both sides, or a step to one would
             # seem to lessen the noise
             if (
-                effect in LATE
+                effect in LATE_ROTOR_EFFECTS
                 and abs(value) > abs(delta)
                 and c.minimum <= value - delta
                 and value + delta <= c.maximum
@@ -486,13 +509,13 @@ def held_out(number: Index) -> Index:
     """Return which block of its four is held out, of each block: the last of the first, then as
     evenly as can be.
     """
-    turn = (0.75 + _GOLDEN * (number // _HELD_OUT)) % 1.0
-    return np.asarray(_HELD_OUT * turn, dtype=np.int64)
+    turn = (0.75 + REGRESSION.held_out_step * (number // REGRESSION.blocks_per_held_out)) % 1.0
+    return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
 
 
 def _rows(signals: Signals) -> Index:
-    step = max(1, round(1.0 / (_RATE_HZ * signals.period)))
-    edge = round(_EDGE / signals.period)
+    step = max(1, round(1.0 / (REGRESSION.row_rate_hz * signals.period)))
+    edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)
 
 

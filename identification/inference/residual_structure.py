@@ -10,72 +10,92 @@ blocks that are left out in turn.
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Structure
+from ..motion.cutoffs import CUTOFFS
 from ..motion.signals import low_pass
 from .candidate_regressors import dictionary, drag_by_place, drags, drives, places, scaled, swings
 from .gram_matrix import Gram
 from .innovations import Innovations, adds
-from .regression import BLOCK, CENTRAL, CUTOFF_HZ, DRAGS, LATE, Column, Flights, Setting
-from .search import LEAST_SIZE, Fit, Search
+from .regression import (
+    CENTRAL,
+    DRAG_EFFECTS,
+    LATE_ROTOR_EFFECTS,
+    REGRESSION,
+    Column,
+    Flights,
+    Setting,
+)
+from .search import SEARCH, Fit, Search
 
 Array = NDArray[np.float64]
 
-# whitened energy on blocks left out; where nothing is lacking few flights have a column above 25
-LEAST_GAIN = 40.0
-LEAST_SHARE = 0.004  # and as a share of the remainder's energy
-# and of what the named effects explain: laws, and the plant they act in, are no truer than one per
-# cent
-LEAST_OF_NAMED = 1e-4
-LEAST_SPREAD = (
-    1.5  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
-)
-LEAST_SPREAD_OF_COMMANDS = (
-    2.0  # the same of flights known from commands, where nothing is confirmed by innovations
-)
-LARGE, LEAST_OF_LARGE = (
-    3.0,
-    1.0,
-)  # times the least gain: a law that acts in one part of the flight, but strongly
-# of columns that are tried together, as a share of their mean energy; from 0.03 to 0.3 little
-# changes
-RIDGE = 0.1
-ROUGH = (
-    4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
-)
 
-_BATCH = 24  # columns at a time
-UNSTEADY, LEAST_UNSTEADY = (
-    5.0,
-    0.1,
-)  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
-LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5
-# the same of an exponent that is off by half or more; on two flights on a circle, at one speed, a
-# third of a friction had 6.4 and 8.1
-OFF, LEAST_OF_OFF = 0.5, 4.0
-SLOW = 0.05  # m/s, below which speed is noise
-KINKS = 0.9, 1.0, 1.1, 1.2, 1.3  # of the thrust of hover
-# whitened energy, of one question: 36 true curvatures had up to 4, rotors that stall 29 to 680; and
-# where no curvature is named, 93 flights without a kink had up to 17 that innovations bore out, a
-# rotor that stalls 56
-LEAST_OF_KINKS, LEAST_OF_STALLS = 12.0, 25.0
-RIGID = frozenset(
-    {"mass", "inertia", "com_offset", "marker_offset"}
-)  # what is bolted on moves along, however fast
-SLOW_HZ = 3.0  # of the 5 that the residual has
-# of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to
-# 2.3
-LEAST_OF_LOOSE = 0.02
-HINT, BORNE_OUT = (
-    10.0,
-    50.0,
-)  # energy of an effect in the residual, and in innovations, that is too much to pass over
-MOST = 12  # signs, the strongest
-_ASKED = 36  # of the innovations, which takes its time
+@dataclass(frozen=True)
+class StructureSettings:
+    """From which deviance on, a candidate regressor shows an effect that the model lacks.
+
+    Deviances are on left-out blocks, if nothing else is said.
+    """
+
+    # deviance that a column must explain; where nothing is lacking few flights have a column
+    # above 25
+    least_deviance_reduction: float = 40.0
+    least_share_of_residual: float = 0.004  # of the residual's deviance, the same
+    # of the deviance that the named effects explain: effect models, and the plant in which they
+    # act, are true to one per cent
+    least_share_of_named: float = 1e-4
+    # reduction over the root of the blocks' summed squares: an effect acts again and again, a
+    # transient disturbance once; the second is for commanded flights, where innovations confirm
+    # nothing
+    least_spread: float = 1.5
+    commanded_least_spread: float = 2.0
+    # times the least reduction, from which the least spread is smaller: an effect that acts in one
+    # part of a flight, but strongly
+    large_reduction_ratio: float = 3.0
+    least_spread_of_large: float = 1.0
+    # of columns that are tried together, as a share of their mean square sum; from 0.03 to 0.3
+    # little changes
+    ridge: float = 0.1
+    # factor on the least reduction where rotor speeds hardly leave their rounding steps
+    rounded_rotor_factor: float = 4.0
+    batch: int = 24  # columns at a time
+    # standard deviations beyond chance, and relative standard deviation of a coefficient from block
+    # to block; true effects have at most 3 of the first
+    least_scatter_significance: float = 5.0
+    least_scatter: float = 0.1
+    # deviance of one question, whether a drag grows with another power of speed: 93 true drags had
+    # up to 5
+    least_reduction_of_power: float = 7.0
+    # the same where the exponent is off by so much or more; on two flights on a circle, at one
+    # speed, a third of a friction had 6.4 and 8.1
+    large_exponent_error: float = 0.5
+    least_reduction_of_large_exponent: float = 4.0
+    least_speed: float = 0.05  # m/s, below which speed is noise
+    thrust_bends: tuple[float, ...] = (0.9, 1.0, 1.1, 1.2, 1.3)  # times the thrust of hover
+    # deviance of one question, whether thrust bends: 36 true thrust_curvatures had up to 4, rotors
+    # that stall 29 to 680; where no curvature is named, 93 flights without a bend had up to 17 that
+    # innovations confirmed, a rotor that stalls 56
+    least_reduction_of_bend: float = 12.0
+    least_reduction_of_stall: float = 25.0
+    # of the deviance that a rigid effect explains, which its slow motion alone must explain: beyond
+    # the least reduction true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
+    least_share_of_loose_mount: float = 0.02
+    # deviance of an effect in the residual, and in the innovations, that is too much for no name
+    least_residual_hint: float = 10.0
+    least_innovation_hint: float = 50.0
+    most_signs: int = 12  # reported, the strongest first
+    most_confirmations: int = 36  # columns asked of the innovations, which takes time
+
+
+STRUCTURE = StructureSettings()
+# effects of what is bolted on: it moves along, however fast
+RIGID_EFFECTS = frozenset({"mass", "inertia", "com_offset", "marker_offset"})
 
 
 def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
@@ -121,27 +141,31 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
         named += [search.whitened_energy(share)] * (len(columns) - len(named))
-    rough = 1.0 if flights.lively else ROUGH
-    least_of_all = max(LEAST_GAIN * unit, LEAST_SHARE * error)
-    least = rough * np.maximum(least_of_all, LEAST_OF_NAMED * np.array(named))
-    steady = LEAST_SPREAD_OF_COMMANDS if flights.commanded else LEAST_SPREAD
+    rough = 1.0 if flights.lively else STRUCTURE.rounded_rotor_factor
+    least_of_all = max(
+        STRUCTURE.least_deviance_reduction * unit, STRUCTURE.least_share_of_residual * error
+    )
+    least = rough * np.maximum(least_of_all, STRUCTURE.least_share_of_named * np.array(named))
+    steady = STRUCTURE.commanded_least_spread if flights.commanded else STRUCTURE.least_spread
     found = []
-    for at in range(0, len(columns), _BATCH):
-        batch = columns[at : at + _BATCH]
+    for at in range(0, len(columns), STRUCTURE.batch):
+        batch = columns[at : at + STRUCTURE.batch]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
             if gain > least[i] and spread >= (
-                steady if gain < LARGE * least[i] else LEAST_OF_LARGE
+                steady
+                if gain < STRUCTURE.large_reduction_ratio * least[i]
+                else STRUCTURE.least_spread_of_large
             ):
                 found.append((Structure(*words[i], float(gain) / error), column))
     if not flights.commanded and (group := drag_by_place(flights, fit.setting)):
         together, column = _together(search, regression, group)
-        if together > rough * max(least_of_all, LEAST_OF_NAMED * every):
+        if together > rough * max(least_of_all, STRUCTURE.least_share_of_named * every):
             where = "a drag with place and heading together"
             found.append((Structure("a general dictionary", where, together / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
-        return [sign for sign, _ in found[:MOST]], bool(found)
+        return [sign for sign, _ in found[: STRUCTURE.most_signs]], bool(found)
     wandering = [
         *unsteady(search, shares, regression),
         *other_powers(search, shares, regression, base),
@@ -154,10 +178,10 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
     innovations = Innovations(flights, fit.setting)
     laws = (
         sign
-        for sign, column in found[:_ASKED]
+        for sign, column in found[: STRUCTURE.most_confirmations]
         if innovations.confirm_column(_added(search, regression, base, column))
     )
-    return [*wandering, *itertools.islice(laws, MOST)], True
+    return [*wandering, *itertools.islice(laws, STRUCTURE.most_signs)], True
 
 
 def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> Iterator[Structure]:
@@ -183,8 +207,14 @@ def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> I
         beyond = float(np.sum(slope**2) - unit * np.sum(size))
         squares = float(np.sum(size**2))
         scatter = np.sqrt(max(beyond, 0.0) / max(squares, 1e-30))
-        if beyond > UNSTEADY * unit * np.sqrt(2.0 * squares) and scatter > LEAST_UNSTEADY:
-            words = f"it changes by {scatter:.0%} from one {BLOCK:.0f} s of flight to the next"
+        if (
+            beyond > STRUCTURE.least_scatter_significance * unit * np.sqrt(2.0 * squares)
+            and scatter > STRUCTURE.least_scatter
+        ):
+            words = (
+                f"it changes by {scatter:.0%} from one {REGRESSION.block:.0f} s of flight to the "
+                "next"
+            )
             yield Structure(
                 f"{effect}'s coefficient is not constant",
                 words,
@@ -208,18 +238,21 @@ def other_powers(
     """
     flights = search.flights
     whole = regression.blocks[:, -1, -1].sum()
-    for effect in filter(DRAGS.__contains__, shares):
+    for effect in filter(DRAG_EFFECTS.__contains__, shares):
         speed = np.concatenate(
             [np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})]
         )
         # what slow flight tells, and what quick flight tells
         asked = (
             _beside(search, regression, base, shares[effect] * x[:, None])
-            for x in (np.log(speed.clip(SLOW)), speed)
+            for x in (np.log(speed.clip(STRUCTURE.least_speed)), speed)
         )
         (exponent, slow), (_, quick) = asked
         gain = max(slow, quick)
-        if gain > LEAST_OF_POWERS or (slow > LEAST_OF_OFF and abs(exponent) > OFF):
+        if gain > STRUCTURE.least_reduction_of_power or (
+            slow > STRUCTURE.least_reduction_of_large_exponent
+            and abs(exponent) > STRUCTURE.large_exponent_error
+        ):
             yield Structure(
                 f"{effect}'s coefficient is not constant",
                 "its force grows with another power of speed",
@@ -251,7 +284,7 @@ def kinked(
             f"what rotors deliver beyond {share:.1f} times the thrust of hover",
             _bent(flights, fit.setting, share, 0.0),
         )
-        for share in KINKS
+        for share in STRUCTURE.thrust_bends
     ]
     if bent:
         asked.append(
@@ -263,10 +296,10 @@ def kinked(
     gains = [_beside(search, regression, base, column)[1] for _, column in asked]
     best = int(np.argmax(gains))
     where, column = asked[best]
-    stalls = gains[best] > LEAST_OF_STALLS and Innovations(flights, fit.setting).confirm_column(
-        _added(search, regression, base, column)
-    )
-    if stalls or (bent and gains[best] > LEAST_OF_KINKS):
+    stalls = gains[best] > STRUCTURE.least_reduction_of_stall and Innovations(
+        flights, fit.setting
+    ).confirm_column(_added(search, regression, base, column))
+    if stalls or (bent and gains[best] > STRUCTURE.least_reduction_of_bend):
         yield Structure(
             "a general dictionary",
             where,
@@ -286,7 +319,9 @@ def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Arr
         force = piece.signals.rotation[:, :, 2] * wrench[:, :1]
         parts.append(
             low_pass(
-                np.concatenate([force, wrench[:, 1:]], axis=1), CUTOFF_HZ, piece.signals.period
+                np.concatenate([force, wrench[:, 1:]], axis=1),
+                CUTOFFS.residual_hz,
+                piece.signals.period,
             )[piece.rows]
         )
     return np.concatenate(parts)
@@ -309,17 +344,19 @@ def loose(
     """
     flights = search.flights
     whole = float(regression.blocks[:, -1, -1].sum())
-    least = LEAST_GAIN * max(1.0, whole / regression.design[..., 0].size)
-    for effect in filter(RIGID.__contains__, shares):
+    least = STRUCTURE.least_deviance_reduction * max(1.0, whole / regression.design[..., 0].size)
+    for effect in filter(RIGID_EFFECTS.__contains__, shares):
         pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
-        slow = np.concatenate([low_pass(piece, SLOW_HZ, flights.period) for piece in pieces])
+        slow = np.concatenate(
+            [low_pass(piece, CUTOFFS.slow_motion_hz, flights.period) for piece in pieces]
+        )
         more, gain = _beside(search, regression, base, slow)
         if more > 0.0 and gain > max(
-            least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])
+            least, STRUCTURE.least_share_of_loose_mount * search.whitened_energy(shares[effect])
         ):
             yield Structure(
                 f"{effect}'s coefficient is not constant",
-                f"it changes below {SLOW_HZ:.0f} Hz",
+                f"it changes below {CUTOFFS.slow_motion_hz:.0f} Hz",
                 gain / max(whole, 1e-30),
             )
 
@@ -338,9 +375,9 @@ def overlooked(search: Search, fit: Fit) -> Iterator[Structure]:
     """
     regression = search.linearise(fit)
     for gain in search.gains(fit, regression, search.gram(fit, regression)):
-        if gain.energy > HINT and gain.size > LEAST_SIZE:
+        if gain.energy > STRUCTURE.least_residual_hint and gain.size > SEARCH.least_size:
             more = search.refit(gain.fit)
-            if adds(search.flights, fit.setting, more.setting, BORNE_OUT):
+            if adds(search.flights, fit.setting, more.setting, STRUCTURE.least_innovation_hint):
                 yield Structure(
                     "innovations show more than the residual", f"of {gain.effect}", gain.share
                 )
@@ -352,7 +389,7 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     What is moved in time differs from what it was by its noise too, which is also in the residual:
     of such an effect it is what a little more of it would change.
     """
-    if effect not in LATE:
+    if effect not in LATE_ROTOR_EFFECTS:
         return flights.residual(fit.without(effect).setting) - residual
     own = fit.setting[effect]
     columns = flights.columns(fit.setting, [(effect, name) for name in own], 0.1)
@@ -405,7 +442,10 @@ def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float,
     blocks = np.array([part.T @ part for part in parts])
     total = blocks.sum(axis=0)
     ridge = np.concatenate(
-        [g.precision, np.full(len(columns), RIDGE * np.trace(total[k:n, k:n]) / len(columns))]
+        [
+            g.precision,
+            np.full(len(columns), STRUCTURE.ridge * np.trace(total[k:n, k:n]) / len(columns)),
+        ]
     )
 
     def error(size: int) -> float:

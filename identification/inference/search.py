@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...runtime.errors import InputError
-from .commanded_rotors import AFTER_SAG, SECOND, SECOND_SHARE, mates
+from .commanded_rotors import AFTER_SAG, COMMANDED, SECOND_CHOICE_EFFECTS, mates
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
     CENTRAL,
+    DELAY_EFFECTS,
     LAG,
     LEAN,
     MOMENT,
     SHIFT,
     START,
-    TIMING,
     Column,
     Flights,
     Setting,
@@ -31,33 +31,45 @@ from .regression import (
     typical,
 )
 from .starting_points import STARTS
-from .turning_delay import EFFECT, turning_delay
+from .turning_delay import LATENCY, turning_delay
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
-# whitened energy on blocks left out that an effect must explain; a spurious one explains some 10
-LEAST_GAIN = 40.0
-LEAST_SIZE = 0.1  # typical sizes: what is smaller is not worth a name
-COMPLEXITY = 8.0  # energy by which an effect with one coefficient more must be better
-FINDING, MEASURING = (
-    (1.0, 2.0),
-    (0.2, 0.5),
-)  # Hz; noise in commands makes a lag too long if quick changes weigh much
-_REFITS = 6
-_IDLE = (
-    1.0  # whitened energy; a turn of a refit that gains less is idle, and two in a row are the last
-)
-_PATIENCE = (
-    3.0  # times what the last turn of a refit gained, which all that are to come may still gain
-)
-# share of noise in what a column adds, or explains, that is too much: of true effects it is up to
-# 0.02
-_DROWNED = 0.3
-# share of an effect's energy that other named ones must leave of it: in hover, a thrust and a
-# steady force leave 0.00001 of each other; on 78 flights where two effects were found, each left at
-# least 0.019 of the other, and on a slow one 0.0007
-_APART = 0.0003
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """What an effect must explain to be named, and when the Gauss-Newton fit stops.
+
+    A deviance is the sum of squares of a whitened residual: twice the negative log-likelihood, up
+    to a constant.
+    """
+
+    # deviance on left-out blocks that an effect must explain; a spurious effect explains about 10
+    least_deviance_reduction: float = 40.0
+    # typical sizes; a smaller effect is not worth a name
+    least_size: float = 0.1
+    # deviance by which an effect with one more coefficient must be better
+    deviance_per_coefficient: float = 8.0
+    # Hz, of flights known from commands: the band that weighs effects when they are selected, and
+    # the one that weighs their coefficients: noise in commands makes a lag too long if fast changes
+    # weigh much
+    selection_band_hz: tuple[float, float] = (1.0, 2.0)
+    estimation_band_hz: tuple[float, float] = (0.2, 0.5)
+    most_iterations: int = 6  # of Gauss-Newton
+    # deviance; an iteration that lowers it by less is idle, and two idle ones in a row are the last
+    least_iteration_reduction: float = 1.0
+    # times what the last iteration gained: what all further iterations together may still gain
+    most_further_gain: float = 3.0
+    # share of sensor noise in what a column adds or explains; true effects have up to 0.02
+    most_noise_share: float = 0.3
+    # share of an effect's deviance that the other named effects must leave unexplained. In hover a
+    # thrust and a steady force leave 0.00001 of each other; on 78 flights on which two effects were
+    # found each left at least 0.019 of the other, on one slow flight 0.0007
+    least_independent_share: float = 0.0003
+
+
+SEARCH = SearchSettings()
 
 
 @dataclass(eq=False)
@@ -122,7 +134,7 @@ class Search:
         delay = turning_delay(
             [p.signals for p in flights.pieces({}) if p.log < flights.own], flights.vehicle
         )
-        self.delay = delay if flights.commanded and EFFECT in self.library else None
+        self.delay = delay if flights.commanded and LATENCY in self.library else None
         self.noise: Array = np.zeros((0, 6))
         self.whiten: Whitener
 
@@ -142,13 +154,13 @@ class Search:
         """Return whether an effect is known from elsewhere than the residual: it is neither fitted
         nor taken away.
         """
-        return self.delay is not None and effect == EFFECT
+        return self.delay is not None and effect == LATENCY
 
     def base(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: its effects', those of effects that are tried, and the
         shift that any log may have.
         """
-        shift = [] if self.flights.commanded or TIMING & {*effects, *tried} else [SHIFT]
+        shift = [] if self.flights.commanded or DELAY_EFFECTS & {*effects, *tried} else [SHIFT]
         lag = [] if self.flights.commanded else [LAG]
         return [
             *shift,
@@ -188,7 +200,9 @@ class Search:
         """Return the whitened sums of a regression."""
         return gram(self.flights, fit.setting, self.whiten, regression.columns, regression.residual)
 
-    def _whitener(self, noise: Array, band: tuple[float, float] = FINDING) -> Whitener:
+    def _whitener(
+        self, noise: Array, band: tuple[float, float] = SEARCH.selection_band_hz
+    ) -> Whitener:
         flights = self.flights
         return Whitener(
             noise,
@@ -251,7 +265,7 @@ class Search:
         """Weigh frequencies of flights known from commands as their coefficients need it, not as
         finding effects does.
         """
-        self.whiten = self._whitener(self.noise, MEASURING)
+        self.whiten = self._whitener(self.noise, SEARCH.estimation_band_hz)
 
     def _refit(self, fit: Fit, enough: float = np.inf) -> Fit:
         setting = {k: dict(v) for k, v in fit.setting.items()}
@@ -263,7 +277,7 @@ class Search:
             return out
         before = least = self.energy(setting)
         risen, idle = False, 0
-        for _ in range(_REFITS):
+        for _ in range(SEARCH.most_iterations):
             columns = self.flights.columns(setting, wanted, 0.1)
             g = gram(self.flights, setting, self.whiten, columns, self.flights.residual(setting))
             index = g.index(wanted)
@@ -282,11 +296,15 @@ class Search:
             else:
                 break
             moved = max(abs(d) / s for d, s in zip(change, std.values(), strict=True))
-            idle = 0 if least - after > _IDLE else idle + 1
+            idle = 0 if least - after > SEARCH.least_iteration_reduction else idle + 1
             gained, risen, setting, before = before - after, after > before, trial, after
             if after <= least:
                 out.setting, out.std, least = setting, std, after
-            if moved < 0.05 or idle == 2 or before - enough > _PATIENCE * max(gained, 0.0):
+            if (
+                moved < 0.05
+                or idle == 2
+                or before - enough > SEARCH.most_further_gain * max(gained, 0.0)
+            ):
                 break
         return out
 
@@ -330,9 +348,13 @@ class Search:
         return sorted(
             found,
             key=lambda x: (
-                COMPLEXITY * freedom(x.effect)
+                SEARCH.deviance_per_coefficient * freedom(x.effect)
                 - x.energy
-                * (SECOND_SHARE if self.flights.commanded and x.effect in SECOND else 1.0)
+                * (
+                    COMMANDED.second_choice_factor
+                    if self.flights.commanded and x.effect in SECOND_CHOICE_EFFECTS
+                    else 1.0
+                )
             ),
         )
 
@@ -362,11 +384,13 @@ class Search:
         shape = change[[wanted.index(c) for c in own]]
         energy = _beyond(g, total, own, shape, [c for c in wanted if c[0] != effect])
         others = [c for c in wanted if c[0] not in (effect, "")]
-        if others and _beyond(g, total, own, shape, others) < _APART * _beyond(
-            g, total, own, shape, []
-        ):
+        if others and _beyond(
+            g, total, own, shape, others
+        ) < SEARCH.least_independent_share * _beyond(g, total, own, shape, []):
             return True
-        return bool(max(self._noise(dict(zip(own, shape, strict=True)))) > _DROWNED * energy)
+        return bool(
+            max(self._noise(dict(zip(own, shape, strict=True)))) > SEARCH.most_noise_share * energy
+        )
 
     def noise_explained(self, fit: Fit) -> float:
         """Return by how much a fit lowers the whitened energy because it makes the sensors' noise
@@ -416,7 +440,8 @@ class Search:
         # a fit to commands is not weighed as it is judged: it need not be at its least
         return (
             error
-            if self.flights.commanded or self.energy(fit.setting) < 1.05 * error + LEAST_GAIN
+            if self.flights.commanded
+            or self.energy(fit.setting) < 1.05 * error + SEARCH.least_deviance_reduction
             else np.inf
         )
 
@@ -503,7 +528,9 @@ def freedom(effect: str) -> float:
     last.
     """
     return (
-        len(get(effect).coefficients) - (effect in TIMING) + 0.1 * (get(effect).kind == "sensing")
+        len(get(effect).coefficients)
+        - (effect in DELAY_EFFECTS)
+        + 0.1 * (get(effect).kind == "sensing")
     )
 
 

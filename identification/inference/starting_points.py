@@ -5,7 +5,7 @@ one fixed shape.
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,20 @@ from .regression import Flights, typical
 
 Array = NDArray[np.float64]
 
-_LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of a cable
-_HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
-_THINNED = 20  # every so many samples of a flight are enough for a map of the jet
-_KEPT = 4
-_STILL = 1e-9  # m/s
-_RINGS = 0.2  # damping ratio of a swing, at most
+
+@dataclass(frozen=True)
+class StartingSettings:
+    """The grids of starting points of effects with nonlinear coefficients."""
+
+    cable_lengths: tuple[float, ...] = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m
+    fan_headings: tuple[float, ...] = tuple(2 * math.pi * k / 8 for k in range(8))  # rad
+    fan_sample_step: int = 20  # every so many samples are enough for a map of the jet
+    most_fan_starts: int = 4
+    least_speed: float = 1e-9  # m/s, against a division by zero
+    most_damping_ratio: float = 0.2  # of a load that swings in air
+
+
+STARTING = StartingSettings()
 
 
 def slung_payload(
@@ -30,7 +38,7 @@ def slung_payload(
 ) -> list[dict[str, float]]:
     """Return loads of typical mass on cables of several lengths, or of the one that is stated."""
     mass = typical(("slung_payload", "m"), flights.vehicle)
-    lengths = (stated["l"],) if "l" in stated else _LENGTHS
+    lengths = (stated["l"],) if "l" in stated else STARTING.cable_lengths
     return [
         {"m": mass, "l": length, "damping": stated.get("damping", damping)}
         for length in lengths
@@ -46,7 +54,7 @@ def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) ->
     return (
         load is not None
         and load["l"] > 0
-        and load["damping"] > 2.0 * _RINGS * math.sqrt(gravity / load["l"])
+        and load["damping"] > 2.0 * STARTING.most_damping_ratio * math.sqrt(gravity / load["l"])
     )
 
 
@@ -60,7 +68,7 @@ def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list
     drag = typical(("wind", "cd"), flights.vehicle)
     force = residual[flights.fit, :2]
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[flights.fit]
-    v = np.linalg.norm(velocity, axis=1) + _STILL
+    v = np.linalg.norm(velocity, axis=1) + STARTING.least_speed
     steady = np.tile(np.eye(2), (len(v), 1))
     with_wind = (
         v[:, None, None] * np.eye(2)
@@ -91,7 +99,9 @@ def fan_jet(
     row = 0
     for piece in flights.pieces({}):
         s = piece.signals
-        at = piece.rows[:: max(1, _THINNED // max(1, int(piece.rows[1] - piece.rows[0])))]
+        at = piece.rows[
+            :: max(1, STARTING.fan_sample_step // max(1, int(piece.rows[1] - piece.rows[0])))
+        ]
         wanted.append(row + np.searchsorted(piece.rows, at))
         row += len(piece.rows)
         thin.append(
@@ -118,7 +128,7 @@ def fan_jet(
     speed, kd, area = (typical(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area"))
     found: list[tuple[float, int, dict[str, float]]] = []
     for heading, distance, across in itertools.product(
-        _HEADINGS, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
+        STARTING.fan_headings, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
     ):
         along = np.array([math.cos(heading), math.sin(heading)])
         x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
@@ -144,7 +154,7 @@ def fan_jet(
                 (float(np.sum(shape * target * scale)) / math.sqrt(size), len(found), start)
             )
     found.sort(reverse=True)
-    return [start for _, _, start in found[:_KEPT]]
+    return [start for _, _, start in found[: STARTING.most_fan_starts]]
 
 
 STARTS: dict[str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]] = {

@@ -6,49 +6,57 @@ rows.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .commanded_rotors import takes_back
 from .gram_matrix import Gram
 from .innovations import Innovations, adds
-from .search import (
-    COMPLEXITY,
-    LEAST_GAIN,
-    LEAST_SIZE,
-    Fit,
-    Gain,
-    Regression,
-    Search,
-    freedom,
-    started,
-)
+from .search import SEARCH, Fit, Gain, Regression, Search, freedom, started
 from .starting_points import STARTS, barely_swings
 
-LEAST_SHARE = 0.01  # of what is left unexplained, that an effect must explain besides LEAST_GAIN
-PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
-LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
-SWAP_GAIN = 12.0
-MOST_EFFECTS = 4
-LEAST_OF_COMMANDS = (
-    25.0,
-    0.018,
-)  # gain and share; effects that cannot be there explain up to 25, and 0.01, of real flights
-LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
-LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
-MOST_OF_COMMANDS = (
-    8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
-)
-_ROUNDS = 2  # of adding and pruning: what wanders on stands for a law that the library lacks
-_MOVES = 3  # at a time, which takes seconds each where four effects stand for one
-_SHORTLIST = 2
-_TRIED = 8  # candidates for one place, the best first, that innovations may turn down
-_FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
-_HOPE = (
-    0.2  # share of what effects explain that a fit of its own may still gain over the linear one
-)
+
+@dataclass(frozen=True)
+class StepwiseSettings:
+    """How many effects may be named, and by how much a move of the search must pay.
+
+    Deviances are on left-out blocks. ``commanded`` marks flights whose rotor speeds are worked out
+    from commands.
+    """
+
+    # share of the deviance that is left unexplained, which an effect must explain as well as
+    # ``SEARCH.least_deviance_reduction``
+    least_share_of_deviance: float = 0.01
+    # times the least reduction; an effect that explains so much may have half the least size
+    large_reduction_ratio: float = 4.0
+    # typical sizes, for effects whose least size is another one: attitude_gain is wrong by the
+    # share of noise in the tilt
+    least_sizes: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.25})
+    swap_reduction: float = 12.0  # deviance by which one effect in place of another must be better
+    most_effects: int = 4
+    # the same for commanded flights; effects that cannot be there explain up to 25, and a share of
+    # 0.01, of real flights
+    commanded_least_deviance_reduction: float = 25.0
+    commanded_least_share_of_deviance: float = 0.018
+    # share that an effect with nonlinear coefficients must explain of a commanded flight
+    commanded_least_share_of_nonlinear: float = 0.15
+    # typical sizes; a larger effect takes up what the thrust curve of a commanded flight lacks
+    commanded_largest_size: float = 6.0
+    # thrust scale, battery sag, delay and tilt come on top of what other flights have
+    commanded_most_effects: int = 8
+    rounds: int = 2  # of adding and pruning; what changes further stands for an unlisted effect
+    most_moves: int = 3  # of one pruning; a move takes seconds where four effects stand for one
+    most_replacements: int = 2  # single effects tried in place of others, the best first
+    most_candidates: int = 8  # tried for one place, the best first, if innovations reject them
+    # effects; up to so many, replacements are tried with columns linearised without the effects
+    most_relinearised: int = 2
+    # share of what effects explain, which a refit may gain beyond the linear prediction
+    most_refit_gain: float = 0.2
+
+
+STEPWISE = StepwiseSettings()
 
 
 def find(search: Search) -> tuple[Fit, list[Gain]]:
@@ -58,7 +66,7 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
     needed = Fit(search.delay.setting if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
-    for _ in range(_ROUNDS):
+    for _ in range(STEPWISE.rounds):
         fit, gains = _forward(search, needed)
         first = first or gains
         if asked and fit.effects == needed.effects:
@@ -99,7 +107,7 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
     """
     commanded, most = (
         search.flights.commanded,
-        MOST_OF_COMMANDS if search.flights.commanded else MOST_EFFECTS,
+        STEPWISE.commanded_most_effects if search.flights.commanded else STEPWISE.most_effects,
     )
     first: list[Gain] = []
     for count in range(len([e for e in fit.effects if not search.held(e)]), most + 1):
@@ -116,7 +124,7 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
         ]
         if not better or count == most:
             break
-        for gain in better[:_TRIED]:
+        for gain in better[: STEPWISE.most_candidates]:
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
             if commanded:
@@ -137,8 +145,8 @@ def _plausible(search: Search, gain: Gain, count: int) -> bool:
     """
     if takes_back(gain.fit.setting, search.flights.vehicle.weight):
         return False
-    return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (
-        gain.effect not in STARTS or gain.share > LEAST_OF_STARTS
+    return (gain.size < STEPWISE.commanded_largest_size or count == 0) and (
+        gain.effect not in STARTS or gain.share > STEPWISE.commanded_least_share_of_nonlinear
     )
 
 
@@ -148,7 +156,7 @@ def _prune(search: Search, fit: Fit) -> Fit:
     """
     error = search.error(fit)
     failed: dict[frozenset[str], float] = {}
-    for _ in range(_MOVES):
+    for _ in range(STEPWISE.most_moves):
         better = _best_move(search, fit, error, failed)
         if better is None:
             break
@@ -178,17 +186,23 @@ def _best_move(
         search.flights.commanded
     ):  # whose effects are far apart: no two of those that are alike are ever named
         return None
-    few = len(fit.effects) <= _FEW
+    few = len(fit.effects) <= STEPWISE.most_relinearised
     if not few:  # what stands for two effects with three or four is left by no small step
-        less, spared = fit.without(*fit.effects), COMPLEXITY * sum(map(freedom, fit.effects))
+        less, spared = (
+            fit.without(*fit.effects),
+            SEARCH.deviance_per_coefficient * sum(map(freedom, fit.effects)),
+        )
         regression = search.linearise(less)
-        g, bar = search.gram(less, regression), error - SWAP_GAIN + spared
+        g, bar = search.gram(less, regression), error - STEPWISE.swap_reduction + spared
         couple = _couple(search, less, regression, g, search.library, bar)
         if better := _swapped(search, couple, fit, fit.effects):
             return better
-    for size, allowed in ((2, least), (1, -SWAP_GAIN)):
+    for size, allowed in ((2, least), (1, -STEPWISE.swap_reduction)):
         for group in itertools.combinations(fit.effects, size):
-            less, spared = fit.without(*group), COMPLEXITY * sum(map(freedom, group))
+            less, spared = (
+                fit.without(*group),
+                SEARCH.deviance_per_coefficient * sum(map(freedom, group)),
+            )
             rest, bar = frozenset(less.effects), error + allowed + spared
             if bar <= failed.get(rest, -np.inf):
                 continue
@@ -240,11 +254,17 @@ def _swapped(
 
 def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -> Iterator[Swap]:
     """Yield the rivals that may do better than ``bar``, less what their coefficients cost."""
-    for rival in rivals[:_SHORTLIST]:
+    for rival in rivals[: STEPWISE.most_replacements]:
         # what is far from linear may do better than it looks here, but not by any amount
-        near = rival.left <= error + allowed + _HOPE * (rival.left + rival.energy - error)
+        near = rival.left <= error + allowed + STEPWISE.most_refit_gain * (
+            rival.left + rival.energy - error
+        )
         if near and rival.size > _least_size(rival.effect):
-            yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
+            yield Swap(
+                (rival.effect,),
+                rival.fit,
+                bar - SEARCH.deviance_per_coefficient * freedom(rival.effect),
+            )
 
 
 def _couple(
@@ -263,7 +283,7 @@ def _couple(
         wanted = search.base(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
-        cost = COMPLEXITY * sum(map(freedom, both))
+        cost = SEARCH.deviance_per_coefficient * sum(map(freedom, both))
         if (left := g.error(g.index(wanted)) + cost) >= least:
             continue
         change = g.solve(total, g.index(wanted))
@@ -284,16 +304,22 @@ def _least(search: Search, error: float) -> float:
     """Return the energy that an effect must explain of flights of which so much is left
     unexplained.
     """
-    gain, share = LEAST_OF_COMMANDS if search.flights.commanded else (LEAST_GAIN, LEAST_SHARE)
+    gain, share = (
+        (STEPWISE.commanded_least_deviance_reduction, STEPWISE.commanded_least_share_of_deviance)
+        if search.flights.commanded
+        else (SEARCH.least_deviance_reduction, STEPWISE.least_share_of_deviance)
+    )
     return max(gain, share * error)
 
 
 def _least_size(effect: str) -> float:
     """Return the size, in typical ones, above which an effect is worth a name."""
-    return LEAST_SIZES.get(effect, LEAST_SIZE)
+    return STEPWISE.least_sizes.get(effect, SEARCH.least_size)
 
 
 def _worth(gain: Gain, least: float) -> bool:
     """Return whether an effect explains enough, and is large enough, to be named."""
     size = _least_size(gain.effect)
-    return gain.energy > least and gain.size > (size if gain.energy < PLAIN * least else 0.5 * size)
+    return gain.energy > least and gain.size > (
+        size if gain.energy < STEPWISE.large_reduction_ratio * least else 0.5 * size
+    )

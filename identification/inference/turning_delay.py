@@ -24,15 +24,25 @@ from ..motion.signals import Signals
 
 Array = NDArray[np.float64]
 
-BAND_HZ = (1.0, 8.0)
-# twice the log likelihood over moments that do not show, which have one number less an axis
-LEAST_EVIDENCE = 40.0
-_SEGMENT = 2.0  # s, of a spectrum
-_LONGEST = 0.12  # s
-EFFECT, COEFFICIENT = "latency", "d"
+
+@dataclass(frozen=True)
+class DelaySettings:
+    """The spectra that show the delay of commands."""
+
+    # Hz, where the commanded moments show in the angular acceleration
+    band_hz: tuple[float, float] = (1.0, 8.0)
+    # log-likelihood ratio over moments that do not show, which have one number less an axis
+    least_log_likelihood_ratio: float = 40.0
+    segment: float = 2.0  # s, of a spectrum
+    longest_delay: float = 0.12  # s
+
+
+DELAY = DelaySettings()
+
+LATENCY, LATENCY_COEFFICIENT = "latency", "d"
 # a lag delays slow changes as much, and a log whose clock is off looks like one whose commands are
 # late
-ALIKE = ("motor_lag", "clock_offset")
+SAME_DELAY_EFFECTS = ("motor_lag", "clock_offset")
 
 
 @dataclass(frozen=True)
@@ -46,7 +56,7 @@ class Delay:
     @property
     def setting(self) -> dict[str, dict[str, float]]:
         """The effect with its coefficient."""
-        return {EFFECT: {COEFFICIENT: self.seconds}}
+        return {LATENCY: {LATENCY_COEFFICIENT: self.seconds}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,20 +102,24 @@ def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
         return sum(s.misfit(np.exp(-1j * s.omega * seconds)) for s in spectra)
 
     seconds, std, least = _least(misfit)
-    return Delay(seconds, std, -least) if -least > LEAST_EVIDENCE and seconds > 2.0 * std else None
+    return (
+        Delay(seconds, std, -least)
+        if -least > DELAY.least_log_likelihood_ratio and seconds > 2.0 * std
+        else None
+    )
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     rate = 1.0 / piece.period
-    length = round(_SEGMENT * rate)
-    if rate < 2.2 * BAND_HZ[1] or len(piece.t) < 2 * length:
+    length = round(DELAY.segment * rate)
+    if rate < 2.2 * DELAY.band_hz[1] or len(piece.t) < 2 * length:
         return []
     out = []
     moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
     for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
         f, xx = welch(x, rate, nperseg=length)
         yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
-        band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
+        band = (f >= DELAY.band_hz[0]) & (f <= DELAY.band_hz[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
             out.append(
                 _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
@@ -116,7 +130,7 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
 def _least(misfit: Callable[[float], float]) -> tuple[float, float, float]:
     """Return where a misfit is least, the standard deviation there, and its value."""
     step = 0.005
-    grid = np.arange(0.0, _LONGEST + step, step)
+    grid = np.arange(0.0, DELAY.longest_delay + step, step)
     at = float(grid[int(np.argmin([misfit(float(x)) for x in grid]))])
     best = minimize_scalar(
         misfit, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}

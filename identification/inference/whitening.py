@@ -6,6 +6,8 @@ is in a remainder is no noise but something that no effect explains, and must no
 noise: a filter free to follow the remainder would hide it.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
@@ -14,13 +16,22 @@ from scipy.signal import lfilter, welch
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_ORDER = 8  # of the autoregression
-# share of the variance added as white noise, so that what the low-pass took away is not blown up
-_LOADING = 1e-3
-_SEGMENT = 256  # rows of a spectrum's segment
-_GUST_HZ = 0.6  # corner: a correlation time of a quarter of a second
-_GUST_BAND = (0.3, 1.5)  # Hz, where their strength is read
-_SPARE = 1.1  # on the sensors' part
+
+@dataclass(frozen=True)
+class WhiteningSettings:
+    """The noise model of a residual."""
+
+    order: int = 8  # of the autoregression
+    # share of the variance added as white noise, so that what the low-pass took away is not blown
+    # up
+    loading: float = 1e-3
+    segment: int = 256  # rows of a spectrum's segment
+    disturbance_corner_hz: float = 0.6  # a correlation time of a quarter of a second
+    disturbance_band_hz: tuple[float, float] = (0.3, 1.5)  # where their strength is read
+    sensor_noise_factor: float = 1.1  # on the sensors' part
+
+
+WHITENING = WhiteningSettings()
 
 
 class Whitener:
@@ -61,15 +72,20 @@ class Whitener:
                     whole[(frequency >= free[0]) & (frequency <= free[1])].mean(),
                 )
             else:
-                shape = 1.0 / (1.0 + np.square(frequency / _GUST_HZ))
-                band = (frequency >= _GUST_BAND[0]) & (frequency <= _GUST_BAND[1])
+                shape = 1.0 / (1.0 + np.square(frequency / WHITENING.disturbance_corner_hz))
+                band = (frequency >= WHITENING.disturbance_band_hz[0]) & (
+                    frequency <= WHITENING.disturbance_band_hz[1]
+                )
                 noise = (
-                    _SPARE * own + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
+                    WHITENING.sensor_noise_factor * own
+                    + max(float(np.median(((whole - own) / shape)[band])), 0.0) * shape
                 )
             self._filters.append(_predictor(noise))
         ends = np.flatnonzero(start)
         self._lost = np.unique(
-            np.concatenate([np.arange(int(k), min(int(k) + _ORDER, len(start))) for k in ends])
+            np.concatenate(
+                [np.arange(int(k), min(int(k) + WHITENING.order, len(start))) for k in ends]
+            )
         )
 
     def __call__(self, x: Array) -> Array:
@@ -89,11 +105,11 @@ def _spectrum(
     """Return frequencies (Hz) and the power at each, averaged over unbroken pieces; it sums to the
     variance.
     """
-    total, weight = np.zeros(_SEGMENT // 2 + 1), 0
-    frequency = np.fft.rfftfreq(_SEGMENT, period)
+    total, weight = np.zeros(WHITENING.segment // 2 + 1), 0
+    frequency = np.fft.rfftfreq(WHITENING.segment, period)
     for part in np.split(x, np.flatnonzero(start)[1:]):
-        if len(part) >= 2 * _ORDER:
-            length = min(_SEGMENT, len(part))
+        if len(part) >= 2 * WHITENING.order:
+            length = min(WHITENING.segment, len(part))
             at, power = welch(
                 part, 1.0 / period, nperseg=length, noverlap=length // 2, detrend=detrend
             )
@@ -109,7 +125,7 @@ def _predictor(power: Array) -> tuple[Array, float]:
     """
     two_sided = power.copy()
     two_sided[1:-1] *= 0.5
-    lags = np.fft.irfft(two_sided, _SEGMENT)[: _ORDER + 1] * _SEGMENT
-    lags[0] = lags[0] * (1.0 + _LOADING) + 1e-30
-    a = solve_toeplitz(lags[:_ORDER], lags[1:])
+    lags = np.fft.irfft(two_sided, WHITENING.segment)[: WHITENING.order + 1] * WHITENING.segment
+    lags[0] = lags[0] * (1.0 + WHITENING.loading) + 1e-30
+    a = solve_toeplitz(lags[: WHITENING.order], lags[1:])
     return a, float(np.sqrt(max(lags[0] - a @ lags[1:], 1e-12 * lags[0])))

@@ -5,7 +5,7 @@ Everything in this folder that compares a log's motion with a model takes the co
 the filter, which undoes these effects by itself, takes the log as it is.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,16 @@ from ...runtime.compiled import Record, compiled
 from ..logs.flight_log import FlightLog
 
 _MODEL = np.dtype(MODEL_FIELDS)
-_BREAK = 0.1  # s without a pose, over which nothing is interpolated
+
+
+@dataclass(frozen=True)
+class SensingSettings:
+    """Where the poses of a log are unbroken."""
+
+    longest_gap: float = 0.1  # s without a pose, over which nothing is interpolated
+
+
+SENSING = SensingSettings()
 
 
 @compiled
@@ -74,7 +83,9 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     """
     seen = np.flatnonzero(log.valid)
     starts = (
-        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > _BREAK)] if seen.size else seen
+        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > SENSING.longest_gap)]
+        if seen.size
+        else seen
     )
     last = np.searchsorted(starts, np.arange(len(log.t)), side="right") - 1
     began = np.where(last >= 0, log.t[starts[last]] if starts.size else np.inf, np.inf)

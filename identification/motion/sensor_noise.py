@@ -15,9 +15,16 @@ from ..logs.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
-_ABOVE = (
-    0.25  # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
-)
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """Where a log shows its sensors' noise."""
+
+    # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
+    lowest_frequency: float = 0.25
+
+
+NOISE = NoiseSettings()
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
 
 
 def _high(x: Array) -> Array:
-    sections = butter(4, 2.0 * _ABOVE, btype="highpass", output="sos")
+    sections = butter(4, 2.0 * NOISE.lowest_frequency, btype="highpass", output="sos")
     impulse = np.zeros(201)
     impulse[100] = 1.0
     kept = np.linalg.norm(sosfiltfilt(sections, impulse))  # of white noise

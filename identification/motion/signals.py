@@ -17,11 +17,19 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from .cutoffs import CUTOFFS
 
 Array = NDArray[np.float64]
 
-WIDE_HZ = 15.0
-_SHORTEST = 3.0  # s of unbroken pose
+
+@dataclass(frozen=True)
+class SignalSettings:
+    """Which pieces of a log have signals."""
+
+    shortest_piece: float = 3.0  # s of unbroken pose
+
+
+SIGNALS = SignalSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +63,7 @@ def _sections(share_of_nyquist: float) -> Array:
     return np.asarray(butter(2, share_of_nyquist, output="sos"))
 
 
-def log_signals(log: FlightLog, wide_hz: float = WIDE_HZ) -> list[Signals]:
+def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signals]:
     """Return the motion over each unbroken piece of a log that is long enough to say something.
 
     Uneven time steps and single lost poses are bridged by interpolation; a gap of more than 0.1 s
@@ -70,10 +78,12 @@ def log_signals(log: FlightLog, wide_hz: float = WIDE_HZ) -> list[Signals]:
     out = [
         _piece(log, piece, wide_hz)
         for piece in pieces
-        if log.t[piece[-1]] - log.t[piece[0]] > _SHORTEST
+        if log.t[piece[-1]] - log.t[piece[0]] > SIGNALS.shortest_piece
     ]
     if not out:
-        raise InputError(f"{log.name}: no unbroken piece of pose is longer than {_SHORTEST:g} s")
+        raise InputError(
+            f"{log.name}: no unbroken piece of pose is longer than {SIGNALS.shortest_piece:g} s"
+        )
     return out
 
 

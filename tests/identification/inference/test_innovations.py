@@ -9,7 +9,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.disturbance_filter import innovations
 from windwrench.identification.inference.innovations import Innovations, at_odds
 from windwrench.identification.inference.regression import Flights, typical
-from windwrench.identification.inference.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
+from windwrench.identification.inference.search import SEARCH, Fit, Search
 from windwrench.identification.inference.stepwise_search import find
 from windwrench.studies.trials.practice_flights import fly_practice
 
@@ -65,10 +65,10 @@ def test_what_gusts_suggest_is_not_confirmed(gusty):
     search.set_noise(Fit({}), regression)
     best = search.gains(Fit({}), regression, search.gram(Fit({}), regression))[0]
     suggested = search.refit(best.fit).setting[best.effect]
-    assert best.energy > 10.0 * LEAST_GAIN
+    assert best.energy > 10.0 * SEARCH.least_deviance_reduction
     assert (
         max(abs(value) / typical((best.effect, name), VEHICLE) for name, value in suggested.items())
-        > LEAST_SIZE
+        > SEARCH.least_size
     )
     assert not Innovations(search.flights, {}).confirm({best.effect: suggested})
 
