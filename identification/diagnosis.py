@@ -40,7 +40,7 @@ from .inference.transient_disturbances import pushes
 from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
-from .motion.cutoffs import CUTOFFS
+from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
 
 Array = NDArray[np.float64]

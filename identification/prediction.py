@@ -26,9 +26,9 @@ from ..estimator.ukf import default_covariance, step
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
-from .motion.cutoffs import CUTOFFS
 from .motion.sensing_effects import undo_log_sensing
-from .motion.signals import Signals, log_signals, low_pass
+from .motion.signals import Signals, log_signals
+from .motion.smoothing import CUTOFFS, continuous, low_pass
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
@@ -192,12 +192,7 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     _integrate_rate(np.ascontiguousarray(twist[:, 3:]), period, turned)
     path = Rotation.from_quat(turned, scalar_first=True)
     drift = (attitude * path.inv()).as_quat(scalar_first=True)
-    # a quaternion and its negative are one attitude: make the sequence continuous before it is
-    # smoothed
-    signs = np.where(np.sum(drift[1:] * drift[:-1], axis=1) < 0.0, -1.0, 1.0)
-    drift = low_pass(
-        drift * np.cumprod(np.concatenate([[1.0], signs]))[:, None], CUTOFFS.twist_hz, period
-    )
+    drift = low_pass(continuous(drift), CUTOFFS.twist_hz, period)
     states = np.zeros((len(signals.t), STATE_SIZE))
     states[:, 0:3] = low_pass(signals.position, CUTOFFS.position_hz, period)
     states[:, 3:7] = (Rotation.from_quat(drift, scalar_first=True) * path).as_quat(

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
 from ..findings import CHANNELS
-from ..motion.cutoffs import CUTOFFS
-from ..motion.signals import low_pass
+from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
@@ -105,8 +104,8 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
 
 
 def _is_plain(flights: Flights, axis: int) -> bool:
-    """Return whether an angular velocity, which is also the column of a rate's damping, is more than the
-    sensors' noise.
+    """Return whether an angular velocity is more than the sensors' noise; it is also the column of
+    rate_damping.
     """
     column = "rate_damping", f"d{'xyz'[axis]}"
     noise, whole = (

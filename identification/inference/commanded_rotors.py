@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases
-from ..motion.cutoffs import CUTOFFS
-from ..motion.signals import Signals, low_pass
+from ..motion.signals import Signals
+from ..motion.smoothing import CUTOFFS, low_pass
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 class DisturbanceSettings:
     """The grid of disturbances on which the likeliest is searched for."""
 
-    # variances of the disturbance, in the acceleration's unit squared, over that of the pose's noise
+    # variances of the disturbance (acceleration squared) over that of the pose's noise
     strengths: Array = field(
         default_factory=lambda: np.asarray(2.0 ** np.arange(-10, 47), dtype=np.float64)
     )

@@ -19,11 +19,11 @@ from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
-from ..motion.cutoffs import CUTOFFS
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
-from ..motion.signals import Signals, log_signals, low_pass
+from ..motion.signals import Signals, log_signals
+from ..motion.smoothing import CUTOFFS, low_pass
 from .commanded_rotors import (
     NOT_FROM_COMMANDS,
     THRUST_SCALE,

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Structure
-from ..motion.cutoffs import CUTOFFS
-from ..motion.signals import low_pass
+from ..motion.smoothing import CUTOFFS, low_pass
 from .candidate_regressors import dictionary, drag_by_place, drags, drives, places, scaled, swings
 from .gram_matrix import Gram
 from .innovations import Innovations, adds

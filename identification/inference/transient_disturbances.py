@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..findings import CHANNELS, Push
-from ..motion.cutoffs import CUTOFFS
-from ..motion.signals import low_pass
+from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]

@@ -7,24 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog
+from .smoothing import CUTOFFS, high_pass
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class NoiseSettings:
-    """Where a log shows its sensors' noise."""
-
-    # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
-    lowest_frequency: float = 0.25
-
-
-NOISE = NoiseSettings()
 
 
 @dataclass(frozen=True)
@@ -46,23 +35,17 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
-    position = _high(log.position[seen])[whole]
+    position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
     turned = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
     angle = (
         turned[:-1].inv() * turned[1:]
     ).as_rotvec()  # white noise differenced: twice its power, and a known shape
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     return SensorNoise(
-        _level(position), _level(_high(np.cumsum(angle, axis=0))), step / np.sqrt(12.0)
+        _level(position),
+        _level(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
+        step / np.sqrt(12.0),
     )
-
-
-def _high(x: Array) -> Array:
-    sections = butter(4, 2.0 * NOISE.lowest_frequency, btype="highpass", output="sos")
-    impulse = np.zeros(201)
-    impulse[100] = 1.0
-    kept = np.linalg.norm(sosfiltfilt(sections, impulse))  # of white noise
-    return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
 
 
 def _level(x: Array) -> float:

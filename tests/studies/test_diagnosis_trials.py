@@ -14,7 +14,8 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.page import write_results
