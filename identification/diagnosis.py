@@ -1,9 +1,10 @@
 """From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
 
-The residual wrench is regressed on whole effects of the library (``search``), every name is asked
-what else it could be (``equivalence``) and the remainder whether a law is still in it
-(``structure``). Structure and coefficients are chosen on the fit's blocks of flight; the errors
-before and after are those of blocks, or logs, that the fit never saw.
+The residual wrench is regressed on whole effects of the library (``inference.search``), every named
+effect is compared with what else it could be (``inference.equivalence``), and the residual is
+searched for further structure (``inference.residual_structure``). Effects and coefficients are
+chosen on the fitted blocks of flight; the errors before and after are those of blocks, or logs,
+that the fit never saw.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,24 +20,35 @@ from .findings import (
     CHANNELS,
     Candidate,
     Diagnosis,
+    Disturbance,
     Errors,
-    Gusts,
     NamedEffect,
     Signature,
     Structure,
     Trace,
 )
-from .inference.candidate_regressors import drives
-from .inference.coefficient_range import beyond_belief
-from .inference.commanded_rotors import shared
-from .inference.equivalence import composites, equivalents, overshadowed, unlisted
-from .inference.innovations import Innovations, at_odds
-from .inference.likelihood_refit import lag_or_delay, lateness, measured, others_late, with_lag
-from .inference.regression import CENTRAL, SHIFT, Flights, coefficient, typical
-from .inference.residual_structure import structure
-from .inference.search import Fit, Gain, Search
-from .inference.stepwise_search import find
-from .inference.transient_disturbances import pushes
+from .inference.candidate_regressors import explanatory_variables
+from .inference.coefficient_range import implausible_coefficients
+from .inference.commanded_rotors import without_deviations
+from .inference.equivalence import (
+    composite_doubts,
+    equivalents,
+    unidentifiable_rivals,
+    unlisted_equivalent_doubts,
+)
+from .inference.innovations import Innovations, contradicted_by_innovations
+from .inference.likelihood_refit import (
+    delay_alternatives,
+    delay_doubts,
+    delay_kind,
+    refitted_by_likelihood,
+    with_lag,
+)
+from .inference.regression import CENTRAL, ROTOR_TIME_OFFSET, Flights, coefficient, typical_size
+from .inference.residual_structure import find_structure
+from .inference.search import FittedEffects, Gain, Search
+from .inference.stepwise_search import find_effects
+from .inference.transient_disturbances import transient_disturbances
 from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
@@ -104,66 +116,67 @@ def diagnose(
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
-    fit, first = find(search)
-    follow = lateness(search, fit)
-    if follow == "as behind a lag":
+    fit, first = find_effects(search)
+    rotor_delay = delay_kind(search, fit)
+    if rotor_delay == "lag":
         fit = with_lag(search, fit)
     report("asking what else it could be")
     classes = {
-        e: (*equivalents(search, fit, e), *overshadowed(search, fit, e)) for e in fit.effects
+        e: (*equivalents(search, fit, e), *unidentifiable_rivals(search, fit, e))
+        for e in fit.effects
     }
     classes |= {
         e: tuple(dict.fromkeys([*classes[e], *more]))
-        for e, more in others_late(search, fit, follow).items()
+        for e, more in delay_alternatives(search, fit, rotor_delay).items()
     }
-    report("looking for what is left")
-    signs, gusty = structure(search, fit)
-    fit = measured(search, fit)
-    mimics = [*composites(flights, fit), *unlisted(search, fit)]
+    report("looking for structure in the residual")
+    signs, unconfirmed = find_structure(search, fit)
+    fit = refitted_by_likelihood(search, fit)
+    name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
     if not flights.commanded:
-        mimics += [
-            *beyond_belief(search, fit),
-            *at_odds(flights, fit.setting),
-            *lag_or_delay(search, fit, follow),
+        name_doubts += [
+            *implausible_coefficients(search, fit),
+            *contradicted_by_innovations(flights, fit.setting),
+            *delay_doubts(search, fit, rotor_delay),
         ]
 
     before, after = (
         flights.residual({}),
-        flights.residual(shared(fit.setting)),
-    )  # no flight's own scale or lean
-    held = ~flights.fit
+        flights.residual(without_deviations(fit.setting)),
+    )  # no flight's own thrust scale or tilt
+    held_out = ~flights.fit_rows
     floor = _rms(flights.sensor_noise)
-    error_before, error_after = _rms(before[held]), _rms(after[held])
+    error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     noisy = (
         error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
         or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
     )
-    gusts = (
+    disturbances = (
         ()
         if flights.commanded
         else tuple(
-            Gusts(channel, *found)
+            Disturbance(channel, *found)
             for channel, found in zip(
-                CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True
+                CHANNELS, Innovations(flights, fit.setting).disturbances(), strict=True
             )
         )
     )
     calm = vehicle.weight * np.repeat(
         [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
     )
-    pushed = () if flights.commanded else tuple(pushes(flights, fit.setting))
-    windy = bool(pushed) or any(
-        found.below(CUTOFFS.calm_hz) > most for found, most in zip(gusts, calm, strict=False)
+    transients = () if flights.commanded else tuple(transient_disturbances(flights, fit.setting))
+    disturbed = bool(transients) or any(
+        found.below(CUTOFFS.calm_hz) > most for found, most in zip(disturbances, calm, strict=False)
     )
-    remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
-    large = noisy if flights.commanded else windy
+    remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
+    large = noisy if flights.commanded else disturbed
     effects = tuple(
-        _named(search, fit, effect, classes[effect], bool(signs or mimics), large)
+        _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
     )
     if not flights.commanded and any(
         effect.tentative for effect in effects
-    ):  # what one name has too much, another one lacks
+    ):  # what one effect explains too much, another one explains too little
         effects = tuple(replace(effect, tentative=True) for effect in effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = (
@@ -171,18 +184,18 @@ def diagnose(
         if effects
         else ("nothing to explain" if remainder == "none" else "unexplained")
     )
-    notes += mimics
+    notes += name_doubts
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
-    nuisances = fit.setting.get(SHIFT[0], {})
-    shift = nuisances.get(SHIFT[1], 0.0)
-    if abs(shift) > DIAGNOSIS.least_rotor_time_offset and Innovations(
-        flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}
+    time_offsets = fit.setting.get(ROTOR_TIME_OFFSET[0], {})
+    offset = time_offsets.get(ROTOR_TIME_OFFSET[1], 0.0)
+    if abs(offset) > DIAGNOSIS.least_rotor_time_offset and Innovations(
+        flights, {**fit.setting, ROTOR_TIME_OFFSET[0]: {**time_offsets, ROTOR_TIME_OFFSET[1]: 0.0}}
     ).confirm(fit.setting):
         notes.append(
-            f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than "
-            f"at their sample"
+            f"the rotor speeds act {abs(1000 * offset):.1f} ms "
+            f"{'later' if offset > 0 else 'earlier'} than they are logged"
         )
     return Diagnosis(
         verdict=verdict,
@@ -193,14 +206,14 @@ def diagnose(
         after=_errors(flights, amended, segments, error_after),
         floor_force_rms=floor[0],
         floor_torque_rms=floor[1],
-        advice=tuple(_advice(effects, sorted(flights.drowned), remainder)),
+        advice=tuple(_advice(effects, sorted(flights.not_identifiable), remainder)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
         traces=tuple(_traces(flights, before, after)),
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
         structure=tuple(signs),
-        gusts=gusts,
-        pushes=pushed,
+        gusts=disturbances,
+        pushes=transients,
         cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
         amended=amended,
@@ -218,21 +231,26 @@ def _rms(wrench: Array) -> tuple[float, float]:
 
 
 def _named(
-    search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool
+    search: Search,
+    fit: FittedEffects,
+    effect: str,
+    others: tuple[str, ...],
+    structured: bool,
+    noisy: bool,
 ) -> NamedEffect:
     error = search.error(fit)
     gain = search.error_without(fit, effect) - error
     std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
-    if search.delay is not None and search.held(effect):
-        gain, std = search.delay.evidence, {LATENCY_COEFFICIENT: search.delay.std}
-    # that a law acts at the rotors, as it is written, is nothing to report
+    if search.delay is not None and search.is_fixed(effect):
+        gain, std = search.delay.log_likelihood_ratio, {LATENCY_COEFFICIENT: search.delay.std}
+    # that an effect acts at the rotors, as it is written, is nothing to report
     values = {
         k: v
         for k, v in fit.setting[effect].items()
         if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)
     }
     sizes = [
-        abs(v) / typical((effect, k), search.flights.vehicle)
+        abs(v) / typical_size((effect, k), search.flights.vehicle)
         for k, v in values.items()
         if k != CENTRAL
     ]
@@ -253,12 +271,12 @@ def _named(
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
-    held = ~flights.fit
+    held_out = ~flights.fit_rows
     begins = np.flatnonzero(
-        held
+        held_out
         & (
             flights.start
-            | np.concatenate([[True], flights.fit[:-1]])
+            | np.concatenate([[True], flights.fit_rows[:-1]])
             | (np.diff(flights.block, prepend=-1) != 0)
         )
     )
@@ -296,7 +314,7 @@ def _mean(values: Array, weight: Sequence[float]) -> float:
     )
 
 
-def _candidates(first: Sequence[Gain], fit: Fit, search: Search) -> tuple[Candidate, ...]:
+def _candidates(first: Sequence[Gain], fit: FittedEffects, search: Search) -> tuple[Candidate, ...]:
     return tuple(Candidate(x.effect, x.share, x.effect in fit.effects) for x in first)
 
 
@@ -311,13 +329,13 @@ def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
                 flights.t[a:b],
                 before[a:b],
                 after[a:b],
-                ~flights.fit[a:b],
+                ~flights.fit_rows[a:b],
             )
         )
     return out
 
 
-def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signature:
+def _signature(flights: Flights, fit: FittedEffects, effect: str, after: Array) -> Signature:
     """Return the channel in which an effect is largest, against what it follows most closely."""
     share = flights.residual(fit.without(effect).setting) - after
     noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
@@ -327,7 +345,7 @@ def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signatu
         else int(np.argmax(np.abs(share).mean(axis=0) / noise))
     )
     y = share[:, channel]
-    known = drives(flights, fit.setting)
+    known = explanatory_variables(flights, fit.setting)
     name, x = max(
         known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0
     )
@@ -337,28 +355,29 @@ def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signatu
     )
 
 
-def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: str) -> list[str]:
+def _advice(
+    effects: Sequence[NamedEffect], not_identifiable: Sequence[str], remainder: str
+) -> list[str]:
     out = []
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
             out.append(
-                f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
+                f"{' or '.join(group)}: these logs cannot tell them apart. To do so, fly: "
                 + "; ".join(f"{name}: {get(name).excitation}" for name in group)
             )
     if remainder == "structured":
         out.append(
-            "A law is left in the remainder that no effect of the library fits: the names are "
-            "tentative. Fly one thing "
-            "at a time (hover, climbs, level flight at several speeds, turns) to see what the "
-            "remainder follows."
+            "The residual still has structure that no effect of the library explains, so the "
+            "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
+            "several speeds, turns) to see what the residual follows."
         )
-    if drowned:
+    if not_identifiable:
         out.append(
-            "These flights could not show: "
-            + ", ".join(drowned)
-            + ". To look for one of them, fly: "
-            + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4])
+            "Not identifiable from these flights: "
+            + ", ".join(not_identifiable)
+            + ". To identify one of them, fly: "
+            + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
         )
     return out
 

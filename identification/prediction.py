@@ -65,13 +65,13 @@ def rollout_error(
     """Return the RMS distance (m) between flight and model after ``horizon`` s of open-loop
     prediction.
 
-    Every ``every`` s the model starts from the flight's position, velocity, attitude and body rate,
-    and from then on is given the logged turn rates and voltage alone; a turn rate holds over the
-    interval that ends at its sample. Rotors and effects start with the memory that the flight
-    before gave them. Declared sensing effects are taken out of the log.
+    Every ``every`` s the model starts from the flight's position, velocity, attitude and angular
+    velocity, and from then on is given the logged rotor speeds and voltage alone; a rotor speed
+    holds over the interval that ends at its sample. Rotors and effects start with the memory that
+    the flight before gave them. Declared sensing effects are taken out of the log.
 
-    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of body
-    rate is 16 mm. See ``start_states``.
+    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
+    velocity is 16 mm. See ``start_states``.
 
     Args:
         log: the flight.
@@ -118,8 +118,8 @@ def _squared_errors(
     if not starts.size:
         return np.empty(0)
     starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
-    held = max(1, math.ceil(period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
-    dt = period / held
+    substeps = max(1, math.ceil(period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
+    dt = period / substeps
     voltage = np.zeros(len(signals.t)) if signals.voltage is None else signals.voltage
     # one model that flies along, and a copy of it for every start
     models = np.zeros(1 + len(starts), dtype=_MODEL)
@@ -139,11 +139,11 @@ def _squared_errors(
         ),
     )
     _fly_along(
-        models, starts, dt, held, speeds, voltage, position, rotation, velocity, rate, modelled
+        models, starts, dt, substeps, speeds, voltage, position, rotation, velocity, rate, modelled
     )
     states = start_states(signals, modelled)
     ends = states[starts]
-    _roll_out(models, starts, dt, held, ahead, speeds, voltage, ends)
+    _roll_out(models, starts, dt, substeps, ahead, speeds, voltage, ends)
     squares: Array = np.sum(np.square(ends[:, :3] - states[starts + ahead, :3]), axis=1)
     return squares
 
@@ -169,11 +169,11 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     """Return the flight's state (n, STATE_SIZE) in the filter's layout, without the wrench and
     without a filter's delay.
 
-    Velocity, attitude and body rate are the pose's below 1 Hz and the model's above, where the pose
-    is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor steers
-    above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at 200 Hz
-    that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the pose alone, cut at 5 Hz, it is 1.1
-    mrad, 19 mrad/s and the flight's own quick motion lost.
+    Velocity, attitude and angular velocity are the pose's below 1 Hz and the model's above, where
+    the pose is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor
+    steers above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at
+    200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the pose alone, cut at 5 Hz, it
+    is 1.1 mrad, 19 mrad/s and the flight's own quick motion lost.
 
     Args:
         signals: n samples.
@@ -204,8 +204,8 @@ def start_states(signals: Signals, modelled: Array) -> Array:
 
 @compiled
 def _integrate_rate(rate: Array, period: float, out: Array) -> None:
-    """Write the attitude (n, 4) that turns at a body rate (n, 3) into ``out``, from its first row
-    on.
+    """Write the attitude (n, 4) that turns at a angular velocity (n, 3) into ``out``, from its
+    first row on.
     """
     for k in range(1, len(rate)):
         a, b = rate[k - 1], rate[k]
@@ -224,7 +224,7 @@ def _fly_along(
     models: Record,
     starts: np.ndarray,
     dt: float,
-    held: int,
+    substeps: int,
     speeds: Array,
     voltage: Array,
     position: Array,
@@ -242,7 +242,7 @@ def _fly_along(
     for k in range(len(speeds)):
         if k > 0:
             j = k - 1
-            for _ in range(held):
+            for _ in range(substeps):
                 drive(f, speeds[k], dt, voltage[k])
                 apply_effects(f, position[j], rotation[j], velocity[j], rate[j])
                 accelerations(
@@ -257,7 +257,7 @@ def _fly_along(
                 )
                 f.time += dt
                 for i in range(6):
-                    modelled[k, i] += f.acceleration[i] / held
+                    modelled[k, i] += f.acceleration[i] / substeps
         if at < len(starts) and starts[at] == k:
             at += 1
             models[at] = f
@@ -268,7 +268,7 @@ def _roll_out(
     models: Record,
     starts: np.ndarray,
     dt: float,
-    held: int,
+    substeps: int,
     ahead: int,
     speeds: Array,
     voltage: Array,
@@ -282,7 +282,7 @@ def _roll_out(
     for n in range(len(starts)):
         g, x = models[1 + n], states[n]
         for k in range(starts[n] + 1, starts[n] + ahead + 1):
-            for _ in range(held):
+            for _ in range(substeps):
                 drive(g, speeds[k], dt, voltage[k])
                 for _ in range(_MOTION_STEPS):
                     propagate(g, x, fine, after)

@@ -1,7 +1,8 @@
-"""What a law may depend on, as columns: for the search for a law in what a fit leaves.
+"""Candidate regressors: what a missing effect may depend on, as columns.
 
-Drives are scaled to one standard deviation, a column is one of them in one channel. What hardly
-moves, or is the sensors' noise in part, is left out: the noise is in the residual as well.
+Each explanatory variable is scaled to one standard deviation, and a column is one of them in one
+channel. Variables that hardly vary, or are sensor noise in part, are left out: that noise is in the
+residual as well.
 """
 
 import itertools
@@ -55,21 +56,23 @@ class RegressorSettings:
 REGRESSORS = RegressorSettings()
 
 
-Drive = tuple[str, Array]  # in words, (rows,)
+Variable = tuple[str, Array]  # in words, (rows,)
 
 
-def drives(flights: Flights, setting: Setting) -> list[Drive]:
-    """Return what a force may depend on, with its unit, at the rows."""
-    parts: list[list[Drive]] = []
+def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
+    """Return the explanatory variables at the rows: what a force may depend on, with its unit."""
+    parts: list[list[Variable]] = []
     vehicle = flights.amended(setting)
-    plain = [_is_plain(flights, i) for i in range(3)]
+    plain = [_is_excited(flights, i) for i in range(3)]
     for piece in flights.pieces(setting):
         s, at = piece.signals, piece.rows
         body = np.einsum("nij,ni->nj", s.rotation[at], s.velocity[at])
         speed = np.linalg.norm(body, axis=1)
         thrust = vehicle.rotor_wrench(s.rotor_speeds)[:, 0]
         heading = np.arctan2(s.rotation[at, 1, 0], s.rotation[at, 0, 0])
-        found: list[Drive] = [(f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")]
+        found: list[Variable] = [
+            (f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")
+        ]
         found += [
             ("speed (m/s)", speed),
             ("squared speed (m2/s2)", speed**2),
@@ -78,7 +81,7 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
             ("cosine of the heading", np.cos(heading)),
             ("time (s)", s.t[at]),
         ]
-        if flights.lively:
+        if flights.rotor_speeds_vary:
             found.append(("thrust (N)", low_pass(thrust, CUTOFFS.residual_hz, s.period)[at]))
         found += [
             (
@@ -103,7 +106,7 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
     ]
 
 
-def _is_plain(flights: Flights, axis: int) -> bool:
+def _is_excited(flights: Flights, axis: int) -> bool:
     """Return whether an angular velocity is more than the sensors' noise; it is also the column of
     rate_damping.
     """
@@ -115,14 +118,14 @@ def _is_plain(flights: Flights, axis: int) -> bool:
     return bool(noise <= REGRESSORS.most_noise_share * whole)
 
 
-def scaled(found: list[Drive]) -> dict[str, Array]:
-    """Return drives with mean zero and standard deviation one, by their names without units."""
+def standardised(found: list[Variable]) -> dict[str, Array]:
+    """Return variables with mean zero and standard deviation one, by their names without units."""
     return {name.split(" (")[0]: (x - x.mean()) / x.std() for name, x in found}
 
 
-def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield general columns (rows, 6), with the channel and what drives it in words."""
-    known = scaled(drives(flights, setting))
+def general_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield general columns (rows, 6), with the channel and the variable in words."""
+    known = standardised(explanatory_variables(flights, setting))
     shapes = dict(known)
     for a in "xyz":
         u = known.get(f"body velocity {a}")
@@ -147,7 +150,10 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
     for i, a in enumerate("xyz"):
         if velocity[:, i].std() > REGRESSORS.least_variation["velocity"]:
             shapes[f"world velocity {a}"] = velocity[:, i]
-        if flights.lively and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share:
+        if (
+            flights.rotor_speeds_vary
+            and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share
+        ):
             shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
         if rotation[:, 2, i].std() > REGRESSORS.least_variation["tilt"]:
@@ -161,7 +167,7 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
             shapes[f"{name} near {center:.3g}"] = np.maximum(
                 0.0, 1.0 - np.abs(x - center) / (0.2 * (high - low) + 1e-9)
             )
-    shapes["nothing (a constant)"] = np.ones(len(rotation))
+    shapes["a constant"] = np.ones(len(rotation))
     for name, x in shapes.items():
         for channel in range(6):
             column = np.zeros((len(x), 6))
@@ -173,7 +179,7 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
                 yield f"force along body {'xyz'[channel]}", name, column
 
 
-def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+def place_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
     """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and
     the place in words.
     """
@@ -192,30 +198,30 @@ def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
             column[:, channel] = bump
             yield (
                 CHANNELS[channel],
-                f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
+                f"the place near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
                 column,
             )
 
 
-def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of a linear drag that changes with something, in the mean nothing,
-    and with what in words.
+def drag_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield columns (rows, 6) of a linear drag that changes with a variable and has a mean of zero,
+    with the variable in words.
     """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
     if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
         return
-    for name, x in scaled(drives(flights, setting)).items():
+    for name, x in standardised(explanatory_variables(flights, setting)).items():
         yield "a drag", name, np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)])
 
 
 def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
-    """Return columns (rows, 6) of a linear drag, and of one that changes with place, with heading
-    and with both at once.
+    """Return columns (rows, 6) of a linear drag, and of drags that change with position, with
+    heading and with both at once.
     """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
     if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
         return []
-    known = scaled(drives(flights, setting))
+    known = standardised(explanatory_variables(flights, setting))
     places = [x for name, x in known.items() if "position" in name]
     headings = [x for name, x in known.items() if "heading" in name]
     shapes = [
@@ -227,19 +233,19 @@ def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
     return [np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)]) for x in shapes]
 
 
-def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield what a part would pull or twist (rows, 6) that the vehicle's own motion makes swing,
-    with the channel and how fast.
+def resonant_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield the force or torque (rows, 6) of a resonant mode that the vehicle's own motion excites,
+    with the channel and the frequency in words.
 
-    A load on a cable is driven by the vehicle's acceleration, what is on a soft mount by the
-    angular one. Differentiated, the attitude's noise would be in column and residual alike: it is
-    what the rotors' torque, hardly noisy, makes of the inertia.
+    A load on a cable is excited by the vehicle's acceleration, a part on a soft mount by the
+    angular one. From the differentiated attitude, its noise would be in column and residual alike:
+    the angular acceleration is taken from the rotors' torque, which is hardly noisy.
     """
     pieces = flights.pieces(setting)
     for hertz in REGRESSORS.load_frequencies_hz:
         parts = [
             low_pass(
-                _swung(p.signals.acceleration[:, :2], hertz, p.signals.period),
+                _resonant_response(p.signals.acceleration[:, :2], hertz, p.signals.period),
                 CUTOFFS.residual_hz,
                 p.signals.period,
             )[p.rows]
@@ -248,7 +254,7 @@ def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
         pull = np.concatenate(parts)
         yield (
             "Fx and Fy",
-            f"what swings at {hertz:.2g} Hz",
+            f"a resonant mode at {hertz:.2g} Hz",
             np.column_stack([pull, np.zeros((len(pull), 4))]),
         )
     vehicle = flights.amended(setting)
@@ -256,23 +262,25 @@ def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
     plain = [
         i
         for i in range(3)
-        if flights.lively and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share
+        if flights.rotor_speeds_vary and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share
     ]
     for hertz, i in itertools.product(REGRESSORS.mount_frequencies_hz, plain):
         parts = [
             low_pass(
-                _swung(torque[:, i], hertz, p.signals.period), CUTOFFS.residual_hz, p.signals.period
+                _resonant_response(torque[:, i], hertz, p.signals.period),
+                CUTOFFS.residual_hz,
+                p.signals.period,
             )[p.rows]
             for torque, p in zip(torques, pieces, strict=True)
         ]
         column = np.zeros((sum(map(len, parts)), 6))
         column[:, 3 + i] = np.concatenate(parts)
-        yield CHANNELS[3 + i], f"what swings at {hertz:.2g} Hz", column
+        yield CHANNELS[3 + i], f"a resonant mode at {hertz:.2g} Hz", column
 
 
-def _swung(drive: Array, hertz: float, period: float) -> Array:
-    """Return what a pendulum or a spring gives back (n, ...) of how its base is accelerated, sample
-    by sample.
+def _resonant_response(drive: Array, hertz: float, period: float) -> Array:
+    """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base,
+    sample by sample.
     """
     # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz

@@ -1,16 +1,16 @@
-"""Whether a named effect leaves the range in which its law is believed.
+"""Whether the coefficients of a named effect are plausible.
 
-A law that stands for another one is often bent to its limit: a dry friction, named a drag, wants a
-quadratic part below zero. The truth sits at a bound too where a coefficient is zero, but nothing
-pulls it beyond.
+An effect that stands for another one is often fitted at a bound: a dry friction, named a drag,
+needs a quadratic part below zero. A true coefficient of zero is at a bound too, but its best fit is
+not far outside.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from .regression import CENTRAL, DRAG_EFFECTS, typical
-from .search import Fit, Search
+from .regression import CENTRAL, DRAG_EFFECTS, typical_size
+from .search import FittedEffects, Search
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,16 @@ ANY_SIZE_EFFECTS = frozenset(
 )
 
 
-def beyond_belief(search: Search, fit: Fit) -> list[str]:
-    """Return in words which coefficients would leave their range if they could, or are such as no
-    law of theirs has.
+def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
+    """Return, as sentences, which coefficients would leave their range, or are implausible for
+    their effect.
     """
     vehicle = search.flights.vehicle
     found = []
     size = {
         effect: max(
             (
-                abs(v) / typical((effect, k), vehicle)
+                abs(v) / typical_size((effect, k), vehicle)
                 for k, v in fit.setting[effect].items()
                 if k != CENTRAL
             ),
@@ -61,20 +61,18 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
     for effect in fit.effects:
         if size[effect] > RANGES.most_typical_sizes and effect not in ANY_SIZE_EFFECTS:
             found.append(
-                f"{effect} would be {size[effect]:.0f} times what it typically is: another effect "
-                f"may be behind it"
+                f"{effect} is {size[effect]:.0f} times its typical size: another effect may be the "
+                "cause"
             )
     wind = fit.setting.get("wind", {})
     named = {*fit.effects, *(e.name for e in vehicle.effects)}
     if (
         wind
         and not DRAG_EFFECTS & named
-        and wind["cd"] < RANGES.least_wind_drag * typical(("wind", "cd"), vehicle)
+        and wind["cd"] < RANGES.least_wind_drag * typical_size(("wind", "cd"), vehicle)
     ):  # drags feel a wind too
         found.append(
-            "wind would act on hardly any drag, as a steady force does whatever the speed: another "
-            "effect may be "
-            "behind it"
+            "wind acts on hardly any drag, like a constant force: another effect may be the cause"
         )
     damping = fit.setting.get("rate_damping", {})
     if (
@@ -83,17 +81,15 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
         < RANGES.least_share_of_yaw_damping * damping["dz"]
     ):
         found.append(
-            "rate_damping would be about z alone, and the arms' rotors damp the other axes more: "
-            "another effect may "
-            "be behind it"
+            "rate_damping acts about z alone, but rotors damp the other axes more: another effect "
+            "may be the cause"
         )
     if "body_drag" in fit.effects and _leaves_out_an_axis(search, fit):
         found.append(
-            "body_drag would be along some axes alone, and air drags a body whichever way it "
-            "moves: another effect "
-            "may be behind it"
+            "body_drag acts along some axes alone, but air drags a body along every axis: another "
+            "effect may be the cause"
         )
-    g = search.at(fit)
+    g = search.gram_at(fit)
     total, k = g.blocks.sum(axis=0), len(g.columns)
     normal = total[:k, :k] + np.diag(g.precision)
     change = np.linalg.solve(normal, total[:k, -1] - g.precision * g.value)
@@ -104,7 +100,7 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
     ):
         least = (
             RANGES.least_excess_share
-            * typical((effect, name), vehicle)
+            * typical_size((effect, name), vehicle)
             * (1.0 if name == CENTRAL else size.get(effect, 0.0))
         )
         if (
@@ -114,15 +110,15 @@ def beyond_belief(search: Search, fit: Fit) -> list[str]:
         ):
             beyond.setdefault(effect, []).append(name)
     found += [
-        f"{effect} would leave its range if it could, with {', '.join(names)}: another effect may "
-        f"be behind the name"
+        f"{effect}: the best fit of {', '.join(names)} lies outside the allowed range: another "
+        "effect may be the cause"
         for effect, names in beyond.items()
     ]
     return found
 
 
-def _leaves_out_an_axis(search: Search, fit: Fit) -> bool:
-    """Return whether a named body_drag, at the flights' RMS speed, is surely hardly any along one
+def _leaves_out_an_axis(search: Search, fit: FittedEffects) -> bool:
+    """Return whether a named body_drag, at the flights' RMS speed, is significantly small along one
     axis beside another.
     """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in search.flights.pieces({})])

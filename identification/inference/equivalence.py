@@ -1,8 +1,8 @@
-"""Which other effect would have left the same traces: decided from the flights and the laws, not
-from the noise's luck.
+"""Which other effects would explain the same residual: decided from the flights and the effect
+models, not from chance.
 
-An effect's own part of the residual is projected on the columns of another one. What is left over
-is the energy, in units of the noise, by which the flights can tell the two apart.
+An effect's own part of the residual is projected on the columns of another effect. What remains is
+the deviance by which the flights tell the two apart.
 """
 
 from copy import copy
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gram_matrix import GRAM, gram
-from .regression import CENTRAL, REGRESSION, SHIFT, Flights, coefficient
-from .search import SEARCH, Fit, Search, freedom
+from .regression import CENTRAL, REGRESSION, ROTOR_TIME_OFFSET, Flights, coefficient
+from .search import SEARCH, FittedEffects, Search, coefficient_count
 from .turning_delay import SAME_DELAY_EFFECTS
 
 Array = NDArray[np.float64]
@@ -69,12 +69,12 @@ COUNTERPARTS = {"mass": "thrust_scale", "thrust_scale": "mass"}
 INERTIA_AXES = ("jx", "jy", "jz")
 
 
-def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
+def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     """Return the effects of the library that would explain what ``effect`` explains, given all
     others of the fit.
     """
     flights = search.flights
-    if search.held(effect):
+    if search.is_fixed(effect):
         return [other for other in SAME_DELAY_EFFECTS if other in search.library]
     less = fit.without(effect)
     regression = search.linearise(less)
@@ -82,17 +82,15 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
     limit = _limit(search, part)
-    if (
-        flights.commanded
-    ):  # little of such flights is beyond doubt: the other one must explain most of it
+    if flights.commanded:  # they tell less: the other one must explain most of it
         alone = search.refit(less)
         limit = min(
             limit,
             EQUIVALENCE.commanded_most_share_without
-            * search.whitened_energy(flights.residual(alone.setting) - whole),
+            * search.deviance_of(flights.residual(alone.setting) - whole),
         )
-    # no farther apart than that, by the triangle's inequality
-    enough = (np.sqrt(search.whitened_energy(whole)) + np.sqrt(limit)) ** 2
+    # by the triangle inequality they are no farther apart
+    enough = (np.sqrt(search.deviance_of(whole)) + np.sqrt(limit)) ** 2
     out = []
     for other in search.gains(less, regression, g):
         near, hopeful = (
@@ -108,47 +106,47 @@ def equivalents(search: Search, fit: Fit, effect: str) -> list[str]:
         if (
             other.effect == effect
             or other.size > EQUIVALENCE.largest_size
-            or other.left > near * limit
+            or other.deviance_left > near * limit
         ):
             continue
-        # what is far from linear is fitted to the flights themselves
+        # a nonlinear effect is refitted to the flights
         swapped = search.refit(other.fit, enough)
-        if search.whitened_energy(flights.residual(swapped.setting) - whole) < limit:
+        if search.deviance_of(flights.residual(swapped.setting) - whole) < limit:
             out.append(other.effect)
     return out
 
 
-def overshadowed(search: Search, fit: Fit, effect: str) -> list[str]:
-    """Return the effects that explain more than ``effect`` in its place, and that the flights
-    hardly excite.
+def unidentifiable_rivals(search: Search, fit: FittedEffects, effect: str) -> list[str]:
+    """Return the effects that explain more than ``effect`` in its place, but are not identifiable.
 
-    Their columns are noise of the sensors in good part, so they are not searched for; what is named
-    in the place of one may be it all the same.
+    Their columns are sensor noise to a large part, so they are not searched for; the named effect
+    may stand for one of them.
     """
-    if not search.hidden:
+    if not search.dominated_by_noise:
         return []
     less, wider = fit.without(effect), copy(search)
-    wider.library = search.hidden
+    wider.library = search.dominated_by_noise
     regression = wider.linearise(less)
     own = (
         search.error_without(fit, effect)
         - search.error(fit)
-        - SEARCH.deviance_per_coefficient * freedom(effect)
+        - SEARCH.deviance_per_coefficient * coefficient_count(effect)
     )
     return [
         x.effect
         for x in wider.gains(less, regression, wider.gram(less, regression))
-        if x.energy - SEARCH.deviance_per_coefficient * freedom(x.effect) > own
+        if x.deviance_reduction - SEARCH.deviance_per_coefficient * coefficient_count(x.effect)
+        > own
         and SEARCH.least_size < x.size <= EQUIVALENCE.largest_size
     ]
 
 
-def unlisted(search: Search, fit: Fit) -> list[str]:
-    """Return in words which names may stand for an exact equivalent that the library lacks, where
-    the flights do not tell.
+def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
+    """Return, as sentences, which named effects may stand for an exact equivalent outside the
+    library.
 
-    Mass and thrust_scale are alike but for the moments. A load on a cable is a mass that does not
-    turn with the body.
+    Mass and thrust_scale differ only in the moments. A load on a cable is a mass that does not
+    rotate with the body.
     """
     flights = search.flights
     found = []
@@ -169,21 +167,19 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
         )
         whole = flights.residual(fit.setting)
         turned = flights.residual({**fit.setting, "inertia": dict.fromkeys(INERTIA_AXES, share)})
-        columns = flights.columns(fit.setting, search.base(fit.effects), 0.1)
+        columns = flights.columns(fit.setting, search.model_columns(fit.effects), 0.1)
         g = gram(flights, fit.setting, search.whiten, columns, turned - whole)
         if g.error(np.arange(len(g.columns))) < _limit(
             search, flights.residual(fit.without(effect).setting) - whole
         ):
             found.append(
-                f"whether the moments go with {effect} these flights do not show: an effect that "
-                f"is not among these "
-                "names may be behind it"
+                f"{effect}: these flights do not show whether the moments change with it. An "
+                "effect outside the library may be the cause: fly faster rolls and pitches"
             )
-        elif search.whitened_energy(turned) < search.whitened_energy(whole):
+        elif search.deviance_of(turned) < search.deviance_of(whole):
             found.append(
-                f"moments that do not go as {effect} says fit better: an effect that is not among "
-                f"these names may be "
-                "behind it"
+                f"{effect}: moments other than those of this effect fit better. An effect outside "
+                "the library may be the cause"
             )
     heavier = fit.setting.get("mass", {}).get("dm", 0.0) > 0.0
     if heavier and "com_offset" in fit.effects and "slung_payload" not in search.library:
@@ -192,22 +188,22 @@ def unlisted(search: Search, fit: Fit) -> list[str]:
             abs(centre["cx"]), abs(centre["cy"])
         ):
             found.append(
-                "more mass, and a centre of mass that is off along z alone: a load that hangs may "
-                "be behind them"
+                "a larger mass and a centre of mass that is off along z alone were found: a "
+                "suspended load may be the cause"
             )
     return found
 
 
 def _limit(search: Search, part: Array) -> float:
-    """Return the energy from which two explanations of ``part`` (rows, 6) are apart."""
+    """Return the deviance from which on two explanations of ``part`` (rows, 6) are told apart."""
     return max(
         EQUIVALENCE.least_deviance,
         (EQUIVALENCE.commanded_least_share if search.flights.commanded else EQUIVALENCE.least_share)
-        * search.whitened_energy(part),
+        * search.deviance_of(part),
     )
 
 
-def _relative(flights: Flights, fit: Fit) -> tuple[Array, Array]:
+def _relative(flights: Flights, fit: FittedEffects) -> tuple[Array, Array]:
     """Return the relative changes of inertia (three), mass and thrust in a fit, and their standard
     deviations.
     """
@@ -233,7 +229,7 @@ def _weighted(values: Array, std: Array) -> float:
     return float(np.average(values, weights=None if np.any(std == 0.0) else std**-2.0))
 
 
-def _three_alike(fit: Fit) -> bool:
+def _three_alike(fit: FittedEffects) -> bool:
     """Return whether the efficiencies of just three rotors are the same, and not zero."""
     rotors = [f"e{i + 1}" for i in range(4)]
     off = np.array([fit.setting["rotor_efficiency"].get(name, 0.0) for name in rotors])
@@ -247,13 +243,13 @@ def _three_alike(fit: Fit) -> bool:
     )
 
 
-def composites(flights: Flights, fit: Fit) -> list[str]:
-    """Return in words which single effect the named ones could be instead, where together they are
-    its exact equivalent.
+def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
+    """Return, as sentences, which single effect may be the cause of several named ones that are
+    together its exact equivalent.
 
     Mass is thrust_scale with inertia, thrust_scale is mass with inertia, and inertia is mass with
-    thrust_scale (coefficients that coincide give them away); a battery that falls evenly is a
-    thrust that is off and fades.
+    thrust_scale (their coefficients coincide then); a battery that falls evenly is a thrust that is
+    off and fades.
     """
     found = []
     names = set(fit.effects)
@@ -261,26 +257,28 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         len(names - AERODYNAMIC_EFFECTS) + bool(names & AERODYNAMIC_EFFECTS)
         > EQUIVALENCE.most_reliable_effects
     ):
-        found.append(f"{len(names)} effects at once may stand for one that the library lacks")
-    shift = fit.setting.get(SHIFT[0], {}).get(SHIFT[1], 0.0)
+        found.append(
+            f"{len(names)} effects were needed: together they may stand for one effect outside the "
+            "library"
+        )
+    shift = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
     if names and shift < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
         found.append(
-            "turn rates would act before they are logged, by as much as is allowed: an effect that "
-            "is not among these "
-            "names may be behind it"
+            "the fitted rotor speeds act earlier than they are logged, by as much as is allowed: "
+            "an effect outside the library may be the cause"
         )
     if (
         max(fit.setting.get("rotor_efficiency", {"": 0.0}).values())
         > EQUIVALENCE.share_of_bound * GRAM.plausible_maxima["rotor_efficiency"]
     ):
         found.append(
-            "a rotor would have to deliver far more than declared: rotor_efficiency may stand for "
-            "another effect"
+            "a rotor reaches the largest plausible thrust: rotor_efficiency may stand for another "
+            "effect"
         )
     if "rotor_efficiency" in names and _three_alike(fit):
         found.append(
-            "three rotors are off by the same: a mass or a thrust_scale, and one rotor, may be "
-            "behind them"
+            "three rotors have the same efficiency: a mass or a thrust_scale, and one weak rotor, "
+            "may be the cause"
         )
     if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
         values, std = _relative(flights, fit)
@@ -290,16 +288,15 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         )
         if off @ off < EQUIVALENCE.least_deviance + EQUIVALENCE.most_share_apart * whole @ whole:
             found.append(
-                "coefficients of inertia and thrust or mass coincide: a single other effect may be "
-                "behind them"
+                "the relative changes of inertia and of thrust or mass coincide: a single other "
+                "effect may be the cause"
             )
     if {"mass", "thrust_scale"} <= names:
         weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass
         thrust = 1.0 + fit.setting["thrust_scale"].get("s", 0.0)
         if abs(thrust / weight - 1.0) < EQUIVALENCE.most_share_uncancelled * abs(thrust - 1.0):
             found.append(
-                "more mass and as much more thrust cancel, but for the moments: inertia may be "
-                "behind them"
+                "mass and thrust_scale cancel, but for the moments: inertia may be the cause"
             )
     if "thrust_fade" in names and names & {
         "mass",
@@ -319,7 +316,7 @@ def composites(flights: Flights, fit: Fit) -> list[str]:
         )
         if drop and even:
             found.append(
-                "the battery's voltage falls evenly: thrust that is off and fades may be "
+                "the battery's voltage falls evenly: a thrust that is off and fades may be "
                 "battery_sag"
             )
     return found

@@ -1,8 +1,7 @@
-"""Which effects a residual needs: forward selection of whole effects, judged on blocks that are
-left out in turn.
+"""The regression as Gram matrices of blocks, with priors and bounds of coefficients.
 
-At one setting of coefficients everything is linear: each column is whitened, and all that
-selection, removal and comparison ask is in the Gram matrices of the blocks.
+At one setting of coefficients everything is linear: each column is whitened, and selection, removal
+and comparison of effects need the Gram matrices of the blocks alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,14 +13,14 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from .regression import (
     CENTRAL,
-    MOMENT,
-    START,
+    MOMENT_PREFIX,
+    START_PREFIX,
     Column,
     Flights,
     Setting,
     coefficient,
     range_of,
-    typical,
+    typical_size,
 )
 from .whitening import Whitener
 
@@ -49,7 +48,7 @@ GRAM = GramSettings()
 def columns_of(effect: str, fitted: bool) -> list[Column]:
     """Return the columns of an effect.
 
-    Whether the law of one that acts rotor by rotor makes a moment is the log's to say: while it is
+    Whether an effect that acts rotor by rotor makes a moment is a question to the log: while it is
     only tried, the moment part of each column is free; once it is ``fitted``, the coefficient
     ``central`` is.
     """
@@ -57,7 +56,7 @@ def columns_of(effect: str, fitted: bool) -> list[Column]:
     if fitted or (effect, CENTRAL) not in own:
         return own
     own.remove((effect, CENTRAL))
-    return own + [(effect, MOMENT + name) for _, name in own]
+    return own + [(effect, MOMENT_PREFIX + name) for _, name in own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ class Gram:
                     at = np.flatnonzero(free)[i]
                     change[at], free[at] = high[at] if step[i] > 0 else low[at], False
                     continue
-            # one that is held and would rather come back from its bound is let go
+            # a coefficient at its bound that would come back is freed
             pull = (right - normal @ change) * scale
             inwards = np.where(change >= high, -pull, pull)
             inwards[free | (low >= high)] = 0.0
@@ -124,22 +123,22 @@ class Gram:
         return change, free
 
     def error(self, index: NDArray[np.int64]) -> float:
-        """Return the whitened energy on each block of the fit when it is predicted from all others.
+        """Return the deviance on each block of the fit when it is predicted from all others.
 
         A coefficient that the whole fit holds at a bound is held there for every block.
         """
         total = self.blocks.sum(axis=0)
         if not len(index):
             return float(total[-1, -1])
-        held, free = self._solve(total, index)
-        change = np.tile(held, (len(self.blocks), 1))
+        bounded, free = self._solve(total, index)
+        change = np.tile(bounded, (len(self.blocks), 1))
         if free.any():
             at, fixed = index[free], index[~free]
             rest = total - self.blocks
             normal = rest[:, at[:, None], at] + np.diag(self.precision[at])
             right = rest[:, at, -1] - self.precision[at] * self.value[at]
             if len(fixed):
-                right = right - rest[:, at[:, None], fixed] @ held[~free]
+                right = right - rest[:, at[:, None], fixed] @ bounded[~free]
             change[:, free] = np.linalg.solve(normal, right[..., None])[..., 0]
         square = np.einsum("bi,bij,bj->", change, self.blocks[:, index[:, None], index], change)
         return float(total[-1, -1] - 2.0 * np.sum(change * self.blocks[:, index, -1]) + square)
@@ -157,20 +156,20 @@ def gram(
     """
     names = tuple(columns)
     x = np.stack([*columns.values(), residual], axis=2)
-    x = np.ascontiguousarray(whiten(x)[flights.fit])
-    begins = np.flatnonzero(np.diff(flights.block[flights.fit], prepend=-1))
+    x = np.ascontiguousarray(whiten(x)[flights.fit_rows])
+    begins = np.flatnonzero(np.diff(flights.block[flights.fit_rows], prepend=-1))
     parts = (part.reshape(-1, len(names) + 1) for part in np.split(x, begins[1:]))
     blocks = np.array([part.T @ part for part in parts])
-    return Gram(names, x, begins, blocks, *room(flights, setting, names))
+    return Gram(names, x, begins, blocks, *priors_and_ranges(flights, setting, names))
 
 
-def room(
+def priors_and_ranges(
     flights: Flights, setting: Setting, columns: Sequence[Column]
 ) -> tuple[Array, Array, Array, Array]:
-    """Return of each column (columns,) its prior's precision, its value, and by how much this may
+    """Return for each column (columns,) its prior's precision, its value, and by how much it may
     fall and rise.
     """
-    size = np.array([typical(c, flights.vehicle) for c in columns])
+    size = np.array([typical_size(c, flights.vehicle) for c in columns])
     value = np.array(
         [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
     )
@@ -178,9 +177,9 @@ def room(
     for i, c in enumerate(columns):
         if not c[0]:
             low[i], high[i] = range_of(c)
-        elif c[1].startswith(MOMENT):
+        elif c[1].startswith(MOMENT_PREFIX):
             low[i], high[i] = -np.inf, np.inf
-        elif c[1].startswith(START):
+        elif c[1].startswith(START_PREFIX):
             low[i], high[i] = 0.0, GRAM.prior_std
         else:
             low[i], high[i] = (

@@ -1,11 +1,10 @@
-"""Whether what is left after all named effects still has a law in it, and so a name may be another
-effect's.
+"""Whether the residual after all named effects still has structure, so that a name may stand for
+another effect.
 
-A library that lacks the true effect explains it by a neighbour, down to the floor of the residual.
-What gives the neighbour away is small: something systematic is left over (columns of a general
-dictionary), or its own coefficient would rather change with speed, height, load, time or frequency,
-or its force, in one channel, would rather be larger than in another. Each column is tried alone, on
-blocks that are left out in turn.
+A library that lacks the true effect explains it by a similar one, down to the noise floor. Small
+signs show it: candidate regressors still explain part of the residual; the coefficient of the named
+effect changes with speed, height, load, time or frequency; or its force differs between channels.
+Each column is tried alone, on blocks that are left out in turn.
 """
 
 import itertools
@@ -18,9 +17,17 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Structure
 from ..motion.smoothing import CUTOFFS, low_pass
-from .candidate_regressors import dictionary, drag_by_place, drags, drives, places, scaled, swings
+from .candidate_regressors import (
+    drag_by_place,
+    drag_regressors,
+    explanatory_variables,
+    general_regressors,
+    place_regressors,
+    resonant_regressors,
+    standardised,
+)
 from .gram_matrix import Gram
-from .innovations import Innovations, adds
+from .innovations import Innovations, confirms_addition
 from .regression import (
     CENTRAL,
     DRAG_EFFECTS,
@@ -30,7 +37,7 @@ from .regression import (
     Flights,
     Setting,
 )
-from .search import SEARCH, Fit, Search
+from .search import SEARCH, FittedEffects, Search
 
 Array = NDArray[np.float64]
 
@@ -97,50 +104,53 @@ STRUCTURE = StructureSettings()
 RIGID_EFFECTS = frozenset({"mass", "inertia", "com_offset", "marker_offset"})
 
 
-def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
-    """Return the strongest signs of a law in what a fit leaves, the first first, and whether it
-    looks as if there were any.
+def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure], bool]:
+    """Return the strongest signs of structure in the residual of a fit, the strongest first, and
+    whether there seemed to be any.
 
-    What looks like a law and is not confirmed by the innovations may be the flight loop's answer to
-    gusts.
+    Structure that the innovations do not confirm may be a feedback-induced correlation.
     """
     flights = search.flights
-    regression = search.at(fit)
+    regression = search.gram_at(fit)
     error = regression.error(np.arange(len(regression.columns)))
     unit = max(
         1.0, error / regression.design[..., 0].size
-    )  # of chance, where gusts are not what they are taken to be
+    )  # of chance, where the noise model is wrong
     residual = flights.residual(fit.setting)
     base = flights.columns(fit.setting, regression.columns, 0.1)
-    every = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
+    every = search.deviance_of(flights.residual(fit.without(*fit.effects).setting) - residual)
     words: list[tuple[str, str]] = []
     columns: list[Array] = []
-    named: list[float] = []  # energy of what a column may be an untruth of
-    asked = [dictionary] if flights.commanded else [dictionary, places, drags, swings]
+    named: list[float] = []  # deviance of the effects whose model error a column may be
+    asked = (
+        [general_regressors]
+        if flights.commanded
+        else [general_regressors, place_regressors, drag_regressors, resonant_regressors]
+    )
     for channel_words, drive, column in itertools.chain.from_iterable(
         ask(flights, fit.setting) for ask in asked
     ):
-        words.append(("a general dictionary", f"{channel_words} with {drive}"))
+        words.append(("a candidate regressor", f"{channel_words} with {drive}"))
         columns.append(column)
         named.append(every)
-    known = scaled(drives(flights, fit.setting))
-    # what is known from elsewhere was not fitted to these forces
-    shares = {e: _share(flights, fit, e, residual) for e in fit.effects if not search.held(e)}
+    known = standardised(explanatory_variables(flights, fit.setting))
+    # a fixed effect was not fitted to these forces
+    shares = {
+        e: _explained_part(flights, fit, e, residual) for e in fit.effects if not search.is_fixed(e)
+    }
     for effect, share in shares.items():
         for name, x in known.items():
             words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
             columns.append(share * x[:, None])
         rotorwise = any(
             c.name == CENTRAL for c in get(effect).coefficients
-        )  # whose moment is free as it is
+        )  # its moment is free in any case
         for channel in range(3 if rotorwise else 6):
-            words.append(
-                (f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs")
-            )
+            words.append((f"{effect}'s channels do not agree", f"{CHANNELS[channel]} differs"))
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
-        named += [search.whitened_energy(share)] * (len(columns) - len(named))
-    rough = 1.0 if flights.lively else STRUCTURE.rounded_rotor_factor
+        named += [search.deviance_of(share)] * (len(columns) - len(named))
+    rough = 1.0 if flights.rotor_speeds_vary else STRUCTURE.rounded_rotor_factor
     least_of_all = max(
         STRUCTURE.least_deviance_reduction * unit, STRUCTURE.least_share_of_residual * error
     )
@@ -158,49 +168,51 @@ def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
             ):
                 found.append((Structure(*words[i], float(gain) / error), column))
     if not flights.commanded and (group := drag_by_place(flights, fit.setting)):
-        together, column = _together(search, regression, group)
+        together, column = _joint_regression(search, regression, group)
         if together > rough * max(least_of_all, STRUCTURE.least_share_of_named * every):
-            where = "a drag with place and heading together"
-            found.append((Structure("a general dictionary", where, together / error), column))
+            where = "a drag with position and heading together"
+            found.append((Structure("a candidate regressor", where, together / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[: STRUCTURE.most_signs]], bool(found)
-    wandering = [
-        *unsteady(search, shares, regression),
-        *other_powers(search, shares, regression, base),
-        *kinked(search, fit, regression, base),
-        *loose(search, shares, regression, base),
+    block_signs = [
+        *varying_coefficients(search, shares, regression),
+        *drag_exponents(search, shares, regression, base),
+        *bending_thrust(search, fit, regression, base),
+        *loose_mounts(search, shares, regression, base),
     ]
     if not found:
-        signs = wandering or list(overlooked(search, fit))
+        signs = block_signs or list(innovation_hints(search, fit))
         return signs, bool(signs)
     innovations = Innovations(flights, fit.setting)
-    laws = (
+    confirmed = (
         sign
         for sign, column in found[: STRUCTURE.most_confirmations]
-        if innovations.confirm_column(_added(search, regression, base, column))
+        if innovations.confirm_column(_best_multiple(search, regression, base, column))
     )
-    return [*wandering, *itertools.islice(laws, STRUCTURE.most_signs)], True
+    return [*block_signs, *itertools.islice(confirmed, STRUCTURE.most_signs)], True
 
 
-def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> Iterator[Structure]:
-    """Yield a sign for each effect that changes from one block of flight to the next by more than
-    chance has it.
+def varying_coefficients(
+    search: Search, shares: Mapping[str, Array], regression: Gram
+) -> Iterator[Structure]:
+    """Yield a sign for each effect whose coefficient changes from block to block by more than
+    chance.
 
     Args:
         search: that found the effects.
         shares: what each explains (rows, 6).
         regression: on the columns of the fit.
 
-    A law is the same all along; what comes and goes, and has a mean, looks like one. Each block has
-    a multiple of the effect of its own; by how much these scatter is the moment estimate of a
-    random coefficient's variance (T. S. Breusch and A. R. Pagan, Econometrica 47 (1979), 1287-1294,
-    have the test).
+    An effect is the same throughout a flight; a disturbance that comes and goes, and has a mean,
+    looks like one. Each block has its own multiple of the effect; their scatter is the moment
+    estimate of a random coefficient's variance (T. S. Breusch and A. R. Pagan, Econometrica 47
+    (1979), 1287-1294, have the test).
     """
     whole = regression.blocks[:, -1, -1].sum()
     unit = max(1.0, float(whole) / regression.design[..., 0].size)
     for effect, share in shares.items():
-        x = search.whiten(share)[search.flights.fit]
+        x = search.whiten(share)[search.flights.fit_rows]
         slope = np.add.reduceat(np.sum(x * regression.design[..., -1], axis=1), regression.begins)
         size = np.add.reduceat(np.sum(x * x, axis=1), regression.begins)
         beyond = float(np.sum(slope**2) - unit * np.sum(size))
@@ -211,8 +223,7 @@ def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> I
             and scatter > STRUCTURE.least_scatter
         ):
             words = (
-                f"it changes by {scatter:.0%} from one {REGRESSION.block:.0f} s of flight to the "
-                "next"
+                f"it changes by {scatter:.0%} from one {REGRESSION.block:.0f} s block to the next"
             )
             yield Structure(
                 f"{effect}'s coefficient is not constant",
@@ -221,10 +232,10 @@ def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> I
             )
 
 
-def other_powers(
+def drag_exponents(
     search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign for each named drag whose force would rather grow with another power of speed.
+    """Yield a sign for each named drag whose force grows with another power of speed.
 
     Args:
         search: that found the effects.
@@ -232,8 +243,7 @@ def other_powers(
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    A question of its own, in all rows together: a flight at one speed has another one only as it
-    begins.
+    It is asked in all rows together: a flight at one speed has another one only as it begins.
     """
     flights = search.flights
     whole = regression.blocks[:, -1, -1].sum()
@@ -241,9 +251,9 @@ def other_powers(
         speed = np.concatenate(
             [np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})]
         )
-        # what slow flight tells, and what quick flight tells
+        # weighted towards slow flight, and towards fast flight
         asked = (
-            _beside(search, regression, base, shares[effect] * x[:, None])
+            _single_regression(search, regression, base, shares[effect] * x[:, None])
             for x in (np.log(speed.clip(STRUCTURE.least_speed)), speed)
         )
         (exponent, slow), (_, quick) = asked
@@ -259,10 +269,10 @@ def other_powers(
             )
 
 
-def kinked(
-    search: Search, fit: Fit, regression: Gram, base: Mapping[Column, Array]
+def bending_thrust(
+    search: Search, fit: FittedEffects, regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign where rotors would rather deliver less, or more, beyond some thrust.
+    """Yield a sign where rotors deliver less, or more, beyond some thrust.
 
     Args:
         search: that found the effects.
@@ -271,44 +281,44 @@ def kinked(
         base: these columns (rows, 6) each.
 
     A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few
-    blocks for a law, and a thrust_curvature takes it up in good part: a question of its own, in all
-    rows together. Where one is named it is asked, too, whether thrust would rather bend at hover
-    than all along, and nothing needs to be borne out.
+    blocks, and a thrust_curvature explains most of it: it is asked in all rows together. Where a
+    thrust_curvature is named it is also asked whether thrust bends at hover alone; innovations need
+    not confirm that.
     """
     flights, bent = search.flights, "thrust_curvature" in fit.effects
-    if not flights.lively:
+    if not flights.rotor_speeds_vary:
         return
     asked = [
         (
-            f"what rotors deliver beyond {share:.1f} times the thrust of hover",
-            _bent(flights, fit.setting, share, 0.0),
+            f"rotor thrust beyond {share:.1f} times the thrust of hover",
+            _thrust_beyond(flights, fit.setting, share, 0.0),
         )
         for share in STRUCTURE.thrust_bends
     ]
     if bent:
         asked.append(
             (
-                "thrust, which bends at one point rather than all along",
-                _bent(flights, fit.setting, 1.0, -1.0),
+                "thrust that bends at one point",
+                _thrust_beyond(flights, fit.setting, 1.0, -1.0),
             )
         )
-    gains = [_beside(search, regression, base, column)[1] for _, column in asked]
+    gains = [_single_regression(search, regression, base, column)[1] for _, column in asked]
     best = int(np.argmax(gains))
     where, column = asked[best]
     stalls = gains[best] > STRUCTURE.least_reduction_of_stall and Innovations(
         flights, fit.setting
-    ).confirm_column(_added(search, regression, base, column))
+    ).confirm_column(_best_multiple(search, regression, base, column))
     if stalls or (bent and gains[best] > STRUCTURE.least_reduction_of_bend):
         yield Structure(
-            "a general dictionary",
+            "a candidate regressor",
             where,
             gains[best] / max(float(regression.blocks[:, -1, -1].sum()), 1e-30),
         )
 
 
-def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Array:
-    """Return what rotors deliver (rows, 6) beyond so many times their share of the weight, and
-    ``below`` times what below.
+def _thrust_beyond(flights: Flights, setting: Setting, share: float, below: float) -> Array:
+    """Return what rotors deliver (rows, 6) beyond a multiple of their share of the weight, and
+    ``below`` times what they deliver below it.
     """
     vehicle, parts = flights.amended(setting), []
     for piece in flights.pieces(setting):
@@ -326,11 +336,11 @@ def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Arr
     return np.concatenate(parts)
 
 
-def loose(
+def loose_mounts(
     search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign for each named mass, inertia or place of one that is another one for slow motion
-    than for quick motion.
+    """Yield a sign for each named mass, inertia or offset that differs between slow and fast
+    motion.
 
     Args:
         search: that found the effects.
@@ -338,8 +348,8 @@ def loose(
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    What is on a soft mount follows slow motion as if it were bolted on, and quick motion hardly:
-    below its own frequency it is the larger one.
+    A part on a soft mount follows slow motion as if it were bolted on, and fast motion hardly:
+    below its resonance it adds to mass and inertia.
     """
     flights = search.flights
     whole = float(regression.blocks[:, -1, -1].sum())
@@ -349,9 +359,9 @@ def loose(
         slow = np.concatenate(
             [low_pass(piece, CUTOFFS.slow_motion_hz, flights.period) for piece in pieces]
         )
-        more, gain = _beside(search, regression, base, slow)
+        more, gain = _single_regression(search, regression, base, slow)
         if more > 0.0 and gain > max(
-            least, STRUCTURE.least_share_of_loose_mount * search.whitened_energy(shares[effect])
+            least, STRUCTURE.least_share_of_loose_mount * search.deviance_of(shares[effect])
         ):
             yield Structure(
                 f"{effect}'s coefficient is not constant",
@@ -360,33 +370,40 @@ def loose(
             )
 
 
-def overlooked(search: Search, fit: Fit) -> Iterator[Structure]:
-    """Yield a sign for each effect of which the residual shows too little for a name, and the
-    innovations much.
+def innovation_hints(search: Search, fit: FittedEffects) -> Iterator[Structure]:
+    """Yield a sign for each effect that the innovations confirm and of which the residual shows too
+    little for a name.
 
     Args:
         search: that found the effects.
         fit: the effects.
 
     The residual ends at 5 Hz, where an inertia only begins to show; innovations have all
-    frequencies. Beside what was named rightly, or rightly not, on 129 flights no other effect of a
-    tenth of its typical size had more than 41 units there.
+    frequencies. On 129 flights that were diagnosed rightly no other effect of a tenth of its
+    typical size had a log-likelihood ratio above 41 there.
     """
     regression = search.linearise(fit)
     for gain in search.gains(fit, regression, search.gram(fit, regression)):
-        if gain.energy > STRUCTURE.least_residual_hint and gain.size > SEARCH.least_size:
+        if (
+            gain.deviance_reduction > STRUCTURE.least_residual_hint
+            and gain.size > SEARCH.least_size
+        ):
             more = search.refit(gain.fit)
-            if adds(search.flights, fit.setting, more.setting, STRUCTURE.least_innovation_hint):
+            if confirms_addition(
+                search.flights, fit.setting, more.setting, STRUCTURE.least_innovation_hint
+            ):
                 yield Structure(
-                    "innovations show more than the residual", f"of {gain.effect}", gain.share
+                    "the innovations confirm what the residual hardly shows",
+                    gain.effect,
+                    gain.share,
                 )
 
 
-def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
-    """Return what an effect explains (rows, 6) of the residual that is left without it.
+def _explained_part(flights: Flights, fit: FittedEffects, effect: str, residual: Array) -> Array:
+    """Return what an effect explains (rows, 6) of the residual without it.
 
-    What is moved in time differs from what it was by its noise too, which is also in the residual:
-    of such an effect it is what a little more of it would change.
+    Moving signals in time also moves their noise, which is in the residual as well: for such an
+    effect it is the linear change with its coefficients.
     """
     if effect not in LATE_ROTOR_EFFECTS:
         return flights.residual(fit.without(effect).setting) - residual
@@ -397,29 +414,29 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     )
 
 
-def _added(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
+def _best_multiple(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
     """Return what the best multiple of a column (rows, 6) adds to a fit with columns ``base``."""
-    alone = _alone(search, g, base, column)
-    x = search.whiten(alone)[search.flights.fit]
+    alone = _orthogonal_part(search, g, base, column)
+    x = search.whiten(alone)[search.flights.fit_rows]
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
-def _beside(
+def _single_regression(
     search: Search, g: Gram, base: Mapping[Column, Array], column: Array
 ) -> tuple[float, float]:
     """Return the best multiple of a column (rows, 6) beside the columns ``base`` of a fit, and the
-    energy that it explains.
+    deviance that it explains.
     """
-    x = search.whiten(_alone(search, g, base, column))[search.flights.fit]
+    x = search.whiten(_orthogonal_part(search, g, base, column))[search.flights.fit_rows]
     slope, size = float(np.sum(x * g.design[..., -1])), max(float(np.sum(x * x)), 1e-30)
     return slope / size, slope**2 / size
 
 
-def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
-    """Return a column (rows, 6) less what the columns ``base`` of a fit make of it."""
+def _orthogonal_part(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
+    """Return the part of a column (rows, 6) that is orthogonal to the columns ``base`` of a fit."""
     k = len(g.columns)
     cross = np.tensordot(
-        g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1])
+        g.design[..., :k], search.whiten(column)[search.flights.fit_rows], axes=([0, 1], [0, 1])
     )
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
     return column - sum(
@@ -427,14 +444,13 @@ def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array)
     )
 
 
-def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
-    """Return the energy that columns (rows, 6) explain together on blocks left out, and what of
-    them (rows, 6) does it best.
+def _joint_regression(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
+    """Return the deviance that columns (rows, 6) explain together on left-out blocks, and their
+    best sum (rows, 6).
 
-    A ridge keeps each small: what many columns make of noise would cost more than what a law is
-    worth.
+    A ridge keeps each small: many columns fitted to noise would cost more than an effect is worth.
     """
-    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit]
+    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit_rows]
     k, n = len(g.columns), len(g.columns) + len(columns)
     design = np.concatenate([g.design[..., :k], x, g.design[..., -1:]], axis=2)
     parts = (part.reshape(-1, n + 1) for part in np.split(design, g.begins[1:]))
@@ -460,10 +476,10 @@ def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float,
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
-    """Return the energy that each of more columns (rows, 6, c) explains alone on blocks left out,
-    and how it spreads.
+    """Return the deviance that each of more columns (rows, 6, c) explains alone on left-out blocks,
+    and its spread over the blocks.
     """
-    x = search.whiten(columns)[search.flights.fit]
+    x = search.whiten(columns)[search.flights.fit_rows]
     k = len(g.columns)
     parts = zip(np.split(x, g.begins[1:]), np.split(g.design, g.begins[1:]), strict=True)
     cross = np.array(
@@ -472,8 +488,8 @@ def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
     own = np.add.reduceat(np.einsum("nic,nic->nc", x, x), g.begins)  # (blocks, c)
     rest = g.blocks.sum(axis=0) - g.blocks
     rest_cross, rest_own = cross.sum(axis=0) - cross, own.sum(axis=0) - own
-    # each column less what the base's columns make of it, and the base's own change, fitted without
-    # the block
+    # each column without its part in the base's columns, and the base's own change, both fitted
+    # without the block
     normal = rest[:, :k, :k] + np.diag(g.precision)
     weights = np.linalg.solve(normal, np.swapaxes(rest_cross[..., :k], 1, 2))  # (blocks, k, c)
     change = np.linalg.solve(normal, rest[:, :k, -1:])  # (blocks, k, 1)

@@ -1,5 +1,5 @@
-"""Where to start with effects whose force is no sum over their coefficients: each start is tried as
-one fixed shape.
+"""Starting points of effects with nonlinear coefficients; each is tried as a column of fixed
+shape.
 """
 
 import itertools
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import EffectSetting
 from ..motion.residual import residual_wrench
 from ..motion.signals import Signals
-from .regression import Flights, typical
+from .regression import Flights, typical_size
 
 Array = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ STARTING = StartingSettings()
 def slung_payload(
     flights: Flights, residual: Array, stated: Mapping[str, float]
 ) -> list[dict[str, float]]:
-    """Return loads of typical mass on cables of several lengths, or of the one that is stated."""
-    mass = typical(("slung_payload", "m"), flights.vehicle)
+    """Return loads of typical mass on cables of several lengths, or of the length that is fixed."""
+    mass = typical_size(("slung_payload", "m"), flights.vehicle)
     lengths = (stated["l"],) if "l" in stated else STARTING.cable_lengths
     return [
         {"m": mass, "l": length, "damping": stated.get("damping", damping)}
@@ -46,10 +46,8 @@ def slung_payload(
     ]
 
 
-def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) -> bool:
-    """Return whether a fitted load hardly swings: it imitates a drag then, and no load in air is
-    damped like that.
-    """
+def overdamped_load(setting: Mapping[str, Mapping[str, float]], gravity: float) -> bool:
+    """Return whether a fitted load is damped more than any load in air: it imitates a drag then."""
     load = setting.get("slung_payload")
     return (
         load is not None
@@ -59,15 +57,17 @@ def barely_swings(setting: Mapping[str, Mapping[str, float]], gravity: float) ->
 
 
 def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return winds along the mean force, and along what of the force goes with a slow wind's part
-    of a drag.
+    """Return winds along the mean force, and along the part of the force that goes like a slow
+    wind's part of a drag.
 
-    That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may be.
+    That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
     """
-    speed = typical(("wind", "wx"), flights.vehicle)
-    drag = typical(("wind", "cd"), flights.vehicle)
-    force = residual[flights.fit, :2]
-    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[flights.fit]
+    speed = typical_size(("wind", "wx"), flights.vehicle)
+    drag = typical_size(("wind", "cd"), flights.vehicle)
+    force = residual[flights.fit_rows, :2]
+    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[
+        flights.fit_rows
+    ]
     v = np.linalg.norm(velocity, axis=1) + STARTING.least_speed
     steady = np.tile(np.eye(2), (len(v), 1))
     with_wind = (
@@ -92,9 +92,7 @@ def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list
 def fan_jet(
     flights: Flights, residual: Array, stated: Mapping[str, float]
 ) -> list[dict[str, float]]:
-    """Return the fans around the flight whose jets' maps of force resemble the
-    residual the most.
-    """
+    """Return the fans around the flight whose force maps resemble the residual most."""
     thin, wanted = [], []
     row = 0
     for piece in flights.pieces({}):
@@ -119,13 +117,15 @@ def fan_jet(
             )
         )
     rows = np.concatenate(wanted)
-    seen = flights.fit[rows]
+    seen = flights.fit_rows[rows]
     target = residual[rows][seen]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
     bare = replace(flights.vehicle, effects=())
     base = [residual_wrench(s, bare) for s in thin]
     centre = np.concatenate([s.position for s in thin]).mean(axis=0)
-    speed, kd, area = (typical(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area"))
+    speed, kd, area = (
+        typical_size(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area")
+    )
     found: list[tuple[float, int, dict[str, float]]] = []
     for heading, distance, across in itertools.product(
         STARTING.fan_headings, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
@@ -157,7 +157,9 @@ def fan_jet(
     return [start for _, _, start in found[: STARTING.most_fan_starts]]
 
 
-STARTS: dict[str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]] = {
+STARTING_POINTS: dict[
+    str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]
+] = {
     "slung_payload": slung_payload,
     "wind": wind,
     "fan_jet": fan_jet,

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .commanded_rotors import takes_back
+from .commanded_rotors import cancels_thrust_scale
 from .gram_matrix import Gram
-from .innovations import Innovations, adds
-from .search import SEARCH, Fit, Gain, Regression, Search, freedom, started
-from .starting_points import STARTS, barely_swings
+from .innovations import Innovations, confirms_addition
+from .search import SEARCH, FittedEffects, Gain, Regression, Search, coefficient_count, with_changes
+from .starting_points import STARTING_POINTS, overdamped_load
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class StepwiseSettings:
 STEPWISE = StepwiseSettings()
 
 
-def find(search: Search) -> tuple[Fit, list[Gain]]:
-    """Return the effects that are needed, and what each of the library explained
-    at first, alone.
+def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
+    """Return the effects that are needed, and what each effect of the library explained alone at
+    first.
     """
-    needed = Fit(search.delay.setting if search.delay else {})
+    needed = FittedEffects(search.delay.setting if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
     for _ in range(STEPWISE.rounds):
@@ -72,7 +72,7 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
         if asked and fit.effects == needed.effects:
             break
         search.report("asking whether every effect is needed")
-        # by the noise as it is known by now
+        # with the noise as estimated by now
         needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
         if (
             search.flights.commanded
@@ -80,28 +80,28 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
             or set(needed.effects) in asked
         ):
             break
-        # one in place of two leaves room, and what was small beside a wrong effect may be plain
-        # beside a right one
+        # one effect in place of two leaves room for more, and an effect that was small beside a
+        # wrong one may be large beside the right one
         asked.append(set(needed.effects))
-    return _borne_out(search, needed), first
+    return _confirmed_effects(search, needed), first
 
 
-def _borne_out(search: Search, fit: Fit) -> Fit:
-    """Return a fit less the effects that innovations do not confirm beside those that are left."""
+def _confirmed_effects(search: Search, fit: FittedEffects) -> FittedEffects:
+    """Return a fit without the effects that the innovations do not confirm beside the others."""
     if search.flights.commanded:
         return fit
     for effect in fit.effects:
-        if not _is_borne_out(search, fit, effect):
-            search.report(f"{effect} is an answer to gusts")
-            return _borne_out(search, search.refit(fit.without(effect)))
+        if not _is_confirmed(search, fit, effect):
+            search.report(f"{effect} is a feedback-induced correlation")
+            return _confirmed_effects(search, search.refit(fit.without(effect)))
     return fit
 
 
-def _is_borne_out(search: Search, fit: Fit, effect: str) -> bool:
+def _is_confirmed(search: Search, fit: FittedEffects, effect: str) -> bool:
     return Innovations(search.flights, fit.without(effect).setting).confirm(fit.setting)
 
 
-def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
+def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Gain]]:
     """Return ``fit`` with the effects that are worth adding one after the other, and what each
     explained at first.
     """
@@ -110,7 +110,7 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
         STEPWISE.commanded_most_effects if search.flights.commanded else STEPWISE.most_effects,
     )
     first: list[Gain] = []
-    for count in range(len([e for e in fit.effects if not search.held(e)]), most + 1):
+    for count in range(len([e for e in fit.effects if not search.is_fixed(e)]), most + 1):
         regression = search.linearise(fit)
         search.set_noise(fit, regression)
         if count == 0:
@@ -118,9 +118,11 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
         g = search.gram(fit, regression)
         gains = search.gains(fit, regression, g)
         first = first or gains
-        least = _least(search, g.error(g.index(search.base(fit.effects))))
+        least = _least(search, g.error(g.index(search.model_columns(fit.effects))))
         better = [
-            x for x in gains if _worth(x, least) and (not commanded or _plausible(search, x, count))
+            x
+            for x in gains
+            if _is_worth_naming(x, least) and (not commanded or _plausible(search, x, count))
         ]
         if not better or count == most:
             break
@@ -128,9 +130,9 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
             if commanded:
-                taken = not barely_swings(more.setting, search.flights.vehicle.gravity)
+                taken = not overdamped_load(more.setting, search.flights.vehicle.gravity)
             else:
-                taken = adds(search.flights, fit.setting, more.setting)
+                taken = confirms_addition(search.flights, fit.setting, more.setting)
             if taken:
                 break
         else:
@@ -140,19 +142,20 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
 
 
 def _plausible(search: Search, gain: Gain, count: int) -> bool:
-    """Return whether an effect may be named of a flight whose thrust is a guess, as the
-    ``count``-th one.
+    """Return whether an effect is plausible as the ``count``-th one of a flight whose thrust is a
+    guess.
     """
-    if takes_back(gain.fit.setting, search.flights.vehicle.weight):
+    if cancels_thrust_scale(gain.fit.setting, search.flights.vehicle.weight):
         return False
     return (gain.size < STEPWISE.commanded_largest_size or count == 0) and (
-        gain.effect not in STARTS or gain.share > STEPWISE.commanded_least_share_of_nonlinear
+        gain.effect not in STARTING_POINTS
+        or gain.share > STEPWISE.commanded_least_share_of_nonlinear
     )
 
 
-def _prune(search: Search, fit: Fit) -> Fit:
-    """Return a fit in which every effect is needed given all others, and none, nor two, would be
-    better replaced.
+def _prune(search: Search, fit: FittedEffects) -> FittedEffects:
+    """Return a fit in which every effect is needed beside the others, and no one or two effects
+    have a better replacement.
     """
     error = search.error(fit)
     failed: dict[frozenset[str], float] = {}
@@ -163,45 +166,43 @@ def _prune(search: Search, fit: Fit) -> Fit:
         fit, error = better
     if search.flights.commanded:
         fit = search.refit(fit)
-        search.weigh_to_measure()
+        search.weight_for_estimation()
     return fit
 
 
 def _best_move(
-    search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]
-) -> tuple[Fit, float] | None:
-    """Return a better fit and its error: with an effect less, one in place of two or one, or two in
-    place of one or of many.
+    search: Search, fit: FittedEffects, error: float, failed: dict[frozenset[str], float]
+) -> tuple[FittedEffects, float] | None:
+    """Return a better fit and its error: without one effect, one in place of two or one, or two in
+    place of one or many.
 
-    ``failed`` keeps which effects no other one could bring down to which error, so that it is tried
-    no second time.
+    ``failed`` keeps the error that no replacement of these effects could reach, so that it is not
+    tried again.
     """
     least = _least(search, error)
     for effect in fit.effects:
-        if not search.held(effect) and search.error_without(fit, effect) < error + least:
+        if not search.is_fixed(effect) and search.error_without(fit, effect) < error + least:
             search.report(f"{effect} is not needed")
             less = search.refit(fit.without(effect))
             return less, search.error(less)
-    if (
-        search.flights.commanded
-    ):  # whose effects are far apart: no two of those that are alike are ever named
+    if search.flights.commanded:  # similar effects are never named together here
         return None
     few = len(fit.effects) <= STEPWISE.most_relinearised
-    if not few:  # what stands for two effects with three or four is left by no small step
+    if not few:  # no small step leads from three or four effects to the right two
         less, spared = (
             fit.without(*fit.effects),
-            SEARCH.deviance_per_coefficient * sum(map(freedom, fit.effects)),
+            SEARCH.deviance_per_coefficient * sum(map(coefficient_count, fit.effects)),
         )
         regression = search.linearise(less)
         g, bar = search.gram(less, regression), error - STEPWISE.swap_reduction + spared
-        couple = _couple(search, less, regression, g, search.library, bar)
-        if better := _swapped(search, couple, fit, fit.effects):
+        couple = _pair_swap(search, less, regression, g, search.library, bar)
+        if better := _first_better(search, couple, fit, fit.effects):
             return better
     for size, allowed in ((2, least), (1, -STEPWISE.swap_reduction)):
         for group in itertools.combinations(fit.effects, size):
             less, spared = (
                 fit.without(*group),
-                SEARCH.deviance_per_coefficient * sum(map(freedom, group)),
+                SEARCH.deviance_per_coefficient * sum(map(coefficient_count, group)),
             )
             rest, bar = frozenset(less.effects), error + allowed + spared
             if bar <= failed.get(rest, -np.inf):
@@ -210,99 +211,110 @@ def _best_move(
             regression = search.linearise(less, None if few else fit)
             g = search.gram(less, regression)
             rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
-            if better := _swapped(search, _singles(rivals, error, allowed, bar), fit, group):
+            if better := _first_better(
+                search, _single_swaps(rivals, error, allowed, bar), fit, group
+            ):
                 return better
             if few and size == 1:
                 others = [
                     e for e in search.library if e not in group
-                ]  # one that only joins has been asked already
-                couple = _couple(search, less, regression, g, others, error - least + spared)
-                if better := _swapped(search, couple, fit, group):
+                ]  # adding one effect has been tried already
+                couple = _pair_swap(search, less, regression, g, others, error - least + spared)
+                if better := _first_better(search, couple, fit, group):
                     return better
     return None
 
 
 @dataclass(frozen=True, eq=False)
 class Swap:
-    """What may come in place of effects that are taken away."""
+    """Effects that may replace others."""
 
     effects: tuple[str, ...]
-    fit: Fit  # with them, before it is refitted
-    limit: float  # whitened energy that it must come below
+    fit: FittedEffects  # with them, before it is refitted
+    limit: float  # of its deviance
 
 
-def _swapped(
-    search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]
-) -> tuple[Fit, float] | None:
-    """Return the first of the swaps for a group of a fit's effects that keeps what it promises,
+def _first_better(
+    search: Search, swaps: Iterable[Swap], old: FittedEffects, group: Sequence[str]
+) -> tuple[FittedEffects, float] | None:
+    """Return the first swap for a group of a fit's effects that stays below its limit when
     refitted, and its error.
 
-    What it gains by less noise of the sensors does not count.
+    A gain from less sensor noise does not count.
     """
     quiet = search.noise_explained(old)
     for swap in swaps:
         fit = search.refit(swap.fit, swap.limit)
         limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
-        better = search.energy(fit.setting) < limit and (error := search.error(fit)) < limit
+        better = search.deviance(fit.setting) < limit and (error := search.error(fit)) < limit
         if better and (
-            len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)
+            len(swap.effects) == 1 or all(_is_confirmed(search, fit, e) for e in swap.effects)
         ):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error
     return None
 
 
-def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -> Iterator[Swap]:
-    """Yield the rivals that may do better than ``bar``, less what their coefficients cost."""
+def _single_swaps(
+    rivals: Sequence[Gain], error: float, allowed: float, bar: float
+) -> Iterator[Swap]:
+    """Yield the single effects that may do better than ``bar`` minus the cost of their
+    coefficients.
+    """
     for rival in rivals[: STEPWISE.most_replacements]:
-        # what is far from linear may do better than it looks here, but not by any amount
-        near = rival.left <= error + allowed + STEPWISE.most_refit_gain * (
-            rival.left + rival.energy - error
+        # a nonlinear effect may do better than its linearisation, within limits
+        near = rival.deviance_left <= error + allowed + STEPWISE.most_refit_gain * (
+            rival.deviance_left + rival.deviance_reduction - error
         )
         if near and rival.size > _least_size(rival.effect):
             yield Swap(
                 (rival.effect,),
                 rival.fit,
-                bar - SEARCH.deviance_per_coefficient * freedom(rival.effect),
+                bar - SEARCH.deviance_per_coefficient * coefficient_count(rival.effect),
             )
 
 
-def _couple(
-    search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float
+def _pair_swap(
+    search: Search,
+    fit: FittedEffects,
+    regression: Regression,
+    g: Gram,
+    library: Sequence[str],
+    bar: float,
 ) -> Iterator[Swap]:
-    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than
-    ``bar``, less what they cost.
+    """Yield the best pair of effects of ``library`` beyond a fit, if it is better than ``bar``
+    minus the cost of its coefficients.
 
-    What takes two to replace it is passed on the way to neither of them. Two together are nearly
+    The search does not reach a pair through either effect alone. Two effects together are nearly
     linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
     for both in itertools.combinations(
-        [e for e in library if e not in search.begun and e not in fit.effects], 2
+        [e for e in library if e not in search.nonlinear_effects and e not in fit.effects], 2
     ):
-        wanted = search.base(fit.effects, both)
+        wanted = search.model_columns(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
-        cost = SEARCH.deviance_per_coefficient * sum(map(freedom, both))
+        cost = SEARCH.deviance_per_coefficient * sum(map(coefficient_count, both))
         if (left := g.error(g.index(wanted)) + cost) >= least:
             continue
         change = g.solve(total, g.index(wanted))
         if not any(
-            search.drowned(g, total, wanted, change, e)
+            search.not_identifiable(g, total, wanted, change, e)
             or search.size(wanted, change, e) <= _least_size(e)
             for e in both
         ):
             least, best = (
                 left,
-                Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost),
+                Swap(both, with_changes(search.flights, fit, wanted, change, *both), bar - cost),
             )
     if best:
         yield best
 
 
 def _least(search: Search, error: float) -> float:
-    """Return the energy that an effect must explain of flights of which so much is left
-    unexplained.
+    """Return the deviance that an effect must explain of flights with such an unexplained
+    deviance.
     """
     gain, share = (
         (STEPWISE.commanded_least_deviance_reduction, STEPWISE.commanded_least_share_of_deviance)
@@ -317,9 +329,9 @@ def _least_size(effect: str) -> float:
     return STEPWISE.least_sizes.get(effect, SEARCH.least_size)
 
 
-def _worth(gain: Gain, least: float) -> bool:
+def _is_worth_naming(gain: Gain, least: float) -> bool:
     """Return whether an effect explains enough, and is large enough, to be named."""
     size = _least_size(gain.effect)
-    return gain.energy > least and gain.size > (
-        size if gain.energy < STEPWISE.large_reduction_ratio * least else 0.5 * size
+    return gain.deviance_reduction > least and gain.size > (
+        size if gain.deviance_reduction < STEPWISE.large_reduction_ratio * least else 0.5 * size
     )

@@ -1,9 +1,9 @@
-"""Pushes: what a model leaves now and then, for a fraction of a second or a few, and not in
-between.
+"""Transient disturbances: forces and torques that a model leaves for a fraction of a second or a
+few, and not in between.
 
-Gusts, taken for noise of one strength, hide a push that comes seldom: spread over a minute it is
-weak. But noise of one strength, however quick, has peaks of some four standard deviations in a
-minute, and a push has more, of the median's.
+A disturbance model of one strength hides a seldom transient: spread over a minute it is weak. But
+noise of one strength, however fast, has peaks of about four standard deviations in a minute, and a
+transient disturbance has more, in terms of the median.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..findings import CHANNELS, Push
+from ..findings import CHANNELS, TransientDisturbance
 from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
@@ -32,9 +32,9 @@ class TransientSettings:
 TRANSIENT = TransientSettings()
 
 
-def pushes(flights: Flights, setting: Setting) -> list[Push]:
-    """Return the largest push of each channel in which a model with these effects leaves any, the
-    plainest first.
+def transient_disturbances(flights: Flights, setting: Setting) -> list[TransientDisturbance]:
+    """Return the largest transient disturbance of each channel in the residual of a model with
+    these effects, the most significant first.
     """
     residual, starts = flights.residual(setting), np.flatnonzero(flights.start)[1:]
     edge = round(TRANSIENT.margin / flights.period)
@@ -45,7 +45,7 @@ def pushes(flights: Flights, setting: Setting) -> list[Push]:
         return []
     weight = flights.vehicle.weight
     least = TRANSIENT.least_size * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
-    found: dict[str, tuple[float, Push]] = {}
+    found: dict[str, tuple[float, TransientDisturbance]] = {}
     for cutoff in CUTOFFS.transient_hz:
         slow = np.concatenate(
             [low_pass(x, cutoff, flights.period) for x in np.split(residual, starts)]
@@ -63,6 +63,8 @@ def pushes(flights: Flights, setting: Setting) -> list[Push]:
             ):
                 found[channel] = (
                     above,
-                    Push(channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak),
+                    TransientDisturbance(
+                        channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak
+                    ),
                 )
     return [push for _, push in sorted(found.values(), key=lambda x: -x[0])]

@@ -1,9 +1,9 @@
-"""A filter that makes the noise of a residual white, so that least squares weigh it as it deserves.
+"""A filter that makes the noise of a residual white, so that least squares weight it rightly.
 
-The noise has two parts: what the sensors leave, known from the log itself, and gusts, of which only
-the strength is not known: their spectrum is flat up to a corner and falls beyond it. Whatever else
-is in a remainder is no noise but something that no effect explains, and must not be taken for
-noise: a filter free to follow the remainder would hide it.
+The noise has two parts: that of the sensors, known from the log itself, and disturbances, of which
+only the strength is unknown: their spectrum is flat up to a corner and falls beyond it. What else
+is in a residual is no noise but an effect that the model lacks: a filter free to follow the
+residual would hide it.
 """
 
 from dataclasses import dataclass
@@ -38,19 +38,19 @@ class Whitener:
     """A filter for each channel after which the noise is white with variance one.
 
     Args:
-        remainder: (rows, 6), what no effect explains; its level in the gusts' band gives their
-            strength.
+        residual: (rows, 6), that no effect explains; its level in the disturbances' band gives
+            their strength.
         sensors: (rows, 6), a sample of what sensors alone make.
         start: (rows,) first rows of unbroken pieces.
-        fit: (rows,) the rows of the remainder that may be looked at.
+        fit: (rows,) the rows of the residual that may be looked at.
         period: s, from row to row.
-        free: of flights whose rotors are known from commands alone: take all of the remainder for
+        free: of flights whose rotors are known from commands alone: take all of the residual for
             noise, nowhere less than its mean in this band (Hz).
     """
 
     def __init__(
         self,
-        remainder: Array,
+        residual: Array,
         sensors: Array,
         start: Mask,
         fit: Mask,
@@ -60,11 +60,11 @@ class Whitener:
         # blocks apart in time are pieces apart
         begins = start | np.concatenate([[True], fit[1:] != fit[:-1]])
         self._filters: list[tuple[Array, float]] = []
-        for i in range(remainder.shape[1]):
+        for i in range(residual.shape[1]):
             frequency, own = _spectrum(sensors[:, i], start, period)
             # a mean that nothing explains is no noise: it would make an offset count for little
             _, whole = _spectrum(
-                remainder[fit, i], begins[fit], period, "constant" if free is not None else False
+                residual[fit, i], begins[fit], period, "constant" if free is not None else False
             )
             if free is not None:
                 noise = np.maximum(

@@ -1,5 +1,5 @@
-"""A log as it would be without the sensing effects that its vehicle declares: poses and turn rates
-brought back to truth.
+"""A log as it would be without the sensing effects that its vehicle declares: poses and rotor
+speeds brought back to truth.
 
 Everything in this folder that compares a log's motion with a model takes the corrected log; only
 the filter, which undoes these effects by itself, takes the log as it is.
@@ -30,7 +30,7 @@ SENSING = SensingSettings()
 
 @compiled
 def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
-    """Bring ``samples`` (n, 11), turn rates and pose, back to the truth in place; ``seen`` (n,)
+    """Bring ``samples`` (n, 11), rotor speeds and pose, back to the truth in place; ``seen`` (n,)
     says where a pose is.
     """
     f = models[0]
@@ -47,8 +47,8 @@ def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
 
 
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return the log with the vehicle's declared sensing effects taken out of its poses and turn
-    rates.
+    """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
+    speeds.
 
     It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows
     tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s after a

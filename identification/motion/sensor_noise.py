@@ -22,14 +22,14 @@ class SensorNoise:
 
     position: float  # m
     attitude: float  # rad
-    rate: float  # rad/s, of a turn rate
+    rate: float  # rad/s, of a rotor speed
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     """Return the noise of a log: of its pose what lies above a quarter of the sampling rate, taken
     as white.
 
-    The turn rates' is the step to which they are rounded, as the log shows it (no more than the
+    The rotor speeds' is the step to which they are rounded, as the log shows it (no more than the
     vehicle's file says).
     """
     seen = np.flatnonzero(log.valid)

@@ -1,5 +1,5 @@
-"""What a flight log says about motion, without a filter's delay: velocity, acceleration, body rate
-and its derivative.
+"""What a flight log says about motion, without a filter's delay: velocity, acceleration, angular
+velocity and its derivative.
 
 A zero-phase low-pass (a Butterworth filter run forwards and backwards) smooths the pose before it
 is differentiated, wide enough (15 Hz) to leave a quadrotor's motion alone. Whatever is compared

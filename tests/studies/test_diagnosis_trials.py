@@ -205,19 +205,19 @@ def test_coefficients_are_compared_where_the_truth_is_not_zero():
 
 
 def test_the_rules_count_what_they_say():
-    def typical(effect, *diagnoses):
+    def typical_size(effect, *diagnoses):
         return outcome("typical", {effect: {"x": 1.0}}, *diagnoses)
 
     outcomes = [
-        typical(
+        typical_size(
             "mass", found(name("mass", x=1.01), rollout=0.3), found(name("wind"), without=("mass",))
         ),
-        typical(
+        typical_size(
             "wind",
             found(name("wind", tentative=True, x=1.2)),
             found(remainder="structured", without=("wind",)),
         ),
-        typical(
+        typical_size(
             "latency",
             found(),
             found(name("clock_offset"), without=("latency",)),

@@ -19,8 +19,8 @@ from windwrench.identification.findings import (
     CHANNELS,
     Candidate,
     Diagnosis,
+    Disturbance,
     Errors,
-    Gusts,
     NamedEffect,
     Signature,
     Structure,
@@ -158,7 +158,7 @@ def diagnosis():
             for i in range(2)
         ),
         structure=(),
-        gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)),
+        gusts=(Disturbance("Fx", 0.0153, 0.25), Disturbance("tau_z", 0.0004, 0.11)),
         pushes=(),
         cutoff_hz=CUTOFF,
         declared=VEHICLE,
