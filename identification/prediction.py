@@ -135,7 +135,7 @@ def _squared_errors(
             signals.position,
             signals.rotation,
             signals.velocity,
-            signals.rate,
+            signals.angular_velocity,
         ),
     )
     _fly_along(
@@ -172,8 +172,8 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     Velocity, attitude and angular velocity are the pose's below 1 Hz and the model's above, where
     the pose is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor
     steers above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at
-    200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the pose alone, cut at 5 Hz, it
-    is 1.1 mrad, 19 mrad/s and the flight's own quick motion lost.
+    200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of angular velocity; from the pose alone, cut
+    at 5 Hz, it is 1.1 mrad, 19 mrad/s and the flight's own fast motion lost.
 
     Args:
         signals: n samples.
@@ -182,14 +182,14 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     """
     period = signals.period
     integral = period * np.cumsum(modelled, axis=0)
-    measured = np.column_stack([signals.velocity, signals.rate])
+    measured = np.column_stack([signals.velocity, signals.angular_velocity])
     twist = integral + low_pass(measured - integral, CUTOFFS.twist_hz, period)
-    # the attitude that this rate integrates to drifts slowly off the measured one: low-pass the
-    # difference
+    # the attitude that this angular velocity integrates to drifts slowly off the measured one:
+    # low-pass the difference
     attitude = Rotation.from_matrix(signals.rotation)
     turned = np.empty((len(signals.t), 4))
     turned[0] = attitude[0].as_quat(scalar_first=True)
-    _integrate_rate(np.ascontiguousarray(twist[:, 3:]), period, turned)
+    _integrate_angular_velocity(np.ascontiguousarray(twist[:, 3:]), period, turned)
     path = Rotation.from_quat(turned, scalar_first=True)
     drift = (attitude * path.inv()).as_quat(scalar_first=True)
     drift = low_pass(continuous(drift), CUTOFFS.twist_hz, period)
@@ -203,7 +203,7 @@ def start_states(signals: Signals, modelled: Array) -> Array:
 
 
 @compiled
-def _integrate_rate(rate: Array, period: float, out: Array) -> None:
+def _integrate_angular_velocity(rate: Array, period: float, out: Array) -> None:
     """Write the attitude (n, 4) that turns at a angular velocity (n, 3) into ``out``, from its
     first row on.
     """

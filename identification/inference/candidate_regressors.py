@@ -86,7 +86,7 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
         found += [
             (
                 f"angular velocity {a} (rad/s)",
-                low_pass(s.rate[:, i], CUTOFFS.residual_hz, s.period)[at],
+                low_pass(s.angular_velocity[:, i], CUTOFFS.residual_hz, s.period)[at],
             )
             for i, a in enumerate("xyz")
             if plain[i]

@@ -102,7 +102,7 @@ def downsampled(signals: Signals) -> Signals:
         signals.rotation[at],
         signals.velocity[at],
         signals.acceleration[at],
-        signals.rate[at],
+        signals.angular_velocity[at],
         signals.angular_acceleration[at],
         smooth[at],
         None if signals.voltage is None else signals.voltage[at],

@@ -261,8 +261,8 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             f"{len(names)} effects were needed: together they may stand for one effect outside the "
             "library"
         )
-    shift = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
-    if names and shift < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
+    offset = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
+    if names and offset < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
         found.append(
             "the fitted rotor speeds act earlier than they are logged, by as much as is allowed: "
             "an effect outside the library may be the cause"

@@ -318,7 +318,7 @@ class Innovations:
             pose = np.column_stack(
                 [self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]]
             )
-            begun = np.concatenate([like.signals.velocity[0], like.signals.rate[0]])
+            begun = np.concatenate([like.signals.velocity[0], like.signals.angular_velocity[0]])
             fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
             out.append(
                 np.stack(

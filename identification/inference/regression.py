@@ -555,6 +555,6 @@ def _with_time_offsets(
             signals, velocity=signals.velocity - velocity_offset * signals.acceleration
         )
     if attitude_offset != 0.0:
-        turn = Rotation.from_rotvec(-attitude_offset * signals.rate).as_matrix()
+        turn = Rotation.from_rotvec(-attitude_offset * signals.angular_velocity).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)
     return signals

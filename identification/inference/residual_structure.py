@@ -285,7 +285,7 @@ def bending_thrust(
     thrust_curvature is named it is also asked whether thrust bends at hover alone; innovations need
     not confirm that.
     """
-    flights, bent = search.flights, "thrust_curvature" in fit.effects
+    flights, curved = search.flights, "thrust_curvature" in fit.effects
     if not flights.rotor_speeds_vary:
         return
     asked = [
@@ -295,7 +295,7 @@ def bending_thrust(
         )
         for share in STRUCTURE.thrust_bends
     ]
-    if bent:
+    if curved:
         asked.append(
             (
                 "thrust that bends at one point",
@@ -308,7 +308,7 @@ def bending_thrust(
     stalls = gains[best] > STRUCTURE.least_reduction_of_stall and Innovations(
         flights, fit.setting
     ).confirm_column(_best_multiple(search, regression, base, column))
-    if stalls or (bent and gains[best] > STRUCTURE.least_reduction_of_bend):
+    if stalls or (curved and gains[best] > STRUCTURE.least_reduction_of_bend):
         yield Structure(
             "a candidate regressor",
             where,

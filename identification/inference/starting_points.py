@@ -110,7 +110,7 @@ def fan_jet(
                 s.rotation[at],
                 s.velocity[at],
                 s.acceleration[at],
-                s.rate[at],
+                s.angular_velocity[at],
                 s.angular_acceleration[at],
                 s.rotor_speeds[at],
                 None if s.voltage is None else s.voltage[at],

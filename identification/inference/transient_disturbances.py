@@ -67,4 +67,4 @@ def transient_disturbances(flights: Flights, setting: Setting) -> list[Transient
                         channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak
                     ),
                 )
-    return [push for _, push in sorted(found.values(), key=lambda x: -x[0])]
+    return [transient for _, transient in sorted(found.values(), key=lambda x: -x[0])]

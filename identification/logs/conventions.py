@@ -528,13 +528,13 @@ def _motion(
     columns: list[list[Array]] = [[] for _ in range(6)]
     for s, mask in zip(signals, masks, strict=True):
         thrust = np.square(s.rotor_speeds) @ vehicle.k
-        inverse = -np.einsum("nij,nj->ni", s.rotation, s.rate)
+        inverse = -np.einsum("nij,nj->ni", s.rotation, s.angular_velocity)
         for column, x in zip(
             columns,
             (
                 s.acceleration,
                 s.rotation * thrust[:, None, None],
-                s.rate,
+                s.angular_velocity,
                 s.angular_acceleration,
                 inverse,
                 central_difference(inverse, s.period),

@@ -22,7 +22,7 @@ class SensorNoise:
 
     position: float  # m
     attitude: float  # rad
-    rate: float  # rad/s, of a rotor speed
+    rotor_speed: float  # rad/s
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
@@ -64,7 +64,8 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
         log,
         position=log.position + noise.position * rng.standard_normal((n, 3)),
         quaternion=quaternion,
-        rotor_speeds=log.rotor_speeds + noise.rate * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
+        rotor_speeds=log.rotor_speeds
+        + noise.rotor_speed * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
     )
 
 

@@ -40,7 +40,7 @@ class Signals:
     rotation: Array  # (n, 3, 3) body to world
     velocity: Array  # (n, 3) m/s, world
     acceleration: Array  # (n, 3) m/s2, world
-    rate: Array  # (n, 3) rad/s, body
+    angular_velocity: Array  # (n, 3) rad/s, body
     angular_acceleration: Array  # (n, 3) rad/s2, body
     rotor_speeds: Array  # (n, 4) rad/s, of the interval that ends at the sample
     voltage: Array | None  # (n,) V
@@ -85,7 +85,7 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     dq = derivative(q, period)
     w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
-    rate = 2.0 * (w * dv - dw * v - np.cross(v, dv))
+    angular_velocity = 2.0 * (w * dv - dw * v - np.cross(v, dv))
     position = low_pass(even(log.position), wide_hz, period)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     speeds = np.column_stack([np.interp(t, log.t, column) for column in log.rotor_speeds.T])
@@ -96,8 +96,8 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
         Rotation.from_quat(q, scalar_first=True).as_matrix(),
         derivative(position, period),
         derivative(position, period, 2),
-        rate,
-        derivative(rate, period),
+        angular_velocity,
+        derivative(angular_velocity, period),
         speeds,
         voltage,
     )
