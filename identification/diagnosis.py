@@ -363,7 +363,7 @@ def _advice(
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
             out.append(
-                f"{' or '.join(group)}: these logs cannot tell them apart. To do so, fly: "
+                f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
                 + "; ".join(f"{name}: {get(name).excitation}" for name in group)
             )
     if remainder == "structured":
