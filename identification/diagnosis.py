@@ -1,13 +1,14 @@
 """From flight logs to the effects that their vehicle's model lacks: the whole of a diagnosis.
 
-The residual wrench is regressed on whole effects of the library (``search``), every name is asked
-what else it could be (``equivalence``) and the remainder whether a law is still in it
-(``structure``). Structure and coefficients are chosen on the fit's blocks of flight; the errors
-before and after are those of blocks, or logs, that the fit never saw.
+The residual wrench is regressed on whole effects of the library (``inference.search``), every named
+effect is compared with what else it could be (``inference.equivalence``), and the residual is
+searched for further structure (``inference.residual_structure``). Effects and coefficients are
+chosen on the fitted blocks of flight; the errors before and after are those of blocks, or logs,
+that the fit never saw.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,44 +20,63 @@ from .findings import (
     CHANNELS,
     Candidate,
     Diagnosis,
+    Disturbance,
     Errors,
-    Gusts,
     NamedEffect,
     Signature,
     Structure,
     Trace,
 )
-from .inference.candidate_regressors import drives
-from .inference.coefficient_range import beyond_belief
-from .inference.commanded_rotors import shared
-from .inference.equivalence import composites, equivalents, overshadowed, unlisted
-from .inference.innovations import Innovations, at_odds
-from .inference.likelihood_refit import lag_or_delay, lateness, measured, others_late, with_lag
-from .inference.regression import CENTRAL, CUTOFF_HZ, SHIFT, Flights, coefficient, typical
-from .inference.residual_structure import structure
-from .inference.search import Fit, Gain, Search
-from .inference.stepwise_search import find
-from .inference.transient_disturbances import pushes
-from .inference.turning_delay import COEFFICIENT
+from .inference.candidate_regressors import explanatory_variables
+from .inference.coefficient_range import implausible_coefficients
+from .inference.commanded_rotors import without_deviations
+from .inference.equivalence import (
+    composite_doubts,
+    equivalents,
+    unidentifiable_rivals,
+    unlisted_equivalent_doubts,
+)
+from .inference.innovations import Innovations, contradicted_by_innovations
+from .inference.likelihood_refit import (
+    delay_alternatives,
+    delay_doubts,
+    delay_kind,
+    refitted_by_likelihood,
+    with_lag,
+)
+from .inference.regression import CENTRAL, ROTOR_TIME_OFFSET, Flights, coefficient, typical_size
+from .inference.residual_structure import find_structure
+from .inference.search import FittedEffects, Gain, Search
+from .inference.stepwise_search import find_effects
+from .inference.transient_disturbances import transient_disturbances
+from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
+from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
 
 Array = NDArray[np.float64]
 
-AT_THE_FLOOR = 1.2  # a residual of up to this many times what sensors leave has nothing in it
-CALM = (
-    0.006,
-    0.0015,
-)  # nor have gusts of up to this share of the weight, and of the weight times the arm, below
-CALM_HZ = (
-    2.0  # quicker ones are noise in part: of the pose, of the step to which turn rates are rounded
-)
-LEAST_SECONDS_EACH = 3.0  # of flight, where several logs are given together
-# share of the remainder's energy: a name that explains less beside a large remainder is tentative
-_FAINT = 0.1
-_POINTS = 600  # of a signature
-_LEAST_SHIFT = 0.001  # s, of the turn rates, worth a note
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """What the verdict of a diagnosis goes by."""
+
+    # times the noise floor; a residual up to that is the sensors' noise
+    most_floor_ratio: float = 1.2
+    # shares of the weight, and of the weight times the arm: a weaker disturbance, below the cut-off
+    # ``CUTOFFS.calm_hz``, is none
+    calm_force: float = 0.006
+    calm_torque: float = 0.0015
+    least_seconds_each: float = 3.0  # of flight, where several logs are given together
+    # share of the residual's deviance; a name that explains less beside a large residual is
+    # tentative
+    least_share_of_residual: float = 0.1
+    most_signature_points: int = 600
+    least_rotor_time_offset: float = 0.001  # s, worth a note
+
+
+DIAGNOSIS = DiagnosisSettings()
 
 
 def diagnose(
@@ -87,66 +107,76 @@ def diagnose(
         raise InputError("diagnose: no log was given; expected at least one")
     report("looking at the logs")
     every = (*logs, *test)
-    least = LEAST_SECONDS if len(every) == 1 and not every[0].commanded else LEAST_SECONDS_EACH
+    least = (
+        LEAST_SECONDS
+        if len(every) == 1 and not every[0].commanded
+        else DIAGNOSIS.least_seconds_each
+    )
     doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     search = Search(flights, [n for n in names() if n not in without], report)
-    fit, first = find(search)
-    follow = lateness(search, fit)
-    if follow == "as behind a lag":
+    fit, first = find_effects(search)
+    rotor_delay = delay_kind(search, fit)
+    if rotor_delay == "lag":
         fit = with_lag(search, fit)
     report("asking what else it could be")
     classes = {
-        e: (*equivalents(search, fit, e), *overshadowed(search, fit, e)) for e in fit.effects
+        e: (*equivalents(search, fit, e), *unidentifiable_rivals(search, fit, e))
+        for e in fit.effects
     }
     classes |= {
         e: tuple(dict.fromkeys([*classes[e], *more]))
-        for e, more in others_late(search, fit, follow).items()
+        for e, more in delay_alternatives(search, fit, rotor_delay).items()
     }
-    report("looking for what is left")
-    signs, gusty = structure(search, fit)
-    fit = measured(search, fit)
-    mimics = [*composites(flights, fit), *unlisted(search, fit)]
+    report("looking for structure in the residual")
+    signs, unconfirmed = find_structure(search, fit)
+    fit = refitted_by_likelihood(search, fit)
+    name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
     if not flights.commanded:
-        mimics += [
-            *beyond_belief(search, fit),
-            *at_odds(flights, fit.setting),
-            *lag_or_delay(search, fit, follow),
+        name_doubts += [
+            *implausible_coefficients(search, fit),
+            *contradicted_by_innovations(flights, fit.setting),
+            *delay_doubts(search, fit, rotor_delay),
         ]
 
     before, after = (
         flights.residual({}),
-        flights.residual(shared(fit.setting)),
-    )  # no flight's own scale or lean
-    held = ~flights.fit
+        flights.residual(without_deviations(fit.setting)),
+    )  # no flight's own thrust scale or tilt
+    held_out = ~flights.fit_rows
     floor = _rms(flights.sensor_noise)
-    error_before, error_after = _rms(before[held]), _rms(after[held])
-    noisy = error_after[0] > AT_THE_FLOOR * floor[0] or error_after[1] > AT_THE_FLOOR * floor[1]
-    gusts = (
+    error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
+    noisy = (
+        error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
+        or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
+    )
+    disturbances = (
         ()
         if flights.commanded
         else tuple(
-            Gusts(channel, *found)
+            Disturbance(channel, *found)
             for channel, found in zip(
-                CHANNELS, Innovations(flights, fit.setting).gusts(), strict=True
+                CHANNELS, Innovations(flights, fit.setting).disturbances(), strict=True
             )
         )
     )
-    calm = vehicle.weight * np.repeat([CALM[0], CALM[1] * vehicle.arm_l], 3)
-    pushed = () if flights.commanded else tuple(pushes(flights, fit.setting))
-    windy = bool(pushed) or any(
-        found.below(CALM_HZ) > most for found, most in zip(gusts, calm, strict=False)
+    calm = vehicle.weight * np.repeat(
+        [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
     )
-    remainder = "structured" if signs else "random" if noisy or gusty or windy else "none"
-    large = noisy if flights.commanded else windy
+    transients = () if flights.commanded else tuple(transient_disturbances(flights, fit.setting))
+    disturbed = bool(transients) or any(
+        found.below(CUTOFFS.calm_hz) > most for found, most in zip(disturbances, calm, strict=False)
+    )
+    remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
+    large = noisy if flights.commanded else disturbed
     effects = tuple(
-        _named(search, fit, effect, classes[effect], bool(signs or mimics), large)
+        _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
     )
     if not flights.commanded and any(
         effect.tentative for effect in effects
-    ):  # what one name has too much, another one lacks
+    ):  # what one effect explains too much, another one explains too little
         effects = tuple(replace(effect, tentative=True) for effect in effects)
     sure = remainder == "none" and not any(effect.tentative for effect in effects)
     verdict = (
@@ -154,18 +184,18 @@ def diagnose(
         if effects
         else ("nothing to explain" if remainder == "none" else "unexplained")
     )
-    notes += mimics
+    notes += name_doubts
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
-    nuisances = fit.setting.get(SHIFT[0], {})
-    shift = nuisances.get(SHIFT[1], 0.0)
-    if abs(shift) > _LEAST_SHIFT and Innovations(
-        flights, {**fit.setting, SHIFT[0]: {**nuisances, SHIFT[1]: 0.0}}
+    time_offsets = fit.setting.get(ROTOR_TIME_OFFSET[0], {})
+    offset = time_offsets.get(ROTOR_TIME_OFFSET[1], 0.0)
+    if abs(offset) > DIAGNOSIS.least_rotor_time_offset and Innovations(
+        flights, {**fit.setting, ROTOR_TIME_OFFSET[0]: {**time_offsets, ROTOR_TIME_OFFSET[1]: 0.0}}
     ).confirm(fit.setting):
         notes.append(
-            f"the turn rates act {1000 * shift:.1f} ms {'later' if shift > 0 else 'earlier'} than "
-            f"at their sample"
+            f"the rotor speeds act {abs(1000 * offset):.1f} ms "
+            f"{'later' if offset > 0 else 'earlier'} than they are logged"
         )
     return Diagnosis(
         verdict=verdict,
@@ -176,15 +206,15 @@ def diagnose(
         after=_errors(flights, amended, segments, error_after),
         floor_force_rms=floor[0],
         floor_torque_rms=floor[1],
-        advice=tuple(_advice(effects, sorted(flights.drowned), remainder)),
+        advice=tuple(_advice(effects, sorted(flights.not_identifiable), remainder)),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
         traces=tuple(_traces(flights, before, after)),
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
         structure=tuple(signs),
-        gusts=gusts,
-        pushes=pushed,
-        cutoff_hz=CUTOFF_HZ,
+        gusts=disturbances,
+        pushes=transients,
+        cutoff_hz=CUTOFFS.residual_hz,
         declared=vehicle,
         amended=amended,
         logs=tuple(log.name for log in logs),
@@ -201,21 +231,26 @@ def _rms(wrench: Array) -> tuple[float, float]:
 
 
 def _named(
-    search: Search, fit: Fit, effect: str, others: tuple[str, ...], structured: bool, noisy: bool
+    search: Search,
+    fit: FittedEffects,
+    effect: str,
+    others: tuple[str, ...],
+    structured: bool,
+    noisy: bool,
 ) -> NamedEffect:
     error = search.error(fit)
     gain = search.error_without(fit, effect) - error
     std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
-    if search.delay is not None and search.held(effect):
-        gain, std = search.delay.evidence, {COEFFICIENT: search.delay.std}
-    # that a law acts at the rotors, as it is written, is nothing to report
+    if search.delay is not None and search.is_fixed(effect):
+        gain, std = search.delay.log_likelihood_ratio, {LATENCY_COEFFICIENT: search.delay.std}
+    # that an effect acts at the rotors, as it is written, is nothing to report
     values = {
         k: v
         for k, v in fit.setting[effect].items()
         if k != CENTRAL or v > 3.0 * fit.std.get((effect, k), np.inf)
     }
     sizes = [
-        abs(v) / typical((effect, k), search.flights.vehicle)
+        abs(v) / typical_size((effect, k), search.flights.vehicle)
         for k, v in values.items()
         if k != CENTRAL
     ]
@@ -224,7 +259,7 @@ def _named(
         coefficients=values,
         std={k: std[k] for k in values},
         units={k: coefficient((effect, k)).unit for k in values},
-        tentative=structured or (noisy and gain < _FAINT * error),
+        tentative=structured or (noisy and gain < DIAGNOSIS.least_share_of_residual * error),
         indistinguishable_from=others,
         evidence={
             "energy_explained": gain / (gain + error),
@@ -236,12 +271,12 @@ def _named(
 
 def _segments(flights: Flights) -> list[tuple[int, float, float]]:
     """Return the held-out stretches of flight: log, from, to (s)."""
-    held = ~flights.fit
+    held_out = ~flights.fit_rows
     begins = np.flatnonzero(
-        held
+        held_out
         & (
             flights.start
-            | np.concatenate([[True], flights.fit[:-1]])
+            | np.concatenate([[True], flights.fit_rows[:-1]])
             | (np.diff(flights.block, prepend=-1) != 0)
         )
     )
@@ -279,7 +314,7 @@ def _mean(values: Array, weight: Sequence[float]) -> float:
     )
 
 
-def _candidates(first: Sequence[Gain], fit: Fit, search: Search) -> tuple[Candidate, ...]:
+def _candidates(first: Sequence[Gain], fit: FittedEffects, search: Search) -> tuple[Candidate, ...]:
     return tuple(Candidate(x.effect, x.share, x.effect in fit.effects) for x in first)
 
 
@@ -294,13 +329,13 @@ def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
                 flights.t[a:b],
                 before[a:b],
                 after[a:b],
-                ~flights.fit[a:b],
+                ~flights.fit_rows[a:b],
             )
         )
     return out
 
 
-def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signature:
+def _signature(flights: Flights, fit: FittedEffects, effect: str, after: Array) -> Signature:
     """Return the channel in which an effect is largest, against what it follows most closely."""
     share = flights.residual(fit.without(effect).setting) - after
     noise = np.maximum(flights.sensor_noise.std(axis=0), 1e-12)
@@ -310,38 +345,39 @@ def _signature(flights: Flights, fit: Fit, effect: str, after: Array) -> Signatu
         else int(np.argmax(np.abs(share).mean(axis=0) / noise))
     )
     y = share[:, channel]
-    known = drives(flights, fit.setting)
+    known = explanatory_variables(flights, fit.setting)
     name, x = max(
         known, key=lambda d: abs(float(np.corrcoef(d[1], y)[0, 1])) if y.std() > 1e-9 else 0.0
     )
-    thin = slice(None, None, max(1, len(y) // _POINTS))
+    thin = slice(None, None, max(1, len(y) // DIAGNOSIS.most_signature_points))
     return Signature(
         effect, CHANNELS[channel], name, x[thin], (y + after[:, channel])[thin], y[thin]
     )
 
 
-def _advice(effects: Sequence[NamedEffect], drowned: Sequence[str], remainder: str) -> list[str]:
+def _advice(
+    effects: Sequence[NamedEffect], not_identifiable: Sequence[str], remainder: str
+) -> list[str]:
     out = []
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)
             out.append(
-                f"{' or '.join(group)}: these logs cannot tell. To tell them apart: "
+                f"{' or '.join(group)}: these logs cannot tell them apart. To separate them, fly: "
                 + "; ".join(f"{name}: {get(name).excitation}" for name in group)
             )
     if remainder == "structured":
         out.append(
-            "A law is left in the remainder that no effect of the library fits: the names are "
-            "tentative. Fly one thing "
-            "at a time (hover, climbs, level flight at several speeds, turns) to see what the "
-            "remainder follows."
+            "The residual still has structure that no effect of the library explains, so the "
+            "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
+            "several speeds, turns) to see what the residual follows."
         )
-    if drowned:
+    if not_identifiable:
         out.append(
-            "These flights could not show: "
-            + ", ".join(drowned)
-            + ". To look for one of them, fly: "
-            + "; ".join(f"{name}: {get(name).excitation}" for name in drowned[:4])
+            "Not identifiable from these flights: "
+            + ", ".join(not_identifiable)
+            + ". To identify one of them, fly: "
+            + "; ".join(f"{name}: {get(name).excitation}" for name in not_identifiable[:4])
         )
     return out
 

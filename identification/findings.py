@@ -27,7 +27,7 @@ class NamedEffect:
     coefficients: Mapping[str, float]
     std: Mapping[str, float]  # standard deviation of each coefficient
     units: Mapping[str, str]
-    tentative: bool  # something has the name that may be another's: see ``Diagnosis.structure``
+    tentative: bool  # it may stand for another effect: see ``Diagnosis.structure``
     indistinguishable_from: tuple[str, ...]  # effects that would explain these logs as well
     evidence: Mapping[
         str, float
@@ -49,8 +49,7 @@ class Candidate:
     """An effect that was tried first, alone, against the bare model."""
 
     name: str
-    # share of the residual's whitened energy on blocks left out in turn that it explains; may be
-    # negative
+    # share of the residual's deviance that it explains on left-out blocks; may be negative
     gain: float
     named: bool
 
@@ -69,7 +68,9 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Residual against what drives a named effect (n points), with the effect's own share of it."""
+    """Residual against the variable that a named effect follows (n points), with the effect's own
+    part.
+    """
 
     effect: str
     channel: str  # one of CHANNELS
@@ -81,22 +82,20 @@ class Signature:
 
 @dataclass(frozen=True)
 class Structure:
-    """One sign that the remainder after all named effects still has a law in it."""
+    """One sign that the residual after all named effects still has structure."""
 
     test: str  # what was tried, in words
     where: str  # channel and regressor, in words
-    gain: float  # share of the remainder's whitened energy that it explains on blocks left out
+    gain: float  # share of the residual's deviance that it explains on left-out blocks
 
 
 @dataclass(frozen=True)
-class Gusts:
-    """What a model leaves of one channel, taken for gusts: an Ornstein-Uhlenbeck process, by
-    maximum likelihood.
-    """
+class Disturbance:
+    """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood."""
 
     channel: str  # one of CHANNELS
     rms: float  # N, or Nm
-    time: float  # s, in which they decay to 1/e
+    time: float  # s, correlation time
 
     def below(self, frequency: float) -> float:
         """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
@@ -106,8 +105,8 @@ class Gusts:
 
 
 @dataclass(frozen=True)
-class Push:
-    """The largest of what a model leaves of one channel now and then, and not in between."""
+class TransientDisturbance:
+    """The largest transient disturbance of one channel."""
 
     channel: str  # one of CHANNELS
     log: str
@@ -117,7 +116,11 @@ class Push:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What logs of one vehicle say about its model."""
+    """What logs of one vehicle say about its model.
+
+    ``remainder``, ``gusts`` and ``pushes`` are named as in ``report.json``: the kind of the
+    residual, the disturbances and the transient disturbances.
+    """
 
     verdict: str  # explained, partly explained, unexplained, nothing to explain
     remainder: str  # none, random, structured
@@ -135,10 +138,12 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     signatures: tuple[Signature, ...]
     structure: tuple[Structure, ...]  # strongest first
-    gusts: tuple[Gusts, ...]  # of each channel; none where turn rates are worked out from commands
+    gusts: tuple[
+        Disturbance, ...
+    ]  # of each channel; none where rotor speeds are worked out from commands
     pushes: tuple[
-        Push, ...
-        # one a channel at most, the plainest first; none where turn rates are worked out from
+        TransientDisturbance, ...
+        # one a channel at most, the plainest first; none where rotor speeds are worked out from
         # commands
     ]
     cutoff_hz: float

@@ -9,7 +9,7 @@ the motion with.
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,26 +27,34 @@ from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
 from .motion.sensing_effects import undo_log_sensing
-from .motion.signals import Signals, log_signals, low_pass
+from .motion.signals import Signals, log_signals
+from .motion.smoothing import CUTOFFS, continuous, low_pass
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
 
-_ROTOR_STEP = 0.005  # s, longest over which rotors are held
-_MOTION_STEPS = (
-    4  # of the motion in one of those: one alone, at its zero-order hold, adds 5 mm in a second
-)
-_POSITION_HZ = 10.0
-_BLEND_HZ = (
-    1.0  # with the true model, predictions of 46 flights out of 46 came nearer than with 1.5
-)
-_SETTLE = 0.5  # s at an end of unbroken pose, where a low-pass has but one side to go by
-_MOST = 2000  # starts in a piece, spread over it: each keeps a model of 25 kB
-_AHEAD = 0.1  # s, the same for the position that a prediction is compared with
 
-_LOST = 2.0  # s without a pose, after which the filter starts anew, as in ``estimate_log``
-_SLACK = 0.1  # of a period: a step so little too long is still one step
-_OFF = 1e-6  # of its usual standard deviation: a wrench state that cannot move
+@dataclass(frozen=True)
+class PredictionSettings:
+    """How a model is flown from a logged state, and how the filter without a wrench is set up."""
+
+    longest_rotor_step: float = 0.005  # s, over which rotors are held
+    # of the motion in one of those: one step alone, at its zero-order hold, adds 5 mm in a second
+    motion_steps: int = 4
+    # s at an end of unbroken pose, where a low-pass has but one side to go by
+    start_margin: float = 0.5
+    end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
+    most_starts: int = 2000  # in a piece, spread over it: each keeps a model of 25 kB
+    longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
+    step_tolerance: float = 0.1  # of a period: a step so little too long is still one step
+    # of its usual standard deviation: a wrench state that cannot move
+    frozen_wrench_factor: float = 1e-6
+
+
+PREDICTION = PredictionSettings()
+# compiled code takes plain numbers
+_MOTION_STEPS, _STEP_TOLERANCE = PREDICTION.motion_steps, PREDICTION.step_tolerance
+
 
 _MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8", (3, 3))])
 
@@ -57,13 +65,13 @@ def rollout_error(
     """Return the RMS distance (m) between flight and model after ``horizon`` s of open-loop
     prediction.
 
-    Every ``every`` s the model starts from the flight's position, velocity, attitude and body rate,
-    and from then on is given the logged turn rates and voltage alone; a turn rate holds over the
-    interval that ends at its sample. Rotors and effects start with the memory that the flight
-    before gave them. Declared sensing effects are taken out of the log.
+    Every ``every`` s the model starts from the flight's position, velocity, attitude and angular
+    velocity, and from then on is given the logged rotor speeds and voltage alone; a rotor speed
+    holds over the interval that ends at its sample. Rotors and effects start with the memory that
+    the flight before gave them. Declared sensing effects are taken out of the log.
 
-    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of body
-    rate is 16 mm. See ``start_states``.
+    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
+    velocity is 16 mm. See ``start_states``.
 
     Args:
         log: the flight.
@@ -109,9 +117,9 @@ def _squared_errors(
     starts = starts[starts + ahead < len(signals.t)]
     if not starts.size:
         return np.empty(0)
-    starts = starts[:: math.ceil(len(starts) / _MOST)]
-    held = max(1, math.ceil(period / _ROTOR_STEP - _SLACK))
-    dt = period / held
+    starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
+    substeps = max(1, math.ceil(period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
+    dt = period / substeps
     voltage = np.zeros(len(signals.t)) if signals.voltage is None else signals.voltage
     # one model that flies along, and a copy of it for every start
     models = np.zeros(1 + len(starts), dtype=_MODEL)
@@ -127,15 +135,15 @@ def _squared_errors(
             signals.position,
             signals.rotation,
             signals.velocity,
-            signals.rate,
+            signals.angular_velocity,
         ),
     )
     _fly_along(
-        models, starts, dt, held, speeds, voltage, position, rotation, velocity, rate, modelled
+        models, starts, dt, substeps, speeds, voltage, position, rotation, velocity, rate, modelled
     )
     states = start_states(signals, modelled)
     ends = states[starts]
-    _roll_out(models, starts, dt, held, ahead, speeds, voltage, ends)
+    _roll_out(models, starts, dt, substeps, ahead, speeds, voltage, ends)
     squares: Array = np.sum(np.square(ends[:, :3] - states[starts + ahead, :3]), axis=1)
     return squares
 
@@ -146,7 +154,10 @@ def _start_samples(
     """Return the samples at which predictions start that lie in a segment and well inside this
     piece.
     """
-    first, last = signals.t[0] + _SETTLE, signals.t[-1] - max(horizon + _AHEAD, _SETTLE)
+    first, last = (
+        signals.t[0] + PREDICTION.start_margin,
+        signals.t[-1] - max(horizon + PREDICTION.end_margin, PREDICTION.start_margin),
+    )
     times = np.concatenate(
         [np.empty(0), *(np.arange(t0, t1 - horizon + 1e-9, every) for t0, t1 in segments)]
     )
@@ -158,11 +169,11 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     """Return the flight's state (n, STATE_SIZE) in the filter's layout, without the wrench and
     without a filter's delay.
 
-    Velocity, attitude and body rate are the pose's below 1 Hz and the model's above, where the pose
-    is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor steers
-    above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at 200 Hz
-    that leaves 0.5 mrad of tilt and 3 mrad/s of rate; from the pose alone, cut at 5 Hz, it is 1.1
-    mrad, 19 mrad/s and the flight's own quick motion lost.
+    Velocity, attitude and angular velocity are the pose's below 1 Hz and the model's above, where
+    the pose is mostly noise: what the two differ by goes through a zero-phase low-pass. A quadrotor
+    steers above 1 Hz, but what its model lacks acts mostly below. At 5 mrad of noise in a pose at
+    200 Hz that leaves 0.5 mrad of tilt and 3 mrad/s of angular velocity; from the pose alone, cut
+    at 5 Hz, it is 1.1 mrad, 19 mrad/s and the flight's own fast motion lost.
 
     Args:
         signals: n samples.
@@ -171,22 +182,19 @@ def start_states(signals: Signals, modelled: Array) -> Array:
     """
     period = signals.period
     integral = period * np.cumsum(modelled, axis=0)
-    measured = np.column_stack([signals.velocity, signals.rate])
-    twist = integral + low_pass(measured - integral, _BLEND_HZ, period)
-    # the attitude that this rate integrates to drifts slowly off the measured one: low-pass the
-    # difference
+    measured = np.column_stack([signals.velocity, signals.angular_velocity])
+    twist = integral + low_pass(measured - integral, CUTOFFS.twist_hz, period)
+    # the attitude that this angular velocity integrates to drifts slowly off the measured one:
+    # low-pass the difference
     attitude = Rotation.from_matrix(signals.rotation)
     turned = np.empty((len(signals.t), 4))
     turned[0] = attitude[0].as_quat(scalar_first=True)
-    _integrate_rate(np.ascontiguousarray(twist[:, 3:]), period, turned)
+    _integrate_angular_velocity(np.ascontiguousarray(twist[:, 3:]), period, turned)
     path = Rotation.from_quat(turned, scalar_first=True)
     drift = (attitude * path.inv()).as_quat(scalar_first=True)
-    # a quaternion and its negative are one attitude: make the sequence continuous before it is
-    # smoothed
-    signs = np.where(np.sum(drift[1:] * drift[:-1], axis=1) < 0.0, -1.0, 1.0)
-    drift = low_pass(drift * np.cumprod(np.concatenate([[1.0], signs]))[:, None], _BLEND_HZ, period)
+    drift = low_pass(continuous(drift), CUTOFFS.twist_hz, period)
     states = np.zeros((len(signals.t), STATE_SIZE))
-    states[:, 0:3] = low_pass(signals.position, _POSITION_HZ, period)
+    states[:, 0:3] = low_pass(signals.position, CUTOFFS.position_hz, period)
     states[:, 3:7] = (Rotation.from_quat(drift, scalar_first=True) * path).as_quat(
         scalar_first=True
     )
@@ -195,9 +203,9 @@ def start_states(signals: Signals, modelled: Array) -> Array:
 
 
 @compiled
-def _integrate_rate(rate: Array, period: float, out: Array) -> None:
-    """Write the attitude (n, 4) that turns at a body rate (n, 3) into ``out``, from its first row
-    on.
+def _integrate_angular_velocity(rate: Array, period: float, out: Array) -> None:
+    """Write the attitude (n, 4) that turns at a angular velocity (n, 3) into ``out``, from its
+    first row on.
     """
     for k in range(1, len(rate)):
         a, b = rate[k - 1], rate[k]
@@ -216,7 +224,7 @@ def _fly_along(
     models: Record,
     starts: np.ndarray,
     dt: float,
-    held: int,
+    substeps: int,
     speeds: Array,
     voltage: Array,
     position: Array,
@@ -234,7 +242,7 @@ def _fly_along(
     for k in range(len(speeds)):
         if k > 0:
             j = k - 1
-            for _ in range(held):
+            for _ in range(substeps):
                 drive(f, speeds[k], dt, voltage[k])
                 apply_effects(f, position[j], rotation[j], velocity[j], rate[j])
                 accelerations(
@@ -249,7 +257,7 @@ def _fly_along(
                 )
                 f.time += dt
                 for i in range(6):
-                    modelled[k, i] += f.acceleration[i] / held
+                    modelled[k, i] += f.acceleration[i] / substeps
         if at < len(starts) and starts[at] == k:
             at += 1
             models[at] = f
@@ -260,7 +268,7 @@ def _roll_out(
     models: Record,
     starts: np.ndarray,
     dt: float,
-    held: int,
+    substeps: int,
     ahead: int,
     speeds: Array,
     voltage: Array,
@@ -274,7 +282,7 @@ def _roll_out(
     for n in range(len(starts)):
         g, x = models[1 + n], states[n]
         for k in range(starts[n] + 1, starts[n] + ahead + 1):
-            for _ in range(held):
+            for _ in range(substeps):
                 drive(g, speeds[k], dt, voltage[k])
                 for _ in range(_MOTION_STEPS):
                     propagate(g, x, fine, after)
@@ -312,11 +320,11 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     tuning = UKFTuning.for_vehicle(vehicle, period)
     tuning = replace(
         tuning,
-        force_walk=_OFF * np.asarray(tuning.force_walk),
-        torque_walk=_OFF * np.asarray(tuning.torque_walk),
+        force_walk=PREDICTION.frozen_wrench_factor * np.asarray(tuning.force_walk),
+        torque_walk=PREDICTION.frozen_wrench_factor * np.asarray(tuning.torque_walk),
     )
     covariance = default_covariance(vehicle, tuning)
-    covariance[12:18, 12:18] *= _OFF**2
+    covariance[12:18, 12:18] *= PREDICTION.frozen_wrench_factor**2
     ukf = WrenchUKF(vehicle, tuning, period=period)
     voltage = np.full(len(log.t), vehicle.voltage_ref) if log.voltage is None else log.voltage
     # another memory layout would be another type, and compiled anew
@@ -325,7 +333,7 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     )
     valid = np.ascontiguousarray(log.valid)
     nis = np.full(len(t), np.nan)
-    for rows in np.split(seen, np.flatnonzero(np.diff(log.t[seen]) > _LOST) + 1):
+    for rows in np.split(seen, np.flatnonzero(np.diff(log.t[seen]) > PREDICTION.longest_gap) + 1):
         piece = slice(int(rows[0]), int(rows[-1]) + 1)
         ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
         ukf.record[0]["time"] = t[rows[0]] - t[0]
@@ -362,7 +370,7 @@ def _filter(
     z = np.zeros(11)
     for k in range(1, len(t)):
         dt = t[k] - t[k - 1]
-        steps = max(1, math.ceil(dt / period - _SLACK))
+        steps = max(1, math.ceil(dt / period - _STEP_TOLERANCE))
         for i in range(4):
             z[i] = 0.5 * (speeds[k - 1, i] + speeds[k, i])
         for _ in range(steps):

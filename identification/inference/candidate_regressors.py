@@ -1,61 +1,78 @@
-"""What a law may depend on, as columns: for the search for a law in what a fit leaves.
+"""Candidate regressors: what a missing effect may depend on, as columns.
 
-Drives are scaled to one standard deviation, a column is one of them in one channel. What hardly
-moves, or is the sensors' noise in part, is left out: the noise is in the residual as well.
+Each explanatory variable is scaled to one standard deviation, and a column is one of them in one
+channel. Variables that hardly vary, or are sensor noise in part, are left out: that noise is in the
+residual as well.
 """
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter
 
 from ..findings import CHANNELS
-from ..motion.signals import low_pass
-from .regression import CUTOFF_HZ, Flights, Setting
+from ..motion.smoothing import CUTOFFS, low_pass
+from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
 
-_MOVES = {
-    "velocity": 0.05,
-    "speed": 0.05,
-    "height": 0.03,
-    "heading": 0.05,
-    "turn rate": 0.05,
-    "position": 0.1,
-    "voltage": 0.05,
-    "tilt": 0.01,
-}  # in the drives' units: what varies by less says nothing, or is the sensors' noise
-# share of the sensors' noise in a turn rate that is too much: it is in the residual's torque as
-# well
-_NOISE = 0.05
-_ROUNDING = 0.02  # the same of a rotor torque: shares of 0.045 look like a law
-_PLACES, _SEEN = (
-    5,
-    0.01,
-)  # along either horizontal axis; the least mean of a bump, for places where the vehicle hardly was
-_SWINGS_HZ, _DAMPING = (
-    np.geomspace(0.4, 1.5, 11),
-    0.08,
-)  # of a load on a cable of 0.1 to 1.5 m, critical; loops answer faster
-_MOUNTS_HZ = np.geomspace(1.0, 4.0, 12)  # of a part on a soft mount; the residual ends at 5
 
-Drive = tuple[str, Array]  # in words, (rows,)
+def _least_variation() -> dict[str, float]:
+    return {
+        "velocity": 0.05,
+        "speed": 0.05,
+        "height": 0.03,
+        "heading": 0.05,
+        "angular velocity": 0.05,
+        "position": 0.1,
+        "voltage": 0.05,
+        "tilt": 0.01,
+    }
 
 
-def drives(flights: Flights, setting: Setting) -> list[Drive]:
-    """Return what a force may depend on, with its unit, at the rows."""
-    parts: list[list[Drive]] = []
+@dataclass(frozen=True, eq=False)
+class RegressorSettings:
+    """Which candidate regressors a flight excites, and the grids of places and frequencies."""
+
+    # standard deviation, in the regressor's unit (m/s, m, rad/s, V; sine of an angle): with less it
+    # says nothing, or is the sensors' noise
+    least_variation: Mapping[str, float] = field(default_factory=_least_variation)
+    # share of sensor noise in an angular velocity: it is in the residual's torque as well
+    most_noise_share: float = 0.05
+    # share of rounding noise in a rotor torque: shares of 0.045 look like an effect
+    most_rounding_share: float = 0.02
+    places_per_axis: int = 5  # along either horizontal axis
+    least_presence: float = 0.01  # mean of a place's bump, below which the vehicle was hardly there
+    # Hz, of a load on a cable of 0.1 to 1.5 m; flight loops answer faster
+    load_frequencies_hz: Array = field(default_factory=lambda: np.geomspace(0.4, 1.5, 11))
+    # Hz, of a part on a soft mount; the residual ends at 5
+    mount_frequencies_hz: Array = field(default_factory=lambda: np.geomspace(1.0, 4.0, 12))
+    damping_ratio: float = 0.08  # of these resonant modes
+
+
+REGRESSORS = RegressorSettings()
+
+
+Variable = tuple[str, Array]  # in words, (rows,)
+
+
+def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
+    """Return the explanatory variables at the rows: what a force may depend on, with its unit."""
+    parts: list[list[Variable]] = []
     vehicle = flights.amended(setting)
-    plain = [_is_plain(flights, i) for i in range(3)]
+    plain = [_is_excited(flights, i) for i in range(3)]
     for piece in flights.pieces(setting):
         s, at = piece.signals, piece.rows
         body = np.einsum("nij,ni->nj", s.rotation[at], s.velocity[at])
         speed = np.linalg.norm(body, axis=1)
         thrust = vehicle.rotor_wrench(s.rotor_speeds)[:, 0]
         heading = np.arctan2(s.rotation[at, 1, 0], s.rotation[at, 0, 0])
-        found: list[Drive] = [(f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")]
+        found: list[Variable] = [
+            (f"body velocity {a} (m/s)", body[:, i]) for i, a in enumerate("xyz")
+        ]
         found += [
             ("speed (m/s)", speed),
             ("squared speed (m2/s2)", speed**2),
@@ -64,10 +81,13 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
             ("cosine of the heading", np.cos(heading)),
             ("time (s)", s.t[at]),
         ]
-        if flights.lively:
-            found.append(("thrust (N)", low_pass(thrust, CUTOFF_HZ, s.period)[at]))
+        if flights.rotor_speeds_vary:
+            found.append(("thrust (N)", low_pass(thrust, CUTOFFS.residual_hz, s.period)[at]))
         found += [
-            (f"turn rate {a} (rad/s)", low_pass(s.rate[:, i], CUTOFF_HZ, s.period)[at])
+            (
+                f"angular velocity {a} (rad/s)",
+                low_pass(s.angular_velocity[:, i], CUTOFFS.residual_hz, s.period)[at],
+            )
             for i, a in enumerate("xyz")
             if plain[i]
         ]
@@ -81,41 +101,44 @@ def drives(flights: Flights, setting: Setting) -> list[Drive]:
     return [
         (name, x)
         for name, x in joined
-        if x.std() > next((least for word, least in _MOVES.items() if word in name), 1e-9)
+        if x.std()
+        > next((least for word, least in REGRESSORS.least_variation.items() if word in name), 1e-9)
     ]
 
 
-def _is_plain(flights: Flights, axis: int) -> bool:
-    """Return whether a turn rate, which is also the column of a rate's damping, is more than the
-    sensors' noise.
+def _is_excited(flights: Flights, axis: int) -> bool:
+    """Return whether an angular velocity is more than the sensors' noise; it is also the column of
+    rate_damping.
     """
     column = "rate_damping", f"d{'xyz'[axis]}"
     noise, whole = (
         x[:, 3 + axis].var()
         for x in (flights.column_noise[column], flights.columns({}, [column])[column])
     )
-    return bool(noise <= _NOISE * whole)
+    return bool(noise <= REGRESSORS.most_noise_share * whole)
 
 
-def scaled(found: list[Drive]) -> dict[str, Array]:
-    """Return drives with mean zero and standard deviation one, by their names without units."""
+def standardised(found: list[Variable]) -> dict[str, Array]:
+    """Return variables with mean zero and standard deviation one, by their names without units."""
     return {name.split(" (")[0]: (x - x.mean()) / x.std() for name, x in found}
 
 
-def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield general columns (rows, 6), with the channel and what drives it in words."""
-    known = scaled(drives(flights, setting))
+def general_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield general columns (rows, 6), with the channel and the variable in words."""
+    known = standardised(explanatory_variables(flights, setting))
     shapes = dict(known)
     for a in "xyz":
         u = known.get(f"body velocity {a}")
-        w = known.get(f"turn rate {a}")
+        w = known.get(f"angular velocity {a}")
         if u is not None:
             shapes[f"body velocity {a}, squared with its sign"] = u * np.abs(u)
         if w is not None:
-            shapes[f"turn rate {a}, squared with its sign"] = w * np.abs(w)
+            shapes[f"angular velocity {a}, squared with its sign"] = w * np.abs(w)
     for a, b in (("x", "y"), ("y", "z"), ("x", "z")):
-        if f"turn rate {a}" in known and f"turn rate {b}" in known:
-            shapes[f"turn rates {a} and {b}"] = known[f"turn rate {a}"] * known[f"turn rate {b}"]
+        if f"angular velocity {a}" in known and f"angular velocity {b}" in known:
+            shapes[f"angular velocities {a} and {b}"] = (
+                known[f"angular velocity {a}"] * known[f"angular velocity {b}"]
+            )
         if f"body velocity {a}" in known and f"body velocity {b}" in known:
             shapes[f"body velocities {a} and {b}"] = (
                 known[f"body velocity {a}"] * known[f"body velocity {b}"]
@@ -125,12 +148,15 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in pieces])
     wrench = flights.rotor_wrench(setting)
     for i, a in enumerate("xyz"):
-        if velocity[:, i].std() > _MOVES["velocity"]:
+        if velocity[:, i].std() > REGRESSORS.least_variation["velocity"]:
             shapes[f"world velocity {a}"] = velocity[:, i]
-        if flights.lively and flights.rotor_noise[1 + i] < _ROUNDING:
+        if (
+            flights.rotor_speeds_vary
+            and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share
+        ):
             shapes[f"rotor torque {a}"] = wrench[:, 1 + i]
     for i, a in enumerate("xy"):
-        if rotation[:, 2, i].std() > _MOVES["tilt"]:
+        if rotation[:, 2, i].std() > REGRESSORS.least_variation["tilt"]:
             shapes[f"tilt {a}"] = rotation[:, 2, i]
     limits = {"time": flights.t}
     if "height" in known:
@@ -141,7 +167,7 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
             shapes[f"{name} near {center:.3g}"] = np.maximum(
                 0.0, 1.0 - np.abs(x - center) / (0.2 * (high - low) + 1e-9)
             )
-    shapes["nothing (a constant)"] = np.ones(len(rotation))
+    shapes["a constant"] = np.ones(len(rotation))
     for name, x in shapes.items():
         for channel in range(6):
             column = np.zeros((len(x), 6))
@@ -153,49 +179,49 @@ def dictionary(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, A
                 yield f"force along body {'xyz'[channel]}", name, column
 
 
-def places(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+def place_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
     """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and
     the place in words.
     """
     at = np.concatenate([p.signals.position[p.rows, :2] for p in flights.pieces(setting)])
-    if at.std(axis=0).min() <= _MOVES["position"]:
+    if at.std(axis=0).min() <= REGRESSORS.least_variation["position"]:
         return
     low, high = np.quantile(at, [0.02, 0.98], axis=0)
-    apart = (high - low) / (_PLACES - 1)
-    for i, j in np.ndindex(_PLACES, _PLACES):
+    apart = (high - low) / (REGRESSORS.places_per_axis - 1)
+    for i, j in np.ndindex(REGRESSORS.places_per_axis, REGRESSORS.places_per_axis):
         place = low + apart * [i, j]
         bump = np.prod(np.maximum(0.0, 1.0 - np.abs(at - place) / apart), axis=1)
-        if bump.mean() < _SEEN:
+        if bump.mean() < REGRESSORS.least_presence:
             continue
         for channel in range(6):
             column = np.zeros((len(at), 6))
             column[:, channel] = bump
             yield (
                 CHANNELS[channel],
-                f"what is near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
+                f"the place near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
                 column,
             )
 
 
-def drags(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of a linear drag that changes with something, in the mean nothing,
-    and with what in words.
+def drag_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield columns (rows, 6) of a linear drag that changes with a variable and has a mean of zero,
+    with the variable in words.
     """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
-    if velocity.std(axis=0).max() <= _MOVES["velocity"]:
+    if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
         return
-    for name, x in scaled(drives(flights, setting)).items():
+    for name, x in standardised(explanatory_variables(flights, setting)).items():
         yield "a drag", name, np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)])
 
 
 def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
-    """Return columns (rows, 6) of a linear drag, and of one that changes with place, with heading
-    and with both at once.
+    """Return columns (rows, 6) of a linear drag, and of drags that change with position, with
+    heading and with both at once.
     """
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
-    if velocity.std(axis=0).max() <= _MOVES["velocity"]:
+    if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
         return []
-    known = scaled(drives(flights, setting))
+    known = standardised(explanatory_variables(flights, setting))
     places = [x for name, x in known.items() if "position" in name]
     headings = [x for name, x in known.items() if "heading" in name]
     shapes = [
@@ -207,20 +233,20 @@ def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
     return [np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)]) for x in shapes]
 
 
-def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield what a part would pull or twist (rows, 6) that the vehicle's own motion makes swing,
-    with the channel and how fast.
+def resonant_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
+    """Yield the force or torque (rows, 6) of a resonant mode that the vehicle's own motion excites,
+    with the channel and the frequency in words.
 
-    A load on a cable is driven by the vehicle's acceleration, what is on a soft mount by the
-    angular one. Differentiated, the attitude's noise would be in column and residual alike: it is
-    what the rotors' torque, hardly noisy, makes of the inertia.
+    A load on a cable is excited by the vehicle's acceleration, a part on a soft mount by the
+    angular one. From the differentiated attitude, its noise would be in column and residual alike:
+    the angular acceleration is taken from the rotors' torque, which is hardly noisy.
     """
     pieces = flights.pieces(setting)
-    for hertz in _SWINGS_HZ:
+    for hertz in REGRESSORS.load_frequencies_hz:
         parts = [
             low_pass(
-                _swung(p.signals.acceleration[:, :2], hertz, p.signals.period),
-                CUTOFF_HZ,
+                _resonant_response(p.signals.acceleration[:, :2], hertz, p.signals.period),
+                CUTOFFS.residual_hz,
                 p.signals.period,
             )[p.rows]
             for p in pieces
@@ -228,31 +254,39 @@ def swings(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array
         pull = np.concatenate(parts)
         yield (
             "Fx and Fy",
-            f"what swings at {hertz:.2g} Hz",
+            f"a resonant mode at {hertz:.2g} Hz",
             np.column_stack([pull, np.zeros((len(pull), 4))]),
         )
     vehicle = flights.amended(setting)
     torques = [vehicle.rotor_wrench(p.signals.rotor_speeds)[:, 1:] for p in pieces]
-    plain = [i for i in range(3) if flights.lively and flights.rotor_noise[1 + i] < _ROUNDING]
-    for hertz, i in itertools.product(_MOUNTS_HZ, plain):
+    plain = [
+        i
+        for i in range(3)
+        if flights.rotor_speeds_vary and flights.rotor_noise[1 + i] < REGRESSORS.most_rounding_share
+    ]
+    for hertz, i in itertools.product(REGRESSORS.mount_frequencies_hz, plain):
         parts = [
-            low_pass(_swung(torque[:, i], hertz, p.signals.period), CUTOFF_HZ, p.signals.period)[
-                p.rows
-            ]
+            low_pass(
+                _resonant_response(torque[:, i], hertz, p.signals.period),
+                CUTOFFS.residual_hz,
+                p.signals.period,
+            )[p.rows]
             for torque, p in zip(torques, pieces, strict=True)
         ]
         column = np.zeros((sum(map(len, parts)), 6))
         column[:, 3 + i] = np.concatenate(parts)
-        yield CHANNELS[3 + i], f"what swings at {hertz:.2g} Hz", column
+        yield CHANNELS[3 + i], f"a resonant mode at {hertz:.2g} Hz", column
 
 
-def _swung(drive: Array, hertz: float, period: float) -> Array:
-    """Return what a pendulum or a spring gives back (n, ...) of how its base is accelerated, sample
-    by sample.
+def _resonant_response(drive: Array, hertz: float, period: float) -> Array:
+    """Return the reaction (n, ...) of a pendulum or a spring to the acceleration of its base,
+    sample by sample.
     """
     # s'' = -a - rate^2 s - 2 damping rate s', which pulls by rate^2 s + 2 damping rate s'
     rate = 2.0 * np.pi * hertz
     shape = bilinear(
-        [-2.0 * _DAMPING * rate, -(rate**2)], [1.0, 2.0 * _DAMPING * rate, rate**2], 1.0 / period
+        [-2.0 * REGRESSORS.damping_ratio * rate, -(rate**2)],
+        [1.0, 2.0 * REGRESSORS.damping_ratio * rate, rate**2],
+        1.0 / period,
     )
     return np.asarray(lfilter(*shape, drive, axis=0))

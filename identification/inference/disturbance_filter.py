@@ -1,12 +1,13 @@
-"""Gusts as the pose of a flight shows them: a steady Kalman filter of one axis, its innovations,
-and the gusts' likelihood.
+"""Disturbances as the pose of a flight shows them: a steady Kalman filter of one axis, its
+innovations, and the disturbance's likelihood.
 
-Gusts are an Ornstein-Uhlenbeck acceleration of a strength and a time, which those are that make the
-innovations least.
+A disturbance is an Ornstein-Uhlenbeck acceleration with a strength and a correlation time: those
+that minimise the innovations.
 """
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -16,26 +17,38 @@ from scipy.signal import lfilter, ss2tf
 
 Array = NDArray[np.float64]
 
-STRENGTHS = 2.0 ** np.arange(
-    -10, 47
-)  # variance of gusts, in the acceleration's unit squared, over that of the pose's noise
-TIMES = 0.25 * 1.5 ** np.arange(-6, 6)  # s, of gusts
-_BEGIN = (24, 6)  # where among these the search begins
-_STRIDES = (4, 2, 1)  # of that search
+
+@dataclass(frozen=True, eq=False)
+class DisturbanceSettings:
+    """The grid of disturbances on which the likeliest is searched for."""
+
+    # variances of the disturbance (acceleration squared) over that of the pose's noise
+    strengths: Array = field(
+        default_factory=lambda: np.asarray(2.0 ** np.arange(-10, 47), dtype=np.float64)
+    )
+    # s, correlation times
+    times: Array = field(
+        default_factory=lambda: np.asarray(0.25 * 1.5 ** np.arange(-6, 6), dtype=np.float64)
+    )
+    first_point: tuple[int, int] = (24, 6)  # of the grid, where the search begins
+    strides: tuple[int, ...] = (4, 2, 1)  # of that search
 
 
-def likeliest(loss: Callable[[int, int], float]) -> tuple[int, int]:
-    """Return which strength and time of gusts make a loss least, by steps to the best neighbour,
-    large ones first.
+DISTURBANCE = DisturbanceSettings()
+
+
+def likeliest_disturbance(loss: Callable[[int, int], float]) -> tuple[int, int]:
+    """Return the indices of the strength and correlation time that minimise a loss, by steps to the
+    best neighbour, large steps first.
     """
-    known = {_BEGIN: loss(*_BEGIN)}
-    at = _BEGIN
-    for stride in _STRIDES:
+    known = {DISTURBANCE.first_point: loss(*DISTURBANCE.first_point)}
+    at = DISTURBANCE.first_point
+    for stride in DISTURBANCE.strides:
         while True:
             for i, j in itertools.product((-stride, 0, stride), repeat=2):
                 near = (
-                    int(np.clip(at[0] + i, 0, len(STRENGTHS) - 1)),
-                    int(np.clip(at[1] + j, 0, len(TIMES) - 1)),
+                    int(np.clip(at[0] + i, 0, len(DISTURBANCE.strengths) - 1)),
+                    int(np.clip(at[1] + j, 0, len(DISTURBANCE.times) - 1)),
                 )
                 if near not in known:
                     known[near] = loss(*near)
@@ -47,11 +60,11 @@ def likeliest(loss: Callable[[int, int], float]) -> tuple[int, int]:
 
 
 def innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
-    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c)
-    drives, and gusts.
+    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) and a
+    disturbance drive.
 
-    ``strength`` is the gusts' variance, in the acceleration's unit squared, over that of the pose's
-    noise; ``time`` (s) theirs.
+    ``strength`` is the disturbance's variance, in the acceleration's unit squared, over that of the
+    pose's noise; ``time`` (s) its correlation time.
     """
     poles, from_pose, from_drive, _ = _filters(strength, time, period)
     acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
@@ -60,9 +73,9 @@ def innovations(pose: Array, drive: Array, strength: float, time: float, period:
     )
 
 
-def strength_of(innovation: float, strength: float, time: float, period: float) -> float:
-    """Return the gusts' variance, in the acceleration's unit squared, from that of the innovations
-    that they leave.
+def disturbance_variance(innovation: float, strength: float, time: float, period: float) -> float:
+    """Return the disturbance's variance, in the acceleration's unit squared, from that of the
+    innovations.
     """
     return strength * innovation / _filters(strength, time, period)[-1]
 
@@ -72,12 +85,12 @@ def _filters(strength: float, time: float, period: float) -> tuple[Array, Array,
     """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose
     and of what drives it.
 
-    Those of the steady Kalman filter with the states pose, velocity (a period) and gust (a period
-    squared). The last is the innovations' variance over that of the pose's noise.
+    Those of the steady Kalman filter with the states pose, velocity (a period) and disturbance (a
+    period squared). The last is the innovations' variance over that of the pose's noise.
     """
     rate = period / time
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
-    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): what the gusts add over a
+    # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): the disturbance over a
     # period
     both = np.zeros((6, 6))
     both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * strength * period**4

@@ -1,12 +1,11 @@
-"""Which effects a residual needs: forward selection of whole effects, judged on blocks that are
-left out in turn.
+"""The regression as Gram matrices of blocks, with priors and bounds of coefficients.
 
-At one setting of coefficients everything is linear: each column is whitened, and all that
-selection, removal and comparison ask is in the Gram matrices of the blocks.
+At one setting of coefficients everything is linear: each column is whitened, and selection, removal
+and comparison of effects need the Gram matrices of the blocks alone.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,32 +13,42 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from .regression import (
     CENTRAL,
-    MOMENT,
-    START,
+    MOMENT_PREFIX,
+    START_PREFIX,
     Column,
     Flights,
     Setting,
     coefficient,
     range_of,
-    typical,
+    typical_size,
 )
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
 
-# what a law allows and nobody believes: a rotor that delivers far more than it should (all four
-# together are thrust_scale)
-BELIEVED = {"rotor_efficiency": 0.05}
-_MOST_MISSING = 0.9  # of the declared mass
-_TURNS = 4  # of the search for which bounds hold, a column
-_SMALL_PULL = 1e-6  # in standard deviations
-PRIOR = 5.0  # typical sizes: standard deviation of a coefficient before anything is seen
+
+@dataclass(frozen=True)
+class GramSettings:
+    """Priors and bounds of coefficients, and the limits of the bounded least squares."""
+
+    # upper bounds below those of the effect: a rotor that delivers far more than declared is not
+    # plausible (all four together are thrust_scale)
+    plausible_maxima: Mapping[str, float] = field(
+        default_factory=lambda: {"rotor_efficiency": 0.05}
+    )
+    most_missing_mass: float = 0.9  # share of the declared mass
+    iterations_per_column: int = 4  # of the search for the bounds that hold
+    least_gradient: float = 1e-6  # in standard deviations; a smaller one is none
+    prior_std: float = 5.0  # typical sizes, of a coefficient before anything is seen
+
+
+GRAM = GramSettings()
 
 
 def columns_of(effect: str, fitted: bool) -> list[Column]:
     """Return the columns of an effect.
 
-    Whether the law of one that acts rotor by rotor makes a moment is the log's to say: while it is
+    Whether an effect that acts rotor by rotor makes a moment is a question to the log: while it is
     only tried, the moment part of each column is free; once it is ``fitted``, the coefficient
     ``central`` is.
     """
@@ -47,7 +56,7 @@ def columns_of(effect: str, fitted: bool) -> list[Column]:
     if fitted or (effect, CENTRAL) not in own:
         return own
     own.remove((effect, CENTRAL))
-    return own + [(effect, MOMENT + name) for _, name in own]
+    return own + [(effect, MOMENT_PREFIX + name) for _, name in own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +97,12 @@ class Gram:
         change = np.zeros(len(index))  # allowed: bounds lie on either side of the value now
         free = np.ones(len(index), dtype=bool)
         scale = 1.0 / np.sqrt(np.diagonal(normal))
-        for _ in range(_TURNS * len(index)):
+        for _ in range(GRAM.iterations_per_column * len(index)):
             if free.any():
                 step = np.linalg.solve(normal[np.ix_(free, free)], (right - normal @ change)[free])
                 room = np.where(step > 0, high[free] - change[free], change[free] - low[free])
                 share = np.where(
-                    np.abs(step) > _SMALL_PULL * scale[free],
+                    np.abs(step) > GRAM.least_gradient * scale[free],
                     room / np.maximum(np.abs(step), 1e-300),
                     np.inf,
                 )
@@ -104,32 +113,32 @@ class Gram:
                     at = np.flatnonzero(free)[i]
                     change[at], free[at] = high[at] if step[i] > 0 else low[at], False
                     continue
-            # one that is held and would rather come back from its bound is let go
+            # a coefficient at its bound that would come back is freed
             pull = (right - normal @ change) * scale
             inwards = np.where(change >= high, -pull, pull)
             inwards[free | (low >= high)] = 0.0
-            if inwards.max(initial=0.0) < _SMALL_PULL:
+            if inwards.max(initial=0.0) < GRAM.least_gradient:
                 break
             free[int(np.argmax(inwards))] = True
         return change, free
 
     def error(self, index: NDArray[np.int64]) -> float:
-        """Return the whitened energy on each block of the fit when it is predicted from all others.
+        """Return the deviance on each block of the fit when it is predicted from all others.
 
         A coefficient that the whole fit holds at a bound is held there for every block.
         """
         total = self.blocks.sum(axis=0)
         if not len(index):
             return float(total[-1, -1])
-        held, free = self._solve(total, index)
-        change = np.tile(held, (len(self.blocks), 1))
+        bounded, free = self._solve(total, index)
+        change = np.tile(bounded, (len(self.blocks), 1))
         if free.any():
             at, fixed = index[free], index[~free]
             rest = total - self.blocks
             normal = rest[:, at[:, None], at] + np.diag(self.precision[at])
             right = rest[:, at, -1] - self.precision[at] * self.value[at]
             if len(fixed):
-                right = right - rest[:, at[:, None], fixed] @ held[~free]
+                right = right - rest[:, at[:, None], fixed] @ bounded[~free]
             change[:, free] = np.linalg.solve(normal, right[..., None])[..., 0]
         square = np.einsum("bi,bij,bj->", change, self.blocks[:, index[:, None], index], change)
         return float(total[-1, -1] - 2.0 * np.sum(change * self.blocks[:, index, -1]) + square)
@@ -147,20 +156,20 @@ def gram(
     """
     names = tuple(columns)
     x = np.stack([*columns.values(), residual], axis=2)
-    x = np.ascontiguousarray(whiten(x)[flights.fit])
-    begins = np.flatnonzero(np.diff(flights.block[flights.fit], prepend=-1))
+    x = np.ascontiguousarray(whiten(x)[flights.fit_rows])
+    begins = np.flatnonzero(np.diff(flights.block[flights.fit_rows], prepend=-1))
     parts = (part.reshape(-1, len(names) + 1) for part in np.split(x, begins[1:]))
     blocks = np.array([part.T @ part for part in parts])
-    return Gram(names, x, begins, blocks, *room(flights, setting, names))
+    return Gram(names, x, begins, blocks, *priors_and_ranges(flights, setting, names))
 
 
-def room(
+def priors_and_ranges(
     flights: Flights, setting: Setting, columns: Sequence[Column]
 ) -> tuple[Array, Array, Array, Array]:
-    """Return of each column (columns,) its prior's precision, its value, and by how much this may
+    """Return for each column (columns,) its prior's precision, its value, and by how much it may
     fall and rise.
     """
-    size = np.array([typical(c, flights.vehicle) for c in columns])
+    size = np.array([typical_size(c, flights.vehicle) for c in columns])
     value = np.array(
         [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
     )
@@ -168,17 +177,17 @@ def room(
     for i, c in enumerate(columns):
         if not c[0]:
             low[i], high[i] = range_of(c)
-        elif c[1].startswith(MOMENT):
+        elif c[1].startswith(MOMENT_PREFIX):
             low[i], high[i] = -np.inf, np.inf
-        elif c[1].startswith(START):
-            low[i], high[i] = 0.0, PRIOR
+        elif c[1].startswith(START_PREFIX):
+            low[i], high[i] = 0.0, GRAM.prior_std
         else:
             low[i], high[i] = (
                 coefficient(c).minimum,
-                min(coefficient(c).maximum, BELIEVED.get(c[0], np.inf)),
+                min(coefficient(c).maximum, GRAM.plausible_maxima.get(c[0], np.inf)),
             )
             if c[0] == "mass":
-                low[i] = max(low[i], -_MOST_MISSING * flights.vehicle.mass)
-    prior = 1.0 / np.square(PRIOR * np.maximum(size, 1e-300))
+                low[i] = max(low[i], -GRAM.most_missing_mass * flights.vehicle.mass)
+    prior = 1.0 / np.square(GRAM.prior_std * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return prior, value, low - value, high - value

@@ -1,16 +1,18 @@
-"""Whether what seems to explain a residual acts on the vehicle, or is the flight loop's answer to
-gusts.
+"""Whether an effect that explains a residual acts on the vehicle, or is a feedback-induced
+correlation.
 
-A flight loop works against every gust, so rotors, attitude and velocity follow it, and a law of one
-of these seems to explain it. Looked at from the past alone it does not: what no past pose foretells
-of the next one, the innovation of a filter that knows how gusts last, no answer can have followed
-yet. So a change of the model is asked how much of itself the innovations confirm: all of it if it
-is a law, nothing if it is an answer, unknown as the loop is. (With a model of the noise, prediction
-errors identify in closed loop: L. Ljung, System Identification, 2nd edition, 1999, section 13.4.)
+The flight loop counteracts every disturbance, so rotors, attitude and velocity follow it, and an
+effect that depends on one of them seems to explain it. The innovations of a filter that knows how
+disturbances last tell the two apart: past poses do not predict them, so the loop cannot have
+reacted to them yet. A change of the model is asked which share of it the innovations confirm: all
+of it if it is an effect, none if it is a feedback-induced correlation, whatever the loop. (With a
+noise model, prediction errors identify in closed loop: L. Ljung, System Identification, 2nd
+edition, 1999, section 13.4.)
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -22,25 +24,48 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import get
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.signals import log_signals
-from .disturbance_filter import STRENGTHS, TIMES, innovations, likeliest, strength_of
-from .gram_matrix import Gram, room
-from .regression import SHIFT, Column, Flights, Piece, Setting, coefficient, typical
+from .disturbance_filter import (
+    DISTURBANCE,
+    disturbance_variance,
+    innovations,
+    likeliest_disturbance,
+)
+from .gram_matrix import Gram, priors_and_ranges
+from .regression import (
+    ROTOR_TIME_OFFSET,
+    Column,
+    Flights,
+    Piece,
+    Setting,
+    coefficient,
+    typical_size,
+)
 
 Array = NDArray[np.float64]
 
-_SHARE = 0.65  # laws have 0.8 to 1.4, answers -5 to 0.2, one had 0.53
-LEAST_ENERGY = (
-    20.0  # twice the gain of the likelihood's logarithm, that it must have: chance has one an axis
-)
-_AT_ODDS, _SURELY = (
-    0.1,
-    2.0,
-)  # of a share beside one, and of its standard deviations; 200 true effects had up to 0.05
-_SETTLED = 1.0  # s, from the start of a piece to the first innovation that counts
-_NEAR = np.array([-1.0, 1.0])  # in the logarithm, around the best of a grid
-_STEP = 0.1  # typical sizes, over which slopes are taken
-_TINY = 1e-300
-_CLOCK = "clock_offset", "dt"
+
+@dataclass(frozen=True)
+class InnovationSettings:
+    """How much of a change of the model the innovations must confirm."""
+
+    # share of the change; effects have 0.8 to 1.4, feedback-induced correlations -5 to 0.2, one had
+    # 0.53
+    least_confirmed_share: float = 0.65
+    # log-likelihood ratio (twice the gain of the log-likelihood); chance alone gives one an axis
+    least_log_likelihood_ratio: float = 20.0
+    # of the confirmed share and one, and the same in its standard deviations, from which an effect
+    # contradicts the innovations; 200 true effects had up to 0.05
+    most_share_error: float = 0.1
+    most_share_error_in_std: float = 2.0
+    settling_time: float = 1.0  # s, from the start of a piece to the first innovation that counts
+    grid_margin: float = 1.0  # in the logarithm, around the best point of a grid
+    derivative_step: float = 0.1  # typical sizes, over which derivatives are taken
+    least_sum: float = 1e-300  # against a division by zero
+
+
+INNOVATIONS = InnovationSettings()
+
+CLOCK_COEFFICIENT = "clock_offset", "dt"
 
 
 class Innovations:
@@ -54,29 +79,37 @@ class Innovations:
     def __init__(self, flights: Flights, setting: Setting) -> None:
         self._flights, self._setting = flights, setting
         self._poses: dict[int, tuple[Piece, Array]] = {}
-        self._motions = self._seen(setting)
+        self._motions = self._motions_of(setting)
         self._counts = []
-        rows = np.split(flights.fit, np.flatnonzero(flights.start)[1:])
+        rows = np.split(flights.fit_rows, np.flatnonzero(flights.start)[1:])
         for piece, fit in zip(flights.pieces(setting), rows, strict=True):
             t, k = piece.signals.t, np.arange(len(piece.signals.t))
             near = fit[np.searchsorted(piece.rows, k).clip(max=len(fit) - 1)]
-            self._counts.append(near & (t > t[0] + _SETTLED) & (k <= piece.rows[-1]))
+            self._counts.append(
+                near & (t > t[0] + INNOVATIONS.settling_time) & (k <= piece.rows[-1])
+            )
         self._count = sum(int(np.count_nonzero(x)) for x in self._counts)
 
-    def confirm(self, after: Setting, least: float = LEAST_ENERGY) -> bool:
-        """Return whether innovations confirm the change to the effects ``after``, with an energy of
-        at least ``least``.
+    def confirm(
+        self, after: Setting, least: float = INNOVATIONS.least_log_likelihood_ratio
+    ) -> bool:
+        """Return whether innovations confirm the change to the effects ``after``, with a
+        log-likelihood ratio of at least ``least``.
         """
-        return _confirmed(*self.share(after), least)
+        return _confirmed(*self.confirmed_share(after), least)
 
-    def share(self, after: Setting) -> tuple[float, float]:
-        """Return the share of that change which makes the innovations least, and the energy that it
-        then explains.
+    def confirmed_share(self, after: Setting) -> tuple[float, float]:
+        """Return the share of that change that minimises the innovations, and its log-likelihood
+        ratio.
         """
         return self._share(
             [
                 new - old
-                for old, new in zip(self._motions, self._seen(self._timed(after)), strict=True)
+                for old, new in zip(
+                    self._motions,
+                    self._motions_of(self._with_rotor_time_offset(after)),
+                    strict=True,
+                )
             ]
         )
 
@@ -99,7 +132,7 @@ class Innovations:
         """Return the regression of the innovations on coefficients, in one block, each axis by its
         standard deviation.
 
-        Gusts are those that suit the innovations as they are.
+        The disturbances are the likeliest ones of the innovations as they are.
         """
         slopes = [self._slope(column) for column in columns]
         total = np.zeros((len(columns) + 1, len(columns) + 1))
@@ -109,22 +142,29 @@ class Innovations:
                 for i, motion in enumerate(self._motions)
             ]
             products = self._products([part[..., -1:] for part in parts])
-            strength, time = likeliest(lambda *gusts, of=products: float(of(*gusts)[0, 0]))
-            sums = self._sums(parts, float(STRENGTHS[strength]), float(TIMES[time]))
-            total += sums * self._count / max(sums[-1, -1], _TINY)
+            strength, time = likeliest_disturbance(
+                lambda *disturbance, of=products: float(of(*disturbance)[0, 0])
+            )
+            sums = self._sums(
+                parts, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+            )
+            total += sums * self._count / max(sums[-1, -1], INNOVATIONS.least_sum)
         return Gram(
             tuple(columns),
             np.zeros((0, 6, len(total))),
             np.zeros(1, dtype=np.intp),
             total[None],
-            *room(self._flights, self._setting, columns),
+            *priors_and_ranges(self._flights, self._setting, columns),
         )
 
     def _slope(self, column: Column) -> list[Array]:
         """Return what a unit of a coefficient adds to the motions (2, n, 6)."""
         effect, name = column
         own = self._flights.coefficients(self._setting, effect)
-        value, delta = own.get(name, 0.0), _STEP * typical(column, self._flights.vehicle)
+        value, delta = (
+            own.get(name, 0.0),
+            INNOVATIONS.derivative_step * typical_size(column, self._flights.vehicle),
+        )
         if (
             effect
             and not coefficient(column).minimum <= value + delta <= coefficient(column).maximum
@@ -133,52 +173,55 @@ class Innovations:
         after = {**self._setting, effect: {**own, name: value + delta}}
         return [
             (new - old) / delta
-            for new, old in zip(self._seen(self._timed(after)), self._motions, strict=True)
+            for new, old in zip(
+                self._motions_of(self._with_rotor_time_offset(after)), self._motions, strict=True
+            )
         ]
 
-    def gusts(self) -> list[tuple[float, float]]:
-        """Return the RMS (N in the world, Nm in the body) and the time (s) of the likeliest gusts
-        of each of the six channels.
+    def disturbances(self) -> list[tuple[float, float]]:
+        """Return the RMS (N in the world, Nm in the body) and the correlation time (s) of the
+        likeliest disturbances of each of the six channels.
 
-        A law that the model lacks counts as gusts too. The steps to which turn rates are rounded
-        look like quick gusts.
+        An effect that the model lacks counts as a disturbance too. The rounding steps of rotor
+        speeds look like fast disturbances.
         """
         inertias = [self._flights.vehicle.mass] * 3 + np.diagonal(
             self._flights.vehicle.inertia
         ).tolist()
         return [
-            self._gusts([-motion[..., [axis]] for motion in self._motions], inertia)
+            self._disturbance([-motion[..., [axis]] for motion in self._motions], inertia)
             for axis, inertia in enumerate(inertias)
         ]
 
-    def _gusts(self, motions: Sequence[Array], inertia: float) -> tuple[float, float]:
+    def _disturbance(self, motions: Sequence[Array], inertia: float) -> tuple[float, float]:
         period = self._flights.pieces(self._setting)[0].signals.period
         products = self._products(motions)
-        i, j = likeliest(lambda strength, time: float(products(strength, time)[0, 0]))
-        begun = np.log([STRENGTHS[i], TIMES[j]])
+        i, j = likeliest_disturbance(lambda strength, time: float(products(strength, time)[0, 0]))
+        begun = np.log([DISTURBANCE.strengths[i], DISTURBANCE.times[j]])
 
         def loss(x: Array) -> float:
             return float(np.log(self._sums(motions, *np.exp(x).tolist())[0, 0]))
 
+        near = INNOVATIONS.grid_margin * np.array([-1.0, 1.0])
         best = minimize(
             loss,
             begun,
             method="Nelder-Mead",
-            bounds=[begun[0] + _NEAR, begun[1] + _NEAR],
+            bounds=[begun[0] + near, begun[1] + near],
             options={"xatol": 0.05, "fatol": 1.0 / self._count},
         )
         strength, time = np.exp(best.x).tolist()
         return inertia * math.sqrt(
-            strength_of(math.exp(best.fun) / self._count, strength, time, period)
+            disturbance_variance(math.exp(best.fun) / self._count, strength, time, period)
         ), time
 
     def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
-        """Return the share of changes of the motions that makes the innovations least, of all axes
-        together, and its energy.
+        """Return the share of changes of the motions that minimises the innovations, over all axes,
+        and its log-likelihood ratio.
 
-        Each axis has gusts of its own, an Ornstein-Uhlenbeck acceleration. Their strength and time
-        are those that make its innovations least (maximum likelihood), once together with a share
-        and once without any: the energy is what the share gains over other gusts.
+        Each axis has a disturbance of its own, an Ornstein-Uhlenbeck acceleration. Its strength and
+        correlation time are the likeliest ones, once together with a share and once without: the
+        ratio is what the share gains over other disturbances.
         """
         axes = [
             self._axis(
@@ -190,35 +233,47 @@ class Innovations:
             for axis in range(6)
             if any(np.any(change[..., axis]) for change in changes)
         ]
-        cross, square = (sum(x[row, 1] / _left(x) for x, _ in axes) for row in (0, 1))
-        share = float(cross / max(square, _TINY))
+        cross, square = (sum(x[row, 1] / _unexplained(x) for x, _ in axes) for row in (0, 1))
+        share = float(cross / max(square, INNOVATIONS.least_sum))
         rest = np.array([-1.0, share])
-        energy = self._count * sum(
-            float(np.log(max(y[0, 0], _TINY) / max(rest @ x @ rest, _TINY))) for x, y in axes
+        ratio = self._count * sum(
+            float(
+                np.log(
+                    max(y[0, 0], INNOVATIONS.least_sum)
+                    / max(rest @ x @ rest, INNOVATIONS.least_sum)
+                )
+            )
+            for x, y in axes
         )
-        return share, energy
+        return share, ratio
 
     def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
         """Return the sums of products (2, 2) of one axis' innovations and of a change's, of which
         each piece is (2, n, 2).
 
-        Once with the gusts that suit both, once with those that suit the innovations alone.
+        Once with the likeliest disturbance of both, once with that of the innovations alone.
         """
         products = self._products(both)
         found = [
-            products(*likeliest(lambda *gusts: _left(products(*gusts)))),
-            products(*likeliest(lambda *gusts: float(products(*gusts)[0, 0]))),
+            products(
+                *likeliest_disturbance(lambda *disturbance: _unexplained(products(*disturbance)))
+            ),
+            products(
+                *likeliest_disturbance(lambda *disturbance: float(products(*disturbance)[0, 0]))
+            ),
         ]
-        return min(found, key=_left), min(found, key=lambda x: float(x[0, 0]))
+        return min(found, key=_unexplained), min(found, key=lambda x: float(x[0, 0]))
 
     def _products(self, motions: Sequence[Array]) -> Callable[[int, int], Array]:
-        """Return a function of gusts that gives the sums of products (c, c) of innovations; each
-        piece is (2, n, c).
+        """Return a function of disturbances that gives the sums of products (c, c) of innovations;
+        each piece is (2, n, c).
         """
 
         @cache
         def products(strength: int, time: int) -> Array:
-            return self._sums(motions, float(STRENGTHS[strength]), float(TIMES[time]))
+            return self._sums(
+                motions, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+            )
 
         return products
 
@@ -230,28 +285,30 @@ class Innovations:
         ]
         return np.asarray(sum(x.T @ x for x in found))
 
-    def _timed(self, after: Setting) -> Setting:
-        """Return ``after`` with a change of the clock made by moving the turn rates: moved poses
-        take their noise along.
+    def _with_rotor_time_offset(self, after: Setting) -> Setting:
+        """Return ``after`` with a change of the clock made by a rotor time offset: moving the poses
+        would move their noise as well.
         """
-        effect, name = _CLOCK
+        effect, name = CLOCK_COEFFICIENT
         if effect not in after:
             return after
         own = self._flights.coefficients(self._setting, effect)
-        shifts = dict(after.get(SHIFT[0], {}))
-        shifts[SHIFT[1]] = shifts.get(SHIFT[1], 0.0) + after[effect][name] - own.get(name, 0.0)
+        offsets = dict(after.get(ROTOR_TIME_OFFSET[0], {}))
+        offsets[ROTOR_TIME_OFFSET[1]] = (
+            offsets.get(ROTOR_TIME_OFFSET[1], 0.0) + after[effect][name] - own.get(name, 0.0)
+        )
         return {
             **{k: v for k, v in after.items() if k != effect},
-            SHIFT[0]: shifts,
+            ROTOR_TIME_OFFSET[0]: offsets,
             **({effect: own} if own else {}),
         }
 
-    def _seen(self, setting: Setting) -> list[Array]:
-        """Return of each piece (2, n, 6) the pose as measured, and the model's acceleration, linear
-        (world) and angular (body).
+    def _motions_of(self, setting: Setting) -> list[Array]:
+        """Return for each piece (2, n, 6) the pose as measured, and the model's acceleration,
+        linear (world) and angular (body).
 
-        The pose's angle (rad) is what the body rates add up to. The attitude is always the same: a
-        gain of it would make the innovations small by taking their own noise away.
+        The pose's angle (rad) is the sum of its rotations. The attitude is always the same: an
+        attitude_gain would make the innovations small by removing their own noise.
         """
         out = []
         pieces = self._flights.pieces(setting)
@@ -261,7 +318,7 @@ class Innovations:
             pose = np.column_stack(
                 [self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]]
             )
-            begun = np.concatenate([like.signals.velocity[0], like.signals.rate[0]])
+            begun = np.concatenate([like.signals.velocity[0], like.signals.angular_velocity[0]])
             fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
             out.append(
                 np.stack(
@@ -274,7 +331,7 @@ class Innovations:
         return out
 
     def _raw(self, setting: Setting, piece: Piece) -> Array:
-        """Return the pose (n, 6) of a piece, from its start, without the low-pass that knows of the
+        """Return the pose (n, 6) of a piece, from its start, without the low-pass, which uses the
         future.
         """
         if id(piece) not in self._poses:
@@ -298,47 +355,61 @@ class Innovations:
         )
 
 
-def _confirmed(share: float, energy: float, least: float = LEAST_ENERGY) -> bool:
-    return share > _SHARE and energy > least
+def _confirmed(
+    share: float, ratio: float, least: float = INNOVATIONS.least_log_likelihood_ratio
+) -> bool:
+    return share > INNOVATIONS.least_confirmed_share and ratio > least
 
 
-def adds(flights: Flights, before: Setting, after: Setting, least: float = LEAST_ENERGY) -> bool:
-    """Return whether innovations confirm what a fit has beyond a smaller one, with an energy of at
-    least ``least``.
+def confirms_addition(
+    flights: Flights,
+    before: Setting,
+    after: Setting,
+    least: float = INNOVATIONS.least_log_likelihood_ratio,
+) -> bool:
+    """Return whether innovations confirm what a fit has beyond a smaller one, with a log-likelihood
+    ratio of at least ``least``.
 
-    Both have the shifts of ``after``: gusts bend them, and they are not what is asked.
+    Both have the time offsets of ``after``: disturbances bias these, and they are not asked about.
     """
-    shifts = {SHIFT[0]: after.get(SHIFT[0], {})}
-    return Innovations(flights, {**before, **shifts}).confirm({**after, **shifts}, least)
+    offsets = {ROTOR_TIME_OFFSET[0]: after.get(ROTOR_TIME_OFFSET[0], {})}
+    return Innovations(flights, {**before, **offsets}).confirm({**after, **offsets}, least)
 
 
-def at_odds(flights: Flights, setting: Setting) -> list[str]:
-    """Return, in words, which effects of a fitted setting are not what the innovations make of
-    them.
+def contradicted_by_innovations(flights: Flights, setting: Setting) -> list[str]:
+    """Return, as sentences, which effects of a fitted setting the innovations contradict.
 
-    A law is the same below 5 Hz, from both sides, as it is from the past alone and at all
-    frequencies; what merely stands for another one seldom is. (Two estimates that must agree: J. A.
+    An effect is the same below 5 Hz from both sides in time as it is from the past alone at all
+    frequencies; one that stands for another effect seldom is. (Two estimates that must agree: J. A.
     Hausman, Econometrica 46 (1978), 1251-1271.)
     """
     out = []
     for effect in setting:
         if (
             not effect or get(effect).kind == "sensing"
-        ):  # of what is seen, not of what acts: bent by its own noise
+        ):  # it changes the measurement and not the motion: biased by its own noise
             continue
-        share, energy = Innovations(
+        share, ratio = Innovations(
             flights, {k: v for k, v in setting.items() if k != effect}
-        ).share(setting)
-        if abs(share - 1.0) > max(_AT_ODDS, _SURELY * abs(share) / np.sqrt(max(energy, _TINY))):
+        ).confirmed_share(setting)
+        if abs(share - 1.0) > max(
+            INNOVATIONS.most_share_error,
+            INNOVATIONS.most_share_error_in_std
+            * abs(share)
+            / np.sqrt(max(ratio, INNOVATIONS.least_sum)),
+        ):
             out.append(
-                f"{effect}: what no past pose foretells bears out {share:.0%} of it: another "
-                f"effect may be behind it"
+                f"{effect}: the innovations confirm {share:.0%} of it: another effect may be the "
+                "cause"
             )
     return out
 
 
-def _left(products: Array) -> float:
-    """Return the energy that the best multiple of a change leaves of innovations, of their sums of
-    products (2, 2).
+def _unexplained(products: Array) -> float:
+    """Return the sum of squares of innovations that the best multiple of a change leaves, from
+    their sums of products (2, 2).
     """
-    return max(float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], _TINY)), _TINY)
+    return max(
+        float(products[0, 0] - products[0, 1] ** 2 / max(products[1, 1], INNOVATIONS.least_sum)),
+        INNOVATIONS.least_sum,
+    )

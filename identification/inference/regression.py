@@ -2,13 +2,13 @@
 
 Rows are samples of all flights, low-passed with zero phase and thinned out; the six channels are
 force in the world frame and torque in the body frame. A column is the change of the residual with
-one coefficient. Residual and columns come from the same laws that plant and estimator run, through
-the same filter.
+one coefficient. Residual and columns come from the same effect models that plant and estimator run,
+through the same filter.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,85 +22,96 @@ from ..logs.flight_log import FlightLog
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
-from ..motion.signals import Signals, log_signals, low_pass
+from ..motion.signals import Signals, log_signals
+from ..motion.smoothing import CUTOFFS, low_pass
 from .commanded_rotors import (
-    LEAN_X,
-    LEAN_Y,
-    NOT_FROM_COMMANDS,
-    SCALE,
-    commanded,
+    EXCLUDED_EFFECTS,
+    THRUST_SCALE,
+    TILT_X,
+    TILT_Y,
+    any_commanded,
     deviation,
+    deviation_size,
     deviations,
+    downsampled,
     in_flight,
-    size_of,
-    thinned,
 )
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.int64]
 
-CUTOFF_HZ = 5.0
-_RATE_HZ = 25.0  # of the rows
-_EDGE = 0.6  # s at either end of a piece, where the filters have only half of what they need
-# share of noise in an effect's column that is too much; a gain of the attitude could cancel the
-# attitude's own noise
-_DROWNED = {"attitude_gain": 0.01}
-_DROWNED_ELSE = 0.1
-# rounding steps by which turn rates must vary: below, their rounding is no noise but a law of its
-# own
-_STEPS = 1.4
-# effects of which a flight with less than that says nothing: they would explain the rounding
-_QUICK = frozenset(
+
+@dataclass(frozen=True)
+class RegressionSettings:
+    """Rows and blocks of the regression, what flights must excite, and how much memory is used."""
+
+    row_rate_hz: float = 25.0  # of the samples that are rows: five times the cut-off
+    margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
+    # share of sensor noise in an effect's column, from which the effect is not identifiable. An
+    # attitude_gain could cancel the attitude's own noise
+    most_noise_share: float = 0.1
+    most_noise_shares: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.01})
+    # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
+    # like an effect
+    least_steps_of_rotor_speed: float = 1.4
+    block: float = 3.0  # s of flight held out, or left out in cross-validation, in one piece
+    short_block: float = 1.0  # s, the same of commanded flights of fewer than eight blocks
+    blocks_per_held_out: int = 4  # one of so many blocks is held out
+    # the golden ratio, by which the place of the held-out block moves: no flight keeps step with it
+    held_out_step: float = 0.5 * (5.0**0.5 - 1.0)
+    memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
+    kept_residuals: int = 16  # a fit asks several times for the residual at its setting
+    bytes_per_sample: int = 400  # of a piece
+    rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
+
+
+REGRESSION = RegressionSettings()
+# effects of fast motion; where rotor speeds hardly leave their rounding steps, these would explain
+# the rounding
+FAST_MOTION_EFFECTS = frozenset(
     {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
 )
-TIMING = frozenset({"latency", "clock_offset"})  # these hold the shift of the turn rates in them
-LATE = TIMING | {"motor_lag"}
-DRAGS = frozenset({"rotor_drag", "body_drag"})
+DELAY_EFFECTS = frozenset({"latency", "clock_offset"})  # each contains the rotors' time offset
+LATE_ROTOR_EFFECTS = DELAY_EFFECTS | {"motor_lag"}
+DRAG_EFFECTS = frozenset({"rotor_drag", "body_drag"})
 # effects whose force is no sum over their coefficients
-STRANGE = frozenset({"slung_payload", "wind", "fan_jet"})
-SHORT_BLOCK = 1.0  # s, the same where less than eight of them were flown
-_ROOM = (
-    2**28
-)  # bytes, for what was worked out and may be asked for again: of pieces, and of columns
-_LATEST = 16  # residuals that are kept: a fit asks several times for that of its setting
-_SAMPLE = 400  # bytes of a piece, a sample
-BLOCK = 3.0  # s, of flight that is held out, or left out in cross-validation, in one piece
-_HELD_OUT, _GOLDEN = (
-    4,
-    0.5 * (5.0**0.5 - 1.0),
-)  # one block of four; which one changes so that no flight keeps step with it
+NONLINEAR_EFFECTS = frozenset({"slung_payload", "wind", "fan_jet"})
+
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
 # A column: an effect's coefficient, or ``moment`` of it, the torque part of that column alone
 Column = tuple[str, str]
-MOMENT = "moment of "
-CENTRAL = "central"  # the coefficient of laws that act rotor by rotor
-START = "start "  # a whole effect at coefficients of its own; the column is a multiple of it
-SHIFT_RANGE = (-0.006, 0.006)  # s
-SHIFT = ("", "rate_shift")  # s, by which the turn rates of a log act later than at their sample
-LEAN = ("", "attitude_shift")  # s, by which a log's attitude is ahead of its position
-# s, by which the velocity that a law asks for is behind the position's: a simulator that holds its
-# forces over a step has it
-LAG = ("", "velocity_shift")
-NUISANCES = (SHIFT, LEAN, LAG)
+MOMENT_PREFIX = "moment of "
+CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
+# a whole effect at coefficients of its own; the column is a multiple of it
+START_PREFIX = "start "
+# time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
+# attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
+# simulator that holds its forces over a step has one)
+ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
+ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
+VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
+TIME_OFFSETS = (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
 
 
 def coefficient(column: Column) -> Coefficient:
     """Return the declaration of a column's coefficient."""
-    return next(c for c in get(column[0]).coefficients if c.name == column[1].removeprefix(MOMENT))
+    return next(
+        c for c in get(column[0]).coefficients if c.name == column[1].removeprefix(MOMENT_PREFIX)
+    )
 
 
-def typical(column: Column, vehicle: Vehicle) -> float:
+def typical_size(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
     library's two.
     """
-    if column in NUISANCES:
+    if column in TIME_OFFSETS:
         return 0.0025
-    if not column[0] and (size := size_of(column[1])) is not None:
+    if not column[0] and (size := deviation_size(column[1])) is not None:
         return size[0]
-    if column[1].startswith(START) or column[1] == CENTRAL:
+    if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
         return 1.0
     c = coefficient(column)
     large, small = (abs(x) for x in c.typical)
@@ -116,9 +127,9 @@ def typical(column: Column, vehicle: Vehicle) -> float:
 
 
 def range_of(column: Column) -> tuple[float, float]:
-    """Return the least and the greatest value of a nuisance's column."""
-    size = size_of(column[1])
-    return SHIFT_RANGE if size is None else (-size[1], size[1])
+    """Return the range of a time offset, or of a flight's deviation."""
+    size = deviation_size(column[1])
+    return REGRESSION.rotor_time_offset_range if size is None else (-size[1], size[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,19 +157,19 @@ class Flights:
         self.vehicle = vehicle
         self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
-        self.commanded = commanded(
+        self.commanded = any_commanded(
             self.logs
         )  # torque is left out, and only the time in the air counts
         if self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         self.logs = tuple(excerpt(self.logs))
-        self.own = (
+        self.deviating_flights = (
             len(logs) if self.commanded else 0
-        )  # flights that have a thrust scale and a lean of their own
-        self.deviations: tuple[Column, ...] = tuple(deviations(self.own))
+        )  # flights that have a thrust scale and a tilt of their own
+        self.deviations: tuple[Column, ...] = tuple(deviations(self.deviating_flights))
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
         self._needs: dict[int, tuple[Piece, Array]] = {}
-        self._moved: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
+        self._offset_signals: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
         self._columns: dict[tuple[object, ...], dict[Column, Array]] = {}
         self._residuals: dict[tuple[object, ...], Array] = {}
         self._first: list[Piece] = []
@@ -166,7 +177,11 @@ class Flights:
         log, block, fit, start, t = [], [], [], [], []
         count = 0
         seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
-        length = SHORT_BLOCK if self.commanded and seconds < 8 * BLOCK else BLOCK
+        length = (
+            REGRESSION.short_block
+            if self.commanded and seconds < 8 * REGRESSION.block
+            else REGRESSION.block
+        )
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
@@ -175,7 +190,7 @@ class Flights:
             seen = (
                 np.full(len(time), piece.log < len(logs))
                 if test
-                else number % _HELD_OUT != held_out(number)
+                else number % REGRESSION.blocks_per_held_out != held_out(number)
             )
             fit.append(seen)
             start.append(np.arange(len(time)) == 0)
@@ -183,28 +198,32 @@ class Flights:
             count += int(number[-1]) + 1
         self.log: Index = np.concatenate(log)  # (rows,) which log
         self.block: Index = np.concatenate(block)  # (rows,)
-        self.fit: Mask = np.concatenate(fit)  # (rows,)
+        self.fit_rows: Mask = np.concatenate(fit)  # (rows,)
         self.start: Mask = np.concatenate(start)  # (rows,) first row of a piece
         self.t: Array = np.concatenate(t)
         self.period = float(np.median(np.diff(self.t)))
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
-        self.drowned: frozenset[
+        self.not_identifiable: frozenset[
             str
-        ]  # effects whose columns are noise in good part: these flights do not excite them
+        ]  # effects whose columns are sensor noise to a large part
         self.column_noise: dict[Column, Array]  # (rows, 6) a sample of it in each column
         self.rotor_noise: (
             Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
         )
-        self.sensor_noise, self.drowned, self.column_noise, self.rotor_noise = self._listen()
+        self.sensor_noise, self.not_identifiable, self.column_noise, self.rotor_noise = (
+            self._repeat_sensor_noise()
+        )
 
-    def _listen(self) -> tuple[Array, frozenset[str], dict[Column, Array], Array]:
-        """Add the sensors' noise once more and see what changes.
+    def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], dict[Column, Array], Array]:
+        """Return samples of the sensor noise: of the residual, of the columns and of the rotors,
+        and the effects that are not identifiable.
 
-        An effect whose column is noise in good part is not excited; fitted all the same, it would
-        come out too small, or explain the noise of the residual by taking it out of the pose.
+        The noise is added to the logs once more, and the change is what noise makes. An effect
+        whose column is noise to a large part is not identifiable; fitted all the same, it would
+        come out too small, or explain the noise of the residual by removing it from the pose.
         """
         noisy = copy(self)  # the same rows of louder logs
-        noisy._pieces, noisy._columns, noisy._needs, noisy._moved, noisy._residuals = (
+        noisy._pieces, noisy._columns, noisy._needs, noisy._offset_signals, noisy._residuals = (
             {},
             {},
             {},
@@ -214,32 +233,37 @@ class Flights:
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
-        drowned = set()
+        not_identifiable = set()
         own: list[Column] = [
             (e, c.name)
             for e in names()
-            if e not in STRANGE
+            if e not in NONLINEAR_EFFECTS
             for c in get(e).coefficients
             if c.name != CENTRAL
         ]
         smooth = own + [
-            (e, MOMENT + n) for e, n in own if any(c.name == CENTRAL for c in get(e).coefficients)
+            (e, MOMENT_PREFIX + n)
+            for e, n in own
+            if any(c.name == CENTRAL for c in get(e).coefficients)
         ]
         quiet, loud = self.columns({}, smooth), noisy.columns({}, smooth)
         for effect in dict.fromkeys(e for e, _ in smooth):
             noise = whole = 0.0
             for c in (c for c in own if c[0] == effect):
-                scale = weight * typical(c, self.vehicle) ** 2
+                scale = weight * typical_size(c, self.vehicle) ** 2
                 noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
                 whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
-            if noise > _DROWNED.get(effect, _DROWNED_ELSE) * whole:
-                drowned.add(effect)
+            if (
+                noise
+                > REGRESSION.most_noise_shares.get(effect, REGRESSION.most_noise_share) * whole
+            ):
+                not_identifiable.add(effect)
         if self.commanded:
-            drowned |= NOT_FROM_COMMANDS
-        drowned |= self.rounded
+            not_identifiable |= EXCLUDED_EFFECTS
+        not_identifiable |= self.explained_by_rounding
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
-        return floor, frozenset(drowned), {c: loud[c] - quiet[c] for c in smooth}, rounded
+        return floor, frozenset(not_identifiable), {c: loud[c] - quiet[c] for c in smooth}, rounded
 
     def rotor_wrench(self, setting: Setting) -> Array:
         """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
@@ -248,25 +272,30 @@ class Flights:
         vehicle = self.amended(setting)
         return np.concatenate(
             [
-                low_pass(vehicle.rotor_wrench(p.signals.rotor_speeds), CUTOFF_HZ, p.signals.period)[
-                    p.rows
-                ]
+                low_pass(
+                    vehicle.rotor_wrench(p.signals.rotor_speeds),
+                    CUTOFFS.residual_hz,
+                    p.signals.period,
+                )[p.rows]
                 for p in self.pieces(setting)
             ]
         )
 
     @property
-    def lively(self) -> bool:
-        """Whether the turn rates vary by enough of the steps to which they are rounded."""
+    def rotor_speeds_vary(self) -> bool:
+        """Whether the rotor speeds vary by enough of their rounding steps."""
         speeds = np.concatenate([p.signals.rotor_speeds[p.rows] for p in self._first])
-        return float(np.median(speeds.std(axis=0))) > _STEPS * self.vehicle.omega_lsb
+        return (
+            float(np.median(speeds.std(axis=0)))
+            > REGRESSION.least_steps_of_rotor_speed * self.vehicle.omega_lsb
+        )
 
     @property
-    def rounded(self) -> frozenset[str]:
-        """The effects that would explain the rounding of turn rates, where these hardly leave its
-        steps.
+    def explained_by_rounding(self) -> frozenset[str]:
+        """The effects that would explain the rounding, where rotor speeds hardly leave their
+        rounding steps.
         """
-        return frozenset() if self.lively else _QUICK
+        return frozenset() if self.rotor_speeds_vary else FAST_MOTION_EFFECTS
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
@@ -279,12 +308,15 @@ class Flights:
         if sensing not in self._pieces:
             if (
                 len(self._pieces)
-                * max(_SAMPLE * sum(len(p.signals.t) for p in self._first), _ROOM // 40)
-                > _ROOM
+                * max(
+                    REGRESSION.bytes_per_sample * sum(len(p.signals.t) for p in self._first),
+                    REGRESSION.memory // 40,
+                )
+                > REGRESSION.memory
             ):
                 self._pieces.clear()
                 self._needs.clear()
-                self._moved.clear()
+                self._offset_signals.clear()
             self._pieces[sensing] = self._cut(vehicle)
         return self._pieces[sensing]
 
@@ -295,7 +327,7 @@ class Flights:
             for s in log_signals(undo_log_sensing(log, vehicle))
         ]
         if self.commanded:
-            found = [(i, thinned(s)) for i, s in found]
+            found = [(i, downsampled(s)) for i, s in found]
         if not self._first:
             return [Piece(i, s, _rows(s)) for i, s in found]
         # a clock offset moves the start of a piece: the rows stay where they are in time
@@ -340,12 +372,12 @@ class Flights:
             found = np.concatenate(
                 [
                     self._needed(piece)
-                    - low_pass(model, CUTOFF_HZ, piece.signals.period)[piece.rows]
+                    - low_pass(model, CUTOFFS.residual_hz, piece.signals.period)[piece.rows]
                     for piece, model in pieces
                 ]
             )
             found.setflags(write=False)
-            if len(self._residuals) == _LATEST:
+            if len(self._residuals) == REGRESSION.kept_residuals:
                 self._residuals.pop(next(iter(self._residuals)))
             self._residuals[key] = found
         return self._residuals[key]
@@ -358,15 +390,16 @@ class Flights:
         as the residual is.
         """
         vehicle = self.amended(setting)
-        shifts = setting.get(SHIFT[0], {})
+        offsets = setting.get(ROTOR_TIME_OFFSET[0], {})
         out = []
         for piece in self.pieces(setting):
-            scale, *lean = (
-                deviation(setting, kind, piece.log, self.own) for kind in (SCALE, LEAN_X, LEAN_Y)
+            scale, *tilt = (
+                deviation(setting, kind, piece.log, self.deviating_flights)
+                for kind in (THRUST_SCALE, TILT_X, TILT_Y)
             )
-            s = self._shifted(piece, shifts, scale)
+            s = self._with_time_offsets(piece, offsets, scale)
             model, _ = acting_wrench(s, vehicle, self.vehicle)
-            model[:, :2] += self.vehicle.weight * np.array(lean)
+            model[:, :2] += self.vehicle.weight * np.array(tilt)
             if self.commanded:
                 model[:, 3:] = 0.0
             out.append(model)
@@ -382,34 +415,36 @@ class Flights:
                 needed[:, 3:] = 0.0
             self._needs[id(piece)] = (
                 piece,
-                low_pass(needed, CUTOFF_HZ, piece.signals.period)[piece.rows],
+                low_pass(needed, CUTOFFS.residual_hz, piece.signals.period)[piece.rows],
             )
         return self._needs[id(piece)][1]
 
-    def _shifted(self, piece: Piece, shifts: Mapping[str, float], scale: float) -> Signals:
+    def _with_time_offsets(
+        self, piece: Piece, offsets: Mapping[str, float], scale: float
+    ) -> Signals:
         key = (
             id(piece),
-            shifts.get(SHIFT[1], 0.0),
-            shifts.get(LEAN[1], 0.0),
-            shifts.get(LAG[1], 0.0),
+            offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
+            offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
+            offsets.get(VELOCITY_TIME_OFFSET[1], 0.0),
             scale,
         )
-        if key not in self._moved:
-            if len(self._moved) > 4 * len(self._first):
-                self._moved.clear()
-            self._moved[key] = piece, _shifted(piece.signals, shifts, scale)
-        return self._moved[key][1]
+        if key not in self._offset_signals:
+            if len(self._offset_signals) > 4 * len(self._first):
+                self._offset_signals.clear()
+            self._offset_signals[key] = piece, _with_time_offsets(piece.signals, offsets, scale)
+        return self._offset_signals[key][1]
 
     def _kept(self, setting: Setting) -> dict[Column, Array]:
-        """Return the columns of effects that were worked out before and hardly change with this
+        """Return the columns of effects that were computed before and hardly change with this
         setting.
 
-        A law asks for the motion and for what the rotors deliver, not for other laws (but for the
-        wind). Shifts of a few milliseconds, and small changes of what the rotors deliver, make no
-        difference to a column that is only tried.
+        An effect model depends on the motion and on what the rotors deliver, not on other effects
+        (except the wind). Time offsets of a few milliseconds, and small changes of what the rotors
+        deliver, make no difference to a column that is only tried.
         """
         key = tuple(
-            (name, c, round(value / (0.05 * typical((name, c), self.vehicle))))
+            (name, c, round(value / (0.05 * typical_size((name, c), self.vehicle))))
             for name, values in sorted(setting.items())
             if name == "wind" or (name and get(name).kind != "wrench")
             for c, value in sorted(values.items())
@@ -417,7 +452,7 @@ class Flights:
         if key not in self._columns:
             if (
                 len(self._columns) > 12
-                or sum(map(len, self._columns.values())) * 48 * len(self.t) > _ROOM
+                or sum(map(len, self._columns.values())) * 48 * len(self.t) > REGRESSION.memory
             ):
                 self._columns.clear()
             self._columns[key] = {}
@@ -438,10 +473,10 @@ class Flights:
             c = coefficient(column)
             if c.typical[0] < 0:
                 delta = -delta
-            # what is moved in time takes its noise along: to both sides, or a step to one would
-            # seem to lessen the noise
+            # moving signals in time moves their noise as well: the difference is taken to both
+            # sides, as a step to one side would seem to reduce the noise
             if (
-                effect in LATE
+                effect in LATE_ROTOR_EFFECTS
                 and abs(value) > abs(delta)
                 and c.minimum <= value - delta
                 and value + delta <= c.maximum
@@ -465,18 +500,20 @@ class Flights:
         kept = self._kept(setting)
         for column in wanted:
             effect, name = column
-            if name.startswith(MOMENT):
+            if name.startswith(MOMENT_PREFIX):
                 continue
             keep = effect not in setting and effect != ""
             if keep and column in kept:
                 out[column] = kept[column]
                 continue
-            out[column] = self._slope(setting, column, base, step * typical(column, self.vehicle))
+            out[column] = self._slope(
+                setting, column, base, step * typical_size(column, self.vehicle)
+            )
             if keep:
                 kept[column] = out[column]
         for column in wanted:
-            if column[1].startswith(MOMENT):
-                part = out[column[0], column[1].removeprefix(MOMENT)].copy()
+            if column[1].startswith(MOMENT_PREFIX):
+                part = out[column[0], column[1].removeprefix(MOMENT_PREFIX)].copy()
                 part[:, :3] = 0.0
                 out[column] = part
         return out
@@ -486,31 +523,38 @@ def held_out(number: Index) -> Index:
     """Return which block of its four is held out, of each block: the last of the first, then as
     evenly as can be.
     """
-    turn = (0.75 + _GOLDEN * (number // _HELD_OUT)) % 1.0
-    return np.asarray(_HELD_OUT * turn, dtype=np.int64)
+    turn = (0.75 + REGRESSION.held_out_step * (number // REGRESSION.blocks_per_held_out)) % 1.0
+    return np.asarray(REGRESSION.blocks_per_held_out * turn, dtype=np.int64)
 
 
 def _rows(signals: Signals) -> Index:
-    step = max(1, round(1.0 / (_RATE_HZ * signals.period)))
-    edge = round(_EDGE / signals.period)
+    step = max(1, round(1.0 / (REGRESSION.row_rate_hz * signals.period)))
+    edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)
 
 
-def _shifted(signals: Signals, shifts: Mapping[str, float], scale: float = 0.0) -> Signals:
-    """Return the signals with turn rates, velocity and attitude moved to when they act, and thrust
-    scaled by 1 + ``scale``.
+def _with_time_offsets(
+    signals: Signals, offsets: Mapping[str, float], scale: float = 0.0
+) -> Signals:
+    """Return the signals with the time offsets of rotor speeds, velocity and attitude applied, and
+    with thrust multiplied by 1 + ``scale``.
     """
     if scale != 0.0:
         signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
-    late, lean = shifts.get(SHIFT[1], 0.0), shifts.get(LEAN[1], 0.0)
-    if late != 0.0:
+    rotor_offset, attitude_offset = (
+        offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
+        offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
+    )
+    if rotor_offset != 0.0:
         n = len(signals.t)
-        at = np.clip(np.arange(n) - late / signals.period, 0, n - 1)
+        at = np.clip(np.arange(n) - rotor_offset / signals.period, 0, n - 1)
         speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
-    if (lag := shifts.get(LAG[1], 0.0)) != 0.0:
-        signals = replace(signals, velocity=signals.velocity - lag * signals.acceleration)
-    if lean != 0.0:
-        turn = Rotation.from_rotvec(-lean * signals.rate).as_matrix()
+    if (velocity_offset := offsets.get(VELOCITY_TIME_OFFSET[1], 0.0)) != 0.0:
+        signals = replace(
+            signals, velocity=signals.velocity - velocity_offset * signals.acceleration
+        )
+    if attitude_offset != 0.0:
+        turn = Rotation.from_rotvec(-attitude_offset * signals.angular_velocity).as_matrix()
         signals = replace(signals, rotation=signals.rotation @ turn)
     return signals

@@ -1,190 +1,230 @@
-"""Whether what is left after all named effects still has a law in it, and so a name may be another
-effect's.
+"""Whether the residual after all named effects still has structure, so that a name may stand for
+another effect.
 
-A library that lacks the true effect explains it by a neighbour, down to the floor of the residual.
-What gives the neighbour away is small: something systematic is left over (columns of a general
-dictionary), or its own coefficient would rather change with speed, height, load, time or frequency,
-or its force, in one channel, would rather be larger than in another. Each column is tried alone, on
-blocks that are left out in turn.
+A library that lacks the true effect explains it by a similar one, down to the noise floor. Small
+signs show it: candidate regressors still explain part of the residual; the coefficient of the named
+effect changes with speed, height, load, time or frequency; or its force differs between channels.
+Each column is tried alone, on blocks that are left out in turn.
 """
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ..findings import CHANNELS, Structure
-from ..motion.signals import low_pass
-from .candidate_regressors import dictionary, drag_by_place, drags, drives, places, scaled, swings
+from ..motion.smoothing import CUTOFFS, low_pass
+from .candidate_regressors import (
+    drag_by_place,
+    drag_regressors,
+    explanatory_variables,
+    general_regressors,
+    place_regressors,
+    resonant_regressors,
+    standardised,
+)
 from .gram_matrix import Gram
-from .innovations import Innovations, adds
-from .regression import BLOCK, CENTRAL, CUTOFF_HZ, DRAGS, LATE, Column, Flights, Setting
-from .search import LEAST_SIZE, Fit, Search
+from .innovations import Innovations, confirms_addition
+from .regression import (
+    CENTRAL,
+    DRAG_EFFECTS,
+    LATE_ROTOR_EFFECTS,
+    REGRESSION,
+    Column,
+    Flights,
+    Setting,
+)
+from .search import SEARCH, FittedEffects, Search
 
 Array = NDArray[np.float64]
 
-# whitened energy on blocks left out; where nothing is lacking few flights have a column above 25
-LEAST_GAIN = 40.0
-LEAST_SHARE = 0.004  # and as a share of the remainder's energy
-# and of what the named effects explain: laws, and the plant they act in, are no truer than one per
-# cent
-LEAST_OF_NAMED = 1e-4
-LEAST_SPREAD = (
-    1.5  # gain over the root of the blocks' summed squares: a law acts again and again, a push once
-)
-LEAST_SPREAD_OF_COMMANDS = (
-    2.0  # the same of flights known from commands, where nothing is confirmed by innovations
-)
-LARGE, LEAST_OF_LARGE = (
-    3.0,
-    1.0,
-)  # times the least gain: a law that acts in one part of the flight, but strongly
-# of columns that are tried together, as a share of their mean energy; from 0.03 to 0.3 little
-# changes
-RIDGE = 0.1
-ROUGH = (
-    4.0  # times the least gain, where turn rates hardly leave the step to which they are rounded
-)
 
-_BATCH = 24  # columns at a time
-UNSTEADY, LEAST_UNSTEADY = (
-    5.0,
-    0.1,
-)  # standard deviations beyond chance, and of a coefficient: true laws have at most 3
-LEAST_OF_POWERS = 7.0  # whitened energy, of one question: 93 true drags had up to 5
-# the same of an exponent that is off by half or more; on two flights on a circle, at one speed, a
-# third of a friction had 6.4 and 8.1
-OFF, LEAST_OF_OFF = 0.5, 4.0
-SLOW = 0.05  # m/s, below which speed is noise
-KINKS = 0.9, 1.0, 1.1, 1.2, 1.3  # of the thrust of hover
-# whitened energy, of one question: 36 true curvatures had up to 4, rotors that stall 29 to 680; and
-# where no curvature is named, 93 flights without a kink had up to 17 that innovations bore out, a
-# rotor that stalls 56
-LEAST_OF_KINKS, LEAST_OF_STALLS = 12.0, 25.0
-RIGID = frozenset(
-    {"mass", "inertia", "com_offset", "marker_offset"}
-)  # what is bolted on moves along, however fast
-SLOW_HZ = 3.0  # of the 5 that the residual has
-# of what it explains: beyond LEAST_GAIN true ones had up to 0.007 (one 0.3), loose cameras 0.04 to
-# 2.3
-LEAST_OF_LOOSE = 0.02
-HINT, BORNE_OUT = (
-    10.0,
-    50.0,
-)  # energy of an effect in the residual, and in innovations, that is too much to pass over
-MOST = 12  # signs, the strongest
-_ASKED = 36  # of the innovations, which takes its time
+@dataclass(frozen=True)
+class StructureSettings:
+    """From which deviance on, a candidate regressor shows an effect that the model lacks.
+
+    Deviances are on left-out blocks, if nothing else is said.
+    """
+
+    # deviance that a column must explain; where nothing is lacking few flights have a column
+    # above 25
+    least_deviance_reduction: float = 40.0
+    least_share_of_residual: float = 0.004  # of the residual's deviance, the same
+    # of the deviance that the named effects explain: effect models, and the plant in which they
+    # act, are true to one per cent
+    least_share_of_named: float = 1e-4
+    # reduction over the root of the blocks' summed squares: an effect acts again and again, a
+    # transient disturbance once; the second is for commanded flights, where innovations confirm
+    # nothing
+    least_spread: float = 1.5
+    commanded_least_spread: float = 2.0
+    # times the least reduction, from which the least spread is smaller: an effect that acts in one
+    # part of a flight, but strongly
+    large_reduction_ratio: float = 3.0
+    least_spread_of_large: float = 1.0
+    # of columns that are tried together, as a share of their mean square sum; from 0.03 to 0.3
+    # little changes
+    ridge: float = 0.1
+    # factor on the least reduction where rotor speeds hardly leave their rounding steps
+    rounded_rotor_factor: float = 4.0
+    batch: int = 24  # columns at a time
+    # standard deviations beyond chance, and relative standard deviation of a coefficient from block
+    # to block; true effects have at most 3 of the first
+    least_scatter_significance: float = 5.0
+    least_scatter: float = 0.1
+    # deviance of one question, whether a drag grows with another power of speed: 93 true drags had
+    # up to 5
+    least_reduction_of_power: float = 7.0
+    # the same where the exponent is off by so much or more; on two flights on a circle, at one
+    # speed, a third of a friction had 6.4 and 8.1
+    large_exponent_error: float = 0.5
+    least_reduction_of_large_exponent: float = 4.0
+    least_speed: float = 0.05  # m/s, below which speed is noise
+    thrust_bends: tuple[float, ...] = (0.9, 1.0, 1.1, 1.2, 1.3)  # times the thrust of hover
+    # deviance of one question, whether thrust bends: 36 true thrust_curvatures had up to 4, rotors
+    # that stall 29 to 680; where no curvature is named, 93 flights without a bend had up to 17 that
+    # innovations confirmed, a rotor that stalls 56
+    least_reduction_of_bend: float = 12.0
+    least_reduction_of_stall: float = 25.0
+    # of the deviance that a rigid effect explains, which its slow motion alone must explain: beyond
+    # the least reduction true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
+    least_share_of_loose_mount: float = 0.02
+    # deviance of an effect in the residual, and in the innovations, that is too much for no name
+    least_residual_hint: float = 10.0
+    least_innovation_hint: float = 50.0
+    most_signs: int = 12  # reported, the strongest first
+    most_confirmations: int = 36  # columns asked of the innovations, which takes time
 
 
-def structure(search: Search, fit: Fit) -> tuple[list[Structure], bool]:
-    """Return the strongest signs of a law in what a fit leaves, the first first, and whether it
-    looks as if there were any.
+STRUCTURE = StructureSettings()
+# effects of what is bolted on: it moves along, however fast
+RIGID_EFFECTS = frozenset({"mass", "inertia", "com_offset", "marker_offset"})
 
-    What looks like a law and is not confirmed by the innovations may be the flight loop's answer to
-    gusts.
+
+def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure], bool]:
+    """Return the strongest signs of structure in the residual of a fit, the strongest first, and
+    whether there seemed to be any.
+
+    Structure that the innovations do not confirm may be a feedback-induced correlation.
     """
     flights = search.flights
-    regression = search.at(fit)
+    regression = search.gram_at(fit)
     error = regression.error(np.arange(len(regression.columns)))
     unit = max(
         1.0, error / regression.design[..., 0].size
-    )  # of chance, where gusts are not what they are taken to be
+    )  # of chance, where the noise model is wrong
     residual = flights.residual(fit.setting)
     base = flights.columns(fit.setting, regression.columns, 0.1)
-    every = search.whitened_energy(flights.residual(fit.without(*fit.effects).setting) - residual)
+    every = search.deviance_of(flights.residual(fit.without(*fit.effects).setting) - residual)
     words: list[tuple[str, str]] = []
     columns: list[Array] = []
-    named: list[float] = []  # energy of what a column may be an untruth of
-    asked = [dictionary] if flights.commanded else [dictionary, places, drags, swings]
+    named: list[float] = []  # deviance of the effects whose model error a column may be
+    asked = (
+        [general_regressors]
+        if flights.commanded
+        else [general_regressors, place_regressors, drag_regressors, resonant_regressors]
+    )
     for channel_words, drive, column in itertools.chain.from_iterable(
         ask(flights, fit.setting) for ask in asked
     ):
-        words.append(("a general dictionary", f"{channel_words} with {drive}"))
+        words.append(("a candidate regressor", f"{channel_words} with {drive}"))
         columns.append(column)
         named.append(every)
-    known = scaled(drives(flights, fit.setting))
-    # what is known from elsewhere was not fitted to these forces
-    shares = {e: _share(flights, fit, e, residual) for e in fit.effects if not search.held(e)}
+    known = standardised(explanatory_variables(flights, fit.setting))
+    # a fixed effect was not fitted to these forces
+    shares = {
+        e: _explained_part(flights, fit, e, residual) for e in fit.effects if not search.is_fixed(e)
+    }
     for effect, share in shares.items():
         for name, x in known.items():
             words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
             columns.append(share * x[:, None])
         rotorwise = any(
             c.name == CENTRAL for c in get(effect).coefficients
-        )  # whose moment is free as it is
+        )  # its moment is free in any case
         for channel in range(3 if rotorwise else 6):
-            words.append(
-                (f"{effect}'s parts do not fit each other", f"{CHANNELS[channel]} differs")
-            )
+            words.append((f"{effect}'s channels do not agree", f"{CHANNELS[channel]} differs"))
             columns.append(np.zeros_like(share))
             columns[-1][:, channel] = share[:, channel]
-        named += [search.whitened_energy(share)] * (len(columns) - len(named))
-    rough = 1.0 if flights.lively else ROUGH
-    least_of_all = max(LEAST_GAIN * unit, LEAST_SHARE * error)
-    least = rough * np.maximum(least_of_all, LEAST_OF_NAMED * np.array(named))
-    steady = LEAST_SPREAD_OF_COMMANDS if flights.commanded else LEAST_SPREAD
+        named += [search.deviance_of(share)] * (len(columns) - len(named))
+    rough = 1.0 if flights.rotor_speeds_vary else STRUCTURE.rounded_rotor_factor
+    least_of_all = max(
+        STRUCTURE.least_deviance_reduction * unit, STRUCTURE.least_share_of_residual * error
+    )
+    least = rough * np.maximum(least_of_all, STRUCTURE.least_share_of_named * np.array(named))
+    steady = STRUCTURE.commanded_least_spread if flights.commanded else STRUCTURE.least_spread
     found = []
-    for at in range(0, len(columns), _BATCH):
-        batch = columns[at : at + _BATCH]
+    for at in range(0, len(columns), STRUCTURE.batch):
+        batch = columns[at : at + STRUCTURE.batch]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
             if gain > least[i] and spread >= (
-                steady if gain < LARGE * least[i] else LEAST_OF_LARGE
+                steady
+                if gain < STRUCTURE.large_reduction_ratio * least[i]
+                else STRUCTURE.least_spread_of_large
             ):
                 found.append((Structure(*words[i], float(gain) / error), column))
     if not flights.commanded and (group := drag_by_place(flights, fit.setting)):
-        together, column = _together(search, regression, group)
-        if together > rough * max(least_of_all, LEAST_OF_NAMED * every):
-            where = "a drag with place and heading together"
-            found.append((Structure("a general dictionary", where, together / error), column))
+        together, column = _joint_regression(search, regression, group)
+        if together > rough * max(least_of_all, STRUCTURE.least_share_of_named * every):
+            where = "a drag with position and heading together"
+            found.append((Structure("a candidate regressor", where, together / error), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
-        return [sign for sign, _ in found[:MOST]], bool(found)
-    wandering = [
-        *unsteady(search, shares, regression),
-        *other_powers(search, shares, regression, base),
-        *kinked(search, fit, regression, base),
-        *loose(search, shares, regression, base),
+        return [sign for sign, _ in found[: STRUCTURE.most_signs]], bool(found)
+    block_signs = [
+        *varying_coefficients(search, shares, regression),
+        *drag_exponents(search, shares, regression, base),
+        *bending_thrust(search, fit, regression, base),
+        *loose_mounts(search, shares, regression, base),
     ]
     if not found:
-        signs = wandering or list(overlooked(search, fit))
+        signs = block_signs or list(innovation_hints(search, fit))
         return signs, bool(signs)
     innovations = Innovations(flights, fit.setting)
-    laws = (
+    confirmed = (
         sign
-        for sign, column in found[:_ASKED]
-        if innovations.confirm_column(_added(search, regression, base, column))
+        for sign, column in found[: STRUCTURE.most_confirmations]
+        if innovations.confirm_column(_best_multiple(search, regression, base, column))
     )
-    return [*wandering, *itertools.islice(laws, MOST)], True
+    return [*block_signs, *itertools.islice(confirmed, STRUCTURE.most_signs)], True
 
 
-def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> Iterator[Structure]:
-    """Yield a sign for each effect that changes from one block of flight to the next by more than
-    chance has it.
+def varying_coefficients(
+    search: Search, shares: Mapping[str, Array], regression: Gram
+) -> Iterator[Structure]:
+    """Yield a sign for each effect whose coefficient changes from block to block by more than
+    chance.
 
     Args:
         search: that found the effects.
         shares: what each explains (rows, 6).
         regression: on the columns of the fit.
 
-    A law is the same all along; what comes and goes, and has a mean, looks like one. Each block has
-    a multiple of the effect of its own; by how much these scatter is the moment estimate of a
-    random coefficient's variance (T. S. Breusch and A. R. Pagan, Econometrica 47 (1979), 1287-1294,
-    have the test).
+    An effect is the same throughout a flight; a disturbance that comes and goes, and has a mean,
+    looks like one. Each block has its own multiple of the effect; their scatter is the moment
+    estimate of a random coefficient's variance (T. S. Breusch and A. R. Pagan, Econometrica 47
+    (1979), 1287-1294, have the test).
     """
     whole = regression.blocks[:, -1, -1].sum()
     unit = max(1.0, float(whole) / regression.design[..., 0].size)
     for effect, share in shares.items():
-        x = search.whiten(share)[search.flights.fit]
+        x = search.whiten(share)[search.flights.fit_rows]
         slope = np.add.reduceat(np.sum(x * regression.design[..., -1], axis=1), regression.begins)
         size = np.add.reduceat(np.sum(x * x, axis=1), regression.begins)
         beyond = float(np.sum(slope**2) - unit * np.sum(size))
         squares = float(np.sum(size**2))
         scatter = np.sqrt(max(beyond, 0.0) / max(squares, 1e-30))
-        if beyond > UNSTEADY * unit * np.sqrt(2.0 * squares) and scatter > LEAST_UNSTEADY:
-            words = f"it changes by {scatter:.0%} from one {BLOCK:.0f} s of flight to the next"
+        if (
+            beyond > STRUCTURE.least_scatter_significance * unit * np.sqrt(2.0 * squares)
+            and scatter > STRUCTURE.least_scatter
+        ):
+            words = (
+                f"it changes by {scatter:.0%} from one {REGRESSION.block:.0f} s block to the next"
+            )
             yield Structure(
                 f"{effect}'s coefficient is not constant",
                 words,
@@ -192,10 +232,10 @@ def unsteady(search: Search, shares: Mapping[str, Array], regression: Gram) -> I
             )
 
 
-def other_powers(
+def drag_exponents(
     search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign for each named drag whose force would rather grow with another power of speed.
+    """Yield a sign for each named drag whose force grows with another power of speed.
 
     Args:
         search: that found the effects.
@@ -203,23 +243,25 @@ def other_powers(
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    A question of its own, in all rows together: a flight at one speed has another one only as it
-    begins.
+    It is asked in all rows together: a flight at one speed has another one only as it begins.
     """
     flights = search.flights
     whole = regression.blocks[:, -1, -1].sum()
-    for effect in filter(DRAGS.__contains__, shares):
+    for effect in filter(DRAG_EFFECTS.__contains__, shares):
         speed = np.concatenate(
             [np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})]
         )
-        # what slow flight tells, and what quick flight tells
+        # weighted towards slow flight, and towards fast flight
         asked = (
-            _beside(search, regression, base, shares[effect] * x[:, None])
-            for x in (np.log(speed.clip(SLOW)), speed)
+            _single_regression(search, regression, base, shares[effect] * x[:, None])
+            for x in (np.log(speed.clip(STRUCTURE.least_speed)), speed)
         )
         (exponent, slow), (_, quick) = asked
         gain = max(slow, quick)
-        if gain > LEAST_OF_POWERS or (slow > LEAST_OF_OFF and abs(exponent) > OFF):
+        if gain > STRUCTURE.least_reduction_of_power or (
+            slow > STRUCTURE.least_reduction_of_large_exponent
+            and abs(exponent) > STRUCTURE.large_exponent_error
+        ):
             yield Structure(
                 f"{effect}'s coefficient is not constant",
                 "its force grows with another power of speed",
@@ -227,10 +269,10 @@ def other_powers(
             )
 
 
-def kinked(
-    search: Search, fit: Fit, regression: Gram, base: Mapping[Column, Array]
+def bending_thrust(
+    search: Search, fit: FittedEffects, regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign where rotors would rather deliver less, or more, beyond some thrust.
+    """Yield a sign where rotors deliver less, or more, beyond some thrust.
 
     Args:
         search: that found the effects.
@@ -239,44 +281,44 @@ def kinked(
         base: these columns (rows, 6) each.
 
     A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few
-    blocks for a law, and a thrust_curvature takes it up in good part: a question of its own, in all
-    rows together. Where one is named it is asked, too, whether thrust would rather bend at hover
-    than all along, and nothing needs to be borne out.
+    blocks, and a thrust_curvature explains most of it: it is asked in all rows together. Where a
+    thrust_curvature is named it is also asked whether thrust bends at hover alone; innovations need
+    not confirm that.
     """
-    flights, bent = search.flights, "thrust_curvature" in fit.effects
-    if not flights.lively:
+    flights, curved = search.flights, "thrust_curvature" in fit.effects
+    if not flights.rotor_speeds_vary:
         return
     asked = [
         (
-            f"what rotors deliver beyond {share:.1f} times the thrust of hover",
-            _bent(flights, fit.setting, share, 0.0),
+            f"rotor thrust beyond {share:.1f} times the thrust of hover",
+            _thrust_beyond(flights, fit.setting, share, 0.0),
         )
-        for share in KINKS
+        for share in STRUCTURE.thrust_bends
     ]
-    if bent:
+    if curved:
         asked.append(
             (
-                "thrust, which bends at one point rather than all along",
-                _bent(flights, fit.setting, 1.0, -1.0),
+                "thrust that bends at one point",
+                _thrust_beyond(flights, fit.setting, 1.0, -1.0),
             )
         )
-    gains = [_beside(search, regression, base, column)[1] for _, column in asked]
+    gains = [_single_regression(search, regression, base, column)[1] for _, column in asked]
     best = int(np.argmax(gains))
     where, column = asked[best]
-    stalls = gains[best] > LEAST_OF_STALLS and Innovations(flights, fit.setting).confirm_column(
-        _added(search, regression, base, column)
-    )
-    if stalls or (bent and gains[best] > LEAST_OF_KINKS):
+    stalls = gains[best] > STRUCTURE.least_reduction_of_stall and Innovations(
+        flights, fit.setting
+    ).confirm_column(_best_multiple(search, regression, base, column))
+    if stalls or (curved and gains[best] > STRUCTURE.least_reduction_of_bend):
         yield Structure(
-            "a general dictionary",
+            "a candidate regressor",
             where,
             gains[best] / max(float(regression.blocks[:, -1, -1].sum()), 1e-30),
         )
 
 
-def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Array:
-    """Return what rotors deliver (rows, 6) beyond so many times their share of the weight, and
-    ``below`` times what below.
+def _thrust_beyond(flights: Flights, setting: Setting, share: float, below: float) -> Array:
+    """Return what rotors deliver (rows, 6) beyond a multiple of their share of the weight, and
+    ``below`` times what they deliver below it.
     """
     vehicle, parts = flights.amended(setting), []
     for piece in flights.pieces(setting):
@@ -286,17 +328,19 @@ def _bent(flights: Flights, setting: Setting, share: float, below: float) -> Arr
         force = piece.signals.rotation[:, :, 2] * wrench[:, :1]
         parts.append(
             low_pass(
-                np.concatenate([force, wrench[:, 1:]], axis=1), CUTOFF_HZ, piece.signals.period
+                np.concatenate([force, wrench[:, 1:]], axis=1),
+                CUTOFFS.residual_hz,
+                piece.signals.period,
             )[piece.rows]
         )
     return np.concatenate(parts)
 
 
-def loose(
+def loose_mounts(
     search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
 ) -> Iterator[Structure]:
-    """Yield a sign for each named mass, inertia or place of one that is another one for slow motion
-    than for quick motion.
+    """Yield a sign for each named mass, inertia or offset that differs between slow and fast
+    motion.
 
     Args:
         search: that found the effects.
@@ -304,55 +348,64 @@ def loose(
         regression: on the columns of the fit.
         base: these columns (rows, 6) each.
 
-    What is on a soft mount follows slow motion as if it were bolted on, and quick motion hardly:
-    below its own frequency it is the larger one.
+    A part on a soft mount follows slow motion as if it were bolted on, and fast motion hardly:
+    below its resonance it adds to mass and inertia.
     """
     flights = search.flights
     whole = float(regression.blocks[:, -1, -1].sum())
-    least = LEAST_GAIN * max(1.0, whole / regression.design[..., 0].size)
-    for effect in filter(RIGID.__contains__, shares):
+    least = STRUCTURE.least_deviance_reduction * max(1.0, whole / regression.design[..., 0].size)
+    for effect in filter(RIGID_EFFECTS.__contains__, shares):
         pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
-        slow = np.concatenate([low_pass(piece, SLOW_HZ, flights.period) for piece in pieces])
-        more, gain = _beside(search, regression, base, slow)
+        slow = np.concatenate(
+            [low_pass(piece, CUTOFFS.slow_motion_hz, flights.period) for piece in pieces]
+        )
+        more, gain = _single_regression(search, regression, base, slow)
         if more > 0.0 and gain > max(
-            least, LEAST_OF_LOOSE * search.whitened_energy(shares[effect])
+            least, STRUCTURE.least_share_of_loose_mount * search.deviance_of(shares[effect])
         ):
             yield Structure(
                 f"{effect}'s coefficient is not constant",
-                f"it changes below {SLOW_HZ:.0f} Hz",
+                f"it changes below {CUTOFFS.slow_motion_hz:.0f} Hz",
                 gain / max(whole, 1e-30),
             )
 
 
-def overlooked(search: Search, fit: Fit) -> Iterator[Structure]:
-    """Yield a sign for each effect of which the residual shows too little for a name, and the
-    innovations much.
+def innovation_hints(search: Search, fit: FittedEffects) -> Iterator[Structure]:
+    """Yield a sign for each effect that the innovations confirm and of which the residual shows too
+    little for a name.
 
     Args:
         search: that found the effects.
         fit: the effects.
 
     The residual ends at 5 Hz, where an inertia only begins to show; innovations have all
-    frequencies. Beside what was named rightly, or rightly not, on 129 flights no other effect of a
-    tenth of its typical size had more than 41 units there.
+    frequencies. On 129 flights that were diagnosed rightly no other effect of a tenth of its
+    typical size had a log-likelihood ratio above 41 there.
     """
     regression = search.linearise(fit)
     for gain in search.gains(fit, regression, search.gram(fit, regression)):
-        if gain.energy > HINT and gain.size > LEAST_SIZE:
+        if (
+            gain.deviance_reduction > STRUCTURE.least_residual_hint
+            and gain.size > SEARCH.least_size
+        ):
             more = search.refit(gain.fit)
-            if adds(search.flights, fit.setting, more.setting, BORNE_OUT):
+            if confirms_addition(
+                search.flights, fit.setting, more.setting, STRUCTURE.least_innovation_hint
+            ):
                 yield Structure(
-                    "innovations show more than the residual", f"of {gain.effect}", gain.share
+                    "the innovations confirm what the residual hardly shows",
+                    gain.effect,
+                    gain.share,
                 )
 
 
-def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
-    """Return what an effect explains (rows, 6) of the residual that is left without it.
+def _explained_part(flights: Flights, fit: FittedEffects, effect: str, residual: Array) -> Array:
+    """Return what an effect explains (rows, 6) of the residual without it.
 
-    What is moved in time differs from what it was by its noise too, which is also in the residual:
-    of such an effect it is what a little more of it would change.
+    Moving signals in time also moves their noise, which is in the residual as well: for such an
+    effect it is the linear change with its coefficients.
     """
-    if effect not in LATE:
+    if effect not in LATE_ROTOR_EFFECTS:
         return flights.residual(fit.without(effect).setting) - residual
     own = fit.setting[effect]
     columns = flights.columns(fit.setting, [(effect, name) for name in own], 0.1)
@@ -361,29 +414,29 @@ def _share(flights: Flights, fit: Fit, effect: str, residual: Array) -> Array:
     )
 
 
-def _added(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
+def _best_multiple(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
     """Return what the best multiple of a column (rows, 6) adds to a fit with columns ``base``."""
-    alone = _alone(search, g, base, column)
-    x = search.whiten(alone)[search.flights.fit]
+    alone = _orthogonal_part(search, g, base, column)
+    x = search.whiten(alone)[search.flights.fit_rows]
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
-def _beside(
+def _single_regression(
     search: Search, g: Gram, base: Mapping[Column, Array], column: Array
 ) -> tuple[float, float]:
     """Return the best multiple of a column (rows, 6) beside the columns ``base`` of a fit, and the
-    energy that it explains.
+    deviance that it explains.
     """
-    x = search.whiten(_alone(search, g, base, column))[search.flights.fit]
+    x = search.whiten(_orthogonal_part(search, g, base, column))[search.flights.fit_rows]
     slope, size = float(np.sum(x * g.design[..., -1])), max(float(np.sum(x * x)), 1e-30)
     return slope / size, slope**2 / size
 
 
-def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
-    """Return a column (rows, 6) less what the columns ``base`` of a fit make of it."""
+def _orthogonal_part(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
+    """Return the part of a column (rows, 6) that is orthogonal to the columns ``base`` of a fit."""
     k = len(g.columns)
     cross = np.tensordot(
-        g.design[..., :k], search.whiten(column)[search.flights.fit], axes=([0, 1], [0, 1])
+        g.design[..., :k], search.whiten(column)[search.flights.fit_rows], axes=([0, 1], [0, 1])
     )
     weights = np.linalg.solve(g.blocks.sum(axis=0)[:k, :k] + np.diag(g.precision), cross)
     return column - sum(
@@ -391,21 +444,23 @@ def _alone(search: Search, g: Gram, base: Mapping[Column, Array], column: Array)
     )
 
 
-def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
-    """Return the energy that columns (rows, 6) explain together on blocks left out, and what of
-    them (rows, 6) does it best.
+def _joint_regression(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
+    """Return the deviance that columns (rows, 6) explain together on left-out blocks, and their
+    best sum (rows, 6).
 
-    A ridge keeps each small: what many columns make of noise would cost more than what a law is
-    worth.
+    A ridge keeps each small: many columns fitted to noise would cost more than an effect is worth.
     """
-    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit]
+    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit_rows]
     k, n = len(g.columns), len(g.columns) + len(columns)
     design = np.concatenate([g.design[..., :k], x, g.design[..., -1:]], axis=2)
     parts = (part.reshape(-1, n + 1) for part in np.split(design, g.begins[1:]))
     blocks = np.array([part.T @ part for part in parts])
     total = blocks.sum(axis=0)
     ridge = np.concatenate(
-        [g.precision, np.full(len(columns), RIDGE * np.trace(total[k:n, k:n]) / len(columns))]
+        [
+            g.precision,
+            np.full(len(columns), STRUCTURE.ridge * np.trace(total[k:n, k:n]) / len(columns)),
+        ]
     )
 
     def error(size: int) -> float:
@@ -421,10 +476,10 @@ def _together(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float,
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
-    """Return the energy that each of more columns (rows, 6, c) explains alone on blocks left out,
-    and how it spreads.
+    """Return the deviance that each of more columns (rows, 6, c) explains alone on left-out blocks,
+    and its spread over the blocks.
     """
-    x = search.whiten(columns)[search.flights.fit]
+    x = search.whiten(columns)[search.flights.fit_rows]
     k = len(g.columns)
     parts = zip(np.split(x, g.begins[1:]), np.split(g.design, g.begins[1:]), strict=True)
     cross = np.array(
@@ -433,8 +488,8 @@ def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:
     own = np.add.reduceat(np.einsum("nic,nic->nc", x, x), g.begins)  # (blocks, c)
     rest = g.blocks.sum(axis=0) - g.blocks
     rest_cross, rest_own = cross.sum(axis=0) - cross, own.sum(axis=0) - own
-    # each column less what the base's columns make of it, and the base's own change, fitted without
-    # the block
+    # each column without its part in the base's columns, and the base's own change, both fitted
+    # without the block
     normal = rest[:, :k, :k] + np.diag(g.precision)
     weights = np.linalg.solve(normal, np.swapaxes(rest_cross[..., :k], 1, 2))  # (blocks, k, c)
     change = np.linalg.solve(normal, rest[:, :k, -1:])  # (blocks, k, 1)

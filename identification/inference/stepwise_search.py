@@ -6,65 +6,73 @@ rows.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from .commanded_rotors import takes_back
+from .commanded_rotors import cancels_thrust_scale
 from .gram_matrix import Gram
-from .innovations import Innovations, adds
-from .search import (
-    COMPLEXITY,
-    LEAST_GAIN,
-    LEAST_SIZE,
-    Fit,
-    Gain,
-    Regression,
-    Search,
-    freedom,
-    started,
-)
-from .starting_points import STARTS, barely_swings
-
-LEAST_SHARE = 0.01  # of what is left unexplained, that an effect must explain besides LEAST_GAIN
-PLAIN = 4.0  # times the least gain: what is half as small, but as plain as that
-LEAST_SIZES = {"attitude_gain": 0.25}  # it comes out wrong by the share of noise in the tilt
-SWAP_GAIN = 12.0
-MOST_EFFECTS = 4
-LEAST_OF_COMMANDS = (
-    25.0,
-    0.018,
-)  # gain and share; effects that cannot be there explain up to 25, and 0.01, of real flights
-LEAST_OF_STARTS = 0.15  # share that a law with a swing of its own must explain of such flights
-LARGEST_OF_COMMANDS = 6.0  # typical sizes: such a law takes up what the law of thrust lacks
-MOST_OF_COMMANDS = (
-    8  # where turn rates are worked out from commands: scale, sag, delay and lean come on top
-)
-_ROUNDS = 2  # of adding and pruning: what wanders on stands for a law that the library lacks
-_MOVES = 3  # at a time, which takes seconds each where four effects stand for one
-_SHORTLIST = 2
-_TRIED = 8  # candidates for one place, the best first, that innovations may turn down
-_FEW = 2  # effects, up to which what could stand for some of them is asked with columns of its own
-_HOPE = (
-    0.2  # share of what effects explain that a fit of its own may still gain over the linear one
-)
+from .innovations import Innovations, confirms_addition
+from .search import SEARCH, FittedEffects, Gain, Regression, Search, coefficient_count, with_changes
+from .starting_points import STARTING_POINTS, overdamped_load
 
 
-def find(search: Search) -> tuple[Fit, list[Gain]]:
-    """Return the effects that are needed, and what each of the library explained
-    at first, alone.
+@dataclass(frozen=True)
+class StepwiseSettings:
+    """How many effects may be named, and by how much a move of the search must pay.
+
+    Deviances are on left-out blocks. ``commanded`` marks flights whose rotor speeds are worked out
+    from commands.
     """
-    needed = Fit(search.delay.setting if search.delay else {})
+
+    # share of the deviance that is left unexplained, which an effect must explain as well as
+    # ``SEARCH.least_deviance_reduction``
+    least_share_of_deviance: float = 0.01
+    # times the least reduction; an effect that explains so much may have half the least size
+    large_reduction_ratio: float = 4.0
+    # typical sizes, for effects whose least size is another one: attitude_gain is wrong by the
+    # share of noise in the tilt
+    least_sizes: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.25})
+    swap_reduction: float = 12.0  # deviance by which one effect in place of another must be better
+    most_effects: int = 4
+    # the same for commanded flights; effects that cannot be there explain up to 25, and a share of
+    # 0.01, of real flights
+    commanded_least_deviance_reduction: float = 25.0
+    commanded_least_share_of_deviance: float = 0.018
+    # share that an effect with nonlinear coefficients must explain of a commanded flight
+    commanded_least_share_of_nonlinear: float = 0.15
+    # typical sizes; a larger effect takes up what the thrust curve of a commanded flight lacks
+    commanded_largest_size: float = 6.0
+    # thrust scale, battery sag, delay and tilt come on top of what other flights have
+    commanded_most_effects: int = 8
+    rounds: int = 2  # of adding and pruning; what changes further stands for an unlisted effect
+    most_moves: int = 3  # of one pruning; a move takes seconds where four effects stand for one
+    most_replacements: int = 2  # single effects tried in place of others, the best first
+    most_candidates: int = 8  # tried for one place, the best first, if innovations reject them
+    # effects; up to so many, replacements are tried with columns linearised without the effects
+    most_relinearised: int = 2
+    # share of what effects explain, which a refit may gain beyond the linear prediction
+    most_refit_gain: float = 0.2
+
+
+STEPWISE = StepwiseSettings()
+
+
+def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
+    """Return the effects that are needed, and what each effect of the library explained alone at
+    first.
+    """
+    needed = FittedEffects(search.delay.setting if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
-    for _ in range(_ROUNDS):
+    for _ in range(STEPWISE.rounds):
         fit, gains = _forward(search, needed)
         first = first or gains
         if asked and fit.effects == needed.effects:
             break
         search.report("asking whether every effect is needed")
-        # by the noise as it is known by now
+        # with the noise as estimated by now
         needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
         if (
             search.flights.commanded
@@ -72,37 +80,37 @@ def find(search: Search) -> tuple[Fit, list[Gain]]:
             or set(needed.effects) in asked
         ):
             break
-        # one in place of two leaves room, and what was small beside a wrong effect may be plain
-        # beside a right one
+        # one effect in place of two leaves room for more, and an effect that was small beside a
+        # wrong one may be large beside the right one
         asked.append(set(needed.effects))
-    return _borne_out(search, needed), first
+    return _confirmed_effects(search, needed), first
 
 
-def _borne_out(search: Search, fit: Fit) -> Fit:
-    """Return a fit less the effects that innovations do not confirm beside those that are left."""
+def _confirmed_effects(search: Search, fit: FittedEffects) -> FittedEffects:
+    """Return a fit without the effects that the innovations do not confirm beside the others."""
     if search.flights.commanded:
         return fit
     for effect in fit.effects:
-        if not _is_borne_out(search, fit, effect):
-            search.report(f"{effect} is an answer to gusts")
-            return _borne_out(search, search.refit(fit.without(effect)))
+        if not _is_confirmed(search, fit, effect):
+            search.report(f"{effect} is a feedback-induced correlation")
+            return _confirmed_effects(search, search.refit(fit.without(effect)))
     return fit
 
 
-def _is_borne_out(search: Search, fit: Fit, effect: str) -> bool:
+def _is_confirmed(search: Search, fit: FittedEffects, effect: str) -> bool:
     return Innovations(search.flights, fit.without(effect).setting).confirm(fit.setting)
 
 
-def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
+def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Gain]]:
     """Return ``fit`` with the effects that are worth adding one after the other, and what each
     explained at first.
     """
     commanded, most = (
         search.flights.commanded,
-        MOST_OF_COMMANDS if search.flights.commanded else MOST_EFFECTS,
+        STEPWISE.commanded_most_effects if search.flights.commanded else STEPWISE.most_effects,
     )
     first: list[Gain] = []
-    for count in range(len([e for e in fit.effects if not search.held(e)]), most + 1):
+    for count in range(len([e for e in fit.effects if not search.is_fixed(e)]), most + 1):
         regression = search.linearise(fit)
         search.set_noise(fit, regression)
         if count == 0:
@@ -110,19 +118,21 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
         g = search.gram(fit, regression)
         gains = search.gains(fit, regression, g)
         first = first or gains
-        least = _least(search, g.error(g.index(search.base(fit.effects))))
+        least = _least(search, g.error(g.index(search.model_columns(fit.effects))))
         better = [
-            x for x in gains if _worth(x, least) and (not commanded or _plausible(search, x, count))
+            x
+            for x in gains
+            if _is_worth_naming(x, least) and (not commanded or _plausible(search, x, count))
         ]
         if not better or count == most:
             break
-        for gain in better[:_TRIED]:
+        for gain in better[: STEPWISE.most_candidates]:
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
             if commanded:
-                taken = not barely_swings(more.setting, search.flights.vehicle.gravity)
+                taken = not overdamped_load(more.setting, search.flights.vehicle.gravity)
             else:
-                taken = adds(search.flights, fit.setting, more.setting)
+                taken = confirms_addition(search.flights, fit.setting, more.setting)
             if taken:
                 break
         else:
@@ -132,63 +142,68 @@ def _forward(search: Search, fit: Fit) -> tuple[Fit, list[Gain]]:
 
 
 def _plausible(search: Search, gain: Gain, count: int) -> bool:
-    """Return whether an effect may be named of a flight whose thrust is a guess, as the
-    ``count``-th one.
+    """Return whether an effect is plausible as the ``count``-th one of a flight whose thrust is a
+    guess.
     """
-    if takes_back(gain.fit.setting, search.flights.vehicle.weight):
+    if cancels_thrust_scale(gain.fit.setting, search.flights.vehicle.weight):
         return False
-    return (gain.size < LARGEST_OF_COMMANDS or count == 0) and (
-        gain.effect not in STARTS or gain.share > LEAST_OF_STARTS
+    return (gain.size < STEPWISE.commanded_largest_size or count == 0) and (
+        gain.effect not in STARTING_POINTS
+        or gain.share > STEPWISE.commanded_least_share_of_nonlinear
     )
 
 
-def _prune(search: Search, fit: Fit) -> Fit:
-    """Return a fit in which every effect is needed given all others, and none, nor two, would be
-    better replaced.
+def _prune(search: Search, fit: FittedEffects) -> FittedEffects:
+    """Return a fit in which every effect is needed beside the others, and no one or two effects
+    have a better replacement.
     """
     error = search.error(fit)
     failed: dict[frozenset[str], float] = {}
-    for _ in range(_MOVES):
+    for _ in range(STEPWISE.most_moves):
         better = _best_move(search, fit, error, failed)
         if better is None:
             break
         fit, error = better
     if search.flights.commanded:
         fit = search.refit(fit)
-        search.weigh_to_measure()
+        search.weight_for_estimation()
     return fit
 
 
 def _best_move(
-    search: Search, fit: Fit, error: float, failed: dict[frozenset[str], float]
-) -> tuple[Fit, float] | None:
-    """Return a better fit and its error: with an effect less, one in place of two or one, or two in
-    place of one or of many.
+    search: Search, fit: FittedEffects, error: float, failed: dict[frozenset[str], float]
+) -> tuple[FittedEffects, float] | None:
+    """Return a better fit and its error: without one effect, one in place of two or one, or two in
+    place of one or many.
 
-    ``failed`` keeps which effects no other one could bring down to which error, so that it is tried
-    no second time.
+    ``failed`` keeps the error that no replacement of these effects could reach, so that it is not
+    tried again.
     """
     least = _least(search, error)
     for effect in fit.effects:
-        if not search.held(effect) and search.error_without(fit, effect) < error + least:
+        if not search.is_fixed(effect) and search.error_without(fit, effect) < error + least:
             search.report(f"{effect} is not needed")
             less = search.refit(fit.without(effect))
             return less, search.error(less)
-    if (
-        search.flights.commanded
-    ):  # whose effects are far apart: no two of those that are alike are ever named
+    if search.flights.commanded:  # similar effects are never named together here
         return None
-    few = len(fit.effects) <= _FEW
-    if not few:  # what stands for two effects with three or four is left by no small step
-        less, spared = fit.without(*fit.effects), COMPLEXITY * sum(map(freedom, fit.effects))
+    few = len(fit.effects) <= STEPWISE.most_relinearised
+    if not few:  # no small step leads from three or four effects to the right two
+        less, spared = (
+            fit.without(*fit.effects),
+            SEARCH.deviance_per_coefficient * sum(map(coefficient_count, fit.effects)),
+        )
         regression = search.linearise(less)
-        g, bar = search.gram(less, regression), error - SWAP_GAIN + spared
-        couple = _couple(search, less, regression, g, search.library, bar)
-        if better := _swapped(search, couple, fit, fit.effects):
+        g, bar = search.gram(less, regression), error - STEPWISE.swap_reduction + spared
+        couple = _pair_swap(search, less, regression, g, search.library, bar)
+        if better := _first_better(search, couple, fit, fit.effects):
             return better
-    for size, allowed in ((2, least), (1, -SWAP_GAIN)):
+    for size, allowed in ((2, least), (1, -STEPWISE.swap_reduction)):
         for group in itertools.combinations(fit.effects, size):
-            less, spared = fit.without(*group), COMPLEXITY * sum(map(freedom, group))
+            less, spared = (
+                fit.without(*group),
+                SEARCH.deviance_per_coefficient * sum(map(coefficient_count, group)),
+            )
             rest, bar = frozenset(less.effects), error + allowed + spared
             if bar <= failed.get(rest, -np.inf):
                 continue
@@ -196,104 +211,127 @@ def _best_move(
             regression = search.linearise(less, None if few else fit)
             g = search.gram(less, regression)
             rivals = [x for x in search.gains(less, regression, g) if x.effect not in group]
-            if better := _swapped(search, _singles(rivals, error, allowed, bar), fit, group):
+            if better := _first_better(
+                search, _single_swaps(rivals, error, allowed, bar), fit, group
+            ):
                 return better
             if few and size == 1:
                 others = [
                     e for e in search.library if e not in group
-                ]  # one that only joins has been asked already
-                couple = _couple(search, less, regression, g, others, error - least + spared)
-                if better := _swapped(search, couple, fit, group):
+                ]  # adding one effect has been tried already
+                couple = _pair_swap(search, less, regression, g, others, error - least + spared)
+                if better := _first_better(search, couple, fit, group):
                     return better
     return None
 
 
 @dataclass(frozen=True, eq=False)
 class Swap:
-    """What may come in place of effects that are taken away."""
+    """Effects that may replace others."""
 
     effects: tuple[str, ...]
-    fit: Fit  # with them, before it is refitted
-    limit: float  # whitened energy that it must come below
+    fit: FittedEffects  # with them, before it is refitted
+    limit: float  # of its deviance
 
 
-def _swapped(
-    search: Search, swaps: Iterable[Swap], old: Fit, group: Sequence[str]
-) -> tuple[Fit, float] | None:
-    """Return the first of the swaps for a group of a fit's effects that keeps what it promises,
+def _first_better(
+    search: Search, swaps: Iterable[Swap], old: FittedEffects, group: Sequence[str]
+) -> tuple[FittedEffects, float] | None:
+    """Return the first swap for a group of a fit's effects that stays below its limit when
     refitted, and its error.
 
-    What it gains by less noise of the sensors does not count.
+    A gain from less sensor noise does not count.
     """
     quiet = search.noise_explained(old)
     for swap in swaps:
         fit = search.refit(swap.fit, swap.limit)
         limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
-        better = search.energy(fit.setting) < limit and (error := search.error(fit)) < limit
+        better = search.deviance(fit.setting) < limit and (error := search.error(fit)) < limit
         if better and (
-            len(swap.effects) == 1 or all(_is_borne_out(search, fit, e) for e in swap.effects)
+            len(swap.effects) == 1 or all(_is_confirmed(search, fit, e) for e in swap.effects)
         ):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error
     return None
 
 
-def _singles(rivals: Sequence[Gain], error: float, allowed: float, bar: float) -> Iterator[Swap]:
-    """Yield the rivals that may do better than ``bar``, less what their coefficients cost."""
-    for rival in rivals[:_SHORTLIST]:
-        # what is far from linear may do better than it looks here, but not by any amount
-        near = rival.left <= error + allowed + _HOPE * (rival.left + rival.energy - error)
-        if near and rival.size > _least_size(rival.effect):
-            yield Swap((rival.effect,), rival.fit, bar - COMPLEXITY * freedom(rival.effect))
-
-
-def _couple(
-    search: Search, fit: Fit, regression: Regression, g: Gram, library: Sequence[str], bar: float
+def _single_swaps(
+    rivals: Sequence[Gain], error: float, allowed: float, bar: float
 ) -> Iterator[Swap]:
-    """Yield the two effects of ``library`` that do best beyond a fit, if they do better than
-    ``bar``, less what they cost.
+    """Yield the single effects that may do better than ``bar`` minus the cost of their
+    coefficients.
+    """
+    for rival in rivals[: STEPWISE.most_replacements]:
+        # a nonlinear effect may do better than its linearisation, within limits
+        near = rival.deviance_left <= error + allowed + STEPWISE.most_refit_gain * (
+            rival.deviance_left + rival.deviance_reduction - error
+        )
+        if near and rival.size > _least_size(rival.effect):
+            yield Swap(
+                (rival.effect,),
+                rival.fit,
+                bar - SEARCH.deviance_per_coefficient * coefficient_count(rival.effect),
+            )
 
-    What takes two to replace it is passed on the way to neither of them. Two together are nearly
+
+def _pair_swap(
+    search: Search,
+    fit: FittedEffects,
+    regression: Regression,
+    g: Gram,
+    library: Sequence[str],
+    bar: float,
+) -> Iterator[Swap]:
+    """Yield the best pair of effects of ``library`` beyond a fit, if it is better than ``bar``
+    minus the cost of its coefficients.
+
+    The search does not reach a pair through either effect alone. Two effects together are nearly
     linear.
     """
     total, least, best = g.blocks.sum(axis=0), bar, None
     for both in itertools.combinations(
-        [e for e in library if e not in search.begun and e not in fit.effects], 2
+        [e for e in library if e not in search.nonlinear_effects and e not in fit.effects], 2
     ):
-        wanted = search.base(fit.effects, both)
+        wanted = search.model_columns(fit.effects, both)
         if not regression.columns.keys() >= set(wanted):
             continue
-        cost = COMPLEXITY * sum(map(freedom, both))
+        cost = SEARCH.deviance_per_coefficient * sum(map(coefficient_count, both))
         if (left := g.error(g.index(wanted)) + cost) >= least:
             continue
         change = g.solve(total, g.index(wanted))
         if not any(
-            search.drowned(g, total, wanted, change, e)
+            search.not_identifiable(g, total, wanted, change, e)
             or search.size(wanted, change, e) <= _least_size(e)
             for e in both
         ):
             least, best = (
                 left,
-                Swap(both, started(search.flights, fit, wanted, change, *both), bar - cost),
+                Swap(both, with_changes(search.flights, fit, wanted, change, *both), bar - cost),
             )
     if best:
         yield best
 
 
 def _least(search: Search, error: float) -> float:
-    """Return the energy that an effect must explain of flights of which so much is left
-    unexplained.
+    """Return the deviance that an effect must explain of flights with such an unexplained
+    deviance.
     """
-    gain, share = LEAST_OF_COMMANDS if search.flights.commanded else (LEAST_GAIN, LEAST_SHARE)
+    gain, share = (
+        (STEPWISE.commanded_least_deviance_reduction, STEPWISE.commanded_least_share_of_deviance)
+        if search.flights.commanded
+        else (SEARCH.least_deviance_reduction, STEPWISE.least_share_of_deviance)
+    )
     return max(gain, share * error)
 
 
 def _least_size(effect: str) -> float:
     """Return the size, in typical ones, above which an effect is worth a name."""
-    return LEAST_SIZES.get(effect, LEAST_SIZE)
+    return STEPWISE.least_sizes.get(effect, SEARCH.least_size)
 
 
-def _worth(gain: Gain, least: float) -> bool:
+def _is_worth_naming(gain: Gain, least: float) -> bool:
     """Return whether an effect explains enough, and is large enough, to be named."""
     size = _least_size(gain.effect)
-    return gain.energy > least and gain.size > (size if gain.energy < PLAIN * least else 0.5 * size)
+    return gain.deviance_reduction > least and gain.size > (
+        size if gain.deviance_reduction < STEPWISE.large_reduction_ratio * least else 0.5 * size
+    )

@@ -1,43 +1,52 @@
-"""Pushes: what a model leaves now and then, for a fraction of a second or a few, and not in
-between.
+"""Transient disturbances: forces and torques that a model leaves for a fraction of a second or a
+few, and not in between.
 
-Gusts, taken for noise of one strength, hide a push that comes seldom: spread over a minute it is
-weak. But noise of one strength, however quick, has peaks of some four standard deviations in a
-minute, and a push has more, of the median's.
+A disturbance model of one strength hides a seldom transient: spread over a minute it is weak. But
+noise of one strength, however fast, has peaks of about four standard deviations in a minute, and a
+transient disturbance has more, in terms of the median.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..findings import CHANNELS, Push
-from ..motion.signals import low_pass
+from ..findings import CHANNELS, TransientDisturbance
+from ..motion.smoothing import CUTOFFS, low_pass
 from .regression import Flights, Setting
 
 Array = NDArray[np.float64]
 
-_CUTOFFS_HZ = 1.5, 3.0  # as long as pushes last, sensors' noise is weakest below these
-# standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up to
-# 4.6
-_LEAST = 10.0
-_LEAST_SIZE = 0.01  # of the weight, or of the weight times the arm
-_EDGE = 1.0  # s at either end of a piece, where the filters have only half of what they need
+
+@dataclass(frozen=True)
+class TransientSettings:
+    """What counts as a transient disturbance."""
+
+    # standard deviations; 378 flights that a model explains had up to 6.6, in strong turbulence up
+    # to 4.6
+    least_significance: float = 10.0
+    least_size: float = 0.01  # of the weight, or of the weight times the arm
+    margin: float = 1.0  # s at either end of a piece, where the filters lack half of what they need
 
 
-def pushes(flights: Flights, setting: Setting) -> list[Push]:
-    """Return the largest push of each channel in which a model with these effects leaves any, the
-    plainest first.
+TRANSIENT = TransientSettings()
+
+
+def transient_disturbances(flights: Flights, setting: Setting) -> list[TransientDisturbance]:
+    """Return the largest transient disturbance of each channel in the residual of a model with
+    these effects, the most significant first.
     """
     residual, starts = flights.residual(setting), np.flatnonzero(flights.start)[1:]
-    edge = round(_EDGE / flights.period)
+    edge = round(TRANSIENT.margin / flights.period)
     inner = np.concatenate(
         [rows[edge : len(rows) - edge] for rows in np.split(np.arange(len(residual)), starts)]
     )
     if not inner.size:
         return []
     weight = flights.vehicle.weight
-    least = _LEAST_SIZE * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
-    found: dict[str, tuple[float, Push]] = {}
-    for cutoff in _CUTOFFS_HZ:
+    least = TRANSIENT.least_size * weight * np.repeat([1.0, flights.vehicle.arm_l], 3)
+    found: dict[str, tuple[float, TransientDisturbance]] = {}
+    for cutoff in CUTOFFS.transient_hz:
         slow = np.concatenate(
             [low_pass(x, cutoff, flights.period) for x in np.split(residual, starts)]
         )
@@ -48,11 +57,14 @@ def pushes(flights: Flights, setting: Setting) -> list[Push]:
             peak = float(slow[row, i])
             above = abs(peak) / max(float(std[i]), 1e-30)
             if (
-                above > max(_LEAST, found[channel][0] if channel in found else 0.0)
+                above
+                > max(TRANSIENT.least_significance, found[channel][0] if channel in found else 0.0)
                 and abs(peak) > least[i]
             ):
                 found[channel] = (
                     above,
-                    Push(channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak),
+                    TransientDisturbance(
+                        channel, flights.logs[flights.log[row]].name, float(flights.t[row]), peak
+                    ),
                 )
-    return [push for _, push in sorted(found.values(), key=lambda x: -x[0])]
+    return [transient for _, transient in sorted(found.values(), key=lambda x: -x[0])]

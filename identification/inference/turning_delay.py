@@ -3,7 +3,7 @@
 In closed loop thrust and vertical acceleration cause each other, and the delay that fits them best
 is as much the loop's as the motors'. Roll and pitch are driven far harder: between 1 and 8 Hz the
 commanded moments show in the angular acceleration of the pose, and by how much they come late there
-is the delay. How much of them shows (inertia, the law of thrust) is left free for each axis of each
+is the delay. How much of them shows (inertia, the thrust curve) is left free for each axis of each
 flight; it may not be negative. What else moves the vehicle, and the pose's noise, may have any
 spectrum: the likelihood is Whittle's with an unknown noise at each frequency.
 
@@ -24,29 +24,39 @@ from ..motion.signals import Signals
 
 Array = NDArray[np.float64]
 
-BAND_HZ = (1.0, 8.0)
-# twice the log likelihood over moments that do not show, which have one number less an axis
-LEAST_EVIDENCE = 40.0
-_SEGMENT = 2.0  # s, of a spectrum
-_LONGEST = 0.12  # s
-EFFECT, COEFFICIENT = "latency", "d"
+
+@dataclass(frozen=True)
+class DelaySettings:
+    """The spectra that show the delay of commands."""
+
+    # Hz, where the commanded moments show in the angular acceleration
+    band_hz: tuple[float, float] = (1.0, 8.0)
+    # log-likelihood ratio over moments that do not show, which have one number less an axis
+    least_log_likelihood_ratio: float = 40.0
+    segment: float = 2.0  # s, of a spectrum
+    longest_delay: float = 0.12  # s
+
+
+DELAY = DelaySettings()
+
+LATENCY, LATENCY_COEFFICIENT = "latency", "d"
 # a lag delays slow changes as much, and a log whose clock is off looks like one whose commands are
 # late
-ALIKE = ("motor_lag", "clock_offset")
+SAME_DELAY_EFFECTS = ("motor_lag", "clock_offset")
 
 
 @dataclass(frozen=True)
 class Delay:
-    """A latency and how sure it is."""
+    """A latency, its standard deviation and its log-likelihood ratio."""
 
     seconds: float
     std: float  # s
-    evidence: float  # twice the log likelihood over moments that do not show at all
+    log_likelihood_ratio: float  # over moments that do not show at all
 
     @property
     def setting(self) -> dict[str, dict[str, float]]:
         """The effect with its coefficient."""
-        return {EFFECT: {COEFFICIENT: self.seconds}}
+        return {LATENCY: {LATENCY_COEFFICIENT: self.seconds}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +71,13 @@ class _Spectra:
     cross: NDArray[np.complex128]
     count: float  # independent segments
 
-    def misfit(self, response: NDArray[np.complex128]) -> float:
+    def deviance(self, response: NDArray[np.complex128]) -> float:
         """Return minus twice the log likelihood, up to a constant, at the gain that fits best."""
         along, power = (
             np.real(np.conj(response) * self.cross),
             np.square(np.abs(response)) * self.moment,
         )
-        # the gain changes the noise that it is weighed with
+        # the gain changes the noise by which it is weighted
         gain = 0.0
         for _ in range(6):
             noise = self.turning - 2.0 * gain * along + gain**2 * power
@@ -81,31 +91,35 @@ def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:
     one.
 
     Args:
-        pieces: unbroken flight, with turn rates worked out from commands.
+        pieces: unbroken flight, with rotor speeds worked out from commands.
         vehicle: as it is declared.
     """
     spectra = [s for piece in pieces for s in _spectra(piece, vehicle)]
     if not spectra:
         return None
 
-    def misfit(seconds: float) -> float:
-        return sum(s.misfit(np.exp(-1j * s.omega * seconds)) for s in spectra)
+    def deviance(seconds: float) -> float:
+        return sum(s.deviance(np.exp(-1j * s.omega * seconds)) for s in spectra)
 
-    seconds, std, least = _least(misfit)
-    return Delay(seconds, std, -least) if -least > LEAST_EVIDENCE and seconds > 2.0 * std else None
+    seconds, std, least = _least(deviance)
+    return (
+        Delay(seconds, std, -least)
+        if -least > DELAY.least_log_likelihood_ratio and seconds > 2.0 * std
+        else None
+    )
 
 
 def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     rate = 1.0 / piece.period
-    length = round(_SEGMENT * rate)
-    if rate < 2.2 * BAND_HZ[1] or len(piece.t) < 2 * length:
+    length = round(DELAY.segment * rate)
+    if rate < 2.2 * DELAY.band_hz[1] or len(piece.t) < 2 * length:
         return []
     out = []
     moments = vehicle.rotor_wrench(piece.rotor_speeds)[:, 1:3]
     for x, y in zip(moments.T, piece.angular_acceleration[:, :2].T, strict=True):
         f, xx = welch(x, rate, nperseg=length)
         yy, xy = welch(y, rate, nperseg=length)[1], csd(x, y, rate, nperseg=length)[1]
-        band = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
+        band = (f >= DELAY.band_hz[0]) & (f <= DELAY.band_hz[1])
         if np.all(xx[band] > 0) and np.all(yy[band] > 0):
             out.append(
                 _Spectra(2.0 * np.pi * f[band], xx[band], yy[band], xy[band], len(x) / length)
@@ -113,16 +127,16 @@ def _spectra(piece: Signals, vehicle: Vehicle) -> list[_Spectra]:
     return out
 
 
-def _least(misfit: Callable[[float], float]) -> tuple[float, float, float]:
-    """Return where a misfit is least, the standard deviation there, and its value."""
+def _least(deviance: Callable[[float], float]) -> tuple[float, float, float]:
+    """Return where a deviance is least, the standard deviation there, and its value."""
     step = 0.005
-    grid = np.arange(0.0, _LONGEST + step, step)
-    at = float(grid[int(np.argmin([misfit(float(x)) for x in grid]))])
+    grid = np.arange(0.0, DELAY.longest_delay + step, step)
+    at = float(grid[int(np.argmin([deviance(float(x)) for x in grid]))])
     best = minimize_scalar(
-        misfit, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
+        deviance, bounds=(max(at - step, 0.0), at + step), method="bounded", options={"xatol": 1e-5}
     )
     seconds, least = float(best.x), float(best.fun)
-    bend = (misfit(seconds + 0.1 * step) - 2.0 * least + misfit(seconds - 0.1 * step)) / (
+    bend = (deviance(seconds + 0.1 * step) - 2.0 * least + deviance(seconds - 0.1 * step)) / (
         0.1 * step
     ) ** 2
     return seconds, float(np.sqrt(2.0 / max(bend, 1e-6))), least

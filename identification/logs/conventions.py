@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.signals import Signals, log_signals, low_pass
+from ..motion.signals import Signals, log_signals
+from ..motion.smoothing import CUTOFFS, central_difference, low_pass
 from .flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
-CUTOFF_HZ = 3.0  # well above a trajectory, well below the noise of a differentiated pose
 _RATE_HZ = 20.0  # of the samples compared
 _EDGE = 0.3  # s at either end of a piece, where filters start
 _FLYING = 0.5  # of the median thrust: less is take-off, landing or ground
@@ -348,7 +348,11 @@ class Balances:
         self._motion = {False: _motion(signals, self._masks, vehicle)}
         self._rotors = _Rotors(
             [
-                (s.t, low_pass(np.square(s.rotor_speeds), CUTOFF_HZ, s.period), s.t[mask])
+                (
+                    s.t,
+                    low_pass(np.square(s.rotor_speeds), CUTOFFS.convention_hz, s.period),
+                    s.t[mask],
+                )
                 for s, mask in zip(signals, self._masks, strict=True)
             ]
         )
@@ -360,7 +364,7 @@ class Balances:
             [
                 low_pass(
                     np.unwrap(np.arctan2(s.rotation[:, 1, 0], s.rotation[:, 0, 0])),
-                    CUTOFF_HZ,
+                    CUTOFFS.convention_hz,
                     s.period,
                 )[mask]
                 for s, mask in zip(signals, self._masks, strict=True)
@@ -504,7 +508,8 @@ def _flying(signals: Sequence[Signals], vehicle: Vehicle) -> list[NDArray[np.int
     second.
     """
     thrusts = [
-        low_pass(np.square(s.rotor_speeds) @ vehicle.k, CUTOFF_HZ, s.period) for s in signals
+        low_pass(np.square(s.rotor_speeds) @ vehicle.k, CUTOFFS.convention_hz, s.period)
+        for s in signals
     ]
     every = np.concatenate(thrusts)
     turning = every[every > 0.1 * float(np.quantile(every, 0.9))]
@@ -523,20 +528,20 @@ def _motion(
     columns: list[list[Array]] = [[] for _ in range(6)]
     for s, mask in zip(signals, masks, strict=True):
         thrust = np.square(s.rotor_speeds) @ vehicle.k
-        inverse = -np.einsum("nij,nj->ni", s.rotation, s.rate)
+        inverse = -np.einsum("nij,nj->ni", s.rotation, s.angular_velocity)
         for column, x in zip(
             columns,
             (
                 s.acceleration,
                 s.rotation * thrust[:, None, None],
-                s.rate,
+                s.angular_velocity,
                 s.angular_acceleration,
                 inverse,
-                np.gradient(inverse, s.period, axis=0),
+                central_difference(inverse, s.period),
             ),
             strict=True,
         ):
-            column.append(low_pass(x, CUTOFF_HZ, s.period)[mask])
+            column.append(low_pass(x, CUTOFFS.convention_hz, s.period)[mask])
     acceleration, frame, *turning = (np.concatenate(column) for column in columns)
     level = float(np.median(np.linalg.norm(frame[:, :, 2], axis=1))) if len(frame) else 1.0
     return _Motion(acceleration, frame * (vehicle.gravity / max(level, 1e-9)), *turning)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ..motion.signals import low_pass
+from ..motion.smoothing import CUTOFFS, low_pass
 from .conventions import Balances, recognise, time_shift
 from .flight_log import FlightLog
 
@@ -298,7 +298,7 @@ def _check_length(
 ) -> tuple[str, ...]:
     """Check that enough is left in unbroken runs in flight, and note where much is not."""
     thrust = (
-        low_pass(np.square(log.rotor_speeds) @ vehicle.k, 1.0, log.period)
+        low_pass(np.square(log.rotor_speeds) @ vehicle.k, CUTOFFS.flying_hz, log.period)
         if len(log.t) > 30
         else np.zeros(len(log.t))
     )

@@ -62,7 +62,7 @@ def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehi
             signals.position,
             signals.rotation,
             signals.velocity,
-            signals.rate,
+            signals.angular_velocity,
         )
     )
     _run_model(
@@ -123,7 +123,7 @@ def acting_wrench(
         rotors,
         effects,
         np.ascontiguousarray(signals.rotation),
-        np.ascontiguousarray(signals.rate),
+        np.ascontiguousarray(signals.angular_velocity),
         np.ascontiguousarray(signals.angular_acceleration),
         own.com,
         own.inertia,

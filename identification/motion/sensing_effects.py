@@ -1,11 +1,11 @@
-"""A log as it would be without the sensing effects that its vehicle declares: poses and turn rates
-brought back to truth.
+"""A log as it would be without the sensing effects that its vehicle declares: poses and rotor
+speeds brought back to truth.
 
 Everything in this folder that compares a log's motion with a model takes the corrected log; only
 the filter, which undoes these effects by itself, takes the log as it is.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +16,21 @@ from ...runtime.compiled import Record, compiled
 from ..logs.flight_log import FlightLog
 
 _MODEL = np.dtype(MODEL_FIELDS)
-_BREAK = 0.1  # s without a pose, over which nothing is interpolated
+
+
+@dataclass(frozen=True)
+class SensingSettings:
+    """Where the poses of a log are unbroken."""
+
+    longest_gap: float = 0.1  # s without a pose, over which nothing is interpolated
+
+
+SENSING = SensingSettings()
 
 
 @compiled
 def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
-    """Bring ``samples`` (n, 11), turn rates and pose, back to the truth in place; ``seen`` (n,)
+    """Bring ``samples`` (n, 11), rotor speeds and pose, back to the truth in place; ``seen`` (n,)
     says where a pose is.
     """
     f = models[0]
@@ -38,8 +47,8 @@ def _undo(models: Record, t: Array, seen: np.ndarray, samples: Array) -> None:
 
 
 def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
-    """Return the log with the vehicle's declared sensing effects taken out of its poses and turn
-    rates.
+    """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
+    speeds.
 
     It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows
     tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s after a
@@ -74,7 +83,9 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     """
     seen = np.flatnonzero(log.valid)
     starts = (
-        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > _BREAK)] if seen.size else seen
+        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > SENSING.longest_gap)]
+        if seen.size
+        else seen
     )
     last = np.searchsorted(starts, np.arange(len(log.t)), side="right") - 1
     began = np.where(last >= 0, log.t[starts[last]] if starts.size else np.inf, np.inf)

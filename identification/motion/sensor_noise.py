@@ -7,17 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog
+from .smoothing import CUTOFFS, high_pass
 
 Array = NDArray[np.float64]
-
-_ABOVE = (
-    0.25  # of the sampling rate: from there to half of it a vehicle's pose holds nothing but noise
-)
 
 
 @dataclass(frozen=True)
@@ -26,36 +22,30 @@ class SensorNoise:
 
     position: float  # m
     attitude: float  # rad
-    rate: float  # rad/s, of a turn rate
+    rotor_speed: float  # rad/s
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     """Return the noise of a log: of its pose what lies above a quarter of the sampling rate, taken
     as white.
 
-    The turn rates' is the step to which they are rounded, as the log shows it (no more than the
+    The rotor speeds' is the step to which they are rounded, as the log shows it (no more than the
     vehicle's file says).
     """
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
-    position = _high(log.position[seen])[whole]
+    position = high_pass(log.position[seen], CUTOFFS.noise_share_of_rate)[whole]
     turned = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
     angle = (
         turned[:-1].inv() * turned[1:]
     ).as_rotvec()  # white noise differenced: twice its power, and a known shape
     step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     return SensorNoise(
-        _level(position), _level(_high(np.cumsum(angle, axis=0))), step / np.sqrt(12.0)
+        _level(position),
+        _level(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
+        step / np.sqrt(12.0),
     )
-
-
-def _high(x: Array) -> Array:
-    sections = butter(4, 2.0 * _ABOVE, btype="highpass", output="sos")
-    impulse = np.zeros(201)
-    impulse[100] = 1.0
-    kept = np.linalg.norm(sosfiltfilt(sections, impulse))  # of white noise
-    return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
 
 
 def _level(x: Array) -> float:
@@ -74,7 +64,8 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
         log,
         position=log.position + noise.position * rng.standard_normal((n, 3)),
         quaternion=quaternion,
-        rotor_speeds=log.rotor_speeds + noise.rate * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
+        rotor_speeds=log.rotor_speeds
+        + noise.rotor_speed * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
     )
 
 

@@ -29,7 +29,8 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.tables import open_table
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
-from windwrench.identification.motion.signals import Signals, log_signals, low_pass
+from windwrench.identification.motion.signals import Signals, log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json, write_png
 from windwrench.runtime.provenance import commit, made_by

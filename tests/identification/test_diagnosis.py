@@ -14,9 +14,9 @@ from windwrench.envs.plant import TICK
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.findings import Diagnosis
 from windwrench.identification.inference.regression import Flights, held_out
-from windwrench.identification.inference.residual_structure import overlooked
+from windwrench.identification.inference.residual_structure import innovation_hints
 from windwrench.identification.inference.search import Search
-from windwrench.identification.inference.stepwise_search import find
+from windwrench.identification.inference.stepwise_search import find_effects
 from windwrench.identification.inference.whitening import Whitener
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
@@ -202,7 +202,7 @@ def test_what_comes_and_goes_is_no_sure_mass():
     flown = practise_held_back(load_vehicle("ardrone2"), "failing_cell", "small", seed=202)
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.tentative for e in found.effects} == {"mass": True}
-    assert any("from one 3 s of flight to the next" in sign.where for sign in found.structure)
+    assert any("from one 3 s block to the next" in sign.where for sign in found.structure)
 
 
 def test_what_is_on_a_soft_mount_is_no_sure_inertia():
@@ -221,11 +221,11 @@ def test_an_inertia_that_only_innovations_show_is_not_passed_over():
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
     assert found.structure[0].where in (
-        "of inertia",
-        "tau_y with what swings at 2.1 Hz",
+        "inertia",
+        "tau_y with a resonant mode at 2.1 Hz",
     )  # the second is at its threshold
     search = Search(Flights([flown.log], flown.vehicle), names())
-    assert [sign.where for sign in overlooked(search, find(search)[0])] == ["of inertia"]
+    assert [sign.where for sign in innovation_hints(search, find_effects(search)[0])] == ["inertia"]
 
 
 def test_what_is_on_a_soft_mount_is_seen_to_swing():
@@ -235,7 +235,7 @@ def test_what_is_on_a_soft_mount_is_seen_to_swing():
     flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", 977114585, 60.0)
     found = diagnose([flown.log], flown.vehicle)
     assert (found.verdict, found.remainder, found.effects) == ("unexplained", "structured", ())
-    assert found.structure[0].where == "tau_y with what swings at 2.1 Hz"
+    assert found.structure[0].where == "tau_y with a resonant mode at 2.1 Hz"
 
 
 @pytest.mark.parametrize("seed", [914766417, 3979625931])
@@ -295,7 +295,7 @@ def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
     )
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.tentative for e in found.effects} == {"thrust_curvature": True}
-    assert found.structure[0].where == "what rotors deliver beyond 1.1 times the thrust of hover"
+    assert found.structure[0].where == "rotor thrust beyond 1.1 times the thrust of hover"
     (curved,) = diagnose([fly("thrust_curvature", a=-0.05)], load_vehicle("ardrone2")).effects
     assert (curved.name, curved.tentative) == ("thrust_curvature", False)
 
@@ -326,7 +326,7 @@ def test_a_load_that_the_library_lacks_is_seen_to_swing():
     found = diagnose([log], load_vehicle("ardrone2"), without=["slung_payload"])
     assert {e.name: e.tentative for e in found.effects} == {"mass": True}
     assert any(
-        "what swings at 0." in sign.where or "what swings at 1 Hz" in sign.where
+        "a resonant mode at 0." in sign.where or "a resonant mode at 1 Hz" in sign.where
         for sign in found.structure
     )
 
@@ -336,7 +336,7 @@ def test_a_load_that_the_library_lacks_is_seen_to_swing():
     [
         ("thermal_column", 1782317122, "near x = "),
         ("patchy_drag", 359922102, "a drag with world position x"),
-        ("patchy_drag", 2356848652, "a drag with place and heading together"),
+        ("patchy_drag", 2356848652, "a drag with position and heading together"),
     ],
 )
 def test_what_acts_in_one_part_of_the_room_is_seen(disturbance, seed, where):
@@ -371,7 +371,7 @@ def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
     """
     flown = practise(load_vehicle("ardrone2"), "pair", seed=508285241)
     assert {e.name for e in flown.effects} == {"marker_offset", "battery_sag"}
-    assert "marker_offset" in Flights([flown.log], flown.vehicle).drowned
+    assert "marker_offset" in Flights([flown.log], flown.vehicle).not_identifiable
     found = diagnose([flown.log], flown.vehicle)
     assert {e.name: e.indistinguishable_from for e in found.effects} == {
         "battery_sag": (),
@@ -440,13 +440,13 @@ def test_the_velocity_of_a_plant_that_holds_its_forces_is_half_a_tick_behind():
         turbulence=0.0,
         sensor=0.5,
     )
-    fit, _ = find(Search(Flights([log], load_vehicle("ardrone2")), names()))
+    fit, _ = find_effects(Search(Flights([log], load_vehicle("ardrone2")), names()))
     assert fit.effects == ["inflow_thrust"]
     assert fit.setting["inflow_thrust"]["kz"] == pytest.approx(2.3e-4, rel=0.01)
-    assert fit.setting[""]["velocity_shift"] == pytest.approx(
-        0.5 * TICK, abs=4.0 * fit.std["", "velocity_shift"]
+    assert fit.setting[""]["velocity_time_offset"] == pytest.approx(
+        0.5 * TICK, abs=4.0 * fit.std["", "velocity_time_offset"]
     )
-    assert fit.std["", "velocity_shift"] < 0.15 * TICK
+    assert fit.std["", "velocity_time_offset"] < 0.15 * TICK
 
 
 def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
@@ -480,7 +480,7 @@ def test_no_flight_keeps_step_with_what_is_held_out():
         share = np.bincount(number % period, held) / np.bincount(number % period)
         assert np.all((share > 0.05) & (share < 0.5)), period
     flights = Flights([fly()], load_vehicle("ardrone2"))
-    assert np.array_equal(flights.fit, flights.block % 4 != held_out(flights.block))
+    assert np.array_equal(flights.fit_rows, flights.block % 4 != held_out(flights.block))
 
 
 def test_the_error_is_that_of_test_logs_where_they_are_given():
@@ -510,9 +510,9 @@ def test_sensor_noise_is_read_off_the_log():
 def test_whitened_noise_is_white():
     flights = Flights([fly()], load_vehicle("ardrone2"))
     remainder = flights.residual({})
-    white = Whitener(remainder, flights.sensor_noise, flights.start, flights.fit, flights.period)(
-        remainder
-    )[20:]
+    white = Whitener(
+        remainder, flights.sensor_noise, flights.start, flights.fit_rows, flights.period
+    )(remainder)[20:]
     assert np.all(np.abs(white.std(axis=0) - 1.0) < 0.15)
     lag = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white * white, axis=0)
     assert np.all(np.abs(lag) < 0.2)

@@ -14,7 +14,8 @@ from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.wrench_series import estimate_log
 

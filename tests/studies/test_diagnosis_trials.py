@@ -15,7 +15,8 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
 from windwrench.studies.trials.outsiders import OUTSIDERS
@@ -206,19 +207,19 @@ def test_coefficients_are_compared_where_the_truth_is_not_zero():
 
 
 def test_the_rules_count_what_they_say():
-    def typical(effect, *diagnoses):
+    def typical_size(effect, *diagnoses):
         return outcome("typical", {effect: {"x": 1.0}}, *diagnoses)
 
     outcomes = [
-        typical(
+        typical_size(
             "mass", found(name("mass", x=1.01), rollout=0.3), found(name("wind"), without=("mass",))
         ),
-        typical(
+        typical_size(
             "wind",
             found(name("wind", tentative=True, x=1.2)),
             found(remainder="structured", without=("wind",)),
         ),
-        typical(
+        typical_size(
             "latency",
             found(),
             found(name("clock_offset"), without=("latency",)),

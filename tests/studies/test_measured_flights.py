@@ -13,9 +13,9 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import (
     deviation,
     deviations,
+    downsampled,
     in_flight,
-    shared,
-    thinned,
+    without_deviations,
 )
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.signals import log_signals
@@ -139,7 +139,7 @@ def test_only_the_time_in_the_air_counts(vehicle):
     assert flight.position[:, 2].min() > 0.4
     assert len(flight.voltage) == len(flight.t) == len(flight.valid)
     signals = log_signals(flight)[0]
-    thin = thinned(signals)
+    thin = downsampled(signals)
     assert thin.period == pytest.approx(0.02, rel=1e-3)
     # a log's rotor speed is that at the instant of its row
     same = np.interp(thin.t, signals.t, signals.rotor_speeds[:, 0])
@@ -157,12 +157,12 @@ def test_deviations_have_no_mean():
         "mass": {"dm": 1.0},
     }
     assert len(columns) == 9
-    for kind in ("thrust scale", "lean x", "lean y"):
+    for kind in ("thrust scale", "tilt x", "tilt y"):
         each = [deviation(setting, kind, i, 4) for i in range(4)]
         assert sum(each) == pytest.approx(0.0)
         assert np.ptp(each) > 0.1
         assert deviation(setting, kind, 4, 4) == 0.0
-    assert shared(setting) == {"": {}, "mass": {"dm": 1.0}}
+    assert without_deviations(setting) == {"": {}, "mass": {"dm": 1.0}}
 
 
 def test_page_of_a_result():

@@ -12,7 +12,8 @@ from windwrench.dynamics.effects import check_setting, get, names
 from windwrench.dynamics.rotation import matrix_of
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.studies.trials.outsiders import OUTSIDERS, Moment
 from windwrench.studies.trials.practice_flights import (
     KINDS,

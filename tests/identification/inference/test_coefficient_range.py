@@ -7,9 +7,9 @@ import pytest
 
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
-from windwrench.identification.inference.coefficient_range import beyond_belief
+from windwrench.identification.inference.coefficient_range import implausible_coefficients
 from windwrench.identification.inference.gram_matrix import Gram
-from windwrench.identification.inference.search import Fit
+from windwrench.identification.inference.search import FittedEffects
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
@@ -40,7 +40,7 @@ def search(columns, pulls, precision=1e8):
     )
     return SimpleNamespace(
         flights=SimpleNamespace(vehicle=VEHICLE, pieces=lambda setting: [LEVEL]),
-        at=lambda fit: gram,
+        gram_at=lambda fit: gram,
     )
 
 
@@ -49,8 +49,8 @@ def search(columns, pulls, precision=1e8):
 )
 def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = Fit({"body_drag": {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}})
-    found = beyond_belief(search(columns, [1.0, pull]), fit)
+    fit = FittedEffects({"body_drag": {"dx": 1e-4, "dy": 1e-4, "dz": 1e-4, "cx": 0.0}})
+    found = implausible_coefficients(search(columns, [1.0, pull]), fit)
     assert bool(found) == doubtful
     assert not doubtful or "cx" in found[0]
 
@@ -59,14 +59,14 @@ def test_a_coefficient_that_would_leave_its_range_is_a_doubt(pull, doubtful):
     ("dx", "dz", "doubtful"), [(0.0, 1e-3, True), (1e-3, 1e-3, False), (1e-3, 0.0, False)]
 )
 def test_air_that_damps_yaw_alone_is_a_doubt(dx, dz, doubtful):
-    fit = Fit({"rate_damping": {"dx": dx, "dy": dx, "dz": dz}})
-    assert bool(beyond_belief(search([("rate_damping", "dz")], [1.0]), fit)) == doubtful
+    fit = FittedEffects({"rate_damping": {"dx": dx, "dy": dx, "dz": dz}})
+    assert bool(implausible_coefficients(search([("rate_damping", "dz")], [1.0]), fit)) == doubtful
 
 
 def test_what_is_small_beside_the_effect_itself_is_no_doubt():
     columns = [("body_drag", "dx"), ("body_drag", "cx")]
-    fit = Fit({"body_drag": {"dx": 0.1, "dy": 0.1, "dz": 0.1, "cx": 0.0}})
-    assert not beyond_belief(search(columns, [1.0, -6.0]), fit)
+    fit = FittedEffects({"body_drag": {"dx": 0.1, "dy": 0.1, "dz": 0.1, "cx": 0.0}})
+    assert not implausible_coefficients(search(columns, [1.0, -6.0]), fit)
 
 
 @pytest.mark.parametrize(
@@ -79,25 +79,31 @@ def test_what_is_small_beside_the_effect_itself_is_no_doubt():
     ],
 )
 def test_a_body_that_air_drags_along_some_axes_alone_is_a_doubt(dx, cx, std, doubtful):
-    fit = Fit(
+    fit = FittedEffects(
         {"body_drag": {"dx": dx, "dy": 0.05, "dz": 0.1, "cx": cx}}, {("body_drag", "dx"): std}
     )
-    assert bool(beyond_belief(search([("body_drag", "dx")], [0.0]), fit)) == doubtful
+    assert bool(implausible_coefficients(search([("body_drag", "dx")], [0.0]), fit)) == doubtful
 
 
 def test_a_wind_that_no_room_has_is_a_doubt_and_any_mass_is_none():
     columns = [("wind", "wx"), ("mass", "dm")]
-    assert beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 30.0, "cd": 1e-5}}))
-    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"wind": {"wx": 2.0, "cd": 0.04}}))
-    assert not beyond_belief(search(columns, [0.0, 0.0]), Fit({"mass": {"dm": 1.0}}))
+    assert implausible_coefficients(
+        search(columns, [0.0, 0.0]), FittedEffects({"wind": {"wx": 30.0, "cd": 1e-5}})
+    )
+    assert not implausible_coefficients(
+        search(columns, [0.0, 0.0]), FittedEffects({"wind": {"wx": 2.0, "cd": 0.04}})
+    )
+    assert not implausible_coefficients(
+        search(columns, [0.0, 0.0]), FittedEffects({"mass": {"dm": 1.0}})
+    )
 
 
 def test_a_wind_on_hardly_any_drag_is_a_steady_force_unless_another_drag_feels_it():
     columns, wind = [("wind", "wx")], {"wx": 6.0, "cd": 1e-3}
-    (doubt,) = beyond_belief(search(columns, [0.0]), Fit({"wind": wind}))
+    (doubt,) = implausible_coefficients(search(columns, [0.0]), FittedEffects({"wind": wind}))
     assert "hardly any drag" in doubt
-    assert not beyond_belief(
-        search(columns, [0.0]), Fit({"wind": wind, "rotor_drag": {"kdx": 1e-4}})
+    assert not implausible_coefficients(
+        search(columns, [0.0]), FittedEffects({"wind": wind, "rotor_drag": {"kdx": 1e-4}})
     )
 
 

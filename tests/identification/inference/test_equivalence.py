@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.identification.inference.equivalence import composites, unlisted
+from windwrench.identification.inference.equivalence import (
+    composite_doubts,
+    unlisted_equivalent_doubts,
+)
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.search import Fit, Search
+from windwrench.identification.inference.search import FittedEffects, Search
 from windwrench.studies.trials.practice_flights import fly_practice
 
 FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
@@ -18,44 +21,51 @@ MASS = FLIGHTS.vehicle.mass
     ("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)]
 )
 def test_mass_and_thrust_that_cancel_may_be_an_inertia(thrust, cancels):
-    fit = Fit({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
-    assert bool(composites(FLIGHTS, fit)) == cancels
+    fit = FittedEffects({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
+    assert bool(composite_doubts(FLIGHTS, fit)) == cancels
 
 
 @pytest.mark.parametrize(
     ("shift", "doubtful"), [(-0.006, True), (-0.005, False), (0.0, False), (0.006, False)]
 )
 def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
-    fit = Fit({"": {"rate_shift": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}})
-    assert bool(composites(FLIGHTS, fit)) == doubtful
-    assert not composites(FLIGHTS, Fit({"": {"rate_shift": shift}}))
+    fit = FittedEffects(
+        {"": {"rotor_time_offset": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}}
+    )
+    assert bool(composite_doubts(FLIGHTS, fit)) == doubtful
+    assert not composite_doubts(FLIGHTS, FittedEffects({"": {"rotor_time_offset": shift}}))
 
 
 def test_what_coincides_within_its_noise_may_be_one_effect():
-    fit = Fit(
+    fit = FittedEffects(
         {"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}}
     )
-    assert not composites(FLIGHTS, fit)
+    assert not composite_doubts(FLIGHTS, fit)
     fit.std = {
         ("thrust_scale", "s"): 3e-5,
         ("inertia", "jx"): 0.021,
         ("inertia", "jy"): 0.020,
         ("inertia", "jz"): 0.003,
     }
-    assert len(composites(FLIGHTS, fit)) == 1
+    assert len(composite_doubts(FLIGHTS, fit)) == 1
     fit.std["inertia", "jx"] = 0.004
-    assert not composites(FLIGHTS, fit)
+    assert not composite_doubts(FLIGHTS, fit)
 
 
 @pytest.mark.parametrize(
     ("dm", "cx", "hangs"), [(0.02, 0.0, True), (0.02, 0.002, False), (-0.02, 0.0, False)]
 )
 def test_mass_and_a_centre_below_may_be_a_load_that_hangs(dm, cx, hangs):
-    fit = Fit({"mass": {"dm": dm}, "com_offset": {"cx": cx, "cy": 0.0, "cz": 0.004}})
+    fit = FittedEffects({"mass": {"dm": dm}, "com_offset": {"cx": cx, "cy": 0.0, "cz": 0.004}})
     library = ("mass", "thrust_scale", "com_offset")
-    assert bool(unlisted(SimpleNamespace(flights=FLIGHTS, library=library), fit)) == hangs
+    assert (
+        bool(unlisted_equivalent_doubts(SimpleNamespace(flights=FLIGHTS, library=library), fit))
+        == hangs
+    )
     # where a load is in the library, it has been tried in their place
-    assert not unlisted(SimpleNamespace(flights=FLIGHTS, library=(*library, "slung_payload")), fit)
+    assert not unlisted_equivalent_doubts(
+        SimpleNamespace(flights=FLIGHTS, library=(*library, "slung_payload")), fit
+    )
 
 
 def test_more_than_two_effects_may_stand_for_one():
@@ -64,8 +74,10 @@ def test_more_than_two_effects_may_stand_for_one():
         "com_offset": {"cx": 0.005, "cy": 0.0, "cz": 0.0},
         "battery_sag": {"n": 1.0},
     }
-    assert len(composites(FLIGHTS, Fit(three))) == 1
-    assert not composites(FLIGHTS, Fit({name: three[name] for name in ("mass", "com_offset")}))
+    assert len(composite_doubts(FLIGHTS, FittedEffects(three))) == 1
+    assert not composite_doubts(
+        FLIGHTS, FittedEffects({name: three[name] for name in ("mass", "com_offset")})
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,8 +91,10 @@ def test_more_than_two_effects_may_stand_for_one():
 )
 def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
     rotors = {f"e{i + 1}": value for i, value in enumerate(off)}
-    fit = Fit({"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors})
-    assert bool(composites(FLIGHTS, fit)) == doubtful
+    fit = FittedEffects(
+        {"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors}
+    )
+    assert bool(composite_doubts(FLIGHTS, fit)) == doubtful
 
 
 @pytest.mark.parametrize("trajectory", ["hover", "vertical"])
@@ -99,7 +113,7 @@ def test_a_thrust_beside_a_steady_force_needs_flight_that_tells_them_apart(traje
         sensor=0.5,
     )
     search = Search(Flights([log], FLIGHTS.vehicle), ("constant_force", "thrust_scale", "mass"))
-    fit = Fit(truth)
+    fit = FittedEffects(truth)
     regression = search.linearise(fit)
     search.set_noise(fit, regression)
     asked = [gain.effect for gain in search.gains(fit, regression, search.gram(fit, regression))]

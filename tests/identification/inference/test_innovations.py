@@ -7,10 +7,10 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.disturbance_filter import innovations
-from windwrench.identification.inference.innovations import Innovations, at_odds
-from windwrench.identification.inference.regression import Flights, typical
-from windwrench.identification.inference.search import LEAST_GAIN, LEAST_SIZE, Fit, Search
-from windwrench.identification.inference.stepwise_search import find
+from windwrench.identification.inference.innovations import Innovations, contradicted_by_innovations
+from windwrench.identification.inference.regression import Flights, typical_size
+from windwrench.identification.inference.search import SEARCH, FittedEffects, Search
+from windwrench.identification.inference.stepwise_search import find_effects
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
@@ -61,14 +61,19 @@ def test_what_gusts_suggest_is_not_confirmed(gusty):
     there explains much.
     """
     search = Search(Flights([gusty], VEHICLE), names())
-    regression = search.linearise(Fit({}))
-    search.set_noise(Fit({}), regression)
-    best = search.gains(Fit({}), regression, search.gram(Fit({}), regression))[0]
+    regression = search.linearise(FittedEffects({}))
+    search.set_noise(FittedEffects({}), regression)
+    best = search.gains(FittedEffects({}), regression, search.gram(FittedEffects({}), regression))[
+        0
+    ]
     suggested = search.refit(best.fit).setting[best.effect]
-    assert best.energy > 10.0 * LEAST_GAIN
+    assert best.deviance_reduction > 10.0 * SEARCH.least_deviance_reduction
     assert (
-        max(abs(value) / typical((best.effect, name), VEHICLE) for name, value in suggested.items())
-        > LEAST_SIZE
+        max(
+            abs(value) / typical_size((best.effect, name), VEHICLE)
+            for name, value in suggested.items()
+        )
+        > SEARCH.least_size
     )
     assert not Innovations(search.flights, {}).confirm({best.effect: suggested})
 
@@ -77,7 +82,7 @@ def test_gusts_are_measured(gusty):
     """Turbulence of 0.06 N and 0.0012 Nm for a quarter of a second, of which the wrench in the log
     is told nothing.
     """
-    found = Innovations(Flights([gusty], VEHICLE), {}).gusts()
+    found = Innovations(Flights([gusty], VEHICLE), {}).disturbances()
     true = [*gusty.force.std(axis=0), *gusty.torque.std(axis=0)]
     for channel, (gust, rms) in enumerate(zip(found, true, strict=True)):
         assert gust[0] == pytest.approx(rms, rel=0.25), channel
@@ -122,6 +127,6 @@ def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
 def test_what_stands_for_another_law_is_at_odds_with_the_innovations(library, doubtful):
     flapping = EffectSetting("flapping_moment", {"kflap": 3e-6})
     flights = Flights([fly_practice(VEHICLE, (flapping,), "excite", 40.0, seed=4)], VEHICLE)
-    fit, _ = find(Search(flights, [library]))
+    fit, _ = find_effects(Search(flights, [library]))
     assert fit.effects == [library]
-    assert bool(at_odds(flights, fit.setting)) == doubtful
+    assert bool(contradicted_by_innovations(flights, fit.setting)) == doubtful

@@ -8,16 +8,16 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
-from windwrench.identification.inference.innovations import at_odds
+from windwrench.identification.inference.innovations import contradicted_by_innovations
 from windwrench.identification.inference.likelihood_refit import (
-    lag_or_delay,
-    lateness,
-    measured,
-    others_late,
+    delay_alternatives,
+    delay_doubts,
+    delay_kind,
+    refitted_by_likelihood,
     with_lag,
 )
-from windwrench.identification.inference.regression import SHIFT, Flights
-from windwrench.identification.inference.search import Fit, Search
+from windwrench.identification.inference.regression import ROTOR_TIME_OFFSET, Flights
+from windwrench.identification.inference.search import FittedEffects, Search
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
@@ -31,7 +31,7 @@ def fitted(truth, guess, seconds=40.0, **flight):
     search = Search(
         Flights([fly_practice(VEHICLE, settings, seconds=seconds, **flight)], VEHICLE), names()
     )
-    fit = Fit({name: dict(values) for name, values in guess.items()})
+    fit = FittedEffects({name: dict(values) for name, values in guess.items()})
     search.set_noise(fit, search.linearise(fit))
     return search, search.refit(fit)
 
@@ -39,13 +39,15 @@ def fitted(truth, guess, seconds=40.0, **flight):
 def test_a_lag_is_no_delay_of_the_turn_rates():
     truth = {"motor_lag": {"tau": 0.0134}}
     search, fit = fitted(truth, truth, seed=2, sensor=0.5, turbulence=0.0)
-    found = measured(search, fit)
+    found = refitted_by_likelihood(search, fit)
     by_residual, by_innovations = (
         abs(x.setting["motor_lag"]["tau"] - 0.0134) for x in (fit, found)
     )
     assert by_residual > 0.002, "if least squares is right, nothing needs measuring anew"
     assert by_innovations < 0.5 * by_residual
-    assert abs(found.setting[SHIFT[0]][SHIFT[1]]) < 0.5 * abs(fit.setting[SHIFT[0]][SHIFT[1]])
+    assert abs(found.setting[ROTOR_TIME_OFFSET[0]][ROTOR_TIME_OFFSET[1]]) < 0.5 * abs(
+        fit.setting[ROTOR_TIME_OFFSET[0]][ROTOR_TIME_OFFSET[1]]
+    )
     assert all(found.std[column] >= fit.std[column] for column in fit.std)
 
 
@@ -54,14 +56,16 @@ def test_a_lag_is_no_delay_of_the_turn_rates():
 def test_lag_and_delay_are_told_apart(truth, guess):
     """To the residual they are the same, at a third of their typical size."""
     search, fit = fitted(truth, guess, seed=4, turbulence=1.0)
-    follow = lateness(search, fit)
-    assert follow == ("as behind a lag" if "motor_lag" in truth else "as behind a delay")
-    assert bool(lag_or_delay(search, fit, follow)) == (truth.keys() != guess.keys())
-    assert not others_late(search, fit, follow)
+    follow = delay_kind(search, fit)
+    assert follow == ("lag" if "motor_lag" in truth else "delay")
+    assert bool(delay_doubts(search, fit, follow)) == (truth.keys() != guess.keys())
+    assert not delay_alternatives(search, fit, follow)
     if "motor_lag" in truth:
         named = with_lag(search, fit)
         assert named.effects == ["motor_lag"]
-        assert measured(search, named).setting["motor_lag"]["tau"] == pytest.approx(0.012, rel=0.2)
+        assert refitted_by_likelihood(search, named).setting["motor_lag"]["tau"] == pytest.approx(
+            0.012, rel=0.2
+        )
 
 
 def test_a_lag_takes_no_delay_s_place_that_the_library_lacks():
@@ -79,12 +83,12 @@ def test_a_lag_takes_no_delay_s_place_that_the_library_lacks():
 @pytest.mark.parametrize(("effect", "other"), [("motor_lag", "latency"), ("latency", "motor_lag")])
 def test_what_flights_do_not_tell_may_be_the_other_or_what_the_library_lacks(effect, other):
     search = SimpleNamespace(library=names())
-    fit = Fit({effect: {}})
-    assert other in others_late(search, fit, "either way")[effect]
-    assert not lag_or_delay(search, fit, "either way")
+    fit = FittedEffects({effect: {}})
+    assert other in delay_alternatives(search, fit, "either")[effect]
+    assert not delay_doubts(search, fit, "either")
     search.library = (effect, "mass")
-    assert not others_late(search, fit, "either way")[effect]
-    assert lag_or_delay(search, fit, "either way")
+    assert not delay_alternatives(search, fit, "either")[effect]
+    assert delay_doubts(search, fit, "either")
 
 
 def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
@@ -92,23 +96,23 @@ def test_a_gain_of_the_attitude_has_no_share_of_its_noise():
     truth = {"attitude_gain": {"g": 0.05}}
     search, fit = fitted(truth, truth, trajectory="gentle", seed=0, sensor=2.0, turbulence=1.0)
     by_residual, by_innovations = (
-        x.setting["attitude_gain"]["g"] - 0.05 for x in (fit, measured(search, fit))
+        x.setting["attitude_gain"]["g"] - 0.05 for x in (fit, refitted_by_likelihood(search, fit))
     )
     assert by_residual > 0.02
     assert abs(by_innovations) < 0.3 * by_residual
     # that the residual's share of noise is there is known: it is no sign of another effect
-    assert not at_odds(search.flights, fit.setting)
+    assert not contradicted_by_innovations(search.flights, fit.setting)
 
 
 def test_other_effects_stay_as_they_are():
     search, fit = fitted({"mass": {"dm": 0.03}}, {"mass": {"dm": 0.03}}, seconds=20.0, seed=4)
-    assert measured(search, fit) is fit
+    assert refitted_by_likelihood(search, fit) is fit
 
 
 def test_a_clock_beside_a_gain_of_the_attitude_is_measured_as_late_turn_rates():
     truth = {"attitude_gain": {"g": 0.05}, "clock_offset": {"dt": -0.026}}
     search, fit = fitted(truth, truth, trajectory="fast", seed=5, turbulence=1.0)
-    found = measured(search, fit)
+    found = refitted_by_likelihood(search, fit)
     assert found.effects == fit.effects
     assert found.std.keys() == fit.std.keys()
     assert found.setting["clock_offset"]["dt"] == pytest.approx(-0.026, rel=0.1)

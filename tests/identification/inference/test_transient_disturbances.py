@@ -10,7 +10,7 @@ import pytest
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.transient_disturbances import pushes
+from windwrench.identification.inference.transient_disturbances import transient_disturbances
 from windwrench.identification.report.words import remainder_sentence
 from windwrench.studies.trials.held_back_outsiders import practise_held_back
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -39,7 +39,7 @@ def test_a_wash_that_passes_now_and_then_is_found_where_it_was():
 @pytest.mark.parametrize("turbulence", [0.0, 1.0, 4.0])
 def test_gusts_of_a_steady_strength_are_no_pushes(turbulence):
     log = fly_practice(VEHICLE, seconds=40.0, seed=5, turbulence=turbulence)
-    assert pushes(Flights([log], VEHICLE), {}) == []
+    assert transient_disturbances(Flights([log], VEHICLE), {}) == []
 
 
 def test_it_is_said_in_which_log_the_push_was():
@@ -48,7 +48,7 @@ def test_it_is_said_in_which_log_the_push_was():
     # what moves it in the log alone: an acceleration that no rotor has made
     moved = np.cumsum(np.cumsum(force / VEHICLE.mass)) * calm.period**2
     pushed = replace(calm, name="pushed", position=calm.position + np.outer(moved, [1.0, 0.0, 0.0]))
-    (push,) = pushes(Flights([calm, pushed], VEHICLE), {})
+    (push,) = transient_disturbances(Flights([calm, pushed], VEHICLE), {})
     assert (push.log, push.channel) == ("pushed", "Fx")
     assert push.t == pytest.approx(12.25, abs=0.1)
     assert push.peak == pytest.approx(0.1 * VEHICLE.weight, rel=0.3)
@@ -56,4 +56,4 @@ def test_it_is_said_in_which_log_the_push_was():
 
 def test_a_flight_too_short_to_look_at_has_no_pushes():
     log = fly_practice(VEHICLE, seconds=3.1, seed=6)
-    assert pushes(Flights([log], VEHICLE), {}) == []
+    assert transient_disturbances(Flights([log], VEHICLE), {}) == []

@@ -29,7 +29,7 @@ def flown():
 
 def test_the_residual_is_newton_and_euler(flown):
     rotors, effects, body = model_wrench(flown, VEHICLE)
-    R, omega, alpha = flown.rotation, flown.rate, flown.angular_acceleration
+    R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
     acceleration = (
         flown.acceleration

@@ -10,7 +10,8 @@ from windwrench.envs.plant import PlantSettings
 from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 
 VEHICLE = load_vehicle("ardrone2")
 QUIET = PlantSettings(disturbance_force=0.0, disturbance_torque=0.0)

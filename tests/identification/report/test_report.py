@@ -19,8 +19,8 @@ from windwrench.identification.findings import (
     CHANNELS,
     Candidate,
     Diagnosis,
+    Disturbance,
     Errors,
-    Gusts,
     NamedEffect,
     Signature,
     Structure,
@@ -28,7 +28,8 @@ from windwrench.identification.findings import (
 )
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals, low_pass
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.pictures import draw_over_frequency, draw_over_time
 from windwrench.identification.report.words import headline, percent, rounded, with_std
@@ -157,7 +158,7 @@ def diagnosis():
             for i in range(2)
         ),
         structure=(),
-        gusts=(Gusts("Fx", 0.0153, 0.25), Gusts("tau_z", 0.0004, 0.11)),
+        gusts=(Disturbance("Fx", 0.0153, 0.25), Disturbance("tau_z", 0.0004, 0.11)),
         pushes=(),
         cutoff_hz=CUTOFF,
         declared=VEHICLE,
