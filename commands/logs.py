@@ -33,7 +33,7 @@ _STAGES = {
     "looking at the logs": 0.0,
     "asking whether every effect is needed": 0.45,
     "asking what else it could be": 0.75,
-    "looking for what is left": 0.9,
+    "looking for structure in the residual": 0.9,
     "predicting the flights": 0.96,
 }
 
