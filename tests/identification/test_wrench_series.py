@@ -237,6 +237,7 @@ def test_phases_without_a_flight(vehicle):
 # measured flights
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_flights(name, tmp_path):
     vehicle = load_vehicle("crazyflie")

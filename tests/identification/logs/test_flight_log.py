@@ -396,6 +396,7 @@ def banded(log, signal, band, kind):
     return filtfilt(b, a, signal, axis=0)
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_thrust_follows_the_specific_force(name):
     # what mass balances the thrust, with the sag that a diagnosis of these flights finds, and how
@@ -415,6 +416,7 @@ def test_nanobench_thrust_follows_the_specific_force(name):
     assert np.std(thrust[flying] / mass - specific[flying]) < 0.11
 
 
+@pytest.mark.measured
 def test_nanobench_rotors_turn_the_vehicle_the_right_way():
     # torque from the rotors, 40 ms later, against angular acceleration: the signs of all three axes
     vehicle = load_vehicle("crazyflie")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.data_paths import NANOBENCH, data_file
+from tests.support.data_paths import NANOBENCH, crazyswarm2_file, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
@@ -260,18 +260,20 @@ def test_the_shared_flights_pass(number):
     )
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_measured_flights_pass(name):
     vehicle = load_vehicle("crazyflie")
     screen_log(read_log(data_file(f"nanobench/{name}.csv"), "nanobench", vehicle), vehicle)
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize(
     "number", [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204]
 )
 def test_short_measured_flights_pass_where_short_is_enough(number):
     vehicle = load_vehicle("crazyflie")
-    log = read_log(data_file(f"crazyswarm2_payload/csv/log{number}.csv"), "crazyswarm2", vehicle)
+    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
     screen_log(log, vehicle, least_seconds=3.0)
     if log.t[-1] < 9.0:
         with pytest.raises(
