@@ -80,7 +80,7 @@ def test_a_px4_log_of_motors_that_stand_still_is_refused(vehicle):
     with pytest.raises(
         InputError,
         match=(
-            "sample.ulg: no motors: expected .* of four motors, found actuator_outputs, "
+            r"sample\.ulg: no motors: expected .* of four motors, found actuator_outputs, "
             "vehicle_attitude, vehicle_local_position"
         ),
     ):
