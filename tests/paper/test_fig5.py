@@ -30,6 +30,7 @@ def ratios(result, pair, noise, error):
     ]
 
 
+@pytest.mark.slow
 def test_an_observer_tuned_for_low_noise_is_far_worse_than_the_filter_at_high_noise(result):
     for error in ("force_steady", "torque_steady"):
         found = ratios(result, "observer / UKF, both tuned at low noise", "high", error)

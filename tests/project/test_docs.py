@@ -26,6 +26,7 @@ from tests.support.paths import ROOT
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
 NOT_CODE = {"", "text", "yaml"}
+QUICK = {"vehicle.md", "effects.md", "estimator.md", "index.md"}  # the others fly for long
 
 
 def blocks(page):
@@ -44,7 +45,9 @@ def blocks(page):
 
 def pages_with_code():
     return [
-        page for page in PAGES if any(language not in NOT_CODE for _, language, *_ in blocks(page))
+        page if page.name in QUICK else pytest.param(page, marks=pytest.mark.slow)
+        for page in PAGES
+        if any(language not in NOT_CODE for _, language, *_ in blocks(page))
     ]
 
 

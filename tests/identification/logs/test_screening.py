@@ -22,6 +22,7 @@ from windwrench.studies.trials.held_back_outsiders import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")
+EXCITED = [CLEAN[0], *(pytest.param(name, marks=pytest.mark.slow) for name in CLEAN[1:])]
 DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up to forward, right, down
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up
 
@@ -181,7 +182,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("trajectory", CLEAN)
+@pytest.mark.parametrize("trajectory", EXCITED)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_another_convention_is_named(kind, trajectory):
     make, expected = HOSTILE[kind]
@@ -189,7 +190,7 @@ def test_another_convention_is_named(kind, trajectory):
         screen_log(make(flight(trajectory)), VEHICLE)
 
 
-@pytest.mark.parametrize("trajectory", CLEAN)
+@pytest.mark.parametrize("trajectory", EXCITED)
 def test_every_order_of_rotors_is_told_apart(trajectory):
     log = flight(trajectory)
     for order in permutations(range(4)):
@@ -249,6 +250,7 @@ def test_a_quiet_hover_decides_nothing():
 
 
 @pytest.mark.parametrize("number", range(16))
+@pytest.mark.slow
 def test_the_shared_flights_pass(number):
     kind = "labelled" if number < 8 else "unlabelled"
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
