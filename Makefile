@@ -26,12 +26,13 @@ test-all: $(VENV)/.tested
 test-fast: $(VENV)/.tested
 	$(PYTEST) -m "not slow" $(FAST)
 
+# programs that tests start write beside the others, wherever they run;
 # compiled code is run, but not seen; `@compiled` functions are left out of the count
 coverage: $(VENV)/.tested
-	$(PYTEST) -m "not slow" $(COVERAGE)
+	COVERAGE_FILE=$(CURDIR)/.coverage $(PYTEST) -m "not slow" $(COVERAGE)
 
 coverage-all: $(VENV)/.tested
-	$(PYTEST) $(COVERAGE)
+	COVERAGE_FILE=$(CURDIR)/.coverage $(PYTEST) $(COVERAGE)
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .

@@ -250,7 +250,9 @@ def test_a_text_that_unpacks_to_more_than_a_flight_is_refused(tmp_path, monkeypa
 
 
 def test_a_parquet_file_that_claims_a_billion_rows_is_refused(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow")
+    pyarrow = pytest.importorskip(
+        "pyarrow", reason="pyarrow is not installed: pip install 'windwrench[parquet]'"
+    )
     from pyarrow import parquet
 
     path = tmp_path / "claim.parquet"

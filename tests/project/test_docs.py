@@ -96,8 +96,12 @@ def run_shell(content, environment, dry, where):
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others."""
     if page.name == "diagnose.md":
-        pytest.importorskip("pyulog")
-        pytest.importorskip("rosbags")
+        pytest.importorskip(
+            "pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'"
+        )
+        pytest.importorskip(
+            "rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'"
+        )
         from tests.support.converted_flights import write_bag, write_ulog
         from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log

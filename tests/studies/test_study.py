@@ -22,7 +22,9 @@ from windwrench.studies.learning.study import (
     run_study,
 )
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip(
+    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
+)
 
 PLAN = {
     "worlds": {

@@ -6,7 +6,9 @@ import pytest
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.configuration import load_config
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip(
+    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
+)
 from windwrench.training.train import read_progress, train
 
 

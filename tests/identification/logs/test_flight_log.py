@@ -168,7 +168,9 @@ def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
 
 
 def test_parquet_columns_must_be_numbers(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow")
+    pyarrow = pytest.importorskip(
+        "pyarrow", reason="pyarrow is not installed: pip install 'windwrench[parquet]'"
+    )
     from pyarrow import parquet
 
     columns = {name: ["0", "1"] if name != "px" else ["here", "there"] for name in REQUIRED}
