@@ -3,18 +3,36 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test coverage lint types docs check clean
+.PHONY: demo test test-all test-fast coverage coverage-all lint types docs check clean
 
 demo: $(VENV)/.installed
 	$(BIN)/windwrench benchmark --episodes 10 --out results/demo
 	$(BIN)/windwrench fly --scenario static --out results/demo
 
-test: $(VENV)/.tested
-	$(BIN)/python -m pytest -n auto --dist loadfile
+# one thread of linear algebra for each worker, or they wait for one another
+PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
+COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=90
+# folders that neither diagnose, train, draw, nor start programs
+FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
+	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
 
+# all but the marked slow: at most ten minutes of processor time, and nearly all lines
+test: $(VENV)/.tested
+	$(PYTEST) -m "not slow"
+
+test-all: $(VENV)/.tested
+	$(PYTEST)
+
+test-fast: $(VENV)/.tested
+	$(PYTEST) -m "not slow" $(FAST)
+
+# programs that tests start write beside the others, wherever they run;
 # compiled code is run, but not seen; `@compiled` functions are left out of the count
 coverage: $(VENV)/.tested
-	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term-missing:skip-covered --cov-fail-under=90
+	COVERAGE_FILE=$(CURDIR)/.coverage $(PYTEST) -m "not slow" $(COVERAGE)
+
+coverage-all: $(VENV)/.tested
+	COVERAGE_FILE=$(CURDIR)/.coverage $(PYTEST) $(COVERAGE)
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .

@@ -17,7 +17,7 @@ COMMAND = Path(sys.executable).with_name("windwrench")
 PNG = b"\x89PNG\r\n\x1a\n"
 
 pytestmark = pytest.mark.skipif(
-    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}"
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
 )
 
 

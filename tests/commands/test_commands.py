@@ -196,7 +196,9 @@ def test_completion_offers_names():
     assert names_in("a, b,,a", "--x") == ["a", "b"]
 
 
-@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+@pytest.mark.skipif(
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
+)
 def test_a_shell_completes_commands_and_names(tmp_path):
     def completed(words):
         environment = {
@@ -215,7 +217,9 @@ def test_a_shell_completes_commands_and_names(tmp_path):
     assert completed("windwrench fly --effect rotor_d") == ["rotor_drag"]
 
 
-@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+@pytest.mark.skipif(
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
+)
 def test_no_color_is_honoured(tmp_path):
     def error(**more):
         environment = {**{k: v for k, v in os.environ.items() if k != "NO_COLOR"}, **more}
@@ -227,7 +231,9 @@ def test_no_color_is_honoured(tmp_path):
     assert "\x1b[3" not in error(FORCE_COLOR="1", TERM="xterm-256color", NO_COLOR="1")
 
 
-@pytest.mark.skipif(not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}")
+@pytest.mark.skipif(
+    not COMMAND.exists(), reason=f"no windwrench command beside {sys.executable}: pip install -e ."
+)
 def test_an_interrupted_command_ends_with_130_and_no_traceback(tmp_path):
     # a shell's background processes ignore interrupts, and so would what they start
     run = subprocess.Popen(

@@ -132,6 +132,7 @@ def flight(tmp_path_factory):
 @pytest.mark.parametrize(
     "arguments", [BENCHMARK, DIAGNOSE, REPRODUCE, CLOSE_LOOP, ("trials",)], ids=lambda a: a[0]
 )
+@pytest.mark.slow
 def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, arguments):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     for folder in (whole, cut):

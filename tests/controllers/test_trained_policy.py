@@ -78,7 +78,9 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode():
 
 
 def test_the_lstm_is_torch_s():
-    torch = pytest.importorskip("torch")
+    torch = pytest.importorskip(
+        "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
+    )
     torch.manual_seed(0)
     cell = torch.nn.LSTM(5, 7)
     weights = {

@@ -39,7 +39,10 @@ def test_gymnasium_s_checker_finds_nothing():
 
 
 def test_stable_baselines_checker_finds_nothing():
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker = pytest.importorskip(
+        "stable_baselines3.common.env_checker",
+        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         checker.check_env(gym.make(NAME), warn=True)

@@ -27,7 +27,10 @@ BACKEND = next(
     None,
 )
 
-pytestmark = pytest.mark.skipif(BACKEND is None, reason="neither libEGL nor libOSMesa is installed")
+pytestmark = pytest.mark.skipif(
+    BACKEND is None,
+    reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
+)
 
 PICTURES = """
 import numpy as np
@@ -126,7 +129,10 @@ def film(folder, kind):
     return folder / f"film.{kind}"
 
 
-@pytest.mark.skipif(find_spec("imageio_ffmpeg") is None, reason="the video extra is not installed")
+@pytest.mark.skipif(
+    find_spec("imageio_ffmpeg") is None,
+    reason="imageio-ffmpeg is not installed: pip install 'windwrench[video]'",
+)
 def test_a_film_is_written_whole_or_not_at_all(tmp_path):
     import imageio_ffmpeg
 
@@ -154,6 +160,7 @@ def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
         Film(tmp_path / "film.mp4", 320, 240)
 
 
+@pytest.mark.slow
 def test_commands_write_films_and_replays(tmp_path):
     command = [sys.executable, "-c", "from windwrench.cli import main; main()"]
     done = run(
@@ -248,7 +255,9 @@ def test_arrows_are_as_long_for_small_forces_as_for_large_ones():
     assert arrow_scales(flight, 0.0631)[0] == pytest.approx(force / 2)
 
 
-@pytest.mark.skipif(find_spec("rerun") is None, reason="the rerun extra is not installed")
+@pytest.mark.skipif(
+    find_spec("rerun") is None, reason="rerun is not installed: pip install 'windwrench[rerun]'"
+)
 def test_a_rerun_recording_holds_the_flight(tmp_path):
     path = tmp_path / "flight.rrd"
     write_rrd(a_flight(), load_vehicle("ardrone2"), path)

@@ -154,7 +154,9 @@ def test_model_runs_repeat_and_have_the_stated_noise():
 
 
 def test_the_benchmark_solves_the_same_problem_as_its_peer(capsys):
-    pytest.importorskip("filterpy")
+    pytest.importorskip(
+        "filterpy", reason="filterpy is not installed: pip install 'windwrench[peers]'"
+    )
     from windwrench.speed import filter_step
 
     filter_step.main(rounds=1, steps=20, peer_steps=20)

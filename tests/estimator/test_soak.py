@@ -1,6 +1,7 @@
 """A million steps of the filter, with everything that motion capture does wrong on the way."""
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import load_vehicle
@@ -53,6 +54,7 @@ def lap(vehicle):
     return rotors, position[end], R[end].as_quat(scalar_first=True)
 
 
+@pytest.mark.slow
 def test_a_million_steps_with_faults_leave_the_filter_healthy():
     vehicle = load_vehicle("ardrone2")
     ukf = WrenchUKF(vehicle, UKFTuning(), PERIOD, gate=0.999)

@@ -13,6 +13,7 @@ def results():
     return fly_all(CONTROLLERS, ["static", "base"], 40, seed=0)
 
 
+@pytest.mark.slow
 def test_the_admittance_controller_holds_the_vehicle_in_the_jet_of_a_moving_fan(results):
     rows = {(row.scenario, row.controller): row for row in leaderboard(results, CONTROLLERS, 0)}
     base = rows["base", "admittance"]
@@ -22,6 +23,7 @@ def test_the_admittance_controller_holds_the_vehicle_in_the_jet_of_a_moving_fan(
     assert rows["base", "hover"].score == 0.0
 
 
+@pytest.mark.slow
 def test_it_comes_in_from_0_8_m_off_within_5_seconds(results):
     at_5_s = [episode.offset[62] for episode in results["admittance", "static"]]
     after = [np.median(episode.offset[62:]) for episode in results["admittance", "static"]]

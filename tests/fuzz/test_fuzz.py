@@ -130,6 +130,7 @@ def test_the_fuzzer_sees_faults(tmp_path):
     assert "exit code 0" in run_command(good, path).replace("None", "0")  # a good log is no refusal
 
 
+@pytest.mark.slow
 def test_the_outcome_does_not_depend_on_processes():
     one, two = (fuzz(30, 3, jobs, only=("effect settings", "names")) for jobs in (1, 2))
     for a, b in zip(one, two, strict=True):
@@ -249,7 +250,9 @@ def test_a_text_that_unpacks_to_more_than_a_flight_is_refused(tmp_path, monkeypa
 
 
 def test_a_parquet_file_that_claims_a_billion_rows_is_refused(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow")
+    pyarrow = pytest.importorskip(
+        "pyarrow", reason="pyarrow is not installed: pip install 'windwrench[parquet]'"
+    )
     from pyarrow import parquet
 
     path = tmp_path / "claim.parquet"

@@ -49,7 +49,7 @@ def test_nothing_is_named_where_nothing_was_added():
     ("name", "trajectory", "coefficients", "ratio"),
     [
         ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 0.9e-4}, 0.4),
-        ("mass", "excite", {"dm": 0.04}, 0.4),
+        pytest.param("mass", "excite", {"dm": 0.04}, 0.4, marks=pytest.mark.slow),
     ],
 )
 def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficients, ratio):
@@ -69,23 +69,43 @@ def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficient
 @pytest.mark.parametrize(
     ("name", "trajectory", "truth", "declared"),
     [
-        ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 0.6e-4, "kdy": 0.6e-4}),
-        ("rotor_drag", "excite", {"kdx": 1.2e-4, "kdy": 1.2e-4}, {"kdx": 1.2e-4}),
+        pytest.param(
+            "rotor_drag",
+            "excite",
+            {"kdx": 1.2e-4, "kdy": 1.2e-4},
+            {"kdx": 0.6e-4, "kdy": 0.6e-4},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            "rotor_drag",
+            "excite",
+            {"kdx": 1.2e-4, "kdy": 1.2e-4},
+            {"kdx": 1.2e-4},
+            marks=pytest.mark.slow,
+        ),
         ("com_offset", "shake", {"cx": 0.005, "cy": 0.004, "cz": 0.005}, {"cz": 0.005}),
-        ("latency", "excite", {"d": 0.03}, {"d": 0.01}),
-        (
+        pytest.param("latency", "excite", {"d": 0.03}, {"d": 0.01}, marks=pytest.mark.slow),
+        pytest.param(
             "wind",
             "excite",
             {"wx": 2.0, "wy": 1.0, "wz": 0.0, "cd": 0.04},
             {"wx": 1.0, "wy": 1.0, "wz": 0.0, "cd": 0.04},
+            marks=pytest.mark.slow,
         ),
-        (
+        pytest.param(
             "slung_payload",
             "excite",
             {"m": 0.03, "l": 0.3, "damping": 1.0},
             {"m": 0.02, "l": 0.3, "damping": 1.0},
+            marks=pytest.mark.slow,
         ),
-        ("slung_payload", "excite", {"m": 0.03, "l": 0.3, "damping": 1.0}, {"l": 0.3}),
+        pytest.param(
+            "slung_payload",
+            "excite",
+            {"m": 0.03, "l": 0.3, "damping": 1.0},
+            {"l": 0.3},
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_an_effect_that_is_declared_wrongly_or_in_part_is_corrected(
@@ -112,6 +132,7 @@ def test_what_is_declared_rightly_is_not_named():
 
 
 @pytest.mark.parametrize("seed", [2388482033, 153285395])
+@pytest.mark.slow
 def test_a_drag_along_one_axis_alone_is_no_sure_one(seed):
     """A third of the rotors' inflow, which the library lacks, in twice the noise: a body's drag
     along z, and no other axis.
@@ -124,6 +145,7 @@ def test_a_drag_along_one_axis_alone_is_no_sure_one(seed):
     assert all(e.tentative for e in found.effects)
 
 
+@pytest.mark.slow
 def test_a_neighbour_of_the_missing_effect_is_tentative_or_not_alone():
     log = fly("flapping_moment", "fast", kflap=4e-6)
     found = diagnose([log], load_vehicle("ardrone2"), without=["flapping_moment"])
@@ -132,6 +154,7 @@ def test_a_neighbour_of_the_missing_effect_is_tentative_or_not_alone():
     assert found.verdict in ("unexplained", "partly explained")
 
 
+@pytest.mark.slow
 def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
     log = fly("mass", "vertical", dm=-0.013)
     found = diagnose([log], load_vehicle("ardrone2"), without=["mass"])
@@ -147,7 +170,7 @@ def test_a_mass_that_is_not_asked_for_is_no_sure_thrust_scale():
     ("effect", "without", "seed", "word"),
     [
         ("thrust_scale", ("thrust_scale", "rotor_efficiency"), 2380884864, "fit better"),
-        ("mass", ("mass",), 4024130846, "coincide"),
+        pytest.param("mass", ("mass",), 4024130846, "coincide", marks=pytest.mark.slow),
     ],
 )
 def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
@@ -163,6 +186,7 @@ def test_moments_give_an_exact_equivalent_away(effect, without, seed, word):
     assert any(word in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_what_takes_two_to_replace_it_gives_way():
     """Heavier, with thrust that grows more steeply: on climbs one constant force does better than
     either of the two.
@@ -180,6 +204,7 @@ def test_what_takes_two_to_replace_it_gives_way():
         assert mine.coefficients == pytest.approx(dict(effect.coefficients), rel=0.05)
 
 
+@pytest.mark.slow
 def test_two_effects_are_found_behind_four_that_stand_for_them():
     """A gain of the attitude and a battery's sag: innovations turn the sag down alone, and four
     others come in their place.
@@ -205,6 +230,7 @@ def test_what_comes_and_goes_is_no_sure_mass():
     assert any("from one 3 s block to the next" in sign.where for sign in found.structure)
 
 
+@pytest.mark.slow
 def test_what_is_on_a_soft_mount_is_no_sure_inertia():
     """A camera on a mount of 2 Hz: slow turns are those of a larger inertia, quick ones are not."""
     flown = practise_held_back(load_vehicle("ardrone2"), "loose_gimbal", "small", seed=30)
@@ -213,6 +239,7 @@ def test_what_is_on_a_soft_mount_is_no_sure_inertia():
     assert any("below 3 Hz" in sign.where for sign in found.structure)
 
 
+@pytest.mark.slow
 def test_an_inertia_that_only_innovations_show_is_not_passed_over():
     """A third of such a camera, in calm air: the residual, which ends at 5 Hz, shows too little for
     a name.
@@ -228,6 +255,7 @@ def test_an_inertia_that_only_innovations_show_is_not_passed_over():
     assert [sign.where for sign in innovation_hints(search, find_effects(search)[0])] == ["inertia"]
 
 
+@pytest.mark.slow
 def test_what_is_on_a_soft_mount_is_seen_to_swing():
     """A third of such a camera in twice the noise: of an inertia little is left, but it swings at 2
     Hz as the vehicle turns.
@@ -239,6 +267,7 @@ def test_what_is_on_a_soft_mount_is_seen_to_swing():
 
 
 @pytest.mark.parametrize("seed", [914766417, 3979625931])
+@pytest.mark.slow
 def test_noise_that_takes_from_slow_turns_makes_no_inertia_tentative(seed):
     """The attitude's noise is in what an inertia explains and in what is left: a mount would add to
     slow turns, not take.
@@ -249,6 +278,7 @@ def test_noise_that_takes_from_slow_turns_makes_no_inertia_tentative(seed):
 
 
 @pytest.mark.parametrize("friction", [True, False])
+@pytest.mark.slow
 def test_friction_on_a_circle_is_no_sure_drag(friction):
     """At one speed friction is a drag; how the flight begins says that it is none,
     if little more."""
@@ -268,6 +298,7 @@ def test_friction_on_a_circle_is_no_sure_drag(friction):
 
 
 @pytest.mark.parametrize("seed", [3326783031, 984713566])
+@pytest.mark.slow
 def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag(seed):
     flown = practise(
         load_vehicle("ardrone2"), "outsider", ("dry_friction",), "small", None, seed, 60.0
@@ -280,6 +311,7 @@ def test_a_third_of_a_friction_on_a_circle_is_no_sure_drag(seed):
     ]
 
 
+@pytest.mark.slow
 def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
     """A tenth of the thrust beyond a tenth more than at hover is lost, in few moments of this
     flight: too few for a law.
@@ -300,6 +332,7 @@ def test_a_rotor_that_stalls_now_and_then_is_no_sure_curvature():
     assert (curved.name, curved.tentative) == ("thrust_curvature", False)
 
 
+@pytest.mark.slow
 def test_a_rotor_that_stalls_is_not_passed_over_where_nothing_is_named():
     """The same in fewer moments still: a law that acts in so few blocks is none of the
     dictionary's.
@@ -318,6 +351,7 @@ def test_a_rotor_that_stalls_is_not_passed_over_where_nothing_is_named():
     assert "times the thrust of hover" in found.structure[0].where
 
 
+@pytest.mark.slow
 def test_a_load_that_the_library_lacks_is_seen_to_swing():
     """A load of 10 g on 0.3 m, 0.9 Hz: its weight is that of a mass, and so little is left of its
     swing.
@@ -339,6 +373,7 @@ def test_a_load_that_the_library_lacks_is_seen_to_swing():
         ("patchy_drag", 2356848652, "a drag with position and heading together"),
     ],
 )
+@pytest.mark.slow
 def test_what_acts_in_one_part_of_the_room_is_seen(disturbance, seed, where):
     """Air that rises in one place, a drag in one half: in all of the flight they are worth too
     little for a name.
@@ -351,6 +386,7 @@ def test_what_acts_in_one_part_of_the_room_is_seen(disturbance, seed, where):
     assert any(where in sign.where for sign in found.structure)
 
 
+@pytest.mark.slow
 def test_names_are_sure_together_or_not_at_all():
     """A hull's drag far above the centre of mass is two laws' in good part, and the third, for what
     they lack, is faint.
@@ -365,6 +401,7 @@ def test_names_are_sure_together_or_not_at_all():
     assert found.remainder == "random"
 
 
+@pytest.mark.slow
 def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
     """Markers off centre, on steady turns in twice the noise: too much is noise for a name, and a
     tilt explains less.
@@ -380,6 +417,7 @@ def test_what_a_flight_hardly_excites_may_be_behind_what_is_named():
     assert any("thrust_axis_tilt or marker_offset" in advice for advice in found.advice)
 
 
+@pytest.mark.slow
 def test_a_mass_beside_a_steady_force_is_no_load_that_swings():
     """On a slow flight a mass and a force leave a thousandth of each other, which is still two
     hundred units.
@@ -389,6 +427,7 @@ def test_a_mass_beside_a_steady_force_is_no_load_that_swings():
     assert set(named(diagnose([flown.log], flown.vehicle))) == {"constant_force", "mass"}
 
 
+@pytest.mark.slow
 def test_a_push_that_lies_in_the_noise_is_not_passed_over():
     """A sixtieth of the weight, to and fro, under the noise of the pose: the residual is at the
     floor, and yet not calm.
@@ -410,6 +449,7 @@ def test_a_push_that_lies_in_the_noise_is_not_passed_over():
     assert max(g.rms for g in calm.gusts[:3]) < 0.5 * max(g.rms for g in found.gusts[:3])
 
 
+@pytest.mark.slow
 def test_turn_rates_that_come_late_are_no_sign_of_structure():
     """The pose's noise, moved in time with the pose, is in what a clock offset explains and in what
     it leaves.
@@ -449,6 +489,7 @@ def test_the_velocity_of_a_plant_that_holds_its_forces_is_half_a_tick_behind():
     assert fit.std["", "velocity_time_offset"] < 0.15 * TICK
 
 
+@pytest.mark.slow
 def test_what_is_small_beside_a_wrong_effect_is_found_beside_the_right_ones():
     """Four effects at once fill the model with two that stand for a third; what takes their place
     leaves room for the last.
@@ -521,6 +562,7 @@ def test_whitened_noise_is_white():
 @pytest.mark.parametrize(
     "name", ["labelled_01", "labelled_02", "labelled_04", "labelled_06", "labelled_07"]
 )
+@pytest.mark.slow
 def test_flights_of_another_simulator(name):
     folder = data_file("flights")
     label = json.loads((folder / "labels.json").read_text())[f"{name}.csv.gz"]

@@ -237,6 +237,7 @@ def test_phases_without_a_flight(vehicle):
 # measured flights
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_flights(name, tmp_path):
     vehicle = load_vehicle("crazyflie")
@@ -270,6 +271,7 @@ def test_nanobench_flights(name, tmp_path):
 @pytest.mark.parametrize(
     "name", [f"{kind}_{k:02d}" for kind in ("labelled", "unlabelled") for k in range(8)]
 )
+@pytest.mark.slow
 def test_simulated_flights(name):
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
     log = read_log(data_file(f"flights/{name}.csv.gz"), vehicle=vehicle)

@@ -8,7 +8,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.paper import fig3
 from windwrench.runtime.errors import InputError
 
-pytest.importorskip("sklearn")
+pytest.importorskip("sklearn", reason="sklearn is not installed: pip install 'windwrench[paper]'")
 
 
 @pytest.fixture(scope="module")

@@ -30,6 +30,7 @@ def ratios(result, pair, noise, error):
     ]
 
 
+@pytest.mark.slow
 def test_an_observer_tuned_for_low_noise_is_far_worse_than_the_filter_at_high_noise(result):
     for error in ("force_steady", "torque_steady"):
         found = ratios(result, "observer / UKF, both tuned at low noise", "high", error)
@@ -84,7 +85,9 @@ def test_a_ratio_of_paired_errors_has_a_tight_interval_where_the_errors_go_toget
     assert fig5.ratio(2.0 * hard, hard) == pytest.approx((2.0, 2.0, 2.0))
 
 
-@pytest.mark.skipif(not installed(), reason="needs drone-estimators")
+@pytest.mark.skipif(
+    not installed(), reason="drone-estimators is not installed: pip install 'windwrench[compare]'"
+)
 def test_the_public_filter_agrees_with_ours_on_the_same_model():
     flight = fly("yawing", "low", "exact", [0])[0]
     samples = flight.samples[1200:1600]  # with the step in the middle

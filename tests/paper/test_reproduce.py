@@ -65,6 +65,7 @@ def test_the_page_shows_the_table_and_the_picture(tmp_path):
     assert "fig4" not in page
 
 
+@pytest.mark.slow
 def test_a_second_run_keeps_what_is_there_and_repeats_what_is_not(tmp_path):
     assert reproduce(["fig6"], tmp_path, seeds=1, jobs=1) == {"fig6": True}
     first = {p.name: p.read_bytes() for p in tmp_path.iterdir()}

@@ -26,6 +26,7 @@ from tests.support.paths import ROOT
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DRY_RUN = "<!-- dry run -->"
 NOT_CODE = {"", "text", "yaml"}
+QUICK = {"vehicle.md", "effects.md", "estimator.md", "index.md"}  # the others fly for long
 
 
 def blocks(page):
@@ -44,7 +45,9 @@ def blocks(page):
 
 def pages_with_code():
     return [
-        page for page in PAGES if any(language not in NOT_CODE for _, language, *_ in blocks(page))
+        page if page.name in QUICK else pytest.param(page, marks=pytest.mark.slow)
+        for page in PAGES
+        if any(language not in NOT_CODE for _, language, *_ in blocks(page))
     ]
 
 
@@ -93,8 +96,12 @@ def run_shell(content, environment, dry, where):
 def prepare(page, folder):
     """Put there what a page takes for given: logs of others."""
     if page.name == "diagnose.md":
-        pytest.importorskip("pyulog")
-        pytest.importorskip("rosbags")
+        pytest.importorskip(
+            "pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'"
+        )
+        pytest.importorskip(
+            "rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'"
+        )
         from tests.support.converted_flights import write_bag, write_ulog
         from windwrench.cli import app
         from windwrench.identification.logs.reading import read_log

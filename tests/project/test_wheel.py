@@ -168,6 +168,7 @@ def test_a_study_says_where_it_runs(empty, tmp_path):
         assert f" {name} " not in call(empty, tmp_path, "--help").stdout
 
 
+@pytest.mark.slow
 def test_it_runs_from_any_folder(installed, tmp_path):
     out = run(
         installed,
@@ -181,6 +182,7 @@ def test_it_runs_from_any_folder(installed, tmp_path):
     assert float(out.stdout) > 0
 
 
+@pytest.mark.slow
 def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
     for name in sorted(command.name for command in app.registered_commands):
         done = call(empty, tmp_path, name, "--help")
@@ -189,6 +191,7 @@ def test_every_command_starts_where_there_is_no_checkout(empty, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_demo_runs_where_there_is_no_checkout(empty, tmp_path):
     done = call(
         empty,

@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from windwrench.runtime.compiled import announced
 
 CODE = (
@@ -23,6 +25,7 @@ def test_a_wait_is_explained_and_a_short_one_is_not(capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_cold_and_a_warm_start_give_the_same_bits(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     cold, *warm = (

@@ -359,6 +359,7 @@ def timeless(outcome):
     }
 
 
+@pytest.mark.slow
 def test_a_flight_is_diagnosed_and_not_again(tmp_path):
     whole = fly_and_diagnose(SHORT)
     # in a process of its own it comes out the same
@@ -443,6 +444,7 @@ def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, c
     ],
     ids=lambda trial: trial.group,
 )
+@pytest.mark.slow
 def test_a_flight_loops_answer_to_gusts_and_noise_is_given_no_name(trial):
     (judged,) = judge(fly_and_diagnose(trial))
     assert judged.outcome in (RIGHT, SILENT)

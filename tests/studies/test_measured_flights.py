@@ -7,7 +7,7 @@ what each misses.
 import numpy as np
 import pytest
 
-from tests.support.data_paths import data_file
+from tests.support.data_paths import crazyswarm2_file, data_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import (
@@ -27,7 +27,6 @@ from windwrench.studies.measured_flights.measured_flights import (
     names_of,
     nanobench_fold,
     page,
-    payload_logs,
     payload_vehicle,
     run,
     swing,
@@ -54,6 +53,8 @@ def nanobench(vehicle):
     return paths[2], logs[2], diagnosis, row
 
 
+@pytest.mark.measured
+@pytest.mark.slow
 def test_nanobench_residual_on_a_flight_not_seen(nanobench):
     path, log, diagnosis, row = nanobench
     assert row["after_rms"][2] < 0.18  # m/s2, with the thrust scale of other flights
@@ -68,6 +69,8 @@ def test_nanobench_residual_on_a_flight_not_seen(nanobench):
     assert imu["model_std"] < imu["constant_std"]
 
 
+@pytest.mark.measured
+@pytest.mark.slow
 def test_nanobench_names(nanobench):
     _, _, diagnosis, _ = nanobench
     named = by_name(diagnosis)
@@ -109,11 +112,11 @@ def test_nanobench_names(nanobench):
     assert {lean.name, *lean.indistinguishable_from} >= {"world_tilt", "constant_force"}
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("number", ["202", "201", "165"])
 def test_slung_payload(number):
-    folder = data_file("crazyswarm2_payload/csv/log202.csv").parent
     carrier = payload_vehicle(0.032 if number == "165" else CARRIER)
-    (log,) = payload_logs(folder, [number], carrier)
+    log = read_log(crazyswarm2_file(number), "crazyswarm2", carrier)
     diagnosis = diagnose([log], carrier)
     named = by_name(diagnosis)
     if number == "165":
@@ -132,6 +135,7 @@ def test_slung_payload(number):
         assert {"mass", "thrust_scale", "constant_force"} <= set(load.indistinguishable_from)
 
 
+@pytest.mark.measured
 def test_only_the_time_in_the_air_counts(vehicle):
     log = read_log(data_file("nanobench/B2_circle_fast_rep3.csv"), "nanobench", vehicle)
     flight = in_flight(log, vehicle)

@@ -15,7 +15,7 @@ BROWSER = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
 )
 needs_browser = pytest.mark.skipif(
-    BROWSER is None, reason="no chromium, chromium-browser or google-chrome is installed"
+    BROWSER is None, reason="no browser is installed: apt-get install chromium fonts-dejavu-core"
 )
 
 # A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.support.literal_ukf import matrix, multiply
+from tests.support.literal_ukf import cross, matrix, multiply
 
 PERIOD = 0.005
 
@@ -56,10 +56,10 @@ def yawing_flight(
         )
         R = matrix(q)
         up = a / np.linalg.norm(a)
-        tilt = R.T @ np.cross(R[:, 2], up)
+        tilt = R.T @ cross(R[:, 2], up)
         rate = np.array([0, 0, yaw_rate * (1 + 0.5 * np.sin(1.1 * t))])
         alpha = 110 * tilt * [1, 1, 0] - 18 * (w - rate) * [1, 1, 0.4]
-        moment = vehicle.inertia @ alpha + np.cross(w, vehicle.inertia @ w) - R.T @ torque
+        moment = vehicle.inertia @ alpha + cross(w, vehicle.inertia @ w) - R.T @ torque
         squares = mixing @ np.array([vehicle.mass * a @ R[:, 2], *moment])
         W = np.sqrt(np.maximum(squares, 1e3))
         c, M = vehicle.k * W**2, vehicle.p * W**2
@@ -75,7 +75,7 @@ def yawing_flight(
             R = matrix(q)
             acc = (R @ [0, 0, c.sum()] + force) / vehicle.mass - [0, 0, vehicle.gravity]
             alpha = np.linalg.solve(
-                vehicle.inertia, moment + R.T @ torque - np.cross(w, vehicle.inertia @ w)
+                vehicle.inertia, moment + R.T @ torque - cross(w, vehicle.inertia @ w)
             )
             x, v = x + h * v + h * h / 2 * acc, v + h * acc
             middle = w + h / 2 * alpha

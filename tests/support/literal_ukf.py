@@ -8,11 +8,17 @@ docs/estimator.md).
 import numpy as np
 
 
+def cross(a, b):
+    """As ``numpy.cross``, bit for bit, without what that takes to accept any shape."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
 def multiply(a, b):
     return np.array(
         [
             a[0] * b[0] - a[1:] @ b[1:],
-            *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])),
+            *(a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])),
         ]
     )
 
@@ -94,12 +100,12 @@ class LiteralUKF:
         if self.effect_wrench is not None:
             force, torque = self.effect_wrench(s["x"], s["q"], s["v"], s["w"], W)
         thrust = np.array([0, 0, c.sum()])
-        moment = moment - np.cross(v.com, thrust)
+        moment = moment - cross(v.com, thrust)
         alpha = np.linalg.solve(
-            v.inertia, moment + n_m + torque + C.T @ s["tau"] - np.cross(s["w"], v.inertia @ s["w"])
+            v.inertia, moment + n_m + torque + C.T @ s["tau"] - cross(s["w"], v.inertia @ s["w"])
         )
         a = (C @ (thrust + n_c) + s["f"] + force) / v.mass - np.array([0, 0, v.gravity])
-        a = a - C @ (np.cross(alpha, v.com) + np.cross(s["w"], np.cross(s["w"], v.com)))
+        a = a - C @ (cross(alpha, v.com) + cross(s["w"], cross(s["w"], v.com)))
         angle = np.linalg.norm(s["w"]) * T / 2
         psi = np.sin(angle) * s["w"] / np.linalg.norm(s["w"]) if angle > 0 else np.zeros(3)
         omega = np.zeros((4, 4))  # (13): right multiplication by the body rate, so -[psi]x

@@ -89,7 +89,10 @@ def processes_of(word):
     not os.path.exists("/proc/self/stat"), reason="looks for processes in Linux's /proc"
 )
 def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster, tmp_path):
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip(
+        "stable_baselines3",
+        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
+    )
     jobs = jobs_of("sac", "base", range(2), TINY, [])
     killed = []
 

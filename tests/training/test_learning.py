@@ -6,10 +6,13 @@ import pytest
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.configuration import load_config
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip(
+    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
+)
 from windwrench.training.train import read_progress, train
 
 
+@pytest.mark.slow
 def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
     config = load_config(
         "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]

@@ -16,8 +16,10 @@ from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
 from windwrench.dynamics import InputError
 from windwrench.training.configuration import ALGORITHMS, load_config
 
-pytest.importorskip("torch")
-pytest.importorskip("stable_baselines3")
+pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
+pytest.importorskip(
+    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
+)
 import stable_baselines3 as sb3
 import torch
 
@@ -55,7 +57,9 @@ SHORT = ["net=[8]", "validation.every=120", "validation.episodes=1"]
 
 def tiny(algorithm, *more):
     if algorithm == "recurrent-ppo":
-        pytest.importorskip("sb3_contrib")
+        pytest.importorskip(
+            "sb3_contrib", reason="sb3_contrib is not installed: pip install 'windwrench[rl]'"
+        )
     checkpoint = [] if algorithm == "imitation" else ["checkpoint=60"]
     return load_config(algorithm, [*SHORT, *TINY[algorithm], *checkpoint, *more])
 
@@ -89,6 +93,7 @@ def test_another_seed_is_another_run(tmp_path):
     assert (tmp_path / "a" / "last.npz").read_bytes() != (tmp_path / "b" / "last.npz").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
     words = [
         sys.executable,

@@ -28,7 +28,7 @@ def test_tuned_laws_fly_with_the_gains_in_the_file():
 
 
 def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp_path):
-    pytest.importorskip("optuna")
+    pytest.importorskip("optuna", reason="optuna is not installed: pip install 'windwrench[rl]'")
     from windwrench.training.tune import keep_gains, tune
 
     found = tune("admittance", "static", trials=3, episodes=3, seed=1)
@@ -68,8 +68,11 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
     ],
 )
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, capfd, arguments, words):
-    pytest.importorskip("stable_baselines3")
-    pytest.importorskip("optuna")
+    pytest.importorskip(
+        "stable_baselines3",
+        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
+    )
+    pytest.importorskip("optuna", reason="optuna is not installed: pip install 'windwrench[rl]'")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["windwrench", *arguments])
     with pytest.raises(SystemExit) as ended:

@@ -10,7 +10,9 @@ from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.vector import FanTrackingVectorEnv
 from windwrench.training.training_envs import make_training_envs
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip(
+    "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
+)
 from windwrench.training.vec_env import FeatureVecEnv
 
 FEATURES = Features(("torque_z", "force_x", "velocity_y", "command"), 3)

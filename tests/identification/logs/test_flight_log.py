@@ -168,7 +168,9 @@ def test_parquet_without_pyarrow_says_what_to_install(tmp_path, monkeypatch):
 
 
 def test_parquet_columns_must_be_numbers(tmp_path):
-    pyarrow = pytest.importorskip("pyarrow")
+    pyarrow = pytest.importorskip(
+        "pyarrow", reason="pyarrow is not installed: pip install 'windwrench[parquet]'"
+    )
     from pyarrow import parquet
 
     columns = {name: ["0", "1"] if name != "px" else ["here", "there"] for name in REQUIRED}
@@ -396,6 +398,7 @@ def banded(log, signal, band, kind):
     return filtfilt(b, a, signal, axis=0)
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_nanobench_thrust_follows_the_specific_force(name):
     # what mass balances the thrust, with the sag that a diagnosis of these flights finds, and how
@@ -415,6 +418,7 @@ def test_nanobench_thrust_follows_the_specific_force(name):
     assert np.std(thrust[flying] / mass - specific[flying]) < 0.11
 
 
+@pytest.mark.measured
 def test_nanobench_rotors_turn_the_vehicle_the_right_way():
     # torque from the rotors, 40 ms later, against angular acceleration: the signs of all three axes
     vehicle = load_vehicle("crazyflie")

@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import butter, filtfilt
 from scipy.spatial.transform import Rotation
 
-from tests.support.data_paths import data_file
+from tests.support.data_paths import crazyswarm2_file
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.wrench_series import estimate_log
@@ -165,9 +165,10 @@ def test_an_unknown_reader_is_told_all():
 # measured flights
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("number", FLIGHTS)
 def test_measured_flights_read(number, vehicle):
-    log = read_log(data_file(f"crazyswarm2_payload/csv/log{number}.csv"), "crazyswarm2", vehicle)
+    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
     assert np.diff(log.t).max() < 0.025
     assert log.period == pytest.approx(0.004, rel=0.02)
     assert ("payload_position" in log.extra) == (number in LOADED)
@@ -194,8 +195,9 @@ def test_measured_flights_read(number, vehicle):
         )
 
 
+@pytest.mark.measured
 def test_a_measured_flight_has_a_sane_wrench(vehicle):
-    log = read_log(data_file("crazyswarm2_payload/csv/log201.csv"), "crazyswarm2", vehicle)
+    log = read_log(crazyswarm2_file(201), "crazyswarm2", vehicle)
     series = estimate_log(log, vehicle)
     flying = series.t > 2.0
     # the controller lifts a vehicle of 0.0419 kg, payload and all; the preset's has 0.027 kg

@@ -8,7 +8,7 @@ from tests.fuzz.ulog_writer import ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.reading import read_log
 
-pytest.importorskip("pyulog")
+pytest.importorskip("pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'")
 
 # our world and body seen from PX4's, each half a turn about x
 FLIP = np.diag([1.0, -1.0, -1.0])

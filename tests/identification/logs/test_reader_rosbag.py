@@ -8,7 +8,7 @@ from windwrench.dynamics import InputError, load_vehicle
 from windwrench.identification.logs.readers import unpacking
 from windwrench.identification.logs.reading import read_log
 
-pytest.importorskip("rosbags")
+pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'")
 
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag1 import reader

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.data_paths import NANOBENCH, data_file
+from tests.support.data_paths import NANOBENCH, crazyswarm2_file, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
@@ -22,6 +22,7 @@ from windwrench.studies.trials.held_back_outsiders import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")
+EXCITED = [CLEAN[0], *(pytest.param(name, marks=pytest.mark.slow) for name in CLEAN[1:])]
 DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up to forward, right, down
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up
 
@@ -181,7 +182,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("trajectory", CLEAN)
+@pytest.mark.parametrize("trajectory", EXCITED)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_another_convention_is_named(kind, trajectory):
     make, expected = HOSTILE[kind]
@@ -189,7 +190,7 @@ def test_another_convention_is_named(kind, trajectory):
         screen_log(make(flight(trajectory)), VEHICLE)
 
 
-@pytest.mark.parametrize("trajectory", CLEAN)
+@pytest.mark.parametrize("trajectory", EXCITED)
 def test_every_order_of_rotors_is_told_apart(trajectory):
     log = flight(trajectory)
     for order in permutations(range(4)):
@@ -249,6 +250,7 @@ def test_a_quiet_hover_decides_nothing():
 
 
 @pytest.mark.parametrize("number", range(16))
+@pytest.mark.slow
 def test_the_shared_flights_pass(number):
     kind = "labelled" if number < 8 else "unlabelled"
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
@@ -260,18 +262,20 @@ def test_the_shared_flights_pass(number):
     )
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("name", NANOBENCH)
 def test_measured_flights_pass(name):
     vehicle = load_vehicle("crazyflie")
     screen_log(read_log(data_file(f"nanobench/{name}.csv"), "nanobench", vehicle), vehicle)
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize(
     "number", [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204]
 )
 def test_short_measured_flights_pass_where_short_is_enough(number):
     vehicle = load_vehicle("crazyflie")
-    log = read_log(data_file(f"crazyswarm2_payload/csv/log{number}.csv"), "crazyswarm2", vehicle)
+    log = read_log(crazyswarm2_file(number), "crazyswarm2", vehicle)
     screen_log(log, vehicle, least_seconds=3.0)
     if log.t[-1] < 9.0:
         with pytest.raises(
