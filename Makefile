@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all test-fast coverage coverage-all lint types docs check clean
+.PHONY: demo test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
 
 demo: $(VENV)/.installed
 	$(BIN)/windwrench benchmark --episodes 10 --out results/demo
@@ -26,6 +26,14 @@ test-all: $(VENV)/.tested
 test-fast: $(VENV)/.tested
 	$(PYTEST) -m "not slow" $(FAST)
 
+# the quick tests where nothing is installed that learns: what other Pythons are tried with
+test-light: $(VENV)/.light
+	$(PYTEST) -m "not slow" $(FAST)
+
+# the same with the lowest versions that pyproject.toml allows
+test-lowest: $(VENV)-lowest/.lowest
+	$(subst $(BIN),$(VENV)-lowest/bin,$(PYTEST)) -m "not slow" $(FAST)
+
 # programs that tests start write beside the others, wherever they run;
 # compiled code is run, but not seen; `@compiled` functions are left out of the count
 coverage: $(VENV)/.tested
@@ -36,6 +44,11 @@ coverage-all: $(VENV)/.tested
 
 lint: $(VENV)/.tested
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
+
+format: $(VENV)/.tested
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
 # the package as a user has it, outside the checkout
 .PHONY: $(VENV)/built
@@ -64,6 +77,17 @@ $(VENV)/.tested: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@
 
+$(VENV)/.light: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	touch $@
+
+$(VENV)-lowest/.lowest: pyproject.toml .ci/lowest.py
+	$(PYTHON) -m venv $(@D)
+	$(PYTHON) .ci/lowest.py > $(@D)/lowest.txt
+	$(@D)/bin/pip install --quiet --disable-pip-version-check -c $(@D)/lowest.txt -e '.[test]'
+	touch $@
+
 clean:
-	rm -rf $(VENV) build dist results site *.egg-info
+	rm -rf $(VENV) $(VENV)-* build dist results site *.egg-info
 	find . -name '*.nb[ic]' -delete
