@@ -10,12 +10,12 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
+from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.logs import diagnose, estimate, replay
 from .commands.paper import reproduce
 from .commands.running import as_command, command_name
-from .commands.studies import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name
 

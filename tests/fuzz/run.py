@@ -272,6 +272,7 @@ def table(tallies: Sequence[Tally]) -> str:
 def main() -> int:
     """Run from a command line; the exit code is 1 where there was a fault."""
     parser = argparse.ArgumentParser(
+        prog="python -m tests.fuzz",
         description=(__doc__ or "").partition("\n")[0],
         epilog="Example: python -m tests.fuzz --inputs 20000 --seed 0",
     )

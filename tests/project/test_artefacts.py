@@ -78,7 +78,7 @@ def test_every_picture_and_data_file_is_used(tracked):
         if "://" not in target
     }
     folders = {ROOT / "docs" / "results" / "learning"}  # `windwrench leaderboard` reads it
-    text = (ROOT / "commands" / "studies.py").read_text(encoding="utf-8")
+    text = (ROOT / "commands" / "from_checkout.py").read_text(encoding="utf-8")
     assert all(f'Path("{folder.relative_to(ROOT).as_posix()}")' in text for folder in folders)
     unused = [
         path.relative_to(ROOT).as_posix()
