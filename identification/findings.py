@@ -114,6 +114,9 @@ class TransientDisturbance:
     peak: float  # N, or Nm
 
 
+Gusts, Push = Disturbance, TransientDisturbance  # their older names
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What logs of one vehicle say about its model.

@@ -160,7 +160,6 @@ def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
         Film(tmp_path / "film.mp4", 320, 240)
 
 
-@pytest.mark.slow
 def test_commands_write_films_and_replays(tmp_path):
     command = [sys.executable, "-c", "from windwrench.cli import main; main()"]
     done = run(

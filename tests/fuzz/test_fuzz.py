@@ -130,7 +130,6 @@ def test_the_fuzzer_sees_faults(tmp_path):
     assert "exit code 0" in run_command(good, path).replace("None", "0")  # a good log is no refusal
 
 
-@pytest.mark.slow
 def test_the_outcome_does_not_depend_on_processes():
     one, two = (fuzz(30, 3, jobs, only=("effect settings", "names")) for jobs in (1, 2))
     for a, b in zip(one, two, strict=True):

@@ -271,7 +271,6 @@ def test_nanobench_flights(name, tmp_path):
 @pytest.mark.parametrize(
     "name", [f"{kind}_{k:02d}" for kind in ("labelled", "unlabelled") for k in range(8)]
 )
-@pytest.mark.slow
 def test_simulated_flights(name):
     vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
     log = read_log(data_file(f"flights/{name}.csv.gz"), vehicle=vehicle)

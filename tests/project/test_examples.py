@@ -141,7 +141,6 @@ def test_the_node_takes_in_a_late_pose_at_its_own_time_and_goes_on_without_any(e
     assert len(node.waiting) <= 42
 
 
-@pytest.mark.slow
 def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_path):
     vehicle = load_vehicle("ardrone2")
     drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})

@@ -54,7 +54,6 @@ def nanobench(vehicle):
 
 
 @pytest.mark.measured
-@pytest.mark.slow
 def test_nanobench_residual_on_a_flight_not_seen(nanobench):
     path, log, diagnosis, row = nanobench
     assert row["after_rms"][2] < 0.18  # m/s2, with the thrust scale of other flights
@@ -70,7 +69,6 @@ def test_nanobench_residual_on_a_flight_not_seen(nanobench):
 
 
 @pytest.mark.measured
-@pytest.mark.slow
 def test_nanobench_names(nanobench):
     _, _, diagnosis, _ = nanobench
     named = by_name(diagnosis)

@@ -88,7 +88,6 @@ def places(tmp_path_factory):
     return places
 
 
-@pytest.mark.slow
 def test_everything_is_done_once(places):
     entries = entries_of(PLAN)
     assert [e.file for e in entries if e.seed is not None][:3] == ["sac-0", "sac-1", "as-it-is-0"]
@@ -104,7 +103,6 @@ def test_everything_is_done_once(places):
     ]
 
 
-@pytest.mark.slow
 def test_what_is_missing_is_scored_from_the_shipped_policy(places, tmp_path):
     kept = json.loads((places.results / "sac-1.json").read_text())
     del kept["scores"]["fast"]
@@ -121,7 +119,6 @@ def test_what_is_missing_is_scored_from_the_shipped_policy(places, tmp_path):
     assert not other.runs.exists()
 
 
-@pytest.mark.slow
 def test_a_shipped_policy_reproduces_its_line(places):
     path = str(places.policies / "sac-0.npz")
     flown = fly_all([path], ["base"], 3, seed=0, jobs=1)[path, "base"]
@@ -130,7 +127,6 @@ def test_a_shipped_policy_reproduces_its_line(places):
     assert kept["lost"] == [int(e.lost) for e in flown]
 
 
-@pytest.mark.slow
 def test_rows_are_those_of_the_files(places):
     results = read_results(places)
     rows = {(r.world, r.name): r for r in rows_of(results, PLAN)}
@@ -154,7 +150,6 @@ def test_rows_are_those_of_the_files(places):
     assert set(names) == {*PLAN["designed"], "sac"}
 
 
-@pytest.mark.slow
 def test_the_page_names_what_is_missing_and_where_learning_loses(places, tmp_path):
     written = write_page(read_results(places), PLAN, places, tmp_path / "board.md")
     text = (tmp_path / "board.md").read_text(encoding="utf-8")

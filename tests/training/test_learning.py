@@ -12,7 +12,6 @@ pytest.importorskip(
 from windwrench.training.train import read_progress, train
 
 
-@pytest.mark.slow
 def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):
     config = load_config(
         "sac", ["steps=4000", "validation.every=1000", "validation.episodes=10", "checkpoint=4000"]

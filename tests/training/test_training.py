@@ -93,7 +93,6 @@ def test_another_seed_is_another_run(tmp_path):
     assert (tmp_path / "a" / "last.npz").read_bytes() != (tmp_path / "b" / "last.npz").read_bytes()
 
 
-@pytest.mark.slow
 def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
     words = [
         sys.executable,

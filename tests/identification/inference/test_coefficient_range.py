@@ -107,7 +107,6 @@ def test_a_wind_on_hardly_any_drag_is_a_steady_force_unless_another_drag_feels_i
     )
 
 
-@pytest.mark.slow
 def test_a_dry_friction_is_no_sure_drag():
     log = fly_practice(
         VEHICLE, trajectory="vertical", seconds=40.0, seed=3, outsider="dry_friction", sensor=2.0

@@ -486,7 +486,6 @@ def test_the_same_diagnosis_gives_the_same_page(reports, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-@pytest.mark.slow
 def test_long_flights_stay_small(diagnosis, tmp_path):
     trace = diagnosis.traces[0]
     n = 200 * 600
