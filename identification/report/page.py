@@ -94,6 +94,18 @@ def _template() -> "Template":
     ).from_string(source)
 
 
+def evidence_words(key: str) -> str:
+    """Return what a key of ``NamedEffect.evidence``, which ``report.json`` has as it is, stands
+    for.
+    """
+    words = {
+        "energy_explained": "share of the deviance explained",
+        "energy_explained_in_noise_units": "deviance explained",
+        "largest_coefficient_in_typical_sizes": "largest coefficient in typical sizes",
+    }
+    return words.get(key, key.replace("_", " "))
+
+
 def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Return the rows of the error before, after and at the floor: what, unit and three rounded
     numbers.
@@ -148,7 +160,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
             }
         )
     evidence = ", ".join(
-        f"{key.replace('_', ' ')} {percent(value) if 'share' in key else rounded(value)}"
+        f"{evidence_words(key)} {percent(value) if 'share' in key else rounded(value)}"
         for key, value in effect.evidence.items()
     )
     return {
