@@ -13,7 +13,7 @@ def training_seed(seed: int, environment: int, episode: int) -> int:
     ``FIRST_VALIDATION_SEED`` - 1.
     """
     words = np.random.SeedSequence((seed, environment, episode)).generate_state(1, np.uint64)
-    # of a Python number: NumPy 1 takes this remainder of a uint64 in floats, and seeds would collide
+    # a Python number: NumPy 1 would take the remainder of a uint64 in floats, and seeds collide
     return int(words[0]) % FIRST_VALIDATION_SEED
 
 
