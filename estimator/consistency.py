@@ -323,7 +323,7 @@ def simulate_model(
     measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
     measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)
     states, measured = np.empty((steps, 20)), np.empty((steps, 7))
-    record = filter_record(vehicle, tuning, period, 0.0, 1)
+    record = filter_record(vehicle, tuning, period)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
     unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
     _simulate(

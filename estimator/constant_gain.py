@@ -16,22 +16,25 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike
 
-from ..dynamics.rotation import attitude_error
+from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
-from .estimate import NIS, Array, WrenchEstimate
+from .estimate import COASTING, NIS, TRACKING, Array, WrenchEstimate
 from .filter_record import FILTER, N, drive, propagate
+from .recovery import Recovery, remember, start_over_if_broken
 from .sample import check_sample, undo_sensing
 from .tuning import UKFTuning
-from .ukf import WrenchUKF
+from .ukf import WrenchUKF, carry, correct_parts
 from .ukf import step as ukf_step
 
 _MEASURED = [0, 1, 2, 6, 7, 8]  # rows of (rho, x) in the error state
 _LONGEST = 60  # s of hover in which the gain must have converged
 _CONVERGED = 1e-9  # relative change of the covariance in a second
 _HEIGHT = 1.2  # m, of that hover
+_LONGEST_GAP = 0.1  # s without a position or an attitude that is coasted over with a constant gain
+_NEAR = 1.1  # of the converged variances: converged again
 
 
 @compiled
@@ -44,10 +47,14 @@ def _turn(values: Array, cosine: float, sine: float) -> None:
 
 @compiled
 def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of
-    the covariance's.
+    """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of the covariance's
+    while the filter is in its steady state.
     """
-    usable: int = check_sample(f, z, parts)
+    if f.steady == 0:
+        usable: int = ukf_step(f, z, parts, dt, voltage)
+        _look_for_steady_state(f)
+        return usable
+    usable = check_sample(f, z, parts)
     if usable < 0:
         return usable
     sample = undo_sensing(f, z, usable, dt)
@@ -58,6 +65,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         drive(f, sample[0:4], dt, voltage)
         propagate(f, x, dt, centre)
         f.time += dt
+    for i in range(3):
+        f.gap[i] += dt
+    f.status = COASTING
     for i in range(6):
         y[i] = 0.0
     if usable & 2 != 0:
@@ -79,16 +89,56 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         for j in range(6):
             total += f.gain[i, j] * y[j]
         mean[i] = total
-    x[NIS] = math.nan
-    if usable == 3:
-        x[NIS] = 0.0
-        for i in range(6):
-            for j in range(6):
-                x[NIS] += y[i] * f.information[i, j] * y[j]
+    nis = 0.0
+    for i in range(6):
+        for j in range(6):
+            nis += y[i] * f.information[i, j] * y[j]
+    if f.gap[0] > _LONGEST_GAP or f.gap[1] > _LONGEST_GAP or not nis <= f.alarm[usable // 3]:
+        _leave_steady_state(f)
+        correct_parts(f, sample, usable)
+        return usable
+    x[NIS] = nis if usable == 3 else math.nan
     _turn(mean[0:3], cosine, sine)  # the rate, next, is in body axes
     _turn(mean[6:N], cosine, sine)
     fold(f, centre, mean)
+    if usable > 0:
+        f.status = TRACKING
+        remember(f, sample[4:7], sample[7:11], usable & 1 != 0, usable & 2 != 0)
     return usable
+
+
+@compiled
+def _leave_steady_state(f: Record) -> None:
+    """Let the filter's own covariance take over at the predicted state, ``f.centre``: after a gap,
+    whose widening is made up for here, or at a measurement that is not to be believed as it is.
+    """
+    x, position_gap, attitude_gap, refused = f.x, f.gap[0], f.gap[1], f.gap[2]
+    f.steady = 0
+    # the covariance after a correction, carried over the time that has not been measured since
+    quaternion_to_matrix(f.centre[3:7], f.rotation)
+    for i in range(NIS):
+        x[i], f.next[i] = f.centre[i], f.centre[i]
+    for _ in range(max(1, round(max(position_gap, attitude_gap) / f.period))):
+        carry(f, f.period)
+        for i in range(NIS):
+            x[i] = f.next[i]
+        f.gap[0], f.gap[1], f.gap[2] = position_gap, attitude_gap, refused
+    start_over_if_broken(f)
+    x[NIS] = math.nan
+
+
+@compiled
+def _look_for_steady_state(f: Record) -> None:
+    """Return to the constant gain once the covariance is that of a converged filter."""
+    if f.status != TRACKING:
+        return
+    for i in range(N):
+        if f.P[i, i] > _NEAR * f.converged[i, i]:
+            return
+    f.steady = 1
+    for i in range(N):
+        for j in range(N):
+            f.P[i, j] = f.converged[i, j]
 
 
 @compiled
@@ -107,26 +157,36 @@ class ConstantGainFilter(WrenchUKF):
 
     It starts with the gain of a filter that has long converged: a first guess of pose or wrench
     that is far off takes the rise time to correct. A measurement, or a part of it, that was not
-    made is coasted over: the state moves on by the model, and what is measured again is believed no
-    more than before. The covariance is that of the converged ``WrenchUKF`` at hover, facing along
-    x. Where noise differs between x and y, the gain is exact at that heading only.
+    made is coasted over for up to 0.1 s: the state moves on by the model, and what is measured
+    again is believed no more than before. After a longer gap, at a restart and at a measurement
+    that the gate refuses it is ``WrenchUKF`` itself, covariance and all, until that has converged
+    again. While the gain is constant, the covariance is that of the converged ``WrenchUKF`` at
+    hover, facing along x. Where noise differs between x and y, the gain is exact at that heading
+    only.
 
     Args:
         vehicle: the declared vehicle, with its declared effects.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
+        gate: as of ``WrenchUKF``.
+        recovery: as of ``WrenchUKF``.
 
     Raises:
-        InputError: the period is out of range, or the filter does not converge at hover.
+        InputError: a setting is out of range, or the filter does not converge at hover.
     """
 
     _compiled_step = staticmethod(_step_record)
     _step_by_address = staticmethod(_step_at)
 
     def __init__(
-        self, vehicle: Vehicle, tuning: UKFTuning | None = None, period: float = 0.005
+        self,
+        vehicle: Vehicle,
+        tuning: UKFTuning | None = None,
+        period: float = 0.005,
+        gate: float | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
-        super().__init__(vehicle, tuning, period)
+        super().__init__(vehicle, tuning, period, gate, recovery)
         super().reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
         self._converged = _converged_covariance(self.record.tobytes(), vehicle.voltage_ref)
         f = self.record[0]
@@ -136,7 +196,8 @@ class ConstantGainFilter(WrenchUKF):
         f["gain"] = self._converged[:, _MEASURED] * inverse
         left = np.diag(f["noise"]) - self._converged[np.ix_(_MEASURED, _MEASURED)]
         f["information"] = inverse[:, None] * left * inverse
-        f["P"] = self._converged
+        f["P"] = f["converged"] = self._converged
+        f["steady"] = 1
 
     def reset(
         self,
@@ -150,7 +211,8 @@ class ConstantGainFilter(WrenchUKF):
         difference.
         """
         super().reset(position, quaternion, covariance, velocity, angular_velocity)
-        self.record[0]["P"] = self._converged
+        f = self.record[0]
+        f["P"], f["steady"] = self._converged, 1
 
     def correct_imu(
         self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None

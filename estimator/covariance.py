@@ -7,9 +7,37 @@ keep their order.
 
 import math
 
-from ..runtime.compiled import Record, compiled_for_vectors, compiled_inline
+import numpy as np
+
+from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
 from .estimate import Array
 from .filter_record import N
+
+
+@compiled
+def root_of(P: Array) -> Array:
+    """Return the lower root of P (n, n), which exists also where rounding has eaten a pivot."""
+    n = len(P)
+    root = np.zeros((n, n))
+    for j in range(n):
+        pivot = P[j, j]
+        for k in range(j):
+            pivot -= root[j, k] * root[j, k]
+        root[j, j] = math.sqrt(max(pivot, _least_pivot(P[j, j])))
+        for i in range(j + 1, n):
+            total = P[i, j]
+            for k in range(j):
+                total -= root[i, k] * root[j, k]
+            root[i, j] = total / root[j, j]
+    return root
+
+
+@compiled_inline
+def _least_pivot(variance: float) -> float:
+    """Return the least pivot of a row of the covariance: rounding may eat the smallest pivots, and
+    a tiny positive one keeps the filter alive and changes nothing.
+    """
+    return 1e-14 * variance + 1e-300
 
 
 @compiled_for_vectors
@@ -77,9 +105,7 @@ def _six_columns(f: Record, rows: Array, first: int) -> None:
         pivot = rows[j, first + j]
         for k in range(j):
             pivot -= L[j, k] * L[j, k]
-        # rounding may eat the smallest pivots; a tiny positive one keeps the filter alive and
-        # changes nothing
-        scale = 1.0 / math.sqrt(max(pivot, 1e-14 * P[first + j, first + j] + 1e-300))
+        scale = 1.0 / math.sqrt(max(pivot, _least_pivot(P[first + j, first + j])))
         scales[j] = scale
         for r in range(j + 1, 6):
             total = rows[j, first + r]

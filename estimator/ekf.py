@@ -14,6 +14,7 @@ from .covariance import add_noise
 from .error_state import symmetrise
 from .estimate import NIS, Array
 from .filter_record import N, drive, propagate
+from .recovery import after_prediction
 from .sample import check_sample, undo_sensing
 from .ukf import WrenchUKF, correct_parts
 
@@ -248,6 +249,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     for i in range(NIS):
         x[i] = f.centre[i]
     x[NIS] = math.nan
+    after_prediction(f, dt)
     f.time += dt
 
 

@@ -7,7 +7,7 @@ from ..runtime.compiled import Record, compiled
 from ..runtime.vector_lanes import any_of, choose
 from .estimate import Array
 
-_SPREAD = 0.25  # largest variance of an MRP (a standard deviation of about 115 degrees)
+LARGEST_MRP_VARIANCE = 0.25  # a standard deviation of about 115 degrees
 
 
 @compiled
@@ -69,9 +69,9 @@ def symmetrise(P: Array) -> None:
             P[i, j] = a
             P[j, i] = a
     for i in range(3):
-        wide = P[i, i] > _SPREAD
+        wide = P[i, i] > LARGEST_MRP_VARIANCE
         if any_of(wide):
-            scale = choose(wide, math.sqrt(_SPREAD / P[i, i]), 1.0)
+            scale = choose(wide, math.sqrt(LARGEST_MRP_VARIANCE / P[i, i]), 1.0)
             for j in range(n):
                 P[i, j] *= scale
                 P[j, i] *= scale

@@ -12,6 +12,12 @@ POSITION, QUATERNION, VELOCITY = slice(0, 3), slice(3, 7), slice(7, 10)
 RATE, TORQUE, FORCE = slice(10, 13), slice(13, 16), slice(16, 19)
 NIS = 19
 STATE_SIZE = 20
+# What became of the last step's measurement, in the filter's memory
+TRACKING, COASTING, REJECTED, RESTARTED = 0.0, 1.0, 2.0, 3.0
+STATUSES = ("tracking", "coasting", "rejected", "restarted")
+# Behind the state the covariance, then the status and how often the estimator restarted
+STATUS, RESTARTS = STATE_SIZE + 18 * 18, STATE_SIZE + 18 * 18 + 1
+ESTIMATE_SIZE = RESTARTS + 1
 
 
 class WrenchEstimate:
@@ -20,7 +26,8 @@ class WrenchEstimate:
     __slots__ = ("_numbers",)
 
     def __init__(self, numbers: Array) -> None:
-        self._numbers = numbers  # (344,) state and covariance, one after the other
+        # (346,) state, covariance, status and count of restarts, one after the other
+        self._numbers = numbers
 
     @property
     def state(self) -> Array:
@@ -32,7 +39,7 @@ class WrenchEstimate:
         """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
         world-frame MRP.
         """
-        return self._numbers[STATE_SIZE:].reshape(18, 18)
+        return self._numbers[STATE_SIZE:STATUS].reshape(18, 18)
 
     @property
     def position(self) -> Array:
@@ -68,6 +75,22 @@ class WrenchEstimate:
     def nis(self) -> float:
         """Normalised innovation squared of the last measurement; NaN where there was none."""
         return float(self._numbers[NIS])
+
+    @property
+    def status(self) -> str:
+        """What became of the last step's measurement.
+
+        "tracking": it was taken in; "coasting": there was none, the estimate is a prediction, or
+        held where a gap has left nothing to predict from; "rejected": the gate refused it;
+        "restarted": pose and twist start anew at it, after a gap, or because it and those before it
+        contradict what was estimated (``estimator.recovery``).
+        """
+        return STATUSES[int(self._numbers[STATUS])]
+
+    @property
+    def restarts(self) -> int:
+        """How often the estimator restarted since its ``reset``."""
+        return int(self._numbers[RESTARTS])
 
 
 class WrenchEstimator(Protocol):

@@ -3,11 +3,13 @@
 import numpy as np
 
 from ..dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
-from ..dynamics.motion import Array, accelerations
+from ..dynamics.motion import LONG_TURN, Array, accelerations, gyroscopic_rest
 from ..dynamics.rotation import quaternion_to_matrix, turn_body
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
+from ..runtime.vector_lanes import any_of, choose
 from .estimate import STATE_SIZE
+from .recovery import Recovery, load_recovery
 from .tuning import UKFTuning
 
 N = 18  # error state (rho, omega, x, v, torque, force)
@@ -18,6 +20,22 @@ FILTER = np.dtype(
         # the estimate, in one piece
         ("x", "f8", (STATE_SIZE,)),
         ("P", "f8", (N, N)),
+        ("status", "f8"),  # what became of the last step's measurement
+        ("restarts", "f8"),  # since the reset
+        # gaps, refusals and restarts: estimator.recovery
+        ("gap", "f8", (3,)),  # s since a position, an attitude was believed, and one was refused
+        ("seen", "f8", (7,)),  # position and quaternion that were believed last
+        ("doubted", "f8", (7,)),  # and those refused last
+        ("refused", "f8"),  # measurements in a row
+        ("lasting", "f8"),  # s for which those refused have agreed with each other
+        ("gated", "i8"),
+        ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
+        ("restart_at", "f8"),  # NIS beyond which no linear correction is made
+        ("patience", "f8"),  # s
+        ("prior", "f8", (N,)),  # variances of what nothing is known of
+        ("lost", "f8", (N,)),  # variances beyond which what is not measured is given up
+        ("push", "f8", (2,)),  # rad/s2 and m/s2, of the hardest push
+        ("response", "f8"),  # s
         # tuning, as variances
         ("motor_torque", "f8", (3,)),
         ("torque_walk", "f8", (3,)),
@@ -27,9 +45,6 @@ FILTER = np.dtype(
         ("imu_noise", "f8", (6,)),  # of gyro and accelerometer
         ("kappa", "f8"),
         ("period", "f8"),
-        ("gate", "f8"),  # largest NIS of a measurement that is taken in; 0: any
-        ("patience", "i8"),  # measurements that may be refused in a row
-        ("refused", "i8"),
         # the step in progress
         (
             "z",
@@ -72,22 +87,31 @@ FILTER = np.dtype(
         # of the innovation
         ("gain", "f8", (N, 6)),
         ("information", "f8", (6, 6)),
+        ("steady", "i8"),  # whether that gain holds now
+        ("converged", "f8", (N, N)),  # the covariance that goes with it
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P
 
 
 def filter_record(
-    vehicle: Vehicle, tuning: UKFTuning, period: float, gate: float, patience: int
+    vehicle: Vehicle,
+    tuning: UKFTuning,
+    period: float,
+    gate: float | None = None,
+    recovery: Recovery | None = None,
 ) -> np.ndarray:
-    """Return the memory (1,) of a filter for a vehicle with its declared effects; ``period`` in s.
+    """Return the memory (1,) of a filter for a vehicle with its declared effects; ``period`` in s,
+    ``gate`` a probability.
 
     Raises:
         InputError: more effects than a model holds.
     """
     record = np.zeros(1, dtype=FILTER)
     f = record[0]
-    f["last_speeds"] = load_model(f, vehicle).hover_rate
+    built = load_model(f, vehicle)
+    f["last_speeds"] = built.hover_rate
+    load_recovery(f, built, gate, Recovery() if recovery is None else recovery)
     for name, deviation in (
         ("motor_torque", tuning.motor_torque_noise),
         ("torque_walk", tuning.torque_walk),
@@ -101,7 +125,7 @@ def filter_record(
         np.square(tuning.gyro_noise),
         np.square(tuning.accelerometer_noise),
     )
-    f["kappa"], f["period"], f["gate"], f["patience"] = tuning.kappa, period, gate, patience
+    f["kappa"], f["period"] = tuning.kappa, period
     return record
 
 
@@ -126,6 +150,13 @@ def move(f: Record, x: Array, dt: float, out: Array) -> None:
         f.effect_wrench,
         f.acceleration,
     )
+    wx, wy, wz = x[10], x[11], x[12]
+    square = dt * dt * (wx * wx + wy * wy + wz * wz)
+    far = square > LONG_TURN * LONG_TURN
+    if any_of(far):
+        rest = gyroscopic_rest(f.body.inertia, f.body.inverse_inertia, wx, wy, wz, square, dt)
+        for i in range(3):
+            f.acceleration[3 + i] += choose(far, rest[i], 0.0)
     for i in range(3):
         out[i] = x[i] + dt * (x[7 + i] + 0.5 * dt * f.acceleration[i])
         out[7 + i] = x[7 + i] + dt * f.acceleration[i]

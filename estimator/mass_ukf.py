@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .covariance import add_noise
+from .covariance import add_noise, root_of, subtract_squares, whiten
 from .error_state import displace, error_from, fold, symmetrise
-from .estimate import NIS, Array, WrenchEstimate
+from .estimate import NIS, RESTARTED, Array, WrenchEstimate
 from .filter_record import N, drive, propagate
-from .sample import check_sample, copy_estimate, undo_sensing
+from .recovery import Recovery, after_prediction
+from .sample import check_sample, copy_estimate, empty_estimate, undo_sensing
 from .tuning import UKFTuning
-from .ukf import NOISE, WrenchUKF
+from .ukf import NOISE, WrenchUKF, believable, innovate
 
 
 @compiled
@@ -33,6 +33,7 @@ def _step_with_mass(
     dt: float,
     voltage: float,
     mass_walk: float,
+    first_variance: float,
     P: Array,
     out: Array,
 ) -> int:
@@ -47,10 +48,7 @@ def _step_with_mass(
     if dt > 0.0:
         _predict(f, sample[0:4], dt, voltage, mass_walk, P)
     if usable > 0:
-        _correct(f, sample, 0 if usable & 2 != 0 else 3, 6 if usable & 1 != 0 else 3, P)
-    for i in range(N):
-        for j in range(N):
-            f.P[i, j] = P[i, j]
+        _correct(f, sample, usable, P, first_variance)
     copy_estimate(f, out)
     return usable
 
@@ -64,7 +62,7 @@ def _predict(
     mass = f.body.mass
     spread = math.sqrt(N + 1 + NOISE + 1 + f.kappa)
     weight = 0.5 / (spread * spread)  # (28)
-    root = np.linalg.cholesky(P)
+    root = root_of(P)
     propagate(f, f.x, dt, f.centre)
     for i in range(3):
         for j in range(3):
@@ -102,42 +100,71 @@ def _predict(
     fold(f, f.centre, mean)
     f.body.mass = mass + mean[N]
     symmetrise(P)
-    f.time += dt
+    for i in range(N):
+        for j in range(N):
+            f.P[i, j] = P[i, j]
     f.x[NIS] = math.nan
+    after_prediction(f, dt)
+    _take_over(f, P)
+    f.time += dt
 
 
 @compiled
-def _correct(f: Record, z: Array, first: int, last: int, P: Array) -> None:
-    """(27)-(37) with rows ``first`` to ``last`` of the measurement (rho, x)."""
-    count = last - first
-    innovation, H = np.empty(count), np.zeros((count, N + 1))
-    full = np.empty(6)
-    if first == 0:
-        attitude_error(z[7:11], f.x[3:7], full[0:3])
-    for i in range(3):
-        full[3 + i] = z[4 + i] - f.x[i]
-    for i in range(count):
-        row = first + i
-        innovation[i] = full[row]
-        H[i, row if row < 3 else row + 3] = 1.0
-    cross = P @ H.T
-    S = H @ cross
-    for i in range(count):
-        S[i, i] += f.noise[first + i]
-    weighted = np.linalg.solve(S, innovation)
-    nis = innovation @ weighted
-    f.x[NIS] = nis
-    if f.gate > 0.0 and nis > f.gate and f.refused < f.patience:
-        f.refused += 1
+def _correct(f: Record, z: Array, parts: int, P: Array, first_variance: float) -> None:
+    """(27)-(37): the correction of ``ukf``, with a nineteenth row."""
+    position, quaternion = z[4:7], z[7:11]
+    with_position, with_attitude = parts & 1 != 0, parts & 2 != 0
+    nis = innovate(f, position, quaternion, with_position, with_attitude)
+    taken = believable(f, position, quaternion, with_position, with_attitude, nis)
+    if not taken:
+        _take_over(f, P)
+        if f.status == RESTARTED:
+            # what contradicts the estimate of the wrench does so of the mass, which stood for it
+            for i in range(N):
+                P[i, N], P[N, i] = 0.0, 0.0
+            P[N, N] = max(P[N, N], first_variance)
         return
-    f.refused = 0
-    step = cross @ weighted
-    P -= cross @ np.linalg.solve(S, cross.T)
-    symmetrise(P)
+    # the whitened cross covariance of the mass, as ``whiten`` has it of the others
+    w = np.empty(6)
+    for i in range(6):
+        w[i] = P[N, i if i < 3 else i + 3]
+        for k in range(i):
+            w[i] -= f.L[i, k] * w[k]
+        w[i] *= f.scales[i]
+    whiten(f)
+    step = 0.0
+    for k in range(6):
+        step += w[k] * f.innovation[k]
+        for i in range(N):
+            P[i, N] -= w[k] * f.W[k, i]
+            P[N, i] = P[i, N]
+        P[N, N] -= w[k] * w[k]
+    subtract_squares(f)
+    for i in range(N):
+        for j in range(N):
+            P[i, j] = f.P[i, j]
     for i in range(NIS):
         f.centre[i] = f.x[i]
-    fold(f, f.centre, step)
-    f.body.mass = max(f.body.mass + step[N], 1e-6)
+    fold(f, f.centre, f.mean)
+    f.body.mass = max(f.body.mass + step, 1e-6)
+
+
+@compiled
+def _take_over(f: Record, P: Array) -> None:
+    """Make the covariance (18, 18) of ``f`` that of P (19, 19); what has become independent of the
+    rest there is so of the mass.
+    """
+    for i in range(N):
+        alone = True
+        for j in range(N):
+            alone = alone and (i == j or f.P[i, j] == 0.0)
+        # scaled as a whole: the mass keeps its correlation
+        scale = 0.0 if alone else math.sqrt(f.P[i, i] / P[i, i])
+        P[i, N] *= scale
+        P[N, i] = P[i, N]
+    for i in range(N):
+        for j in range(N):
+            P[i, j] = f.P[i, j]
 
 
 class WrenchMassUKF(WrenchUKF):
@@ -150,6 +177,7 @@ class WrenchMassUKF(WrenchUKF):
             what is vertical.
         period: time between steps, s.
         gate: as for ``WrenchUKF``.
+        recovery: as for ``WrenchUKF``; a restart keeps the mass.
         mass_std: of the first guess, kg; default: a tenth of it.
         mass_walk: change of the mass in a step, standard deviation, kg.
 
@@ -165,8 +193,9 @@ class WrenchMassUKF(WrenchUKF):
         gate: float | None = None,
         mass_std: float | None = None,
         mass_walk: float = 1e-5,
+        recovery: Recovery | None = None,
     ) -> None:
-        super().__init__(vehicle, tuning, period, gate)
+        super().__init__(vehicle, tuning, period, gate, recovery)
         self._first_mass = float(self.record[0]["body"]["mass"])
         self._mass_std = 0.1 * self._first_mass if mass_std is None else mass_std
         for name, value in (("mass_std", self._mass_std), ("mass_walk", mass_walk)):
@@ -211,11 +240,19 @@ class WrenchMassUKF(WrenchUKF):
         )
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
-        out = np.empty(len(self.record[0]["x"]) + N * N)
+        out = empty_estimate()
         volts = self._voltage if voltage is None else voltage
         if (
             _step_with_mass(
-                self.record, self._sample.z, parts, dt, volts, self._mass_walk, self._P, out
+                self.record,
+                self._sample.z,
+                parts,
+                dt,
+                volts,
+                self._mass_walk,
+                self._mass_std**2,
+                self._P,
+                out,
             )
             < 0
         ):

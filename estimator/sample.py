@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..dynamics.model import rewrite_sample
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .estimate import STATE_SIZE, Array
+from .estimate import ESTIMATE_SIZE, RESTARTS, STATE_SIZE, STATUS, Array
 from .filter_record import N
 
 POSITION, ATTITUDE = 1, 2  # the parts of a pose; their sum is both
@@ -150,14 +150,17 @@ def undo_first_pose(record: Record) -> None:
 
 @compiled
 def copy_estimate(f: Record, out: Array) -> None:
-    """Write state (20) and covariance (18 x 18) one after the other into ``out`` (344,)."""
+    """Write state (20), covariance (18 x 18), status and count of restarts one after the other into
+    ``out`` (346,).
+    """
     for i in range(STATE_SIZE):
         out[i] = f.x[i]
     for i in range(N):
         for j in range(N):
             out[STATE_SIZE + N * i + j] = f.P[i, j]
+    out[STATUS], out[RESTARTS] = f.status, f.restarts
 
 
 def empty_estimate() -> Array:
     """Return an array that ``copy_estimate`` can fill."""
-    return np.empty(STATE_SIZE + N * N)
+    return np.empty(ESTIMATE_SIZE)

@@ -8,6 +8,7 @@ for each number and a column for each point.
 
 import math
 
+from ..dynamics.motion import LONG_TURN, gyroscopic_rest
 from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import any_of, choose
 
@@ -131,6 +132,14 @@ def propagate_points(f: Record, dt: float) -> None:
             1.0
             - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
         )
+    for k in range(POINTS):
+        wx, wy, wz = X[10, k], X[11, k], X[12, k]
+        square = dt * dt * (wx * wx + wy * wy + wz * wz)
+        far = square > LONG_TURN * LONG_TURN
+        if any_of(far):
+            rest = gyroscopic_rest(J, inverse, wx, wy, wz, square, dt)
+            for i in range(3):
+                A[3 + i, k] += choose(far, rest[i], 0.0)
     for k in range(POINTS):
         large = C[0, k] >= 0.01
         if any_of(large):

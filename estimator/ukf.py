@@ -42,15 +42,15 @@ from .covariance import (
     whiten,
 )
 from .error_state import displace, error_from, fold, symmetrise
-from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
+from .estimate import ESTIMATE_SIZE, NIS, STATE_SIZE, TRACKING, Array, WrenchEstimate
 from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
+from .recovery import Recovery, after_prediction, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
 
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
-_PATIENCE = 0.1  # s of measurements that the gate may refuse in a row
 
 
 @compiled
@@ -89,7 +89,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
         _pairs_with_effects(f, dt, spread, scale, weight)
         add_pairs(f)
         add_more_pairs(f)
-        _gather(f)
+        _gather(f, dt)
     f.time += dt
 
 
@@ -107,7 +107,7 @@ def carry(f: Record, dt: float) -> None:
     errors_of_points(f)
     halve_pairs(f, scale, weight)
     add_pairs(f)
-    _gather(f)
+    _gather(f, dt)
 
 
 @compiled
@@ -131,7 +131,7 @@ def _carry_linear(f: Record, dt: float) -> None:
 
 
 @compiled
-def _gather(f: Record) -> None:
+def _gather(f: Record, dt: float) -> None:
     """Take the mean's part off the covariance, and fold it into the estimate."""
     P, mean = f.P, f.mean
     for i in range(12):
@@ -141,13 +141,16 @@ def _gather(f: Record) -> None:
     fold(f, f.centre, mean)
     symmetrise(P)
     f.x[NIS] = math.nan
+    after_prediction(f, dt)
 
 
 @compiled
-def correct(
+def innovate(
     f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
-) -> None:
-    """Take in what was measured of a pose, (rho, x), (27)-(37), unless the gate refuses it."""
+) -> float:
+    """Leave the root of the innovation's covariance in ``f.L`` and the whitened innovation of what
+    was measured of a pose, (rho, x), in ``f.innovation``; return the NIS.
+    """
     x, P, L, scales, y = f.x, f.P, f.L, f.scales, f.innovation
     attitude_error(quaternion, x[3:7], y[0:3])
     for i in range(3):
@@ -169,16 +172,47 @@ def correct(
         total = P[a, a] + f.noise[i]
         for k in range(i):
             total -= L[i, k] * L[i, k]
-        L[i, i] = math.sqrt(total)
+        # never below the measurement's own variance, whatever rounding does
+        L[i, i] = math.sqrt(max(total, f.noise[i]))
         scales[i] = choose(measured, 1.0 / L[i, i], 0.0)
         y[i] = choose(measured, y[i] / L[i, i], 0.0)
         nis += y[i] * y[i]
+    return nis
+
+
+@compiled
+def believable(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    with_position: bool,
+    with_attitude: bool,
+    nis: float,
+) -> bool:
+    """Return whether a measured pose, or a part of it, of which ``innovate`` was called, is taken
+    in by a linear correction; refuse it or restart there if not.
+    """
     taken = with_position | with_attitude
-    x[NIS] = choose(taken, nis, math.nan)
-    if f.gate > 0.0:
-        likely = (nis <= f.gate) | (f.refused >= f.patience)
-        f.refused = choose(taken, choose(likely, 0, f.refused + 1), f.refused)
-        taken = taken & likely
+    f.x[NIS] = choose(taken, nis, math.nan)
+    alarm, gap = f.alarm, f.gap
+    alarming = taken & (nis > choose(with_position & with_attitude, alarm[1], alarm[0]))
+    late = (with_position & (gap[0] > f.patience)) | (with_attitude & (gap[1] > f.patience))
+    if any_of(alarming | late):
+        taken = judge(f, position, quaternion, with_position, with_attitude, nis, alarming)
+    f.status = choose(taken, TRACKING, f.status)
+    remember(f, position, quaternion, taken & with_position, taken & with_attitude)
+    return taken
+
+
+@compiled
+def correct(
+    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+) -> None:
+    """Take in what was measured of a pose, (rho, x), (27)-(37), unless it is not to be believed."""
+    x, scales, y = f.x, f.scales, f.innovation
+    nis = innovate(f, position, quaternion, with_position, with_attitude)
+    taken = believable(f, position, quaternion, with_position, with_attitude, nis)
+    if not all_of(taken):
         if not any_of(taken):
             return
         for i in range(6):
@@ -241,8 +275,15 @@ class WrenchUKF:
             the estimated wrench is what they do not explain.
         tuning: noise of model and measurement; default ``UKFTuning.for_vehicle(vehicle, period)``.
         period: time between steps, s.
-        gate: refuse measurements whose NIS has a smaller chance than ``1 - gate`` (0.999, say);
-            None takes in any. After 0.1 s of nothing but refusals the next one is believed.
+        gate: refuse poses, or parts of one, whose NIS has a smaller chance than ``1 - gate``
+            (0.999, say) and which do not go on from the pose before; None takes in any. Refused
+            poses that agree with each other for ``recovery.patience`` are believed, and the filter
+            restarts there.
+        recovery: how gaps, outliers and restarts are dealt with, gate or not; default
+            ``Recovery()``.
+
+    What became of a step's measurement is ``estimate.status``, and ``estimate.restarts`` counts
+    restarts (``estimator.recovery`` says when and why).
 
     Raises:
         InputError: period or gate out of range.
@@ -257,6 +298,7 @@ class WrenchUKF:
         tuning: UKFTuning | None = None,
         period: float = 0.005,
         gate: float | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
         if not (math.isfinite(period) and period > 0):
             raise InputError(f"WrenchUKF: period must be positive, in s, got {period!r}")
@@ -267,16 +309,16 @@ class WrenchUKF:
         self.vehicle = vehicle
         self.tuning = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
         self.period = float(period)
-        largest = 0.0 if gate is None else _chi2_quantile(gate)
-        patience = max(1, round(_PATIENCE / period))
-        self.record = filter_record(vehicle, self.tuning, self.period, largest, patience)
+        self.gate = gate
+        self.recovery = Recovery() if recovery is None else recovery
+        self.record = filter_record(vehicle, self.tuning, self.period, gate, self.recovery)
         self._voltage = vehicle.voltage_ref
         self._bind()
 
     def _bind(self) -> None:
         """Lay what Python reads and writes in a step over the record."""
         self._sample = Sample(self.record["z"][0])
-        self._now: Array = np.ndarray(STATE_SIZE + N * N, buffer=self.record, offset=ESTIMATE)
+        self._now: Array = np.ndarray(ESTIMATE_SIZE, buffer=self.record, offset=ESTIMATE)
         self._call: Callable[..., int] | None = None
 
     def __getstate__(self) -> dict[str, object]:
@@ -347,9 +389,11 @@ class WrenchUKF:
                 raise InputError("reset: covariance must be positive definite")
         f = self.record[0]
         f["x"], f["P"] = x, P
-        f["refused"] = 0
         reset_model(f)
         undo_first_pose(self.record)
+        for name in ("status", "restarts", "gap", "refused", "lasting"):
+            f[name] = 0.0
+        f["seen"] = f["x"][:7]
 
     @property
     def step_address(self) -> int:
@@ -453,10 +497,3 @@ def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:
     deviations[12:15] = 0.05 * vehicle.weight * vehicle.arm_l
     deviations[15:18] = 0.1 * vehicle.weight
     return np.diag(np.square(deviations))
-
-
-def _chi2_quantile(probability: float) -> float:
-    """Return the NIS (6 numbers) below which a consistent measurement lies with a probability."""
-    from scipy.stats import chi2
-
-    return float(chi2.ppf(probability, 6))

@@ -10,13 +10,25 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import announced, compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import FORCE, NIS, POSITION, QUATERNION, RATE, STATE_SIZE, TORQUE, VELOCITY, Array
+from .estimate import (
+    FORCE,
+    NIS,
+    POSITION,
+    QUATERNION,
+    RATE,
+    STATE_SIZE,
+    STATUSES,
+    TORQUE,
+    VELOCITY,
+    Array,
+)
 from .filter_record import N
+from .recovery import Recovery
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 from .ukf_lanes import Blocks
@@ -41,6 +53,7 @@ def _step_records(
         step(f, z[n], parts, dt, voltage[n])
         for i in range(STATE_SIZE):
             out[n, i] = f.x[i]
+        out[n, STATE_SIZE], out[n, STATE_SIZE + 1] = f.status, f.restarts
 
 
 class _Records:
@@ -57,7 +70,7 @@ class _Records:
 
     @property
     def state(self) -> Array:
-        return np.array(self._records["x"])
+        return np.column_stack([self._records[name] for name in ("x", "status", "restarts")])
 
     @property
     def covariance(self) -> Array:
@@ -67,10 +80,15 @@ class _Records:
 class WrenchEstimates:
     """What a batch of filters believes after a step; later steps do not change it."""
 
-    __slots__ = ("state",)
+    __slots__ = ("_numbers",)
 
-    def __init__(self, state: Array) -> None:
-        self.state = state  # (n, 20), laid out by the constants of ``estimator.estimate``
+    def __init__(self, numbers: Array) -> None:
+        self._numbers = numbers  # (n, 22): state, status, count of restarts
+
+    @property
+    def state(self) -> Array:
+        """All of the estimates (n, 20), laid out by the constants of ``estimator.estimate``."""
+        return self._numbers[:, :STATE_SIZE]
 
     @property
     def position(self) -> Array:
@@ -107,6 +125,16 @@ class WrenchEstimates:
         """Normalised innovation squared (n,) of the last measurements; NaN where there was none."""
         return self.state[:, NIS]
 
+    @property
+    def status(self) -> list[str]:
+        """What became of the last step's measurements, n words of ``WrenchEstimate.status``."""
+        return [STATUSES[int(status)] for status in self._numbers[:, STATE_SIZE]]
+
+    @property
+    def restarts(self) -> NDArray[np.int64]:
+        """How often each filter restarted (n,) since its ``reset``."""
+        return self._numbers[:, STATE_SIZE + 1].astype(np.int64)
+
 
 class WrenchUKFBatch:
     """``WrenchUKF`` for ``count`` vehicles: the same numbers, bit for bit, for all of them in one
@@ -121,6 +149,7 @@ class WrenchUKFBatch:
         tuning: of all of them; default: ``UKFTuning.for_vehicle`` of each.
         period: time between steps, s.
         gate: as of ``WrenchUKF``.
+        recovery: as of ``WrenchUKF``.
 
     Raises:
         InputError: a count that does not fit, or what ``WrenchUKF`` refuses.
@@ -133,6 +162,7 @@ class WrenchUKFBatch:
         tuning: UKFTuning | None = None,
         period: float = 0.005,
         gate: float | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
         given = [vehicles] if isinstance(vehicles, Vehicle) else list(vehicles)
         self.count = len(given) if count is None else count
@@ -141,7 +171,7 @@ class WrenchUKFBatch:
                 f"WrenchUKFBatch: expected one vehicle or one for each of {self.count}, got "
                 f"{len(given)}"
             )
-        self._filters = [WrenchUKF(vehicle, tuning, period, gate) for vehicle in given]
+        self._filters = [WrenchUKF(vehicle, tuning, period, gate, recovery) for vehicle in given]
         self.period = self._filters[0].period
         self._memory = self._new_memory()
         self._compiled = False  # as far as this one knows
@@ -265,7 +295,7 @@ class WrenchUKFBatch:
                 f"(filter {bad})"
             )
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
-        out = np.empty((self.count, STATE_SIZE))
+        out = np.empty((self.count, STATE_SIZE + 2))
         with nullcontext() if self._compiled else announced():
             self._memory.step(z, parts, self.period, volts, out)
         self._compiled = True

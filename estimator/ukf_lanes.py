@@ -19,12 +19,18 @@ from .estimate import STATE_SIZE, Array
 from .filter_record import FILTER, N
 from .ukf import carry, correct
 
-_KEPT = (
+_KEPT = (  # what a filter must not forget from one step to the next
     "x",
     "P",
+    "status",
+    "restarts",
     "last_speeds",
+    "gap",
+    "seen",
+    "doubted",
     "refused",
-)  # what a filter must not forget from one step to the next
+    "lasting",
+)
 _SHARED = (
     "body",
     "motor_torque",
@@ -34,8 +40,14 @@ _SHARED = (
     "noise",
     "kappa",
     "period",
-    "gate",
+    "gated",
+    "alarm",
+    "restart_at",
     "patience",
+    "prior",
+    "lost",
+    "push",
+    "response",
     "effect_wrench",
 )
 _WORK = LaneRecord(
@@ -97,13 +109,26 @@ def _move_estimate(source: Record, target: Record) -> None:
             target.P[i, j] = source.P[i, j]
     for i in range(4):
         target.last_speeds[i] = source.last_speeds[i]
-    target.refused = source.refused
+    for i in range(7):
+        target.seen[i] = source.seen[i]
+        target.doubted[i] = source.doubted[i]
+    for i in range(3):
+        target.gap[i] = source.gap[i]
+    target.status, target.restarts = source.status, source.restarts
+    target.refused, target.lasting = source.refused, source.lasting
 
 
 @compiled_without_gil
 def _step_blocks(
-    work: int, work_z: Array, blocks: int, estimates: Array, z: Array, dt: float, out: Array
+    work: int,
+    work_z: Array,
+    blocks: int,
+    kept: tuple[Array, Array, Array],
+    z: Array,
+    dt: float,
+    out: Array,
 ) -> None:
+    estimates, status, restarts = kept
     f = _work_at(work)
     count = len(z)
     for b in range(len(estimates)):
@@ -129,6 +154,8 @@ def _step_blocks(
         for lane in range(min(WIDTH, count - WIDTH * b)):
             for i in range(STATE_SIZE):
                 out[WIDTH * b + lane, i] = estimates[b, i, lane]
+            out[WIDTH * b + lane, STATE_SIZE] = status[b, lane]
+            out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
 
 
 class Blocks:
@@ -157,12 +184,13 @@ class Blocks:
             self._blocks[name][n // WIDTH][..., lanes] = record[name][0][..., np.newaxis]
 
     def step(self, z: Array, _parts: int, dt: float, _voltage: Array, out: Array) -> None:
-        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 20), written."""
+        """Step all: samples (n, 11), NaN where nothing was measured; estimates (n, 22), written."""
+        kept = self._blocks["x"], self._blocks["status"], self._blocks["restarts"]
         _step_blocks(
             self._work.ctypes.data,
             self._work["z"][0],
             self._blocks.ctypes.data,
-            self._blocks["x"],
+            kept,
             z,
             dt,
             out,
@@ -170,8 +198,8 @@ class Blocks:
 
     @property
     def state(self) -> Array:
-        """Estimates (n, 20)."""
-        return self._each("x")
+        """Estimates, status and count of restarts (n, 22)."""
+        return np.column_stack([self._each(name) for name in ("x", "status", "restarts")])
 
     @property
     def covariance(self) -> Array:

@@ -1,0 +1,349 @@
+"""What a filter does after a gap, and with a measurement that it cannot believe.
+
+Three things happen to a vehicle's poses that a Kalman filter's model does not know: they stay away,
+they are wrong for a while, and their frame jumps for good. A fourth looks alike and is none of
+these: the vehicle is pushed harder than the random walk of the wrench expects. They are told apart
+by what each of them breaks:
+
+* A *gap* makes the covariance grow. What is not known better than nothing is *lost*: pose and twist
+  are then held, with a prior's covariance, and the next measurement restarts them.
+* An *outlier* is a pose that jumps: it is far from what the filter expects and from the pose just
+  before it, by more than a vehicle can move in the time. A gate refuses it.
+* A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
+  is continuous, and the wrench is wrong. It is taken in, gate or not.
+* A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
+  that the filter restarts there.
+
+A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates;
+where a contradiction led to the restart, they are doubted as well and their variances widened, for
+a wrench that the model took for impossible explains it as well as a pose that jumped.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..dynamics.rotation import attitude_error
+from ..dynamics.vehicle import Vehicle
+from ..runtime.compiled import Record, compiled
+from ..runtime.errors import InputError
+from ..runtime.vector_lanes import any_of, choose
+from .error_state import LARGEST_MRP_VARIANCE
+from .estimate import COASTING, REJECTED, RESTARTED, Array
+
+N = 18  # error state (rho, omega, x, v, torque, force)
+_LOST = 0.9  # of a prior's variance: known no better than that
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What the filter assumes of gaps, outliers and restarts; the defaults suit vehicles from 30 g
+    to a few kg.
+    """
+
+    # s: measurements that are refused in a row, and agree with each other, are believed after this
+    # time; longer than the bursts that motion capture is known for (0.1 to 0.5 s)
+    patience: float = 0.6
+    # standard deviations of an innovation beyond which no linear correction is made: the filter
+    # restarts at the measurement. A consistent filter never sees 10; a push of one weight on a
+    # filter that rises in 1 s makes 70
+    restart_at: float = 100.0
+    # rad: standard deviation of the attitude beyond which a vehicle that is not seen is no longer
+    # predicted: where its thrust points has become a guess, and sigma points reach half a turn
+    attitude_std: float = 0.4
+    # m/s and rad/s: standard deviations of velocity and angular velocity of a vehicle of which only
+    # the pose is known; a small multirotor in brisk flight
+    velocity_std: float = 5.0
+    angular_velocity_std: float = 10.0
+    # m: standard deviation beyond which a position means nothing; a flight hall
+    position_std: float = 100.0
+    # of the weight, and of weight times arm: standard deviations of a force and a torque about
+    # which a contradiction has left nothing known
+    force_std: float = 0.5
+    torque_std: float = 0.25
+    # s: time in which the filter follows a push, which is at most two weights and the same about
+    # the arm; how far two poses in a row may lie apart follows from it
+    response: float = 0.05
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+                raise InputError(
+                    f"Recovery: {f.name} must be a positive finite number, got {value!r}"
+                )
+
+
+def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:
+    """Write a filter's gate (a probability or None) and recovery into its record."""
+    weight = vehicle.weight
+    record["gated"] = gate is not None
+    # largest NIS that is taken in unseen, of three numbers and of six
+    restart_at = given.restart_at**2
+    record["alarm"] = restart_at if gate is None else [_quantile(gate, dof) for dof in (3, 6)]
+    record["restart_at"] = restart_at
+    record["patience"] = given.patience
+    torque = given.torque_std * weight * vehicle.arm_l
+    deviations = (
+        math.sqrt(LARGEST_MRP_VARIANCE),
+        given.angular_velocity_std,
+        given.position_std,
+        given.velocity_std,
+        torque,
+        given.force_std * weight,
+    )
+    record["lost"] = np.repeat(np.square(deviations), 3)
+    record["lost"] *= _LOST
+    record["lost"][:3] = (given.attitude_std / 4.0) ** 2  # (16)
+    record["prior"] = np.repeat(np.square(deviations), 3)
+    # accelerations of a push of two weights, and of the same about the arm
+    push = 2.0 * weight
+    record["push"] = (
+        push * vehicle.arm_l / float(np.linalg.eigvalsh(vehicle.inertia)[0]),
+        push / vehicle.mass,
+    )
+    record["response"] = given.response
+
+
+def _quantile(probability: float, dof: int) -> float:
+    """Return the NIS below which a consistent measurement of ``dof`` numbers lies."""
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(probability, dof))
+
+
+@compiled
+def after_prediction(f: Record, dt: float) -> None:
+    """Count the time since the last measurements, keep the covariance within what a vehicle can do,
+    and hold what is lost.
+    """
+    x, P, gap = f.x, f.P, f.gap
+    f.status = COASTING
+    for i in range(3):
+        gap[i] += dt
+    # over a gap variances grow without an end; at 16 times the prior's they have long lost their
+    # meaning
+    for i in range(3, N):
+        wide = P[i, i] > 16.0 * f.prior[i]
+        if any_of(wide):
+            scale = choose(wide, math.sqrt(16.0 * f.prior[i] / P[i, i]), 1.0)
+            for j in range(N):
+                P[i, j] *= scale
+                P[j, i] *= scale
+    if any_of((gap[0] > f.patience) | (gap[1] > f.patience)):
+        position, attitude = _lost_position(f), _lost_attitude(f)
+        _forget(f, position, attitude)
+        for i in range(3):
+            # where it was before this step: the velocity of what is held is zero
+            x[i] -= choose(position, 0.5 * dt * x[7 + i], 0.0)
+            x[7 + i] = choose(position, 0.0, x[7 + i])
+            x[10 + i] = choose(attitude, 0.0, x[10 + i])
+    start_over_if_broken(f)
+
+
+@compiled
+def start_over_if_broken(f: Record) -> None:
+    """Begin again at the last pose that was believed, where inputs that no vehicle can have (rotor
+    speeds of 1e200 rad/s) made numbers overflow.
+    """
+    x, P = f.x, f.P
+    total = x[0]
+    for i in range(1, 19):
+        total += x[i]
+    for i in range(N):
+        total += P[i, i]
+    broken = choose(math.isfinite(total), 0.0, 1.0) > 0.5
+    if any_of(broken):
+        _start_over(f, broken)
+
+
+@compiled
+def _start_over(f: Record, broken: bool) -> None:
+    x, P = f.x, f.P
+    for i in range(7):
+        x[i] = choose(broken, f.seen[i], x[i])
+    for i in range(7, 19):
+        x[i] = choose(broken, 0.0, x[i])
+    for i in range(N):
+        for j in range(N):
+            P[i, j] = choose(broken, f.prior[i] if i == j else 0.0, P[i, j])
+    f.restarts = choose(broken, f.restarts + 1.0, f.restarts)
+    f.status = choose(broken, RESTARTED, f.status)
+
+
+@compiled
+def _lost_position(f: Record) -> bool:
+    """Return whether position and velocity have long not been measured, and are known no better
+    than a prior.
+    """
+    P, lost = f.P, f.lost
+    wide = P[6, 6] > lost[6]
+    for i in range(7, 12):
+        wide = wide | (P[i, i] > lost[i])
+    return wide & (f.gap[0] > f.patience)
+
+
+@compiled
+def _lost_attitude(f: Record) -> bool:
+    """Return the same of attitude and angular velocity."""
+    P, lost = f.P, f.lost
+    wide = P[0, 0] > lost[0]
+    for i in range(1, 6):
+        wide = wide | (P[i, i] > lost[i])
+    return wide & (f.gap[1] > f.patience)
+
+
+@compiled
+def _forget(f: Record, position: bool, attitude: bool) -> None:
+    """Give what is forgotten the prior's covariance, and none with the rest."""
+    P = f.P
+    for i in range(12):
+        gone = attitude if i < 6 else position
+        for j in range(N):
+            P[i, j] = choose(gone, 0.0, P[i, j])
+            P[j, i] = choose(gone, 0.0, P[j, i])
+        P[i, i] = choose(gone, f.prior[i], P[i, i])
+
+
+@compiled
+def judge(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    with_position: bool,
+    with_attitude: bool,
+    nis: float,
+    alarming: bool,
+) -> bool:
+    """Decide about a measurement that is unlikely (``alarming``) or comes when its part of the
+    state is lost; restart there if it must be.
+
+    Returns whether it is to be taken in as any other, by a linear correction.
+    """
+    taken = with_position | with_attitude
+    lost = (with_position & _lost_position(f)) | (with_attitude & _lost_attitude(f))
+    refused = choose(alarming, 1.0, 0.0)
+    if f.gated > 0:
+        gap, first = f.gap, f.refused < 0.5
+        pushed = first & _continues(
+            f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
+        )
+        agreed = _continues(
+            f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
+        )
+        refused = choose(pushed, 0.0, refused)
+        refused = choose(lost, 0.0, refused)
+        lasting = choose(first, 0.0, choose(agreed, f.lasting + gap[2], 0.0))
+        f.lasting = choose(refused > 0.5, lasting, f.lasting)
+        for i in range(3):
+            f.doubted[i] = choose((refused > 0.5) & with_position, position[i], f.doubted[i])
+        for i in range(4):
+            f.doubted[3 + i] = choose(
+                (refused > 0.5) & with_attitude, quaternion[i], f.doubted[3 + i]
+            )
+        gap[2] = choose(refused > 0.5, 0.0, gap[2])
+    else:
+        refused = choose(alarming, 0.0, 0.0)
+    # contradicted: believed at last, or too far for a linear correction
+    contradicted = (refused > 0.5) & (f.lasting > f.patience)
+    refused = choose(contradicted, 0.0, refused)
+    far = alarming & (nis > f.restart_at) & (refused < 0.5)
+    contradicted = contradicted | far
+    restarted = taken & (lost | contradicted)
+    f.refused = choose(refused > 0.5, f.refused + 1.0, f.refused)
+    f.status = choose(refused > 0.5, REJECTED, f.status)
+    _restart(
+        f,
+        position,
+        quaternion,
+        restarted & with_position,
+        restarted & with_attitude,
+        restarted & contradicted,
+    )
+    f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
+    f.status = choose(restarted, RESTARTED, f.status)
+    remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)
+    return taken & (choose(restarted, 1.0, refused) < 0.5)
+
+
+@compiled
+def _continues(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    before: Array,
+    position_age: float,
+    attitude_age: float,
+    with_position: bool,
+    with_attitude: bool,
+) -> bool:
+    """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
+    of a vehicle that moves as estimated, give or take a push.
+    """
+    x, error = f.x, f.mean
+    attitude_error(quaternion, before[3:7], error[0:3])
+    far = choose(with_position, 0.0, 0.0)
+    rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
+    for i in range(6):
+        # the difference of two measurements, at six standard deviations
+        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
+        if i < 3:
+            age, measured, miss = attitude_age, with_attitude, error[i]
+            slack = slack + 0.25 * age * (rate + f.push[0] * (f.response + 0.5 * age))
+        else:
+            age, measured = position_age, with_position
+            miss = position[i - 3] - before[i - 3] - age * x[4 + i]
+            slack = slack + age * f.push[1] * (f.response + 0.5 * age)
+        far += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
+    return far < 0.5
+
+
+@compiled
+def _restart(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    at_position: bool,
+    at_attitude: bool,
+    contradicted: bool,
+) -> None:
+    """Start pose and twist anew at what was measured; doubt the wrench too where the measurement
+    contradicts the estimate.
+    """
+    x, P, prior = f.x, f.P, f.prior
+    _forget(f, at_position, at_attitude)
+    for i in range(4):
+        x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
+    for i in range(3):
+        P[i, i] = choose(at_attitude, f.noise[i], P[i, i])
+        P[6 + i, 6 + i] = choose(at_position, f.noise[3 + i], P[6 + i, 6 + i])
+        x[i] = choose(at_position, position[i], x[i])
+        # the twist is still the best guess, unless none of such a vehicle
+        for k in (7 + i, 10 + i):
+            row = k + 2 if k < 10 else k - 7
+            mad = (at_position if k < 10 else at_attitude) & (x[k] * x[k] > 4.0 * prior[row])
+            x[k] = choose(mad, 0.0, x[k])
+    for i in range(12, N):
+        for j in range(12):
+            P[i, j] = choose(contradicted, 0.0, P[i, j])
+            P[j, i] = choose(contradicted, 0.0, P[j, i])
+        P[i, i] = choose(contradicted & (P[i, i] < prior[i]), prior[i], P[i, i])
+        # a wrench that itself is out of all reason was made by what is now forgotten
+        mad = contradicted & (x[1 + i] * x[1 + i] > 16.0 * prior[i])
+        x[1 + i] = choose(mad, 0.0, x[1 + i])
+
+
+@compiled
+def remember(
+    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+) -> None:
+    """Keep the pose that was believed last, and note that it was now."""
+    seen, gap = f.seen, f.gap
+    for i in range(3):
+        seen[i] = choose(with_position, position[i], seen[i])
+    for i in range(4):
+        seen[3 + i] = choose(with_attitude, quaternion[i], seen[3 + i])
+    gap[0] = choose(with_position, 0.0, gap[0])
+    gap[1] = choose(with_attitude, 0.0, gap[1])
+    f.refused = choose(with_position | with_attitude, 0.0, f.refused)
