@@ -142,8 +142,8 @@ def gyroscopic_rest(
 
     (12) takes ``-omega x J omega`` of the step's start for all of it: explicit Euler, which adds
     energy in each step, and without bound where a step turns far. In the body frame the momentum
-    of a free body turns by ``exp(-[omega dt]x)``, which keeps its length. Below ``LONG_TURN``, where
-    the two agree within a few percent of the gyroscopic term, (12) stands as printed.
+    of a free body turns by ``exp(-[omega dt]x)``, which keeps its length. Below ``LONG_TURN``,
+    where the two agree within a few percent of the gyroscopic term, (12) stands as printed.
     """
     hx = inertia[0, 0] * wx + inertia[0, 1] * wy + inertia[0, 2] * wz
     hy = inertia[1, 0] * wx + inertia[1, 1] * wy + inertia[1, 2] * wz

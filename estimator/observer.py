@@ -31,14 +31,30 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from ..dynamics.model import apply_effects
-from ..dynamics.rotation import normalise, quaternion_to_matrix, turn_body
+from ..dynamics.rotation import (
+    normalise,
+    quaternion_from_mrp,
+    quaternion_multiply,
+    quaternion_to_matrix,
+    turn_body,
+)
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .estimate import NIS, Array, WrenchEstimate
-from .filter_record import drive
+from .error_state import error_from
+from .estimate import COASTING, NIS, RESTARTED, TRACKING, Array, WrenchEstimate
+from .filter_record import drive, propagate
+from .recovery import (
+    Recovery,
+    continues,
+    judge,
+    lost_attitude,
+    lost_position,
+    remember,
+    start_over_if_broken,
+)
 from .sample import Sample, check_sample, copy_estimate, empty_estimate, undo_sensing
-from .ukf import WrenchUKF
+from .ukf import WrenchUKF, carry
 
 _DAMPING = math.sqrt(0.5)  # Butterworth
 _FORGOTTEN = 4.0  # delays of a filter after which exp(-4) of its past is left
@@ -73,6 +89,10 @@ OBSERVER = np.dtype(
         ("sample_q", "f8", (4,)),
         ("position_gap", "f8"),  # s since the last sample
         ("attitude_gap", "f8"),
+        ("position_settles", "f8"),  # s until the filter has forgotten a restart
+        ("attitude_settles", "f8"),
+        ("covariance", "f8", (18, 18)),  # of the error while every pose is measured
+        ("kept", "f8", (18,)),  # share of an error that a step with a pose leaves
         # the step in progress
         ("R_old", "f8", (3, 3)),
         ("R_new", "f8", (3, 3)),
@@ -86,6 +106,10 @@ OBSERVER = np.dtype(
         ("scratch_q", "f8", (4,)),
     ]
 )
+
+
+_RESPONSE = 4.0  # time constants of the slowest gain, after which exp(-8) of a variance is left
+_SMALL = 1e-3  # of a noise's standard deviation: the response to it is linear
 
 
 @dataclass(frozen=True)
@@ -120,24 +144,36 @@ class ObserverTuning:
 
 
 class NonlinearObserver:
-    """Force and torque observer with the interface of ``WrenchUKF``; it knows no covariance (NaN)
-    and no NIS.
+    """Force and torque observer with the interface of ``WrenchUKF``; it has no NIS.
+
+    It works without a covariance. The one that it reports is that of its error under the noise
+    that ``UKFTuning.for_vehicle`` assumes, worked out once from its response to each noise at
+    hover; where nothing is measured it grows as that of ``WrenchUKF`` does.
 
     The pose and twist that it returns are those of the low-pass filters, moved ahead by the
     filters' delay with the model. Through gaps in the measurements the model carries on with the
-    last wrench.
+    last wrench. Poses that jump restart the pose filters, or are refused where there is a gate, as
+    in ``WrenchUKF``; having no innovations, the gate asks only whether a pose can follow the last
+    one.
 
     Args:
         vehicle: the declared vehicle with its declared effects.
         tuning: gains and cutoffs.
         period: time between steps, s.
+        gate: refuse poses that jump (any probability, as of ``WrenchUKF``); None takes in any.
+        recovery: as of ``WrenchUKF``.
 
     Raises:
-        InputError: period out of range.
+        InputError: period, gate or recovery out of range.
     """
 
     def __init__(
-        self, vehicle: Vehicle, tuning: ObserverTuning | None = None, period: float = 0.005
+        self,
+        vehicle: Vehicle,
+        tuning: ObserverTuning | None = None,
+        period: float = 0.005,
+        gate: float | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
         if not (math.isfinite(period) and period > 0):
             raise InputError(f"NonlinearObserver: period must be positive, in s, got {period!r}")
@@ -145,15 +181,25 @@ class NonlinearObserver:
         self.tuning = ObserverTuning() if tuning is None else tuning
         self.period = float(period)
         # lends its checks, its model of the vehicle and its state vector
-        self._filter = WrenchUKF(vehicle, None, period)
+        self._filter = WrenchUKF(vehicle, None, period, gate, recovery)
         self._record = np.zeros(1, dtype=OBSERVER)
         o = self._record[0]
         _low_pass(o["translation"], self.tuning.position_cutoff_hz, period)
         _low_pass(o["rotation"], self.tuning.attitude_cutoff_hz, period)
         o["force_decay"] = np.exp(-period * np.asarray(self.tuning.force_gain))
         o["torque_decay"] = np.exp(-period * np.asarray(self.tuning.torque_gain))
+        # what is left of an error after a step: of pose and twist by the filters, of the wrench by
+        # the gains
+        for rows, kept in (
+            (slice(0, 6), math.exp(-_DAMPING * o["rotation"]["frequency"] * period)),
+            (slice(6, 12), math.exp(-_DAMPING * o["translation"]["frequency"] * period)),
+            (slice(12, 15), o["torque_decay"]),
+            (slice(15, 18), o["force_decay"]),
+        ):
+            o["kept"][rows] = kept
         self._sample = Sample()
         self._voltage = vehicle.voltage_ref
+        o["covariance"] = self._error_covariance()
         self.reset((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
     def reset(
@@ -178,7 +224,6 @@ class NonlinearObserver:
                 rotation.
         """
         self._filter.reset(position, quaternion, None, velocity, angular_velocity)
-        self._filter.record[0]["P"] = math.nan
         _start(self._filter.record, self._record)
 
     @property
@@ -190,7 +235,7 @@ class NonlinearObserver:
 
     @property
     def covariance(self) -> Array:
-        """NaN (18, 18): an observer has none."""
+        """Covariance (18, 18) of the error under assumed noise; see the class."""
         return self._filter.covariance
 
     @property
@@ -229,6 +274,93 @@ class NonlinearObserver:
         ):
             raise sample.bad_quaternion()
         return WrenchEstimate(out)
+
+    def _error_covariance(self) -> Array:
+        """Return the covariance (18, 18) of the error under stationary noise: the sum over time and
+        noises of the squared response to each.
+        """
+        tuning, o = self._filter.tuning, self._record[0]
+        noises = (
+            tuning.motor_torque_noise,
+            tuning.thrust_noise,
+            tuning.torque_walk,
+            tuning.force_walk,
+            np.asarray(tuning.attitude_noise) / 4.0,  # (16)
+            tuning.position_noise,
+        )
+        sizes = np.concatenate([np.broadcast_to(noise, 3) for noise in noises]).astype(np.float64)
+        slowest = min(np.min(self.tuning.force_gain), np.min(self.tuning.torque_gain))
+        steps = min(math.ceil(_RESPONSE / slowest / self.period), 100_000)
+        W = np.full(4, self._filter.record[0]["last_speeds"][0])
+        P = np.diag(np.full(18, 1e-12))
+        for which in range(18):
+            errors = np.empty((2, steps, 18))
+            for run, size in enumerate((0.0, _SMALL * sizes[which])):
+                self._filter.reset((0.0, 0.0, 1.2), (1.0, 0.0, 0.0, 0.0))
+                _start(self._filter.record, self._record)
+                truth = self._filter.record.copy()
+                _respond(
+                    truth,
+                    self._filter.record,
+                    self._record,
+                    W,
+                    which,
+                    size,
+                    self.period,
+                    self._voltage,
+                    errors[run],
+                )
+            response = (errors[1] - errors[0]) / _SMALL
+            P += response.T @ response
+        o["covariance"] = P
+        return P
+
+
+@compiled
+def _respond(
+    truth: Record,
+    model: Record,
+    record: Record,
+    rotor_speeds: Array,
+    which: int,
+    size: float,
+    dt: float,
+    voltage: float,
+    errors: Array,
+) -> None:
+    """Write the observer's errors (K, 18) after one noise, number ``which`` of motor torque,
+    thrust, torque walk, force walk, attitude and position, came in the first step.
+    """
+    g, f, o = truth[0], model[0], record[0]
+    x, z = g.x, np.empty(11)
+    for k in range(len(errors)):
+        push = size if k == 0 else 0.0
+        if 6 <= which < 12:
+            x[7 + which] += push
+        drive(g, rotor_speeds, dt, voltage)
+        if which < 3:
+            g.rotor_wrench[1 + which] += push
+        propagate(g, x, dt, g.next)
+        if 3 <= which < 6:
+            for i in range(3):
+                change = g.rotation[i, which - 3] * push * dt / g.body.mass
+                g.next[i] += 0.5 * dt * change
+                g.next[7 + i] += change
+        normalise(g.next[3:7])
+        for i in range(NIS):
+            x[i] = g.next[i]
+        g.time += dt
+        z[0:4] = rotor_speeds
+        z[4:11] = x[0:7]
+        if 12 <= which < 15:
+            for i in range(3):
+                g.rho[i] = push if i == which - 12 else 0.0
+            quaternion_from_mrp(g.rho, g.q)
+            quaternion_multiply(g.q, x[3:7], z[7:11])
+        if which >= 15:
+            z[4 + which - 15] += push
+        step(f, o, z, 3, dt, voltage)
+        error_from(x, f.x, errors[k])
 
 
 def _low_pass(record: Record, cutoff_hz: float, period: float) -> None:
@@ -333,8 +465,16 @@ def _centre_of_mass(f: Record, position: Array, R: Array, out: Array) -> None:
 
 @compiled
 def _start(model: Record, record: Record) -> None:
-    """Set the observer to the pose and twist of the model's state."""
+    """Start the observer at the pose and twist of the model's state."""
     f, o = model[0], record[0]
+    o.position_settles, o.attitude_settles = 0.0, 0.0
+    _seat(f, o)
+    f.P[:] = o.covariance
+
+
+@compiled
+def _seat(f: Record, o: Record) -> None:
+    """Set the filters to the pose and twist of the model's state."""
     x, c = f.x, f.body.com
     o.sample_q[:] = x[3:7]
     o.omega[:] = x[10:13]
@@ -382,6 +522,8 @@ def _observe_force(f: Record, o: Record, measured: bool, dt: float) -> None:
     for i in range(3):
         o.momentum[i] = mass * v[i]
     _filter_sample(o.translation, o.p, v, o.old_p, o.sample_p)
+    if o.position_settles > 0.0:
+        return
     for i in range(3):
         gain = (1.0 - o.force_decay[i]) / dt
         force[i] = o.force_decay[i] * force[i] + gain * (mass * v[i] - o.momentum[i] - o.impulse[i])
@@ -415,6 +557,8 @@ def _observe_torque(f: Record, o: Record, measured: bool, dt: float) -> None:
         o.momentum[i] = h[i]
     _filter_sample(o.rotation, o.q, o.dq, o.old_q, o.sample_q)
     _twist(f, o)
+    if o.attitude_settles > 0.0:
+        return
     for i in range(3):
         gain = (1.0 - o.torque_decay[i]) / dt
         torque[i] = o.torque_decay[i] * torque[i] + gain * (h[i] - o.momentum[i] - o.impulse[3 + i])
@@ -475,12 +619,82 @@ def _look_ahead(f: Record, o: Record) -> None:
 
 
 @compiled
+def _believed(f: Record, o: Record, z: Array, parts: int, dt: float) -> int:
+    """Return the parts of a sample that are believed, after a restart where it calls for one, and
+    carry the covariance over the step.
+    """
+    P, x = f.P, f.x
+    position, attitude = parts & 1 != 0, parts & 2 != 0
+    for i in range(3):
+        f.gap[i] += dt
+    status = COASTING if parts == 0 else TRACKING
+    if parts != 0:
+        strange = not continues(f, z[4:7], z[7:11], f.seen, f.gap[0], f.gap[1], position, attitude)
+        late = (position and f.gap[0] > f.patience) or (attitude and f.gap[1] > f.patience)
+        if strange or late:
+            # no covariance of an innovation says how strange: as far as can be
+            if not judge(f, z[4:7], z[7:11], position, attitude, math.inf, strange):
+                status = f.status
+                if status == RESTARTED:
+                    _reseat(f, o)
+                else:
+                    parts, position, attitude = 0, False, False
+        if parts != 0:
+            remember(f, z[4:7], z[7:11], position, attitude)
+    if parts != 3:
+        # the filter's own prediction of the covariance; state and times are the observer's
+        for i in range(NIS):
+            f.next[i] = x[i]
+        position_gap, attitude_gap, doubt_gap = f.gap[0], f.gap[1], f.gap[2]
+        quaternion_to_matrix(x[3:7], f.rotation)
+        carry(f, dt)
+        f.gap[0], f.gap[1], f.gap[2] = position_gap, attitude_gap, doubt_gap
+        for i in range(NIS):
+            x[i] = f.next[i]
+        # held where it is lost
+        if lost_position(f):
+            o.v[:], x[7:10] = 0.0, 0.0
+        if lost_attitude(f):
+            o.omega[:], o.angular_momentum[:], x[10:13] = 0.0, 0.0, 0.0
+    f.status = status
+    for i in range(18):
+        a = o.kept[i] if _measured(i, position, attitude) else 1.0
+        for j in range(i + 1):
+            b = o.kept[j] if _measured(j, position, attitude) else 1.0
+            rest = math.sqrt((1.0 - a * a) * (1.0 - b * b))
+            P[i, j] = a * b * P[i, j] + rest * o.covariance[i, j]
+            P[j, i] = P[i, j]
+    return parts
+
+
+@compiled
+def _measured(row: int, position: bool, attitude: bool) -> bool:
+    """Return whether a row of the covariance is of what a sample corrects: attitude, angular
+    velocity and torque, or position, velocity and force.
+    """
+    return attitude if row < 6 or 12 <= row < 15 else position
+
+
+@compiled
+def _reseat(f: Record, o: Record) -> None:
+    """Put pose and twist of the filters where those of the model's state are, and leave the wrench
+    as it is until they have forgotten that.
+    """
+    wrench, rates = o.u.copy(), o.du.copy()
+    _seat(f, o)
+    o.u[:], o.du[:] = wrench, rates
+    o.position_settles = _FORGOTTEN * o.translation.delay
+    o.attitude_settles = _FORGOTTEN * o.rotation.delay
+
+
+@compiled
 def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) -> None:
     """Go ``dt`` s on, the period for which ``o`` was made, with the ``parts`` of ``z`` (11,) that
     were measured.
     """
     x = f.x
     drive(f, z[0:4], dt, voltage)
+    parts = _believed(f, o, z, parts, dt)
     position, attitude = parts & 1 != 0, parts & 2 != 0
     # the samples: those measured, else what is expected
     for i in range(3):
@@ -513,6 +727,8 @@ def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) 
         _seat_position(o, o.old_p)
     o.position_gap = 0.0 if position else o.position_gap + dt
     o.attitude_gap = 0.0 if attitude else o.attitude_gap + dt
+    o.position_settles = max(0.0, o.position_settles - dt)
+    o.attitude_settles = max(0.0, o.attitude_settles - dt)
     _observe_torque(f, o, attitude, dt)
     _observe_force(f, o, position, dt)
     _look_ahead(f, o)
@@ -521,6 +737,9 @@ def step(f: Record, o: Record, z: Array, parts: int, dt: float, voltage: float) 
         _centre_of_mass(f, x[0:3], f.rotation, o.sample_p)
     f.time += dt
     x[NIS] = math.nan
+    if not math.isfinite(np.sum(x[0:NIS])):
+        start_over_if_broken(f)
+        _seat(f, o)
 
 
 @compiled

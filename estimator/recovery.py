@@ -132,7 +132,7 @@ def after_prediction(f: Record, dt: float) -> None:
                 P[i, j] *= scale
                 P[j, i] *= scale
     if any_of((gap[0] > f.patience) | (gap[1] > f.patience)):
-        position, attitude = _lost_position(f), _lost_attitude(f)
+        position, attitude = lost_position(f), lost_attitude(f)
         _forget(f, position, attitude)
         for i in range(3):
             # where it was before this step: the velocity of what is held is zero
@@ -173,7 +173,7 @@ def _start_over(f: Record, broken: bool) -> None:
 
 
 @compiled
-def _lost_position(f: Record) -> bool:
+def lost_position(f: Record) -> bool:
     """Return whether position and velocity have long not been measured, and are known no better
     than a prior.
     """
@@ -185,7 +185,7 @@ def _lost_position(f: Record) -> bool:
 
 
 @compiled
-def _lost_attitude(f: Record) -> bool:
+def lost_attitude(f: Record) -> bool:
     """Return the same of attitude and angular velocity."""
     P, lost = f.P, f.lost
     wide = P[0, 0] > lost[0]
@@ -222,14 +222,14 @@ def judge(
     Returns whether it is to be taken in as any other, by a linear correction.
     """
     taken = with_position | with_attitude
-    lost = (with_position & _lost_position(f)) | (with_attitude & _lost_attitude(f))
+    lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
     refused = choose(alarming, 1.0, 0.0)
     if f.gated > 0:
         gap, first = f.gap, f.refused < 0.5
-        pushed = first & _continues(
+        pushed = first & continues(
             f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
         )
-        agreed = _continues(
+        agreed = continues(
             f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
         )
         refused = choose(pushed, 0.0, refused)
@@ -268,7 +268,7 @@ def judge(
 
 
 @compiled
-def _continues(
+def continues(
     f: Record,
     position: Array,
     quaternion: Array,
@@ -279,9 +279,9 @@ def _continues(
     with_attitude: bool,
 ) -> bool:
     """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
-    of a vehicle that moves as estimated, give or take a push.
+    of a vehicle that moves as estimated, give or take six standard deviations and a push.
     """
-    x, error = f.x, f.mean
+    x, P, error = f.x, f.P, f.mean
     attitude_error(quaternion, before[3:7], error[0:3])
     far = choose(with_position, 0.0, 0.0)
     rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
@@ -290,11 +290,15 @@ def _continues(
         slack = 6.0 * math.sqrt(2.0 * f.noise[i])
         if i < 3:
             age, measured, miss = attitude_age, with_attitude, error[i]
-            slack = slack + 0.25 * age * (rate + f.push[0] * (f.response + 0.5 * age))
+            slack = slack + 0.25 * age * (
+                rate + 6.0 * math.sqrt(P[3 + i, 3 + i]) + f.push[0] * (f.response + 0.5 * age)
+            )
         else:
             age, measured = position_age, with_position
             miss = position[i - 3] - before[i - 3] - age * x[4 + i]
-            slack = slack + age * f.push[1] * (f.response + 0.5 * age)
+            slack = slack + age * (
+                6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
+            )
         far += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
     return far < 0.5
 
