@@ -7,6 +7,7 @@ from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
 from .mass_ukf import WrenchMassUKF
 from .observer import NonlinearObserver, ObserverTuning
+from .recovery import Recovery
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 from .ukf_batch import WrenchEstimates, WrenchUKFBatch
@@ -15,6 +16,7 @@ __all__ = [
     "ConstantGainFilter",
     "NonlinearObserver",
     "ObserverTuning",
+    "Recovery",
     "UKFTuning",
     "WrenchEKF",
     "WrenchEstimate",

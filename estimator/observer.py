@@ -631,14 +631,15 @@ def _believed(f: Record, o: Record, z: Array, parts: int, dt: float) -> int:
     if parts != 0:
         strange = not continues(f, z[4:7], z[7:11], f.seen, f.gap[0], f.gap[1], position, attitude)
         late = (position and f.gap[0] > f.patience) or (attitude and f.gap[1] > f.patience)
-        if strange or late:
-            # no covariance of an innovation says how strange: as far as can be
-            if not judge(f, z[4:7], z[7:11], position, attitude, math.inf, strange):
-                status = f.status
-                if status == RESTARTED:
-                    _reseat(f, o)
-                else:
-                    parts, position, attitude = 0, False, False
+        # no covariance of an innovation says how strange: as far as can be
+        if (strange or late) and not judge(
+            f, z[4:7], z[7:11], position, attitude, math.inf, strange
+        ):
+            status = f.status
+            if status == RESTARTED:
+                _reseat(f, o)
+            else:
+                parts, position, attitude = 0, False, False
         if parts != 0:
             remember(f, z[4:7], z[7:11], position, attitude)
     if parts != 3:

@@ -12,7 +12,7 @@ by what each of them breaks:
 * A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
   is continuous, and the wrench is wrong. It is taken in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
-  that the filter restarts there.
+  that the filter restarts there; without a gate it does so at once.
 
 A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates;
 where a contradiction led to the restart, they are doubted as well and their variances widened, for
@@ -45,9 +45,11 @@ class Recovery:
     # s: measurements that are refused in a row, and agree with each other, are believed after this
     # time; longer than the bursts that motion capture is known for (0.1 to 0.5 s)
     patience: float = 0.6
-    # standard deviations of an innovation beyond which no linear correction is made: the filter
-    # restarts at the measurement. A consistent filter never sees 10; a push of one weight on a
-    # filter that rises in 1 s makes 70
+    # standard deviations of an innovation beyond which a filter without a gate asks whether the
+    # pose jumped, and restarts there if so; a consistent filter never sees them
+    jump_at: float = 10.0
+    # standard deviations beyond which no push is followed by linear corrections: the filter
+    # restarts. One of a weight makes 70 on a filter that rises in 1 s
     restart_at: float = 100.0
     # rad: standard deviation of the attitude beyond which a vehicle that is not seen is no longer
     # predicted: where its thrust points has become a guess, and sigma points reach half a turn
@@ -80,9 +82,9 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     weight = vehicle.weight
     record["gated"] = gate is not None
     # largest NIS that is taken in unseen, of three numbers and of six
-    restart_at = given.restart_at**2
-    record["alarm"] = restart_at if gate is None else [_quantile(gate, dof) for dof in (3, 6)]
-    record["restart_at"] = restart_at
+    jump_at = given.jump_at**2
+    record["alarm"] = jump_at if gate is None else [_quantile(gate, dof) for dof in (3, 6)]
+    record["restart_at"] = given.restart_at**2
     record["patience"] = given.patience
     torque = given.torque_std * weight * vehicle.arm_l
     deviations = (
@@ -223,17 +225,17 @@ def judge(
     """
     taken = with_position | with_attitude
     lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
-    refused = choose(alarming, 1.0, 0.0)
+    gap, first = f.gap, f.refused < 0.5
+    pushed = first & continues(
+        f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
+    )
+    jumped = choose(alarming, choose(pushed, 0.0, 1.0), 0.0)
+    contradicted = alarming & (pushed & (nis > f.restart_at))
+    refused = choose(lost, 0.0, jumped)
     if f.gated > 0:
-        gap, first = f.gap, f.refused < 0.5
-        pushed = first & continues(
-            f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
-        )
         agreed = continues(
             f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
         )
-        refused = choose(pushed, 0.0, refused)
-        refused = choose(lost, 0.0, refused)
         lasting = choose(first, 0.0, choose(agreed, f.lasting + gap[2], 0.0))
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
         for i in range(3):
@@ -243,13 +245,10 @@ def judge(
                 (refused > 0.5) & with_attitude, quaternion[i], f.doubted[3 + i]
             )
         gap[2] = choose(refused > 0.5, 0.0, gap[2])
+        contradicted = contradicted | ((refused > 0.5) & (f.lasting > f.patience))
     else:
-        refused = choose(alarming, 0.0, 0.0)
-    # contradicted: believed at last, or too far for a linear correction
-    contradicted = (refused > 0.5) & (f.lasting > f.patience)
+        contradicted = contradicted | (refused > 0.5)
     refused = choose(contradicted, 0.0, refused)
-    far = alarming & (nis > f.restart_at) & (refused < 0.5)
-    contradicted = contradicted | far
     restarted = taken & (lost | contradicted)
     f.refused = choose(refused > 0.5, f.refused + 1.0, f.refused)
     f.status = choose(refused > 0.5, REJECTED, f.status)
