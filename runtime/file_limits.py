@@ -30,7 +30,7 @@ class FileLimits:
         json_text: bytes of a JSON file: the card of a policy, the progress of a training.
         policy_file: bytes of a policy's ``.npz``; those of the kit have some 100 kB.
         policy_weights: of its arrays.
-        checkpoint: of a training's checkpoint, which holds the replay memory.
+        checkpoint: bytes of a training's checkpoint, which holds the replay memory, not packed.
         bag_chunk: of a chunk of a ROS bag; recorders make chunks of some megabytes.
         bag_unpacked: of all chunks that are unpacked to read one bag.
         bag_index: entries in the index of a ROS 1 bag; there is one for each message.
@@ -54,7 +54,7 @@ class FileLimits:
     json_text: int = 2**22
     policy_file: int = 2**24
     policy_weights: int = 2**26
-    checkpoint: int = 2**29
+    checkpoint: int = 2**30
     bag_chunk: int = 2**26
     bag_unpacked: int = 2**31
     bag_index: int = 4_000_000

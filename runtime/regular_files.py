@@ -82,9 +82,7 @@ def read_bytes(path: Path, what: str, most: int) -> bytes:
         try:
             data = file.read(most + 1)
         except OSError as error:
-            raise InputError(
-                f"{path}: cannot be read as {what}: {_reason(error)}"
-            ) from error
+            raise InputError(f"{path}: cannot be read as {what}: {_reason(error)}") from error
     if len(data) > most:
         raise InputError(f"{path}: more than {most} bytes; expected {what}, no larger")
     return data

@@ -42,7 +42,8 @@ def parse_yaml(text: str, where: str) -> Any:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         if node is not None and _size(node, {}, 0) > LIMITS.yaml_values:
             raise InputError(
-                f"{where}: more than {LIMITS.yaml_values} values, its aliases written out; expected a few"
+                f"{where}: more than {LIMITS.yaml_values} values, its aliases written out; "
+                f"expected a few"
             )
         return yaml.safe_load(text)
     except InputError:

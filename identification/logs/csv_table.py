@@ -86,9 +86,7 @@ def _survey(path: Path, largest: int) -> tuple[int, bool]:
                         f"{path}: more than {largest} characters of text; expected one flight"
                     )
                 if "\0" in piece:
-                    raise InputError(
-                        f"{path}: not a text file (it holds zero bytes); expected CSV"
-                    )
+                    raise InputError(f"{path}: not a text file (it holds zero bytes); expected CSV")
                 first, last = piece.find("\n"), piece.rfind("\n")
                 line += len(piece) if first < 0 else first
                 if line > LIMITS.table_line:
@@ -155,9 +153,7 @@ def _numbers(
     # the fast parser knows no empty field; two passes, because neighbours share a comma
     filled = lines
     if any(",," in line or line[:1] == "," or line[-1:] == "," for line in lines):
-        filled = [
-            f",{line},".replace(",,", ",nan,").replace(",,", ",nan,")[1:-1] for line in lines
-        ]
+        filled = [f",{line},".replace(",,", ",nan,").replace(",,", ",nan,")[1:-1] for line in lines]
     try:
         values = np.loadtxt(filled, delimiter=",", comments=None, usecols=where, ndmin=2)
     except ValueError as error:

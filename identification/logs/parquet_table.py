@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
-
 from ...runtime.errors import InputError
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import check_regular, open_regular
@@ -107,9 +105,7 @@ def _check_type(path: Path, file: Any, name: str) -> None:
     value = kind.value_type if types.is_dictionary(kind) else kind
     tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_null, types.is_decimal)
     if not any(test(value) for test in tests):
-        raise InputError(
-            f"{path}: column {name} cannot be read: it holds {kind}; expected numbers"
-        )
+        raise InputError(f"{path}: column {name} cannot be read: it holds {kind}; expected numbers")
 
 
 def _check_pages(path: Path, file: Any, names: Sequence[str]) -> None:
@@ -128,9 +124,7 @@ def _check_pages(path: Path, file: Any, names: Sequence[str]) -> None:
                 while 0 < at < end:
                     header, length = _page_header(path, raw, at)
                     unpacked, packed = header.get(2, 0), header.get(3, 0)
-                    values = [
-                        part.get(1, 0) for part in header.values() if isinstance(part, dict)
-                    ]
+                    values = [part.get(1, 0) for part in header.values() if isinstance(part, dict)]
                     pages += 1
                     too_much = (
                         not 0 <= unpacked <= LIMITS.parquet_page

@@ -30,8 +30,8 @@ def open_table(path: Path) -> Table:
     repeated = [name for name, count in Counter(table.header).items() if count > 1]
     if repeated:
         raise InputError(
-            f"{path}: column {', '.join(sorted(repeated)[:20])} stands there more than once; expected "
-            f"it once"
+            f"{path}: column {', '.join(sorted(repeated)[:20])} stands there more than once; "
+            f"expected it once"
         )
     if table.rows > LIMITS.table_rows:
         raise InputError(

@@ -144,7 +144,7 @@ def test_a_file_that_is_no_log_is_refused(path, content, expected):
 
 
 def test_unreadable_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"absent.csv: cannot be read as a flight log: No such file"):
+    with pytest.raises(InputError, match=r"absent.csv: cannot be read as .*No such file"):
         read_log(tmp_path / "absent.csv")
     with pytest.raises(
         InputError, match=r"flight.txt: unknown kind of file; expected a name that ends in \.csv"
