@@ -130,5 +130,5 @@ def test_a_pipe_in_its_place_is_refused_at_once(name, stopped, tmp_path):
 @pytest.mark.parametrize("text", ["", "[]", "7", '{"steps": 1}', '{"steps": ["a"]}', '{"x": 1}'])
 def test_progress_of_another_kind_is_refused(text, tmp_path):
     (tmp_path / "progress.json").write_text(text)
-    with pytest.raises(InputError, match="progress.json: "):
+    with pytest.raises(InputError, match=r"progress\.json: "):
         read_progress(tmp_path)
