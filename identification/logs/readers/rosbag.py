@@ -24,6 +24,7 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 """  # noqa: E501
 
 import math
+import os
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -129,9 +130,9 @@ def _topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]
     """Return the settings of pose, rotors and voltage, checked, and the name of the file that they
     are from.
     """
-    stem = path.name if path.is_dir() else path.stem
+    stem = path.name if os.path.isdir(path) else path.stem
     file = Path(option) if option else path.with_name(f"{stem}.topics.yaml")
-    if not option and not file.exists():
+    if not option and not os.path.exists(file):
         return {}, str(file)
     data = read_yaml(file, "a topic map")
     if not isinstance(data, dict):
@@ -188,7 +189,7 @@ def _opened(path: Path) -> Iterator[_Bag]:
         InputError: rosbags is missing or the bag cannot be read.
     """
     ros1 = path.suffix.lower() == ".bag"
-    if not (path.is_dir() or path.name.lower().endswith(SUFFIXES)):
+    if not (os.path.isdir(path) or path.name.lower().endswith(SUFFIXES)):
         raise InputError(
             f"{path}: unknown kind of bag; expected {', '.join(SUFFIXES)} or the folder of a ROS 2 "
             f"bag"

@@ -1,6 +1,7 @@
 """What is packed in a ROS bag, unpacked up to a limit: a few kilobytes may unpack to any size."""
 
 import bz2
+import os
 import re
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -86,7 +87,7 @@ def check_bag_files(path: Path) -> None:
     Raises:
         InputError: one is no regular file, or a database that computes what it holds.
     """
-    if not path.is_dir():
+    if not os.path.isdir(path):
         check_regular(path, "a ROS 2 bag")
         files = [path]
     else:
@@ -129,7 +130,7 @@ def refuse_packed_files(path: Path) -> None:
     Raises:
         InputError: it is one.
     """
-    metadata = path / "metadata.yaml" if path.is_dir() else path.with_name("metadata.yaml")
+    metadata = path / "metadata.yaml" if os.path.isdir(path) else path.with_name("metadata.yaml")
     try:
         with metadata.open("rb") as file:
             found = _WHOLE.search(file.read(_METADATA))
