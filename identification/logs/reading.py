@@ -23,6 +23,7 @@ from .flight_log import (
     time_notes,
     unit_quaternions,
 )
+from .magnitudes import check_magnitudes
 from .readers import READERS, find_reader
 from .tables import Table, open_table
 
@@ -81,6 +82,7 @@ def read_log(
             )
         with np.errstate(over="ignore", invalid="ignore"):
             log = _canonical(table)
+    check_magnitudes(log)
     return _with_doubts(log, vehicle)
 
 
