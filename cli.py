@@ -20,6 +20,7 @@ from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name
 from .runtime.interrupts import INTERRUPTED, forget, noted
+from .runtime.printable import printable
 
 
 class _Commands(TyperGroup):
@@ -115,7 +116,7 @@ def _refused(error: Any) -> int:
     text = str(error) if isinstance(error, InputError) else error.format_message()
     # what a parser says may take several lines
     errors.print(
-        f"error: {' '.join(text.split())}",
+        f"error: {' '.join(printable(text).split())}",
         style="red",
         highlight=False,
         soft_wrap=True,

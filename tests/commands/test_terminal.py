@@ -33,7 +33,7 @@ def run(*arguments, folder=None, **options):
 
 
 def assert_one_line(done, *words):
-    lines = done.stderr.splitlines()
+    lines = done.stderr.strip().splitlines()
     assert (done.returncode, len(lines)) == (2, 1), done.stderr
     assert lines[0].startswith(b"error: ")
     for word in words:
