@@ -5,6 +5,7 @@ and a disk that is full ends the command in one clear line.
 import io
 import os
 import sys
+from typing import cast
 
 from ..runtime.errors import InputError
 
@@ -51,7 +52,7 @@ def prepare_output() -> None:
             stream.flush()
             raw = _Output(stream.fileno(), quiet)
             text = io.TextIOWrapper(
-                io.BufferedWriter(raw),
+                io.BufferedWriter(cast(io.RawIOBase, raw)),
                 stream.encoding,
                 "backslashreplace",
                 line_buffering=stream.line_buffering,

@@ -3,18 +3,16 @@
 Python's reader unpacks no more of a member than the list claims, so the claims are a bound.
 """
 
-import io
 import zipfile
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import InputError
 
 _BEGINS = b"PK\x03\x04"  # a member's header; other readers look here for what kind of file it is
 
 
-def check_archive(
-    path: Path, data: io.BufferedIOBase, most: int, what: str, packed: bool = True
-) -> None:
+def check_archive(path: Path, data: BinaryIO, most: int, what: str, packed: bool = True) -> None:
     """Check that an archive's members unpack to at most ``most`` bytes in all.
 
     Args:
