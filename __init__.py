@@ -3,9 +3,12 @@
 Importing the package registers the environment ``windwrench/FanTracking-v0`` with Gymnasium.
 """
 
-import gymnasium
+from .runtime.interrupts import is_command, leaving_at_once
 
-from .runtime.moved_modules import keep_old_paths
+with leaving_at_once(is_command()):
+    import gymnasium
+
+    from .runtime.moved_modules import keep_old_paths
 
 __version__ = "0.1.0"
 

@@ -14,10 +14,13 @@ from .commands.from_checkout import close_loop, has_studies, leaderboard, real_f
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.logs import diagnose, estimate, replay
+from .commands.output import prepare_output
 from .commands.paper import reproduce
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name
+from .runtime.interrupts import INTERRUPTED, forget, noted
+from .runtime.printable import printable
 
 
 class _Commands(TyperGroup):
@@ -39,9 +42,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     epilog="Exit codes: 0 success; 1 internal error, with its traceback; 2 invalid option or input "
-    "file, with a one-line message; 130 interrupted. NO_COLOR=1 disables colours.",
+    "file, or output that cannot be written, with a one-line message; 130 interrupted. "
+    "NO_COLOR=1 disables colours.",
 )
-_INTERRUPTED = 130
 _UsageError: Any = typer.BadParameter.__base__  # an option or argument that typer cannot use
 
 
@@ -89,21 +92,34 @@ for command in (*_COMMANDS, *_STUDIES):
 
 def main() -> None:
     """Run the command; a user's mistake ends in one clear line and exit code 2."""
-    try:
-        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
-    except (InputError, _UsageError) as error:
-        text = str(error) if isinstance(error, InputError) else error.format_message()
-        # what a parser says may take several lines
-        errors.print(
-            f"error: {' '.join(text.split())}",
-            style="red",
-            highlight=False,
-            soft_wrap=True,
-            markup=False,
-        )
-        sys.exit(2)
-    except (KeyboardInterrupt, typer.Abort):
-        code = _INTERRUPTED
-    if code == _INTERRUPTED:
+    prepare_output()
+    with noted() as interrupted:
+        try:
+            code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+            sys.stdout.flush()
+        except (KeyboardInterrupt, typer.Abort):
+            code = INTERRUPTED
+        except (InputError, _UsageError) as error:
+            code = INTERRUPTED if interrupted() else _refused(error)
+        except Exception:
+            if not interrupted():
+                raise
+            code = INTERRUPTED
+    if code == INTERRUPTED:
+        forget()
         errors.print("interrupted")
     sys.exit(code)
+
+
+def _refused(error: Any) -> int:
+    """Say what the user's mistake was; return the exit code."""
+    text = str(error) if isinstance(error, InputError) else error.format_message()
+    # what a parser says may take several lines
+    errors.print(
+        f"error: {' '.join(printable(text).split())}",
+        style="red",
+        highlight=False,
+        soft_wrap=True,
+        markup=False,
+    )
+    return 2

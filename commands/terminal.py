@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -19,11 +19,27 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 
 from ..runtime.errors import InputError
+from ..runtime.printable import printable
 
-console = Console()
-errors = Console(stderr=True)
+
+class _Terminal(Console):
+    """A console that shows what a terminal might act on, in names and texts of files, as escapes;
+    whatever is printed comes through here.
+    """
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Yield the pieces of text and style that a thing is printed as."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
+
+
+console = _Terminal()
+errors = _Terminal(stderr=True)
 
 
 @dataclass

@@ -8,6 +8,7 @@ deep-learning library.
 import hashlib
 import io
 import json
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
+from ..runtime.file_limits import LIMITS
+from ..runtime.regular_files import read_bytes, read_json
 from ..runtime.whole_files import replaced
 from .features import Features, History
 from .observation import MAX_COMMAND
@@ -175,26 +179,25 @@ def load_policy(path: str | Path) -> TrainedPolicy:
     """Read a policy from its ``.npz`` or its card.
 
     Raises:
-        InputError: a file is missing, not readable, of another format, or the two are not of one
-            policy.
+        InputError: a file is missing, not readable, of another format, larger than ``FileLimits``
+            allows, or the two are not of one policy.
     """
     file = Path(path).with_suffix(".npz")
     card_file = file.with_suffix(".json")
-    try:
-        card = json.loads(card_file.read_text(encoding="utf-8"))
-        data = file.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError(
-            f"{error.filename}: no such file; a trained policy is a .npz file with its .json card"
-        ) from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{card_file}: cannot be read as a policy's card: {error}") from error
+    for path in (card_file, file):
+        if not os.path.lexists(path):
+            raise InputError(
+                f"{path}: no such file; a trained policy is a .npz file with its .json card"
+            )
+    card = read_json(card_file, "a policy's card")
+    data = read_bytes(file, "a policy's weights", LIMITS.policy_file)
     if not isinstance(card, dict) or card.get("format") != FORMAT:
         raise InputError(f"{card_file}: format must be {FORMAT}, a trained policy's card")
     if card.get("sha256") != hashlib.sha256(data).hexdigest():
         raise InputError(
             f"{file}: not the weights that its card {card_file.name} describes (sha256 differs)"
         )
+    check_archive(file, io.BytesIO(data), LIMITS.policy_weights, "weights")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             weights = {name: np.asarray(arrays[name], dtype=np.float32) for name in arrays.files}

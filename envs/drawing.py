@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop
+from .display import need_display
 from .fan import jet_at
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 
@@ -29,10 +30,13 @@ class Viewer:
         height: likewise.
 
     Raises:
-        InputError: this machine has no way to draw.
+        InputError: a window where there is no display; when it is to draw, also that this machine
+            has no way to do it.
     """
 
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
+        if mode == "human":
+            need_display()
         self.mode, self.width, self.height = mode, width, height
         self._renderer: Any = None
         self._window: Any = None

@@ -18,6 +18,7 @@ from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, run_address
 from .decision import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
+from .display import need_display
 from .fan import Fan
 from .plain_steps import normals_of
 from .plant import NOISE, TICK, PlantSettings
@@ -96,7 +97,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
     | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain, for faster training |
-    | `render_mode` | `None`       | `"human"` or `"rgb_array"`                                                 |
+    | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                               |
 
     ## Version history
 
@@ -123,6 +124,8 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise InputError(
                 f"FanTracking: render_mode must be human, rgb_array or None, got {render_mode!r}"
             )
+        if render_mode == "human":
+            need_display()
         self.scenario = scenario if isinstance(scenario, Scenario) else get_scenario(scenario)
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         # a declared vehicle whose model was amended must not bring its effects into the world a
@@ -178,7 +181,16 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; the same seed gives the same episode, bit for bit."""
+        """Start an episode; the same seed gives the same episode, bit for bit.
+
+        Raises:
+            InputError: ``options`` that are not empty: there are none.
+        """
+        if options:
+            raise InputError(
+                f"FanTracking: reset: unknown option(s) {', '.join(map(repr, options))}; expected "
+                f"none: scenario and all else are arguments of the environment"
+            )
         super().reset(seed=seed)
         rng = self.np_random
         scenario, distance = self.scenario, DISTANCE

@@ -6,6 +6,8 @@ import ctypes
 import os
 import sys
 
+from ..runtime.errors import InputError
+
 
 def _choose() -> None:
     if not sys.platform.startswith("linux") or any(
@@ -21,4 +23,23 @@ def _choose() -> None:
         return
 
 
+def _import_mujoco() -> None:
+    """Import MuJoCo, which refuses a way to draw that it does not know or cannot load.
+
+    Raises:
+        InputError: it does.
+    """
+    try:
+        import mujoco  # noqa: F401
+    except Exception as error:
+        asked = os.environ.get("MUJOCO_GL")
+        if asked is None:
+            raise
+        raise InputError(
+            f"MUJOCO_GL={asked}: MuJoCo cannot draw that way ({error}); expected egl, osmesa, glfw "
+            f"or disable, or the variable not set"
+        ) from error
+
+
 _choose()
+_import_mujoco()

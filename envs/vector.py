@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from ..runtime.compiled import specialised
-from ..runtime.errors import InputError
+from ..runtime.errors import InputError, unknown_name
 from ..runtime.work_sharing import PATIENCE, all_done, open_tasks
 from .decision import DECISION_TICKS, EPISODE, INFO, decide
 from .fan_tracking import FanTrackingEnv
@@ -90,8 +90,10 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         (num_envs,), booleans.
 
         Raises:
-            InputError: a list of seeds, or a mask, of another length.
+            InputError: a list of seeds, or a mask, of another length, or another option.
         """
+        if unknown := [name for name in options or {} if name != "reset_mask"]:
+            raise unknown_name("option", str(unknown[0]), ("reset_mask",), "FanTracking: reset")
         seeds = (
             [None if seed is None else seed + i for i in range(self.num_envs)]
             if seed is None or isinstance(seed, int | np.integer)

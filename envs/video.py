@@ -1,6 +1,6 @@
 """Films: pictures one after the other as an mp4 or a GIF, whole or not at all."""
 
-import os
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -44,7 +44,7 @@ class Film:
     ) -> None:
         self.path, self.width, self.height, self.fps = path, width, height, fps
         self._left = None if longest is None else max(1, round(longest * fps))
-        self._partial = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        self._whole = ExitStack()
         self._stream: Any = None
         self._pictures: list[Any] = []
         if path.suffix == ".mp4":
@@ -55,7 +55,7 @@ class Film:
                     f"{path}: an mp4 needs the video extra: pip install 'windwrench[video]'"
                 ) from error
             self._stream = imageio_ffmpeg.write_frames(
-                str(self._partial),
+                str(self._whole.enter_context(replaced(path))),
                 (width, height),
                 fps=fps,
                 quality=7,
@@ -94,11 +94,12 @@ class Film:
         trace: TracebackType | None,
     ) -> None:
         if self._stream is not None:
-            self._stream.close()
-            if kind is None:
-                self._partial.replace(self.path)
-            else:
-                self._partial.unlink(missing_ok=True)
+            try:
+                self._stream.close()
+            except BaseException as failed:
+                self._whole.__exit__(type(failed), failed, failed.__traceback__)
+                raise
+            self._whole.__exit__(kind, error, trace)  # which puts the film in its place
         elif kind is None and self._pictures:
             first, *others = _reduced(self._pictures)
             with replaced(self.path) as partial:

@@ -1,6 +1,7 @@
 """Python files of a user's own, named on purpose: running them is what is asked for."""
 
 import importlib.util
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -23,7 +24,7 @@ def import_file(path: str | Path, what: str) -> ModuleType:
     name = str(path)
     if name in sys.modules:
         return sys.modules[name]
-    if not path.is_file():
+    if not os.path.isfile(path):  # False for a name that is too long
         raise InputError(f"{path}: there is no such file; expected {what}")
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -6,10 +6,10 @@ from typing import Any
 import yaml
 
 from .errors import InputError
+from .file_limits import LIMITS
+from .regular_files import read_bytes
 
-LARGEST = 200_000  # bytes
-_MOST_VALUES = 20_000  # with every alias written out
-_DEEPEST = 60
+LARGEST = LIMITS.yaml_text
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -20,15 +20,12 @@ def read_yaml(path: Path, what: str) -> Any:
         what: it is, for errors: ``"a vehicle file"``.
 
     Raises:
-        InputError: unreadable, too large, or as ``parse_yaml``.
+        InputError: unreadable, no regular file, too large, or as ``parse_yaml``.
     """
+    data = read_bytes(path, what, LARGEST)
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise InputError(f"{path}: more than {LARGEST} bytes; expected {what}")
         text = data.decode("utf-8-sig")
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise InputError(f"{path}: cannot be read as {what}: {error}") from error
     return parse_yaml(text, str(path))
 
@@ -43,9 +40,10 @@ def parse_yaml(text: str, where: str) -> Any:
     try:
         _check_depth(text)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
-        if node is not None and _size(node, {}, 0) > _MOST_VALUES:
+        if node is not None and _size(node, {}, 0) > LIMITS.yaml_values:
             raise InputError(
-                f"{where}: more than {_MOST_VALUES} values, its aliases written out; expected a few"
+                f"{where}: more than {LIMITS.yaml_values} values, its aliases written out; "
+                f"expected a few"
             )
         return yaml.safe_load(text)
     except InputError:
@@ -73,13 +71,13 @@ def _check_depth(text: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
             event, yaml.CollectionEndEvent
         )
-        if depth > _DEEPEST:
-            raise ValueError(f"values within values, more than {_DEEPEST} deep")
+        if depth > LIMITS.yaml_depth:
+            raise ValueError(f"values within values, more than {LIMITS.yaml_depth} deep")
 
 
 def _size(node: yaml.Node, known: dict[int, int], depth: int) -> int:
     """Return how many values a node writes out to; an alias costs what it stands for."""
-    if depth > _DEEPEST:
+    if depth > LIMITS.yaml_depth:
         raise ValueError("an alias within what it stands for")
     if id(node) not in known:
         parts: list[yaml.Node] = []

@@ -13,7 +13,11 @@ from typing import Any
 import numpy as np
 import torch
 
+from ..evaluation.episodes import DECISIONS
+from ..runtime.archives import check_archive
 from ..runtime.errors import InputError
+from ..runtime.file_limits import LIMITS
+from ..runtime.regular_files import check_regular, open_regular
 from ..runtime.whole_files import replaced
 from .vec_env import FeatureVecEnv
 
@@ -63,20 +67,50 @@ def load_checkpoint(learner: Any, env: FeatureVecEnv, path: Path) -> dict[str, A
     ``extra``.
 
     Raises:
-        InputError: not a checkpoint of this configuration, or its environments do not fly back to
-            where they were.
+        InputError: not a checkpoint of this configuration, one that is cut or larger than
+            ``FileLimits`` allows, or its environments do not fly back to where they were.
     """
+    what = "a checkpoint"
+    check_regular(path, what, LIMITS.checkpoint)
     try:
-        state = torch.load(path, weights_only=True)
-        learner.set_parameters(state["parameters"], exact_match=True, device="cpu")
-        text = json.loads(state["text"])
-        buffer = getattr(learner, "replay_buffer", None)
-        if buffer is not None:
-            for name in _REPLAY:
-                getattr(buffer, name)[: len(state["replay"][name])] = state["replay"][name].numpy()
-            buffer.pos, buffer.full = state["replay_position"]
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise InputError(f"{path}: not a checkpoint of this configuration: {error}") from error
+        with open_regular(path, what) as file:
+            check_archive(path, file, LIMITS.checkpoint, what, packed=False)
+            state = torch.load(file, weights_only=True)
+        _check_tensors(state, set())
+        if max(map(len, state["flown"])) > DECISIONS:
+            raise ValueError(f"an episode of more than {DECISIONS} decisions")
+        return _restore(learner, env, state, path)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a parser, or a part of a learner, makes of spoiled bytes
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        raise InputError(
+            f"{path}: not a checkpoint of this configuration: {reason}; delete {path.parent} to "
+            f"start anew"
+        ) from error
+
+
+def _check_tensors(value: Any, known: set[int]) -> None:
+    """Raise ValueError where a tensor has more numbers than its memory, and would grow once it is
+    copied; ``known`` are the containers that were looked at.
+    """
+    if isinstance(value, torch.Tensor):
+        if value.numel() * value.element_size() > value.untyped_storage().nbytes():
+            raise ValueError(f"a tensor of shape {tuple(value.shape)} without that many numbers")
+    elif isinstance(value, dict | list | tuple) and id(value) not in known:
+        known.add(id(value))
+        for part in value.values() if isinstance(value, dict) else value:
+            _check_tensors(part, known)
+
+
+def _restore(learner: Any, env: FeatureVecEnv, state: dict[str, Any], path: Path) -> dict[str, Any]:
+    learner.set_parameters(state["parameters"], exact_match=True, device="cpu")
+    text = json.loads(state["text"])
+    buffer = getattr(learner, "replay_buffer", None)
+    if buffer is not None:
+        for name in _REPLAY:
+            getattr(buffer, name)[: len(state["replay"][name])] = state["replay"][name].numpy()
+        buffer.pos, buffer.full = state["replay_position"]
     for name, value in state["counters"].items():
         setattr(learner, name, value)
     if "log_ent_coef" in state:

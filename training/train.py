@@ -5,7 +5,7 @@ import platform
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from .. import __version__
 from ..controllers.trained_policy import TrainedPolicy, save_policy
 from ..evaluation.episodes import fly_episode
 from ..runtime.errors import InputError
+from ..runtime.regular_files import read_json
 from ..runtime.whole_files import replaced
 from .configuration import Config, features_of
 from .seeds import FIRST_VALIDATION_SEED, training_seed, validation_seeds
@@ -117,10 +118,41 @@ def write_json(data: Any, path: Path) -> None:
         partial.write_text(text + "\n", encoding="utf-8")
 
 
+def progress_from(data: Any, path: Path) -> Progress:
+    """Return the progress that a file holds.
+
+    Raises:
+        InputError: it holds something else.
+    """
+    try:
+        progress = Progress(**data)
+        counts = len(progress.steps), len(progress.rmse_m), len(progress.lost)
+        whole = (
+            len(set(counts)) == 1
+            and -1 <= progress.best < counts[0]
+            and all(isinstance(n, int) for n in (progress.best, *progress.steps, *progress.lost))
+            and all(isinstance(x, int | float) for x in (progress.seconds, *progress.rmse_m))
+        )
+    except TypeError:
+        whole = False
+    if not whole:
+        raise InputError(
+            f"{path}: does not hold the progress of a training "
+            f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
+        )
+    return progress
+
+
 def read_progress(folder: Path) -> Progress | None:
-    """Return how a run in ``folder`` has gone; None where there is none."""
+    """Return how a run in ``folder`` has gone; None where there is none.
+
+    Raises:
+        InputError: the file cannot be read, or holds something else.
+    """
     path = folder / "progress.json"
-    return Progress(**json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+    if not path.exists():
+        return None
+    return progress_from(read_json(path, "the progress of a training"), path)
 
 
 def claim(folder: Path, config: Config, scenario: str, seed: int) -> None:
@@ -132,7 +164,12 @@ def claim(folder: Path, config: Config, scenario: str, seed: int) -> None:
     path = folder / "training.json"
     run = {"config": config, "scenario": scenario, "seed": seed}
     if path.exists():
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = read_json(path, "what a training in this folder is")
+        if not isinstance(kept, dict):
+            raise InputError(
+                f"{path}: does not say what the training in its folder is ({', '.join(run)}); "
+                f"give another --out, or delete {folder}"
+            )
         if {k: kept.get(k) for k in run} != run:
             raise InputError(
                 f"{folder}: holds a run with another configuration, scenario or seed; "
@@ -190,7 +227,7 @@ def train(
     )
     progress, checkpoint = Progress(), folder / "checkpoint.pt"
     if checkpoint.exists():
-        progress = Progress(**load_checkpoint(learner, env, checkpoint))
+        progress = progress_from(load_checkpoint(learner, env, checkpoint), checkpoint)
     every, between = config["validation"]["every"], config["checkpoint"]
     began, before = time.perf_counter(), progress.seconds
     follow = _follower(advance)

@@ -11,6 +11,7 @@ from ..controllers import Admittance, Controller, Ratio
 from ..evaluation.episodes import fly_episode
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
+from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
 
@@ -117,10 +118,7 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
     """
     kept: Any = {}
     if path.exists():
-        try:
-            kept = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise InputError(f"{path}: cannot be read as YAML: {error}") from error
+        kept = read_yaml(path, "tuned gains") or {}
         if not isinstance(kept, dict) or not all(isinstance(v, dict) for v in kept.values()):
             raise InputError(
                 f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"

@@ -1,5 +1,6 @@
 """Reading a flight log from a file: this kit's own format here, any other through its reader."""
 
+import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from .flight_log import (
     time_notes,
     unit_quaternions,
 )
+from .magnitudes import check_magnitudes
 from .readers import READERS, find_reader
 from .tables import Table, open_table
 
@@ -60,7 +62,7 @@ def read_log(
                     f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file "
                     f"of this kind"
                 )
-        if path.is_dir():
+        if os.path.isdir(path):  # False for a name that is too long
             raise InputError(
                 f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a "
                 f"ROS 2 bag"
@@ -80,6 +82,7 @@ def read_log(
             )
         with np.errstate(over="ignore", invalid="ignore"):
             log = _canonical(table)
+    check_magnitudes(log)
     return _with_doubts(log, vehicle)
 
 

@@ -335,3 +335,16 @@ def test_without_a_time_limit_it_flies_on_and_the_fan_stands_still_after_20_s():
     assert seen[248] == pytest.approx(0.01 * (249 * 0.08 - 0.005))
     assert seen[-1] == pytest.approx(0.01 * 20.0)
     assert len(set(seen[-5:])) == 1
+
+
+def test_reset_refuses_options_that_it_does_not_know():
+    env = gym.make("windwrench/FanTracking-v0")
+    env.reset(seed=0, options={})
+    with pytest.raises(InputError, match=r"unknown option.*'speed'; expected none"):
+        env.reset(options={"speed": 1.0})
+    envs = gym.make_vec(
+        "windwrench/FanTracking-v0", num_envs=2, vectorization_mode="vector_entry_point"
+    )
+    envs.reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(InputError, match=r"unknown option 'mask'.*expected one of reset_mask"):
+        envs.reset(options={"mask": 1})

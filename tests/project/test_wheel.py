@@ -151,7 +151,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         if name.startswith(("studies", "tests")) or "fuzz" in name or "trials" in name
     ]
     entry = next(installed.glob("windwrench-*.dist-info")) / "entry_points.txt"
-    assert "windwrench = windwrench.cli:main" in entry.read_text()
+    assert "windwrench = windwrench.__main__:main" in entry.read_text()
 
 
 def test_the_wheel_is_small(wheel):

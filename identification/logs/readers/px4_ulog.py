@@ -31,8 +31,11 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
+from ....runtime.file_limits import LIMITS
+from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
 from .streams import Stream, flight_log, from_ned, slerp
+from .ulog_counting import counting
 
 Array = NDArray[np.float64]
 Fields = Mapping[str, NDArray[Any]]
@@ -110,14 +113,15 @@ def _open(path: Path) -> _Log:
             f"or pip "
             "install pyulog"
         ) from error
+    check_regular(path, "a PX4 log (.ulg)", LIMITS.ulog_file)
     try:
-        with path.open("rb") as file:
+        with open_regular(path, "a PX4 log (.ulg)") as file:
             # pyulog prints its doubts; the notes say them
             with redirect_stdout(io.StringIO()):
-                ulog = ULog(file, list(_TOPICS))
+                ulog = counting(ULog)(file, list(_TOPICS))
             damaged = bool(ulog.file_corruption)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
+    except InputError:
+        raise
     except Exception as error:  # whatever a parser makes of bytes that are no ULog
         raise InputError(
             f"{path}: cannot be read as a ULog: {error}; expected a PX4 log (.ulg)"
@@ -125,6 +129,11 @@ def _open(path: Path) -> _Log:
     topics: dict[str, list[Fields]] = {}
     for data in ulog.data_list:
         if "timestamp" in data.data:
+            if len(data.data["timestamp"]) > LIMITS.table_rows:
+                raise InputError(
+                    f"{path}: topic {data.name}: more than {LIMITS.table_rows} messages; expected "
+                    f"one flight"
+                )
             topics.setdefault(data.name, []).append(data.data)
     parameters = {
         name: value

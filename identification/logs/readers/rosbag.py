@@ -24,6 +24,8 @@ so that nothing in a file decides what code runs; a bag whose definitions differ
 """  # noqa: E501
 
 import math
+import os
+from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -35,10 +37,12 @@ from numpy.typing import NDArray
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
+from ....runtime.file_limits import LIMITS
+from ....runtime.regular_files import check_regular
 from ....runtime.yaml_file import read_yaml
 from ..flight_log import FlightLog
 from .streams import Stream, flight_log, from_ned
-from .unpacking import limited_unpacking, refuse_packed_files
+from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
 
 Array = NDArray[np.float64]
 
@@ -126,9 +130,9 @@ def _topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]
     """Return the settings of pose, rotors and voltage, checked, and the name of the file that they
     are from.
     """
-    stem = path.name if path.is_dir() else path.stem
+    stem = path.name if os.path.isdir(path) else path.stem
     file = Path(option) if option else path.with_name(f"{stem}.topics.yaml")
-    if not option and not file.exists():
+    if not option and not os.path.exists(file):
         return {}, str(file)
     data = read_yaml(file, "a topic map")
     if not isinstance(data, dict):
@@ -185,7 +189,7 @@ def _opened(path: Path) -> Iterator[_Bag]:
         InputError: rosbags is missing or the bag cannot be read.
     """
     ros1 = path.suffix.lower() == ".bag"
-    if not (path.is_dir() or path.name.lower().endswith(SUFFIXES)):
+    if not (os.path.isdir(path) or path.name.lower().endswith(SUFFIXES)):
         raise InputError(
             f"{path}: unknown kind of bag; expected {', '.join(SUFFIXES)} or the folder of a ROS 2 "
             f"bag"
@@ -201,7 +205,10 @@ def _opened(path: Path) -> Iterator[_Bag]:
         ) from error
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     store.register(get_types_from_msg(_ACTUATORS_TEXT, _ACTUATORS))
-    if not ros1:
+    if ros1:
+        check_regular(path, "a ROS 1 bag")
+    else:
+        check_bag_files(path)
         refuse_packed_files(path)
     limits = ExitStack()
     reader: Any = None
@@ -311,24 +318,29 @@ def _stream(
             f"{bag.path}: rotors: topic {topic} is a {kind}, which states no unit; expected unit: "
             f"{', '.join(_UNITS)} in {where}"
         )
-    recorded, stamped, values = [], [], []
+    recorded, stamped, values = array("q"), array("q"), array("d")
     for index, (received, message) in enumerate(bag.messages(topic)):
+        if index >= LIMITS.table_rows:
+            raise InputError(
+                f"{bag.path}: topic {topic}: more than {LIMITS.table_rows} messages; expected one "
+                f"flight"
+            )
         recorded.append(received)
         header = getattr(message, "header", None)
         stamped.append(0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec)
-        values.append(
+        values.extend(
             _rotor_values(message, kind, setting, f"{bag.path}: topic {topic}, message {index + 1}")
             if part == "rotors"
             else _values(message, kind)
         )
-    if not values:
+    if not recorded:
         raise InputError(
             f"{bag.path}: {part}: topic {topic} has no messages; expected at least two"
         )
-    numbers = np.array(values, dtype=np.float64)
+    numbers = np.array(values).reshape(len(recorded), -1)
     if part == "pose" and setting.get("frame") == "ned":
         numbers = np.column_stack(from_ned(numbers[:, :3], numbers[:, 3:]))
-    received_at, sampled_at = np.array(recorded, dtype=np.int64), np.array(stamped, dtype=np.int64)
+    received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
         return received_at, numbers, [f"{topic}: no time stamps; the times of recording were taken"]
     if np.max(np.abs(sampled_at - received_at)) > _SAME_CLOCK * 1e9:

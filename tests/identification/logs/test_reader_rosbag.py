@@ -1,12 +1,16 @@
+import sqlite3
 import sys
+from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import InputError, load_vehicle
-from windwrench.identification.logs.readers import unpacking
+from windwrench.identification.logs.readers import rosbag, unpacking
 from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.file_limits import LIMITS
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'")
 
@@ -453,6 +457,48 @@ def test_packed_chunks_are_unpacked_up_to_a_limit(way, write, vehicle, monkeypat
     with pytest.raises(InputError, match=r"flight.*a chunk unpacks to more than 1000 bytes"):
         read_log(path, "rosbag", vehicle)
     assert reader.decompressors == before  # rosbags is left as it was
+
+
+@pytest.mark.parametrize("way", PACKED)
+def test_chunks_are_counted_over_the_whole_bag(way, write, vehicle, monkeypatch):
+    kind, packed = PACKED[way]
+    path = write(kind, {"/pose": pose_topic(), "/motors": actuator_topic()}, packed=packed)
+    monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_unpacked=20_000))
+    with pytest.raises(InputError, match="its chunks unpack to more than 20000 bytes"):
+        read_log(path, "rosbag", vehicle)
+
+
+def test_the_index_of_a_bag_is_counted(write, vehicle, monkeypatch):
+    path = write("bag", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    monkeypatch.setattr(unpacking, "LIMITS", replace(LIMITS, bag_index=100))
+    with pytest.raises(InputError, match="its index has more than 100 entries"):
+        read_log(path, "rosbag", vehicle)
+
+
+def test_messages_of_a_topic_are_counted(write, vehicle, monkeypatch):
+    path = write("mcap", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    monkeypatch.setattr(rosbag, "LIMITS", replace(LIMITS, table_rows=10))
+    with pytest.raises(InputError, match="topic /pose: more than 10 messages; expected one flight"):
+        read_log(path, "rosbag", vehicle)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "CREATE VIEW schema AS SELECT 1 AS schema_version",
+        "ALTER TABLE messages ADD COLUMN more BLOB GENERATED ALWAYS AS (zeroblob(1000000000))",
+    ],
+)
+def test_a_database_that_computes_what_it_holds_is_refused(change, write, vehicle):
+    path = write("db3", {"/pose": pose_topic(), "/motors": actuator_topic()})
+    (file,) = path.glob("*.db3")
+    with closing(sqlite3.connect(file)) as database:
+        if "VIEW" in change:
+            database.execute("DROP TABLE IF EXISTS schema")
+        database.execute(change)
+        database.commit()
+    with pytest.raises(InputError, match=r"\.db3: its (view|table) '\w+' is computed"):
+        read_log(path, "rosbag", vehicle)
 
 
 @pytest.mark.parametrize("mode", [rosbag2.CompressionMode.FILE, rosbag2.CompressionMode.MESSAGE])

@@ -1,0 +1,66 @@
+"""What a file may cost before it is refused: a few kilobytes may unpack to any size, and a short
+text may take any time.
+
+With these limits no file takes more than about 1 GB of memory or 10 s before it is refused; files
+that pass may take longer. Everything is counted while it is unpacked, never believed from a header.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FileLimits:
+    """Limits of what is read from files. Sizes are in bytes unpacked unless something else is said.
+
+    Attributes:
+        table_text: characters of a CSV file. A flight of one hour at 200 Hz with 25 columns has
+            about 2e8.
+        table_line: characters of one of its lines.
+        table_rows: rows of a table or messages of a topic: more than an hour at 1 kHz.
+        table_numbers: rows times columns that are read; each number takes 8 bytes, and a flight
+            log is copied about twice.
+        gzip_members: packed parts of one ``.gz`` file; those of parallel packers hold 64 kB or
+            more.
+        parquet_page: of one page of a column; writers make pages of 1 MB.
+        parquet_pages: of all columns that are read.
+        parquet_footer: bytes of what describes a Parquet file.
+        yaml_text: bytes of a YAML file, the settings of a vehicle or of a training.
+        yaml_values: values in it, with every alias written out.
+        yaml_depth: of values within values.
+        json_text: bytes of a JSON file: the card of a policy, the progress of a training.
+        policy_file: bytes of a policy's ``.npz``; those of the kit have some 100 kB.
+        policy_weights: of its arrays.
+        checkpoint: bytes of a training's checkpoint, which holds the replay memory, not packed.
+        bag_chunk: of a chunk of a ROS bag; recorders make chunks of some megabytes.
+        bag_unpacked: of all chunks that are unpacked to read one bag.
+        bag_index: entries in the index of a ROS 1 bag; there is one for each message.
+        ulog_file: bytes of a PX4 log.
+        ulog_fields: fields of all topics that it subscribes to, those within fields written out;
+            PX4's logs have some 10,000.
+        ulog_texts: information and parameters in it; PX4's logs have some 2,000.
+    """
+
+    table_text: int = 2**29
+    table_line: int = 1_000_000
+    table_rows: int = 4_000_000
+    table_numbers: int = 2**25
+    gzip_members: int = 100_000
+    parquet_page: int = 2**26
+    parquet_pages: int = 100_000
+    parquet_footer: int = 2**24
+    yaml_text: int = 200_000
+    yaml_values: int = 20_000
+    yaml_depth: int = 60
+    json_text: int = 2**22
+    policy_file: int = 2**24
+    policy_weights: int = 2**26
+    checkpoint: int = 2**30
+    bag_chunk: int = 2**26
+    bag_unpacked: int = 2**31
+    bag_index: int = 4_000_000
+    ulog_file: int = 2**29
+    ulog_fields: int = 200_000
+    ulog_texts: int = 200_000
+
+
+LIMITS = FileLimits()

@@ -1,0 +1,136 @@
+"""The command at the edges of its surroundings: terminals, full disks, encodings, interrupts,
+displays. Each ends in one clear line and the right exit code.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from windwrench.runtime.printable import printable
+
+pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's devices")
+COMMAND = [sys.executable, "-m", "windwrench"]
+
+
+def run(*arguments, folder=None, **options):
+    changes = options.pop("environment", {})
+    unset = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    environment = {name: value for name, value in os.environ.items() if name not in unset}
+    return subprocess.run(
+        [*COMMAND, *arguments],
+        cwd=folder,
+        env={**environment, **changes},
+        stderr=subprocess.PIPE,
+        timeout=60,
+        check=False,
+        **({"stdout": subprocess.PIPE} | options),
+    )
+
+
+def assert_one_line(done, *words):
+    lines = done.stderr.strip().splitlines()
+    assert (done.returncode, len(lines)) == (2, 1), done.stderr
+    assert lines[0].startswith(b"error: ")
+    for word in words:
+        assert word in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("plain text, 3 %", "plain text, 3 %"),
+        ("\x1b[31mred\x1b]0;title\x07", r"\x1b[31mred\x1b]0;title\x07"),
+        ("over\rwritten\x08\x7f", r"over\rwritten\x08\x7f"),
+        ("\x9b31m", r"\x9b31m"),
+        ("turned \u202e round \u200b", r"turned \u202e round \u200b"),
+        (os.fsdecode(b"name\xff"), r"name\xff"),
+        ("lines\nand\ttabs\u2028", "lines\nand\ttabs\\u2028"),
+        ("µ é 漢 ─ 😀", "µ é 漢 ─ 😀"),
+    ],
+)
+def test_what_a_terminal_acts_on_is_shown(text, shown):
+    assert printable(text) == shown
+
+
+@pytest.mark.parametrize(
+    "arguments", [["effects"], ["--version"], ["--help"], ["effects", "--json"]]
+)
+def test_a_full_disk_ends_in_one_line(arguments):
+    with open("/dev/full", "wb") as full:
+        done = run(*arguments, stdout=full)
+    assert_one_line(done, b"standard output cannot be written: No space left on device")
+
+
+def test_a_full_disk_for_errors_keeps_the_exit_code():
+    done = subprocess.run(
+        f"{' '.join(COMMAND)} estimate absent.csv 2>/dev/full", shell=True, check=False
+    )
+    assert done.returncode == 2
+
+
+def test_hostile_names_are_shown_and_never_sent(tmp_path):
+    name = b"a\x1b[31m\xff\xc3\xa9\r.csv"
+    assert_one_line(run(b"estimate", name), rb"a\x1b[31m\xff" + "é".encode() + rb"\r.csv: cannot")
+    ascii_only = {"PYTHONIOENCODING": "ascii"}
+    done = run(b"estimate", name, environment=ascii_only)
+    assert_one_line(done, rb"a\x1b[31m\xff\xe9\r.csv: cannot be read")
+    header = b"t,\x1b[2Jpx,\x1b]0;title\x07\n1,2,3\n"
+    (tmp_path / "log.csv").write_bytes(header)
+    done = run("estimate", "log.csv", folder=tmp_path)
+    assert_one_line(done, rb"found t, \x1b[2Jpx, \x1b]0;title\x07")
+    assert b"\x1b" not in done.stderr
+    done = run("effects", environment=ascii_only)
+    assert done.returncode == 0
+    assert done.stdout.isascii()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["estimate", "LONG.csv"],
+        ["estimate", "x.bag", "--reader", "rosbag:LONG.yaml"],
+        ["estimate", "LONG", "--reader", "rosbag"],
+        ["estimate", "x.csv", "--vehicle", "LONG.yaml"],
+        ["record", "--seconds", "1", "--out", "LONG.csv"],
+        ["fly", "--controller", "LONG.npz"],
+        ["fly", "--controller", "LONG.py:A"],
+        ["fly", "--out", "LONG/LONG"],
+    ],
+)
+def test_a_name_that_is_too_long_is_refused(arguments, tmp_path):
+    given = [word.replace("LONG", "n" * 300) for word in arguments]
+    assert_one_line(run(*given, folder=tmp_path), b"nnnnnnnn")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("display", [{}, {"DISPLAY": ":4711"}, {"WAYLAND_DISPLAY": "none"}])
+def test_a_window_without_a_display_is_an_error(display, tmp_path):
+    done = run("fly", "--view", folder=tmp_path, environment=display)
+    assert_one_line(done, b"render: no window without a display", b"rgb_array")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_way_to_draw_is_named(tmp_path):
+    done = run("fly", folder=tmp_path, environment={"MUJOCO_GL": "bogus"})
+    assert_one_line(done, b"MUJOCO_GL=bogus", b"expected egl, osmesa, glfw or disable")
+
+
+@pytest.mark.parametrize("delay", [0.25, 0.4, 0.7, 1.1, 1.6])
+def test_an_interrupt_ends_in_one_word_at_any_time(delay, tmp_path):
+    child = subprocess.Popen(
+        [*COMMAND, "benchmark", "--controllers", "hover", "--episodes", "500"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    time.sleep(delay)
+    child.send_signal(signal.SIGINT)
+    said = child.communicate(timeout=60)[1]
+    assert (child.returncode, said.strip().splitlines()[-1]) == (130, b"interrupted")
+    assert b"Traceback" not in said

@@ -1,0 +1,238 @@
+"""Files that bite: small ones that unpack to gigabytes, pipes and devices that never end, and
+names that are no text. Memory and time are measured in a process of their own.
+"""
+
+import gzip
+import io
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from windwrench.controllers.trained_policy import FORMAT, load_policy
+from windwrench.dynamics import load_vehicle
+from windwrench.identification import read_log
+from windwrench.identification.logs import csv_table, parquet_table
+from windwrench.identification.logs.flight_log import REQUIRED
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.file_limits import LIMITS
+from windwrench.runtime.regular_files import read_json
+
+HEADER = (",".join(REQUIRED) + "\n").encode()
+MEMORY, SECONDS = 1.1e9, 10.0
+PARQUET = find_spec("pyarrow") is not None
+ULOG = find_spec("pyulog") is not None
+
+# each file is read in one process, so that the peak of its memory is that of the worst
+CHILD = """
+import json, resource, sys, time
+from pathlib import Path
+from windwrench.controllers.trained_policy import load_policy
+from windwrench.dynamics import load_vehicle
+from windwrench.identification import read_log
+from windwrench.runtime.errors import InputError
+for path in sys.argv[1:]:
+    began = time.perf_counter()
+    try:
+        if path.endswith(".ulg"):
+            read_log(path, "px4_ulog", load_vehicle("ardrone2"))
+        elif path.endswith(".npz"):
+            load_policy(path)
+        elif path.endswith(".yaml"):
+            load_vehicle(path)
+        else:
+            read_log(path)
+        said = "read"
+    except InputError as error:
+        said = str(error)
+    memory = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(json.dumps([path, said, time.perf_counter() - began, memory]), flush=True)
+"""
+
+
+def packed_often(piece, times):
+    """Return the gzip file of a piece repeated: its packed parts follow one another."""
+    return gzip.compress(HEADER) + gzip.compress(piece, 1) * times
+
+
+def policy_bomb(path):
+    """Write weights of 2 GB in 2 MB, with the card that they belong to."""
+    header = b"\x93NUMPY\x01\x00" + struct.pack("<H", 118)
+    header += (
+        b"{'descr': '<f4', 'fortran_order': False, 'shape': (536870912,), }".ljust(117) + b"\n"
+    )
+    out = io.BytesIO()
+    with (
+        zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("weight0.npy", "w", force_zip64=True) as member,
+    ):
+        member.write(header)
+        for _ in range(32):
+            member.write(bytes(2**26))
+    data = out.getvalue()
+    path.write_bytes(data)
+    import hashlib
+
+    card = {"format": FORMAT, "sha256": hashlib.sha256(data).hexdigest()}
+    path.with_suffix(".json").write_text(json.dumps(card))
+
+
+def dictionary_bomb(path):
+    """Write a column of 10,000 times one text of 1 MB, which takes its place once."""
+    import pyarrow
+    from pyarrow import parquet
+
+    rows = 10_000
+    text = pyarrow.DictionaryArray.from_arrays(
+        pyarrow.array(np.zeros(rows, np.int32)), pyarrow.array(["1" * 1_000_000])
+    )
+    columns = {name: pyarrow.array(np.arange(rows) * 1.0) for name in REQUIRED} | {"px": text}
+    parquet.write_table(pyarrow.table(columns), path)
+
+
+def ulog(*messages):
+    """Return a ULog of messages (kind, bytes)."""
+    head = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    return head + b"".join(
+        struct.pack("<HB", len(data), ord(kind)) + data for kind, data in messages
+    )
+
+
+NESTED_ULOG = ulog(
+    ("F", b"c:float[60000] x;"),
+    ("F", b"b:c[60000] y;"),
+    ("F", b"vehicle_attitude:uint64_t timestamp;b[60000] z;"),
+    *[("A", struct.pack("<BH", 0, i) + b"vehicle_attitude") for i in range(100)],
+)
+TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in range(4096)] * 60)
+
+
+def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
+    expected = {"zeros.csv.gz": "more than 1000000 in line 2"}
+    (tmp_path / "zeros.csv.gz").write_bytes(packed_often(b"0" * 2**26, 20))
+    expected["lines.csv.gz"] = "more than 4000000 rows"
+    (tmp_path / "lines.csv.gz").write_bytes(packed_often(b"1\n" * 2**25, 20))
+    expected["blank.csv.gz"] = "more than 536870912 characters"
+    (tmp_path / "blank.csv.gz").write_bytes(packed_often((b" " * 999_999 + b"\n") * 64, 10))
+    expected["parts.csv.gz"] = "more than 100000 packed parts"
+    (tmp_path / "parts.csv.gz").write_bytes(gzip.compress(b"") * 1_000_000)
+    expected["columns.csv"] = "missing column"
+    (tmp_path / "columns.csv").write_text(",".join(f"{i:x}" for i in range(150_000)) + "\n1\n")
+    with (tmp_path / "sparse.csv").open("wb") as file:
+        file.truncate(2**34)
+    expected["sparse.csv"] = "zero bytes"
+    policy_bomb(tmp_path / "policy.npz")
+    expected["policy.npz"] = "unpacks to 2147483"
+    (tmp_path / "deep.yaml").write_text("[" * 100_000)
+    expected["deep.yaml"] = "more than 60 deep"
+    if PARQUET:
+        dictionary_bomb(tmp_path / "texts.parquet")
+        expected["texts.parquet"] = "column px cannot be read: it holds"
+    if ULOG:
+        (tmp_path / "nested.ulg").write_bytes(NESTED_ULOG)
+        expected["nested.ulg"] = "more than 200000 fields"
+        (tmp_path / "texts.ulg").write_bytes(TEXTS_ULOG)
+        expected["texts.ulg"] = "more than 200000 parameters"
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, *(str(tmp_path / name) for name in expected)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(found) == len(expected)
+    for path, said, seconds, memory in found:
+        assert said.startswith(str(tmp_path)), said
+        assert expected[Path(path).name] in said
+        assert "\n" not in said
+        assert seconds < SECONDS, path
+        assert memory < MEMORY, path
+
+
+@pytest.mark.parametrize("name", ["x.csv", "x.csv.gz", "x.parquet", "x.ulg", "x.bag", "x.mcap"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+def test_what_is_no_regular_file_is_refused_at_once(kind, name, tmp_path):
+    path = tmp_path / name
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        path.mkdir()
+    for module in {"parquet": ["pyarrow"], "ulg": ["pyulog"], "bag": ["rosbags"]}.get(name[2:], []):
+        pytest.importorskip(module)
+    readers = {"x.ulg": "px4_ulog", "x.bag": "rosbag", "x.mcap": "rosbag"}
+    what = {"pipe": "is a pipe", "device": "is a device", "folder": "(is a folder|cannot be read)"}
+    with pytest.raises(InputError, match=rf"{name}: {what[kind]}"):
+        read_log(path, readers.get(name), load_vehicle("ardrone2"))
+
+
+def test_other_files_are_regular_too(tmp_path):
+    for name in ("p.npz", "p.json", "v.yaml"):
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match=r"p\.json: is a pipe"):
+        load_policy(tmp_path / "p.npz")
+    with pytest.raises(InputError, match=r"v\.yaml: is a pipe"):
+        load_vehicle(tmp_path / "v.yaml")
+    (tmp_path / "large.json").write_bytes(b" " * (LIMITS.json_text + 1))
+    with pytest.raises(InputError, match=r"large\.json: more than 4194304 bytes"):
+        read_json(tmp_path / "large.json", "a card")
+
+
+def test_a_page_that_would_unpack_to_too_much_is_refused_by_its_header(tmp_path, monkeypatch):
+    pyarrow = pytest.importorskip("pyarrow", reason="pip install 'windwrench[parquet]'")
+    from pyarrow import parquet
+
+    rows = 50_000
+    columns = {name: np.full(rows, float(name == "qw")) for name in REQUIRED}
+    columns["t"] = 0.005 * np.arange(rows)
+    path = tmp_path / "flight.parquet"
+    for packing in ("snappy", "zstd", "none"):
+        for dictionary in (True, False):
+            parquet.write_table(
+                pyarrow.table(columns), path, compression=packing, use_dictionary=dictionary
+            )
+            np.testing.assert_array_equal(read_log(path).t, columns["t"])
+    monkeypatch.setattr(parquet_table, "LIMITS", replace(LIMITS, parquet_page=10_000))
+    with pytest.raises(InputError, match=r"column t, page 1: \d+ values in \d+ bytes; expected"):
+        read_log(path)
+
+
+def test_blocks_of_a_text_join_without_a_seam(tmp_path, monkeypatch):
+    rng = np.random.default_rng(0)
+    rows = 1000
+    table = rng.standard_normal((rows, len(REQUIRED)))
+    table[:, 0], table[:, 4:8], table[:, 8:] = 0.01 * np.arange(rows), (1, 0, 0, 0), 300.0
+    lines = [",".join(map(repr, row)) for row in table.tolist()]
+    want = read_text(tmp_path, lines)
+    monkeypatch.setattr(csv_table, "_BLOCK", 7)
+    monkeypatch.setattr(csv_table, "_PIECE", 100)
+    for log in (
+        want,
+        read_text(tmp_path, lines),
+        read_text(tmp_path, [f'"{line.replace(",", chr(34) + "," + chr(34))}"' for line in lines]),
+        read_text(tmp_path, lines, "\r\n"),
+    ):
+        np.testing.assert_array_equal(log.position, table[:, 1:4])
+        np.testing.assert_array_equal(log.t, table[:, 0])
+    lines[777] = lines[777].replace(",", ",here", 1)
+    with pytest.raises(InputError, match=r"column px, row 778 \(line 779\): 'here"):
+        read_text(tmp_path, lines)
+    monkeypatch.setattr(csv_table, "LIMITS", replace(LIMITS, table_rows=999))
+    with pytest.raises(InputError, match="more than 999 rows; expected one flight"):
+        read_text(tmp_path, lines)
+
+
+def read_text(folder, lines, end="\n"):
+    path = folder / "flight.csv.gz"
+    path.write_bytes(gzip.compress((HEADER.decode() + end.join([*lines, "", " ", ""])).encode()))
+    return read_log(path)
