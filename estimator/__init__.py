@@ -5,6 +5,7 @@ are consistent.
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
+from .late_poses import TimedFilter
 from .mass_ukf import WrenchMassUKF
 from .observer import NonlinearObserver, ObserverTuning
 from .tuning import UKFTuning
@@ -15,6 +16,7 @@ __all__ = [
     "ConstantGainFilter",
     "NonlinearObserver",
     "ObserverTuning",
+    "TimedFilter",
     "UKFTuning",
     "WrenchEKF",
     "WrenchEstimate",

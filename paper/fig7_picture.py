@@ -197,7 +197,7 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     bound = np.minimum(
         line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf
     )
-    axes.plot(
+    entries: list[Any] = axes.plot(
         line,
         bound,
         color="black",
@@ -207,7 +207,7 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     axes.fill_between(line, bound, 1.3, color="0.93", lw=0)
     for rise, colour, some in _rows(fastest):
         x = [f.gain for f in some]
-        axes.errorbar(
+        held = axes.errorbar(
             x,
             [f.held for f in some],
             _bars(some),
@@ -239,21 +239,23 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
             mfc="white",
             label="… in calm air, sudden start",
         )
+        entries += [held, *axes.get_lines()[-2:]]
     for gain in gains:
         held = [f.held for _, _, some in _rows(fastest) for f in some if f.gain == gain]
         axes.text(
-            gain,
+            gain + 0.4,
             min(f.held_interval[0] for f in fastest if f.gain == gain) - 0.06,
             " / ".join(f"{speed:.2f}" for speed in held),
             fontsize=8,
-            ha="center",
+            ha="left" if gain < gains[-1] else "center",
         )
     axes.set_ylim(0, 1.2)
     axes.set_xlim(0, line[-1])
     axes.text(
         0.55 * line[-1], 1.08, "beyond the bound no fan can be followed", color="0.45", fontsize=9
     )
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    # in the order drawn; a legend of its own making has bars with intervals last
+    axes.legend(handles=entries, frameon=False, fontsize=8, loc="upper left")
     axes.set_title("the fastest fan held by four flights of five", fontsize=10, loc="left")
     _bare(axes, "gain k (m/s per Nm)", "speed of the fan (m/s)")
 
