@@ -46,7 +46,7 @@ SETS = {
 }
 COLOURS = dict(zip(SETS, ("#d1495b", "#edae49", "#30638e", "#66a182"), strict=True))
 # of lines and dots: where curves lie on one another, an earlier one shows on both sides of the next
-WIDTHS = (6.0, 4.4, 2.8, 1.2)
+WIDTHS = (5.2, 3.8, 2.4, 1.0)
 EXTRA_MASS = 0.053  # kg
 
 
@@ -334,7 +334,7 @@ def _draw(rows: list[dict[str, Any]], shown: dict[str, dict[str, Array]]) -> Fig
                 color=COLOURS[name],
                 label=name,
                 lw=width,
-                ms=2.2 * width,
+                ms=2.0 + 1.3 * width,
             )
         axes.set_title(f"{what}: faster at the same spread with an IMU", loc="left", fontsize=11)
         axes.set_xlabel("10-90 % rise time (s)")

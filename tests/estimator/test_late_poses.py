@@ -27,7 +27,16 @@ VEHICLES = {
     "hummingbird, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, LAG),
 }
 FILTERS = (WrenchUKF, WrenchEKF, WrenchMassUKF, ConstantGainFilter)
-FLIGHTS = {name: yawing_flight(vehicle, 120, seed=4) for name, vehicle in VEHICLES.items()}
+
+
+def fly(vehicle, steps, seed):
+    """A yawing flight under a wrench of a tenth of the vehicle's weight."""
+    force = 0.1 * vehicle.weight * np.array([0.6, -0.6, 0.5])
+    torque = 0.02 * vehicle.weight * vehicle.arm_l * np.array([0.5, 0.5, 0.7])
+    return yawing_flight(vehicle, steps, seed=seed, force=force, torque=torque)
+
+
+FLIGHTS = {name: fly(vehicle, 120, seed=4) for name, vehicle in VEHICLES.items()}
 
 
 def time(k):
@@ -127,7 +136,7 @@ def test_whatever_is_late_comes_out_as_if_it_had_not_been(name, drawn, kind, gat
 def test_a_stream_of_poses_that_are_all_late_is_the_batch_answer(kind):
     """On the grid of the rotor speeds, and off it; the horizon is as long as the longest delay."""
     rng, vehicle = np.random.default_rng(1), VEHICLES["effects that remember"]
-    flight = yawing_flight(vehicle, 400, seed=5)
+    flight = fly(vehicle, 400, seed=5)
     stamps = np.sort(rng.uniform(0.0, 1.7, 170))
     stamps[::3] = PERIOD * np.round(stamps[::3] / PERIOD)
     stamps = np.unique(np.round(stamps, 9))
