@@ -5,6 +5,7 @@ are consistent.
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
+from .late_poses import TimedFilter
 from .mass_ukf import WrenchMassUKF
 from .observer import NonlinearObserver, ObserverTuning
 from .recovery import Recovery
@@ -17,6 +18,7 @@ __all__ = [
     "NonlinearObserver",
     "ObserverTuning",
     "Recovery",
+    "TimedFilter",
     "UKFTuning",
     "WrenchEKF",
     "WrenchEstimate",

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
@@ -220,6 +220,11 @@ class WrenchMassUKF(WrenchUKF):
         self._P[:N, :N] = self.record[0]["P"]
         self._P[N, N] = self._mass_std**2
         self.record[0]["body"]["mass"] = self._first_mass
+
+    @property
+    def memory(self) -> tuple[NDArray[np.uint8], ...]:
+        """All that a step changes, as bytes that can be copied and put back."""
+        return (*super().memory, self._P.reshape(-1).view(np.uint8))
 
     @property
     def mass(self) -> float:

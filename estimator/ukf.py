@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from numba import carray
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
@@ -399,6 +399,11 @@ class WrenchUKF:
     def step_address(self) -> int:
         """Address of the step for ``call_step``, in compiled loops."""
         return address_of(self._step_by_address)
+
+    @property
+    def memory(self) -> tuple[NDArray[np.uint8], ...]:
+        """All that a step changes, as bytes that can be copied and put back."""
+        return (self.record.view(np.uint8),)
 
     @property
     def covariance(self) -> Array:

@@ -1,9 +1,9 @@
 """The filter alone on a stream of messages, as in a ROS node: two callbacks, late messages, gaps
 and outliers.
 
-Motor speeds and poses come at their own times. The filter runs at the time of the poses: it waits
-with the motor speeds until a pose says up to when to use them, so that a pose which comes late is
-taken in where it belongs.
+Rotor speeds and poses come at their own times. The filter runs at the time of the rotor speeds, so
+that its estimate is of now; a pose that comes late or out of order is fused at the time when it was
+measured. The gate refuses outliers.
 
 Install:  pip install .    (in a checkout)
 Run:      python examples/filter_on_a_stream.py
@@ -15,9 +15,9 @@ import numpy as np
 
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.estimator import WrenchUKF
+from windwrench.estimator import TimedFilter, WrenchUKF
 
-PATIENCE = 0.2  # s that the filter waits for a pose; one that is later than that is dropped
+HORIZON = 0.3  # s that a pose may be late; one that is later than that is refused
 
 
 class WrenchNode:
@@ -26,43 +26,36 @@ class WrenchNode:
     """
 
     def __init__(self, vehicle):
-        self.ukf = WrenchUKF(
-            vehicle, period=0.005, gate=0.999
-        )  # the gate refuses outliers; the noise follows each dt
-        self.speeds = 4 * [vehicle.hover_rate]  # rad/s, in use at self.now
-        self.waiting = deque()  # stamps and motor speeds that the filter has not come to
-        self.now = None  # s, up to where the filter is; None before the first pose
+        # the gate refuses outliers; the noise follows the time between messages
+        self.filter = TimedFilter(WrenchUKF(vehicle, period=0.005, gate=0.999), HORIZON)
+        self.early = deque()  # poses of a time that the rotor speeds have not come to
+        self.largest = 0.0  # NIS of the most unlikely pose; of 6 numbers it is 6 on average
 
-    def on_motor_speeds(self, stamp, speeds):
-        """Keep rotor speeds (4,) rad/s; where no pose comes for too long, go on without."""
-        if not self.waiting or stamp > self.waiting[-1][0]:
-            self.waiting.append((stamp, speeds))
-        if self.now is not None:
-            self.run_to(stamp - PATIENCE)
+    def on_rotor_speeds(self, stamp, speeds):
+        """Carry the filter to ``stamp`` with rotor speeds (4,) rad/s; return the present estimate,
+        or None before the first pose and for rotor speeds that come out of order.
+        """
+        if not stamp > self.filter.time:  # neither before a first pose, when there is no time
+            return None
+        estimate = self.filter.predict(stamp, speeds)
+        for pose in [pose for pose in self.early if pose[0] <= stamp]:
+            self.early.remove(pose)
+            estimate = self.on_pose(*pose) or estimate
+        return estimate
 
     def on_pose(self, stamp, position, quaternion):
-        """Take in a pose, m and body to world, and return the estimate; None for one that is too
-        late.
+        """Take in a pose, m and body to world, wherever its stamp belongs; return the present
+        estimate, or None for one that is too late, or of a time that is still to come.
         """
-        if self.now is None:
-            self.ukf.reset(position, quaternion)
-            self.now = stamp
+        if np.isnan(self.filter.time):
+            self.filter.reset(stamp, position, quaternion)
+        if stamp > self.filter.time:
+            self.early.append((stamp, position, quaternion))
             return None
-        if stamp <= self.now:
-            return None
-        self.run_to(stamp)
-        return self.ukf.correct(position, quaternion)
-
-    def run_to(self, stamp):
-        """Predict up to ``stamp``, with each set of motor speeds until the next
-        one was measured.
-        """
-        while self.now < stamp:
-            while self.waiting and self.waiting[0][0] <= self.now:
-                self.speeds = self.waiting.popleft()[1]
-            until = min(stamp, self.waiting[0][0]) if self.waiting else stamp
-            self.ukf.predict(self.speeds, dt=until - self.now)
-            self.now = until
+        estimate = self.filter.correct(stamp, position, quaternion)
+        if estimate is not None:
+            self.largest = max(self.largest, self.filter.fused.nis)
+        return estimate
 
 
 def stream(vehicle, seconds, force, rng):
@@ -78,7 +71,7 @@ def stream(vehicle, seconds, force, rng):
     )
     messages = []
     for k, t in enumerate(flown["t"]):
-        messages.append((t + rng.uniform(0.001, 0.004), "motors", t, (flown["rotor_speeds"][k],)))
+        messages.append((t + 0.002, "rotors", t, (flown["rotor_speeds"][k],)))
         in_gap = 0.5 * seconds < t < 0.5 * seconds + 0.4
         if (
             k % 2 == 0 and not in_gap and rng.random() > 0.1
@@ -94,16 +87,15 @@ def stream(vehicle, seconds, force, rng):
 def main(seconds=10.0, force=(0.4, -0.2, 0.1), seed=0):
     """Feed a stream to the node; print and return the mean force (3,) N of the last 3 s."""
     vehicle = load_vehicle("ardrone2")
-    node, found, late = WrenchNode(vehicle), [], 0
+    node, found = WrenchNode(vehicle), []
     for _, kind, stamp, values in stream(vehicle, seconds, force, np.random.default_rng(seed)):
-        if kind == "motors":
-            node.on_motor_speeds(stamp, *values)
-        elif (estimate := node.on_pose(stamp, *values)) is None:
-            late += 1
-        elif stamp > seconds - 3.0:
+        if kind == "pose":
+            node.on_pose(stamp, *values)
+        elif (estimate := node.on_rotor_speeds(stamp, *values)) and stamp > seconds - 3.0:
             found.append(estimate.force)
     mean = np.mean(found, axis=0)
-    print(f"poses that came out of order, and were dropped: {late}")
+    print(f"poses fused where they belong: {node.filter.late}, too late: {node.filter.too_late}")
+    print(f"the most unlikely pose: NIS {node.largest:.0f}")
     print("force found (N):", " ".join(f"{x:+.3f}" for x in mean))
     print("force applied  :", " ".join(f"{x:+.3f}" for x in force))
     return mean

@@ -7,11 +7,12 @@ the bound: a command ``gain * torque`` is at most ``gain * tau_max``.
 """
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from ..controllers import Admittance
 from ..controllers.observation import MAX_COMMAND
@@ -40,6 +41,7 @@ CAPTURED = 0.3  # m, offset below which the jet is caught
 # to a fifth, and few come back.
 HELD_OFFSET = 0.9
 HELD_SHARE = 0.8  # of the seeds
+REPEATS = 5  # searches for the fastest fan, each with seeds of its own: what an interval is over
 START = 2.0  # s, in which the fan gathers speed
 BRACKET = (0.3, 1.3)  # of the bound, in which the fastest fan is sought
 HALVINGS = 5
@@ -57,9 +59,31 @@ class Fastest:
     gain: float
     rise_time: float
     bound: float  # the least of gain * tau_max and the largest command
-    held: float  # in the standard air
+    searches: tuple[float, ...]  # in the standard air, one a search
     calm: float  # without gusts, disturbance and sensor noise: what lag alone allows
     sudden: float  # calm, and the fan moves at full speed from the start
+
+    @property
+    def held(self) -> float:
+        """Mean of the searches in the standard air."""
+        return float(np.mean(self.searches))
+
+    @property
+    def held_interval(self) -> tuple[float, float]:
+        """Interval of 95 % of that mean."""
+        return interval(self.searches)
+
+
+def interval(values: Sequence[float]) -> tuple[float, float]:
+    """Return Student's interval of 95 % of the mean of a few ``values``, nothing below zero.
+
+    One value alone has none: it is returned twice.
+    """
+    mean, half = float(np.mean(values)), 0.0
+    if len(values) > 1:
+        half = float(student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1))
+        half /= math.sqrt(len(values))
+    return max(mean - half, 0.0), mean + half
 
 
 def ramp(speed: float, start: float = START) -> Path:
@@ -110,12 +134,14 @@ def holds(env: FanTrackingEnv, gain: float, path: Path, seed: int) -> bool:
     return True
 
 
-def enough_hold(env: FanTrackingEnv, gain: float, path: Path, seeds: int) -> bool:
-    """Return whether ``HELD_SHARE`` of the seeds hold the fan; flies only as many as that takes."""
+def enough_hold(env: FanTrackingEnv, gain: float, path: Path, seeds: int, first: int = 0) -> bool:
+    """Return whether ``HELD_SHARE`` of the seeds from ``first`` on hold the fan; flies only as many
+    as that takes.
+    """
     needed = math.ceil(HELD_SHARE * seeds)
     held = failed = 0
     while held < needed and failed <= seeds - needed:
-        if holds(env, gain, path, held + failed):
+        if holds(env, gain, path, first + held + failed):
             held += 1
         else:
             failed += 1
@@ -123,7 +149,12 @@ def enough_hold(env: FanTrackingEnv, gain: float, path: Path, seeds: int) -> boo
 
 
 def fastest_held(
-    env: FanTrackingEnv, gain: float, bound: float, seeds: int, start: float = START
+    env: FanTrackingEnv,
+    gain: float,
+    bound: float,
+    seeds: int,
+    start: float = START,
+    first: int = 0,
 ) -> float:
     """Return the fastest fan (m/s) that was tried and held, by halving ``BRACKET`` of the bound; 0
     if none was.
@@ -132,11 +163,18 @@ def fastest_held(
     fastest = 0.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if enough_hold(env, gain, ramp(middle * bound, start), seeds):
+        if enough_hold(env, gain, ramp(middle * bound, start), seeds, first):
             low, fastest = middle, middle * bound
         else:
             high = middle
     return fastest
+
+
+def searches(env: FanTrackingEnv, gain: float, bound: float, seeds: int) -> tuple[float, ...]:
+    """Return the fastest fan held (m/s) in each of ``REPEATS`` searches; no two share a seed."""
+    return tuple(
+        fastest_held(env, gain, bound, seeds, first=seeds * repeat) for repeat in range(REPEATS)
+    )
 
 
 def sweep(seeds: int, largest: float, progress: Progress) -> list[Fastest]:
@@ -154,7 +192,7 @@ def sweep(seeds: int, largest: float, progress: Progress) -> list[Fastest]:
                     gain,
                     rise_time,
                     bound,
-                    fastest_held(standard, gain, bound, seeds),
+                    searches(standard, gain, bound, seeds),
                     fastest_held(calm, gain, bound, 1),
                     fastest_held(calm, gain, bound, 1, start=0.0),
                 )
@@ -224,7 +262,10 @@ def run(seeds: int, progress: Progress) -> Result:
     fastest = sweep(seeds, largest, lambda share: progress(0.35 + 0.55 * share))
     bound = min(NOISE_GAIN * largest, MAX_COMMAND)
     alone = {
-        noise: fastest_held(make_env(RISE_TIMES[0], (noise,)), NOISE_GAIN, bound, seeds) / bound
+        noise: [
+            speed / bound
+            for speed in searches(make_env(RISE_TIMES[0], (noise,)), NOISE_GAIN, bound, seeds)
+        ]
         for noise in NOISES
     }
     progress(1.0)
@@ -249,6 +290,8 @@ def run(seeds: int, progress: Progress) -> Result:
             "bound_m_s": f.bound,
             "held_m_s": f.held,
             "held_share_of_bound": f.held / f.bound,
+            "held_share_of_bound_ci95": [end / f.bound for end in f.held_interval],
+            "held_m_s_by_search": f.searches,
             "calm_m_s": f.calm,
             "calm_sudden_m_s": f.sudden,
         }
@@ -264,7 +307,13 @@ def run(seeds: int, progress: Progress) -> Result:
         "capture": capture_rows,
         "tracking": track_rows,
         "fastest": fastest_rows,
-        "held_share_of_bound_with_one_noise": alone,
+        "searches": REPEATS,
+        "held_share_of_bound_with_one_noise": {
+            noise: float(np.mean(shares)) for noise, shares in alone.items()
+        },
+        "held_share_of_bound_with_one_noise_ci95": {
+            noise: interval(shares) for noise, shares in alone.items()
+        },
     }
     return Result(
         figures=figures,
@@ -323,7 +372,7 @@ def _comparison(
         Comparison(
             f"fastest fan held, gain {f.gain:g}, rise {f.rise_time:g} s (m/s)",
             "-",
-            f"{f.held:.2f}: {f.held / f.bound:.0%} of the bound {f.bound:.2f} "
+            f"{f.held:.2f}: {_share(f)} of the bound {f.bound:.2f} "
             f"(calm air {f.calm:.2f}, and with a sudden start {f.sudden:.2f})",
         )
         for f in fastest
@@ -331,8 +380,14 @@ def _comparison(
     return rows
 
 
+def _share(row: Fastest) -> str:
+    """Return the held share of the bound with its interval."""
+    low, high = row.held_interval
+    return f"{row.held / row.bound:.0%} [{low / row.bound:.0%}, {high / row.bound:.0%}]"
+
+
 def _remarks(
-    seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, float]
+    seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, list[float]]
 ) -> list[str]:
     step = (BRACKET[1] - BRACKET[0]) / 2**HALVINGS
 
@@ -345,6 +400,11 @@ def _remarks(
             for rise_time in RISE_TIMES
         )
 
+    held = "; ".join(
+        ", ".join(_share(f) for f in fastest if f.rise_time == rise_time)
+        + f" (rise time {rise_time:g} s)"
+        for rise_time in RISE_TIMES
+    )
     best = "; ".join(
         f"gain {f.gain:g} with {f.held:.2f} m/s (rise time {rise_time:g} s)"
         for rise_time in RISE_TIMES
@@ -363,6 +423,10 @@ def _remarks(
         f"rising flank, inside {at:.2f} m; noise may carry it over the top and back, but at "
         f"{HELD_OFFSET:g} m the torque is "
         f"down to a fifth and few return. Speeds are found by halving, to {step:.0%} of the bound.",
+        f"Which seeds are flown matters: each speed held in the standard air is the mean of "
+        f"{REPEATS} searches with {seeds} seeds of their own, with Student's interval of 95 % in "
+        f"brackets. Single searches at the same gain and rise time differ by up to "
+        f"{max(np.ptp(f.searches) / f.bound for f in fastest):.0%} of the bound.",
         f"Lag: in calm air (no gusts, no disturbance, no sensor noise) and behind a fan that "
         f"starts gently, the gains "
         f"{', '.join(f'{gain:g}' for gain in GAINS)} hold these shares of their bounds: "
@@ -374,12 +438,16 @@ def _remarks(
         f"before the filter has "
         "reported it and the vehicle has gathered speed; the faster the fan, the more that costs.",
         f"Noise limits before the bound does: in the standard air the same gains hold "
-        f"{shares('held')}. Near the bound the "
+        f"{held}. Near the bound the "
         "vehicle rides on the flat top of the torque with no reserve, and any disturbance throws "
         "it over. "
         f"Held with one of them alone, at gain {NOISE_GAIN:g} and a rise time of {RISE_TIMES[0]:g} "
         f"s, "
-        + ", ".join(f"{noise}: {share:.0%}" for noise, share in alone.items())
+        + ", ".join(
+            f"{noise}: {np.mean(found):.0%} [{low:.0%}, {high:.0%}]"
+            for noise, found in alone.items()
+            for low, high in [interval(found)]
+        )
         + ". The actuators' unmodelled torque (0.01 Nm, a third of the jet's largest) reads like "
         "the jet's own. A high gain "
         f"turns it into motion, the more so through a slow filter, and a command cut at "

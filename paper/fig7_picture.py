@@ -30,6 +30,8 @@ class _Fastest(Protocol):
     @property
     def held(self) -> float: ...
     @property
+    def held_interval(self) -> tuple[float, float]: ...
+    @property
     def calm(self) -> float: ...
     @property
     def sudden(self) -> float: ...
@@ -56,11 +58,15 @@ def draw_tracking(
     figure = Figure(figsize=(13.5, 14.5), layout=ConstrainedLayoutEngine(w_pad=0.12))
     grid = figure.add_gridspec(4, 3, height_ratios=[1, 1.05, 0.7, 1.15])
     rise_times = sorted({rise for rise, _ in captures})
+    offsets = [_signed_offset(e) for flights in captures.values() for e in flights]
+    reach = min(o.min() for o in offsets), max(o.max() for o in offsets)
     first = None
     for column, rise_time in enumerate(rise_times):
         first = axes = figure.add_subplot(grid[0, column], sharey=first)
         _capture(
-            axes, {gain: flights for (rise, gain), flights in captures.items() if rise == rise_time}
+            axes,
+            {gain: flights for (rise, gain), flights in captures.items() if rise == rise_time},
+            reach,
         )
         axes.set_title(
             f"capture from 0.8 m, filter rise time {rise_time:g} s", fontsize=10, loc="left"
@@ -99,11 +105,18 @@ def _bare(axes: Any, x: str, y: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
-    """Draw the distance of every flight from the axis, and the median flight of each gain."""
+def _signed_offset(episode: Episode) -> Array:
+    """Return the offset (m) from the axis, positive on the side where the vehicle started."""
+    return np.asarray(np.sign(episode.y[0]) * (episode.y - episode.fan_y))
+
+
+def _capture(axes: Any, flights: Mapping[float, list[Episode]], reach: tuple[float, float]) -> None:
+    """Draw the distance of every flight from the axis, and the median flight of each gain;
+    ``reach`` is the least and the largest offset (m) of all that are drawn side by side.
+    """
     axes.axhspan(-_RADIUS, _RADIUS, color=_JET, lw=0)
     for gain, some in flights.items():
-        signed = [np.sign(e.y[0]) * (e.y - e.fan_y) for e in some]
+        signed = [_signed_offset(e) for e in some]
         for e, offset in zip(some, signed, strict=True):
             axes.plot(e.time, offset, color=_GAINS[gain], lw=0.6, alpha=0.35)
         shortest = min(len(offset) for offset in signed)
@@ -115,7 +128,8 @@ def _capture(axes: Any, flights: Mapping[float, list[Episode]]) -> None:
             label=f"gain {gain:g}",
         )
     axes.axhline(0, ls="--", color="#222222", lw=1.2)
-    axes.set_ylim(-0.8, 1.3)
+    # all of every trace, and the legend above them
+    axes.set_ylim(min(reach[0], -_RADIUS) - 0.1, max(reach[1], _RADIUS) + 0.35)
     axes.legend(frameon=False, fontsize=8, ncols=3, loc="upper right")
     _bare(axes, "time (s)", "y - fan, on the side it started (m)")
 
@@ -163,6 +177,19 @@ def _rows(fastest: Sequence[_Fastest]) -> list[tuple[float, str, list[_Fastest]]
     ]
 
 
+def _bars(some: Sequence[_Fastest], percent: bool = False) -> Array:
+    """Return how far the intervals reach below and above what was held: (2, n) m/s, or percent of
+    the bound.
+    """
+    scale = [100.0 / f.bound if percent else 1.0 for f in some]
+    return np.array(
+        [
+            [c * (f.held - f.held_interval[0]) for c, f in zip(scale, some, strict=True)],
+            [c * (f.held_interval[1] - f.held) for c, f in zip(scale, some, strict=True)],
+        ]
+    )
+
+
 def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     """Draw the fastest fan held over the gain, beside the bound."""
     gains = np.array(sorted({f.gain for f in fastest}))
@@ -170,7 +197,7 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     bound = np.minimum(
         line * largest, max(f.bound for f in fastest) if largest * gains[-1] > 1 else np.inf
     )
-    axes.plot(
+    entries: list[Any] = axes.plot(
         line,
         bound,
         color="black",
@@ -180,14 +207,17 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
     axes.fill_between(line, bound, 1.3, color="0.93", lw=0)
     for rise, colour, some in _rows(fastest):
         x = [f.gain for f in some]
-        axes.plot(
+        held = axes.errorbar(
             x,
             [f.held for f in some],
-            "o-",
+            _bars(some),
+            fmt="o-",
             color=colour,
             lw=2.2,
             ms=7,
-            label=f"held, rise time {rise:g} s",
+            elinewidth=1.4,
+            capsize=4,
+            label=f"held, rise time {rise:g} s (95 % interval)",
         )
         axes.plot(
             x,
@@ -209,21 +239,23 @@ def _speeds(axes: Any, fastest: Sequence[_Fastest], largest: float) -> None:
             mfc="white",
             label="… in calm air, sudden start",
         )
+        entries += [held, *axes.get_lines()[-2:]]
     for gain in gains:
         held = [f.held for _, _, some in _rows(fastest) for f in some if f.gain == gain]
         axes.text(
-            gain,
-            min(held) - 0.08,
+            gain + 0.4,
+            min(f.held_interval[0] for f in fastest if f.gain == gain) - 0.06,
             " / ".join(f"{speed:.2f}" for speed in held),
             fontsize=8,
-            ha="center",
+            ha="left" if gain < gains[-1] else "center",
         )
     axes.set_ylim(0, 1.2)
     axes.set_xlim(0, line[-1])
     axes.text(
         0.55 * line[-1], 1.08, "beyond the bound no fan can be followed", color="0.45", fontsize=9
     )
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    # in the order drawn; a legend of its own making has bars with intervals last
+    axes.legend(handles=entries, frameon=False, fontsize=8, loc="upper left")
     axes.set_title("the fastest fan held by four flights of five", fontsize=10, loc="left")
     _bare(axes, "gain k (m/s per Nm)", "speed of the fan (m/s)")
 
@@ -238,14 +270,18 @@ def _shares(axes: Any, fastest: Sequence[_Fastest]) -> None:
             ("calm", "^--", 1, 5),
             ("sudden", "s:", 1, 4),
         ):
-            axes.plot(
+            held = name == "held"
+            axes.errorbar(
                 x,
                 [100 * getattr(f, name) / f.bound for f in some],
-                style,
+                _bars(some, percent=True) if held else None,
+                fmt=style,
                 color=colour,
                 lw=width,
                 ms=size,
-                mfc=colour if name == "held" else "white",
+                elinewidth=1.4,
+                capsize=4,
+                mfc=colour if held else "white",
             )
     axes.set_ylim(0, 130)
     axes.set_title("the same as a share of the bound", fontsize=10, loc="left")

@@ -30,6 +30,12 @@ def test_the_torque_is_antisymmetric_with_its_largest_near_half_a_metre(result):
     )
 
 
+def test_the_page_says_that_the_peak_follows_from_the_fan(result):
+    offsets = result.figures["true_jet_torque_peak_offset_m_by_fan_radius"]
+    assert offsets == pytest.approx({"0.35": 0.38, "0.45": 0.47, "0.55": 0.56}, abs=0.006)
+    assert any("0.38, 0.47, 0.56 m" in remark for remark in result.remarks)
+
+
 def test_the_force_is_strong_on_the_axis_and_blows_away_from_the_fan(result):
     assert result.figures["profile_force_x_on_axis_N"] == pytest.approx(
         result.figures["true_force_x_on_axis_N"], abs=0.03

@@ -16,6 +16,7 @@ SHORT = {
     "RISE_TIMES": (0.45,),
     "FAN_SPEEDS": (0.2,),
     "HALVINGS": 3,
+    "REPEATS": 2,
 }
 
 
@@ -46,6 +47,10 @@ def test_a_moving_fan_is_followed_where_a_vehicle_that_hovers_stays_behind(resul
 
 def test_the_fastest_fan_grows_with_the_gain_and_stays_behind_the_bound(result):
     low, high = result.figures["fastest"]
+    for row in (low, high):
+        ends = row["held_share_of_bound_ci95"]
+        assert ends[0] <= row["held_share_of_bound"] <= ends[1]
+        assert len(row["held_m_s_by_search"]) == 2
     assert low["bound_m_s"] == pytest.approx(12.0 * result.figures["jet_largest_torque_Nm"])
     assert 0.6 * low["bound_m_s"] < low["held_m_s"] < 1.15 * low["bound_m_s"]
     assert low["held_m_s"] < high["held_m_s"]
@@ -89,6 +94,22 @@ def test_as_many_seeds_are_flown_as_it_takes(monkeypatch):
     assert count([True] * 10) == (True, list(range(8)))
     assert count([False, True, False, False]) == (False, [0, 1, 2, 3])
     assert count([False, False] + [True] * 8) == (True, list(range(10)))
+
+
+def test_no_two_searches_share_a_seed(monkeypatch):
+    flown = []
+    monkeypatch.setattr(fig7, "holds", lambda env, gain, path, seed: bool(flown.append(seed)))
+    assert fig7.searches(None, 18.0, 0.5, 10) == (0.0,) * fig7.REPEATS
+    # all fail: three seeds a speed are enough to know
+    assert sorted(set(flown)) == [10 * r + k for r in range(fig7.REPEATS) for k in range(3)]
+
+
+def test_the_interval_is_student_s():
+    low, high = fig7.interval([0.4, 0.5, 0.6, 0.5, 0.5])
+    # a standard deviation of 0.0707 over five, 2.776 of its errors of the mean
+    assert (low, high) == pytest.approx((0.5 - 0.0878, 0.5 + 0.0878), abs=1e-4)
+    assert fig7.interval([0.3]) == (0.3, 0.3)
+    assert fig7.interval([0.0, 0.0, 0.1])[0] == 0.0
 
 
 def test_the_fan_s_paths_have_their_speed():

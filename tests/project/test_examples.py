@@ -129,16 +129,20 @@ def test_the_node_takes_in_a_late_pose_at_its_own_time_and_goes_on_without_any(e
     vehicle = load_vehicle("ardrone2")
     hover, pose = 4 * [vehicle.hover_rate], ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
     node = example("filter_on_a_stream").WrenchNode(vehicle)
-    assert node.on_pose(0.0, *pose) is None  # the first one starts the filter
+    assert node.on_rotor_speeds(0.0, hover) is None  # there is no pose to start from
+    assert node.on_pose(0.0, *pose) is not None  # the first one starts the filter
     for k in range(1, 11):
-        node.on_motor_speeds(0.005 * k, hover)
+        assert node.on_rotor_speeds(0.005 * k, hover) is not None
+    assert node.on_rotor_speeds(0.01, hover) is None  # out of order
     assert node.on_pose(0.03, *pose) is not None
-    assert node.now == pytest.approx(0.03)
-    assert node.on_pose(0.02, *pose) is None  # older than what is known
+    assert node.on_pose(0.02, *pose) is not None  # both late, and the later of them first
+    assert (node.filter.late, node.filter.time) == (2, pytest.approx(0.05))
+    assert node.on_pose(0.052, *pose) is None  # before the rotor speeds of its time
     for k in range(11, 101):
-        node.on_motor_speeds(0.005 * k, hover)
-    assert node.now == pytest.approx(0.5 - 0.2)
-    assert len(node.waiting) <= 42
+        assert node.on_rotor_speeds(0.005 * k, hover) is not None
+    assert (node.filter.late, len(node.early)) == (3, 0)
+    assert node.on_pose(0.15, *pose) is None  # older than the horizon
+    assert node.filter.too_late == 1
 
 
 def test_a_folder_of_logs_makes_one_table_though_a_log_is_broken(example, tmp_path):

@@ -1,0 +1,261 @@
+"""Measurements that come late and out of order, against a filter that was given all in order."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.flights import PERIOD, yawing_flight
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.estimator import (
+    ConstantGainFilter,
+    TimedFilter,
+    WrenchEKF,
+    WrenchMassUKF,
+    WrenchUKF,
+)
+
+LAG = EffectSetting("motor_lag", {"tau": 0.04})
+DELAY = EffectSetting("latency", {"d": 0.02})
+DRAG = EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4})
+MARKER = EffectSetting("marker_offset", {"px": 0.02, "py": 0.0, "pz": -0.01})
+PLAIN = load_vehicle("ardrone2")
+VEHICLES = {
+    "plain": PLAIN,
+    "effects that remember": PLAIN.with_effects(LAG, DELAY),
+    "crazyflie with drag": load_vehicle("crazyflie").with_effects(DRAG, LAG),
+    "hummingbird, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, LAG),
+}
+FILTERS = (WrenchUKF, WrenchEKF, WrenchMassUKF, ConstantGainFilter)
+
+
+def fly(vehicle, steps, seed):
+    """A yawing flight under a wrench of a tenth of the vehicle's weight."""
+    force = 0.1 * vehicle.weight * np.array([0.6, -0.6, 0.5])
+    torque = 0.02 * vehicle.weight * vehicle.arm_l * np.array([0.5, 0.5, 0.7])
+    return yawing_flight(vehicle, steps, seed=seed, force=force, torque=torque)
+
+
+FLIGHTS = {name: fly(vehicle, 120, seed=4) for name, vehicle in VEHICLES.items()}
+
+
+def time(k):
+    """Of the k-th set of rotor speeds, as the filter's clock has it."""
+    return round(PERIOD * k, 9)
+
+
+def make(kind, vehicle, gate=None):
+    gated = {} if kind is ConstantGainFilter else {"gate": gate}
+    return kind(vehicle, period=PERIOD, **gated)
+
+
+def start(filter_, flight):
+    filter_.reset(0.0, flight["position"][0], flight["quaternion"][0])
+
+
+def batch(ukf, flight, measurements):
+    """The estimate at the end of a flight of all ``measurements`` in order of their stamps:
+    predictions end at each stamp and at each set of rotor speeds.
+    """
+    ukf.reset(flight["position"][0], flight["quaternion"][0])
+    now, waiting = 0.0, sorted(measurements, key=lambda m: m[0])
+    for k in range(1, len(flight["rotors"])):
+        until = time(k)
+        while waiting and waiting[0][0] <= until:
+            t, method, values = waiting.pop(0)
+            if t > now:
+                ukf.predict(flight["rotors"][k], t - now)
+                now = t
+            getattr(ukf, method)(*values)
+        if until > now:
+            ukf.predict(flight["rotors"][k], until - now)
+            now = until
+    return ukf
+
+
+def stream(timed, flight, measurements, delays):
+    """The same as they come: each measurement its delay after its stamp."""
+    start(timed, flight)
+    arrivals = sorted(
+        (m[0] + delay, i, m) for i, (m, delay) in enumerate(zip(measurements, delays, strict=True))
+    )
+    for k in range(1, len(flight["rotors"])):
+        timed.predict(time(k), flight["rotors"][k])
+        while arrivals and arrivals[0][0] <= time(k):
+            _, _, (t, method, values) = arrivals.pop(0)
+            getattr(timed, method)(t, *values)
+    for _, _, (t, method, values) in arrivals:
+        getattr(timed, method)(t, *values)
+    return timed
+
+
+def assert_same(timed, ukf):
+    """Bit for bit: state and covariance, and all else that the filter remembers."""
+    for one, other in zip(timed.ukf.memory, ukf.memory, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def poses(flight, stamps, parts):
+    """Noisy poses of a flight at ``stamps``: 1 position, 2 attitude, 3 both, 4 both and off."""
+    out = []
+    for t, part in zip(stamps, parts, strict=True):
+        k = round(t / PERIOD)
+        x, q = flight["position"][k], flight["quaternion"][k]
+        x = x + 0.05 if part == 4 else x
+        out.append((t, "correct", (x if part != 2 else None, q if part != 1 else None)))
+    return out
+
+
+STAMPS = st.lists(
+    st.tuples(
+        st.integers(0, 590_000).map(lambda us: round(1e-6 * us, 9)),
+        st.sampled_from((1, 2, 3, 3, 3, 4)),
+        st.floats(0.0, 0.3),
+    ),
+    min_size=1,
+    max_size=25,
+    unique_by=lambda one: one[0],
+)
+
+
+@pytest.mark.parametrize("name", list(VEHICLES))
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(drawn=STAMPS, kind=st.sampled_from(FILTERS), gate=st.sampled_from((None, 0.999)))
+def test_whatever_is_late_comes_out_as_if_it_had_not_been(name, drawn, kind, gate):
+    vehicle, flight = VEHICLES[name], FLIGHTS[name]
+    # a pose that is off may take the mass below zero; that is not what is tried here
+    parts = [3 if part == 4 and kind is WrenchMassUKF else part for _, part, _ in drawn]
+    measurements = poses(flight, [t for t, _, _ in drawn], parts)
+    timed = TimedFilter(make(kind, vehicle, gate), horizon=0.6)
+    stream(timed, flight, measurements, [delay for _, _, delay in drawn])
+    assert timed.too_late == 0
+    assert_same(timed, batch(make(kind, vehicle, gate), flight, measurements))
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_a_stream_of_poses_that_are_all_late_is_the_batch_answer(kind):
+    """On the grid of the rotor speeds, and off it; the horizon is as long as the longest delay."""
+    rng, vehicle = np.random.default_rng(1), VEHICLES["effects that remember"]
+    flight = fly(vehicle, 400, seed=5)
+    stamps = np.sort(rng.uniform(0.0, 1.7, 170))
+    stamps[::3] = PERIOD * np.round(stamps[::3] / PERIOD)
+    stamps = np.unique(np.round(stamps, 9))
+    measurements = poses(flight, stamps, rng.choice([1, 2, 3, 3], len(stamps)))
+    timed = TimedFilter(make(kind, vehicle), horizon=0.3)
+    stream(timed, flight, measurements, rng.uniform(0.0, 0.29, len(stamps)))
+    assert (timed.too_late, timed.late > 150) == (0, True)
+    assert_same(timed, batch(make(kind, vehicle), flight, measurements))
+
+
+@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
+def test_inertial_measurements_may_be_late_too(kind):
+    rng, flight = np.random.default_rng(2), FLIGHTS["plain"]
+    measurements = poses(flight, np.round(np.arange(0.0135, 0.58, 0.02), 9), [3] * 29)
+    measurements += [
+        (t, "correct_imu", (0.1 * rng.standard_normal(3), [0.0, 0.0, 9.81]))
+        for t in np.round(np.arange(0.011, 0.58, 0.004), 9)
+    ]
+    timed = TimedFilter(make(kind, PLAIN), horizon=0.3)
+    stream(timed, flight, measurements, rng.uniform(0.0, 0.1, len(measurements)))
+    assert_same(timed, batch(make(kind, PLAIN), flight, measurements))
+
+
+def test_what_is_older_than_the_horizon_is_refused_and_changes_nothing():
+    flight = FLIGHTS["plain"]
+    timed = TimedFilter(make(WrenchUKF, PLAIN), horizon=0.1)
+    start(timed, flight)
+    pose = flight["position"][1], flight["quaternion"][1]
+    assert timed.correct(-0.01, *pose) is None  # before the first pose
+    for k in range(1, 101):
+        timed.predict(time(k), flight["rotors"][k])
+    before = timed.ukf.memory[0].copy()
+    assert timed.correct(0.399, *pose) is None
+    assert (timed.late, timed.too_late) == (0, 2)
+    np.testing.assert_array_equal(timed.ukf.memory[0], before)
+    assert timed.correct(0.401, *pose) is not None
+    assert (timed.late, timed.too_late) == (1, 2)
+    start(timed, flight)
+    assert (timed.late, timed.too_late, timed.fused, timed.time) == (0, 0, None, 0.0)
+
+
+def test_it_says_what_a_late_pose_was_like_at_its_own_time():
+    flight = FLIGHTS["plain"]
+    timed, plain = TimedFilter(make(WrenchUKF, PLAIN)), make(WrenchUKF, PLAIN)
+    start(timed, flight)
+    plain.reset(flight["position"][0], flight["quaternion"][0])
+    for k in range(1, 21):
+        timed.predict(time(k), flight["rotors"][k])
+    pose = flight["position"][10], flight["quaternion"][10]
+    present = timed.correct(time(10), *pose)
+    for k in range(1, 11):
+        plain.predict(flight["rotors"][k], time(k) - time(k - 1))
+    np.testing.assert_array_equal(timed.fused.state, plain.correct(*pose).state)
+    assert np.isfinite(timed.fused.nis)
+    np.testing.assert_array_equal(present.state, timed.estimate.state)
+    assert timed.time == time(20)
+
+
+def test_what_is_wrong_is_named_and_changes_nothing():
+    flight = FLIGHTS["plain"]
+    timed = TimedFilter(make(WrenchUKF, PLAIN))
+    pose = flight["position"][1], flight["quaternion"][1]
+    with pytest.raises(InputError, match="reset"):
+        timed.predict(0.1, flight["rotors"][1])
+    start(timed, flight)
+    for k in range(1, 41):
+        timed.predict(time(k), flight["rotors"][k])
+        timed.correct(time(k) - 0.001, *pose)
+    before, events = timed.ukf.memory[0].copy(), len(timed._events)
+    for words, call in (
+        (r"0\.250000 s.*future.*0\.200000 s", lambda: timed.correct(0.25, *pose)),
+        (r"0\.150000 s.*0\.200000 s", lambda: timed.predict(0.15, flight["rotors"][1])),
+        ("finite time", lambda: timed.correct(np.nan, *pose)),
+        ("length 1", lambda: timed.correct(0.15, pose[0], [2.0, 0.0, 0.0, 0.0])),
+        ("length 1", lambda: timed.correct(0.2, pose[0], [2.0, 0.0, 0.0, 0.0])),
+        (r"position \(3,\)", lambda: timed.correct(0.15, [1.0, 2.0], pose[1])),
+        ("numbers", lambda: timed.correct(0.15, "here", pose[1])),
+        (r"rotor_speeds \(4,\)", lambda: timed.predict(0.3, [1.0, 2.0])),
+        ("gyro", lambda: timed.correct_imu(0.15, [1.0, 2.0])),
+    ):
+        with pytest.raises(InputError, match=words):
+            call()
+        assert len(timed._events) == events
+        np.testing.assert_array_equal(timed.estimate.state, before_state(before))
+    with pytest.raises(InputError, match="horizon"):
+        TimedFilter(make(WrenchUKF, PLAIN), horizon=0.0)
+
+
+def before_state(memory):
+    from windwrench.estimator.filter_record import FILTER
+
+    return memory.view(FILTER)[0]["x"]
+
+
+def test_callers_may_use_their_arrays_again():
+    flight, speeds, position = FLIGHTS["plain"], np.empty(4), np.empty(3)
+    timed = TimedFilter(make(WrenchUKF, PLAIN))
+    start(timed, flight)
+    measurements = poses(flight, [0.052, 0.033], [3, 3])
+    for k in range(1, 20):
+        speeds[:] = flight["rotors"][k]
+        timed.predict(time(k), speeds)
+    for t, _, (x, q) in measurements:
+        position[:] = x
+        timed.correct(t, position, q)
+        position[:] = speeds[:] = np.nan
+    short = {name: values[:20] for name, values in flight.items()}
+    assert_same(timed, batch(make(WrenchUKF, PLAIN), short, measurements))
+
+
+def test_what_is_kept_does_not_grow():
+    timed = TimedFilter(make(WrenchUKF, PLAIN))
+    flight = FLIGHTS["plain"]
+    start(timed, flight)
+    sizes = []
+    for k in range(1, 1001):
+        timed.predict(time(k), flight["rotors"][1])
+        timed.correct(time(k) - 0.0025, flight["position"][0], flight["quaternion"][0])
+        sizes.append((len(timed._events), sum(e.before is not None for e in timed._events)))
+    assert max(sizes) == max(sizes[:200])
+    assert max(events for events, _ in sizes) <= 2 * (60 + 5)
+    assert max(snapshots for _, snapshots in sizes) <= 18
