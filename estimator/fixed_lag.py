@@ -35,9 +35,7 @@ class FixedLagSmoother:
 
     def __init__(self, ukf: WrenchUKF, lag: float = 0.3) -> None:
         if type(ukf) is not WrenchUKF:
-            raise InputError(
-                f"FixedLagSmoother: expected a WrenchUKF, got {type(ukf).__name__}"
-            )
+            raise InputError(f"FixedLagSmoother: expected a WrenchUKF, got {type(ukf).__name__}")
         steps = lag / ukf.period if isinstance(lag, (int, float)) else math.nan
         if not 0.5 <= steps <= _LONGEST:
             raise InputError(

@@ -147,9 +147,7 @@ class FilterInputs:
             )
         return SmoothedSeries(states[wanted], std[wanted], full[wanted] if covariance else None)
 
-    def _smooth_segment(
-        self, begin: int, end: int, states: Array, std: Array, full: Array
-    ) -> None:
+    def _smooth_segment(self, begin: int, end: int, states: Array, std: Array, full: Array) -> None:
         """Smooth the events from a start to before the next one into the arrays of all."""
         record = self.starts[begin].copy()
         inputs = self.z, self.parts, self.dt, self.voltage
@@ -171,7 +169,8 @@ class FilterInputs:
 def _forward(record: np.ndarray, z: Array, parts: Array, dt: Array, voltage: Array) -> None:
     f = record[0]
     for k in range(len(z)):
-        step(f, z[k], parts[k], dt[k], voltage[k])
+        f.z[:] = z[k]  # a step brings its quaternion to length 1 in place
+        step(f, f.z, parts[k], dt[k], voltage[k])
 
 
 @compiled
@@ -186,7 +185,8 @@ def _forward_with_links(
 ) -> None:
     f = record[0]
     for k in range(len(z)):
-        step_with_link(f, z[k], parts[k], dt[k], voltage[k], links[1 + k], work)
+        f.z[:] = z[k]
+        step_with_link(f, f.z, parts[k], dt[k], voltage[k], links[1 + k], work)
 
 
 @compiled
@@ -313,9 +313,15 @@ def smooth(
         InputError: a shape is wrong, times do not increase, no row has a whole pose or one with
             ``restarted`` has none, a quaternion's length is not 1, or a number stops being finite.
     """
-    times, speeds, x, q = (np.array(value, dtype=np.float64) for value in (t, rotor_speeds, position, quaternion))
+    times, speeds, x, q = (
+        np.array(value, dtype=np.float64) for value in (t, rotor_speeds, position, quaternion)
+    )
     count = len(times) if times.ndim == 1 else 0
-    for name, array, width in (("rotor_speeds", speeds, 4), ("position", x, 3), ("quaternion", q, 4)):
+    for name, array, width in (
+        ("rotor_speeds", speeds, 4),
+        ("position", x, 3),
+        ("quaternion", q, 4),
+    ):
         if count < 2 or array.shape != (count, width):
             raise InputError(
                 f"smooth: expected t (M,) with M of at least 2 and {name} (M, {width}), got shapes "
@@ -332,7 +338,11 @@ def smooth(
             f"smooth: quaternions must have length 1, got {length[bad[0]]:g} in row {bad[0]}"
         )
     whole = np.flatnonzero(seen == 3)
-    flags = np.zeros(count, dtype=np.bool_) if restarted is None else np.array(restarted, dtype=np.bool_)
+    flags = (
+        np.zeros(count, dtype=np.bool_)
+        if restarted is None
+        else np.array(restarted, dtype=np.bool_)
+    )
     if not whole.size or flags.shape != (count,) or np.any(seen[flags] != 3):
         raise InputError(
             "smooth: expected at least one row with a position and a quaternion, and restarted "
@@ -342,7 +352,11 @@ def smooth(
     flags[first] = True
     period = float(np.median(gaps))
     ukf = WrenchUKF(vehicle, tuning, period, gate)
-    volts = np.full(count, vehicle.voltage_ref) if voltage is None else np.array(voltage, dtype=np.float64)
+    volts = (
+        np.full(count, vehicle.voltage_ref)
+        if voltage is None
+        else np.array(voltage, dtype=np.float64)
+    )
     if volts.shape != (count,):
         raise InputError(f"smooth: expected voltage (M,), got shape {volts.shape}")
 
