@@ -1,0 +1,433 @@
+"""The fixed-interval smoother against its literal reference and a batch solution, and what it must
+hold.
+"""
+
+import numpy as np
+import pytest
+
+from tests.support.flights import PERIOD, yawing_flight
+from tests.support.literal_smoother import LiteralSmoother
+from tests.support.literal_ukf import matrix
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics.effects import compile_effects
+from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoother
+from windwrench.estimator.consistency import chi2_band, simulate_model, state_error
+from windwrench.estimator.smoother import RecordingUKF, smooth
+from windwrench.estimator.ukf import default_covariance
+
+VEHICLE = load_vehicle("ardrone2")
+YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0, 3.0)}
+ANISOTROPIC = UKFTuning(
+    motor_torque_noise=(0.02, 0.03, 0.04),
+    thrust_noise=(0.2, 0.3, 0.4),
+    position_noise=(0.001, 0.002, 0.003),
+    attitude_noise=(0.003, 0.005, 0.008),
+)
+
+
+def initial_covariance(seed=1):
+    rng = np.random.default_rng(seed)
+    A = np.eye(18) + 0.15 * rng.standard_normal((18, 18))
+    scale = np.repeat([0.003, 0.3, 0.003, 0.1, 0.02, 0.3], 3)
+    return (A @ A.T) * np.outer(scale, scale)
+
+
+def log_of(run):
+    """Return the arguments of ``smooth`` for a run drawn from the model."""
+    return (
+        PERIOD * np.arange(len(run.rotor_speeds)),
+        run.rotor_speeds,
+        run.measured_position.copy(),
+        run.measured_quaternion.copy(),
+    )
+
+
+def model_run(steps, seed=1, tuning=None):
+    tuning = UKFTuning() if tuning is None else tuning
+    return simulate_model(
+        VEHICLE, tuning, np.full((steps, 4), VEHICLE.hover_rate), seed=seed, **YAWED
+    )
+
+
+def rms(error):
+    return float(np.sqrt(np.mean(np.square(error))))
+
+
+@pytest.mark.parametrize("effects", [False, True])
+def test_equals_the_literal_smoother_over_a_yawing_flight(effects):
+    kd, steps = 1.5e-4, 60
+    flight = yawing_flight(VEHICLE, steps, seed=3)
+    wrench, vehicle = None, VEHICLE
+    if effects:
+        vehicle = VEHICLE.with_effects(
+            EffectSetting("rotor_drag", {"kdx": kd, "kdy": kd}),
+            EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+        )
+
+        def wrench(x, q, v, w, W):
+            C, force, torque = matrix(q), np.zeros(3), np.zeros(3)
+            for (sx, sy), rate in zip([(1, 1), (-1, 1), (-1, -1), (1, -1)], W, strict=True):
+                r = VEHICLE.arm_l * np.array([sx, sy, 0.0])
+                f = -rate * kd * (C.T @ v + np.cross(w, r)) * [1, 1, 0]
+                # about the centre of mass, where the filter's torques are
+                force, torque = force + C @ f, torque + np.cross(r - vehicle_com, f)
+            return force, torque
+
+        vehicle_com = compile_effects(vehicle).vehicle.com
+    fast = RecordingUKF(vehicle, ANISOTROPIC, PERIOD)
+    slow = LiteralSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, wrench)
+    start = (
+        flight["true_x"][0],
+        flight["true_q"][0],
+        initial_covariance(),
+        flight["velocity"][0],
+        flight["omega"][0],
+    )
+    fast.reset(*start)
+    slow.reset(*start)
+    for k in range(1, steps):
+        W, x, q = (flight[n][k] for n in ("rotors", "position", "quaternion"))
+        slow.predict(W)
+        if 25 <= k < 40:
+            fast.step(W)
+        else:
+            fast.step(W, x, q)
+            slow.correct(x, q)
+    found = fast.smooth(covariance=True)
+    for k, (state, P) in enumerate(slow.smoothed()):
+        e = found.estimate(k)
+        sign = np.sign(state["q"] @ e.quaternion)
+        for ours, theirs in (
+            (e.position, state["x"]),
+            (sign * e.quaternion, state["q"]),
+            (e.velocity, state["v"]),
+            (e.angular_velocity, state["w"]),
+            (e.torque, state["tau"]),
+            (e.force, state["f"]),
+        ):
+            assert np.allclose(ours, theirs, rtol=0, atol=1e-8)
+        size = np.sqrt(np.diag(P))
+        assert np.allclose(e.covariance / np.outer(size, size), P / np.outer(size, size), atol=1e-7)
+
+
+def hover_model(dt, period, tuning):
+    """Return the matrix and noise of the model linearised at a level hover, (18, 18) each."""
+    m, g, inverse = VEHICLE.mass, VEHICLE.gravity, np.linalg.inv(VEHICLE.inertia)
+    F = np.eye(18)
+    F[0:3, 3:6] = dt / 4 * np.eye(3)
+    F[3:6, 12:15] = dt * inverse
+    # thrust m g along the body's z axis, which an MRP turns by four times its size
+    acceleration = np.zeros((3, 18))
+    acceleration[:, 0:3] = 4 * g * np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 0]])
+    acceleration[:, 15:18] = np.eye(3) / m
+    F[6:9] += dt**2 / 2 * acceleration
+    F[6:9, 9:12] += dt * np.eye(3)
+    F[9:12] += dt * acceleration
+    white, walk = period / dt, dt / period
+    B = np.zeros((18, 12))
+    B[3:6, 0:3] = dt * inverse * tuning.motor_torque_noise * np.sqrt(white)
+    B[6:9, 3:6] = dt**2 / 2 / m * np.eye(3) * tuning.thrust_noise * np.sqrt(white)
+    B[9:12, 3:6] = dt / m * np.eye(3) * tuning.thrust_noise * np.sqrt(white)
+    B[12:15, 6:9] = np.eye(3) * tuning.torque_walk * np.sqrt(walk)
+    B[15:18, 9:12] = np.eye(3) * tuning.force_walk * np.sqrt(walk)
+    return F, B @ B.T
+
+
+def test_equals_a_dense_batch_solution_near_hover():
+    """All states and measurements of a hover as one Gaussian vector, conditioned in one go.
+
+    Noise and start are a thousandth of what is usual, so the model is linear to six digits. Rows
+    without a pose, with a position or an attitude alone, and unequal times are among them.
+    """
+    small = 1e-3
+    usual = UKFTuning()
+    tuning = UKFTuning(
+        **{
+            name: small * getattr(usual, name)
+            for name in (
+                "motor_torque_noise",
+                "torque_walk",
+                "thrust_noise",
+                "force_walk",
+                "position_noise",
+                "attitude_noise",
+            )
+        }
+    )
+    rng = np.random.default_rng(0)
+    rows, level = 36, np.array([1.0, 0, 0, 0])
+    gaps = np.full(rows - 1, PERIOD)
+    gaps[[7, 20]] = 3 * PERIOD, 0.6 * PERIOD
+    speeds = np.full((rows, 4), VEHICLE.hover_rate)
+    rho = small * 0.005 / 4 * rng.standard_normal((rows, 3))
+    x = small * 0.001 * rng.standard_normal((rows, 3))
+    q = np.column_stack([np.ones(rows), 2 * rho])
+    q /= np.linalg.norm(q, axis=1)[:, None]
+    q[0], x[0] = level, 0.0
+    x[12:18] = np.nan
+    q[15:22] = np.nan
+    # the start: pose as measured, the rest as ``reset`` takes it
+    P0 = default_covariance(VEHICLE, tuning)
+    wide = P0 * small**2
+    wide[:3, :3], wide[6:9, 6:9] = P0[:3, :3], P0[6:9, 6:9]
+    ukf = RecordingUKF(VEHICLE, tuning, PERIOD)
+    ukf.reset(x[0], q[0], wide)
+    models, ends = [], [0]
+    for k in range(1, rows):
+        steps = round(gaps[k - 1] / PERIOD + 0.4)
+        for _ in range(steps):
+            ukf.predict(speeds[k], gaps[k - 1] / steps)
+            models.append((*hover_model(gaps[k - 1] / steps, PERIOD, tuning), k))
+        ukf.correct(x[k] if np.isfinite(x[k, 0]) else None, q[k] if np.isfinite(q[k, 0]) else None)
+        ends.append(ukf.events - 1)
+    found = ukf.smooth(ends, covariance=True)
+
+    size = 18 * (len(models) + 1)
+    joint = np.zeros((size, size))
+    joint[:18, :18] = wide
+    for n, (F, Q, _) in enumerate(models):
+        a, b = slice(18 * n, 18 * n + 18), slice(18 * n + 18, 18 * n + 36)
+        joint[b, : a.stop] = F @ joint[a, : a.stop]
+        joint[: a.stop, b] = joint[b, : a.stop].T
+        joint[b, b] = F @ joint[a, a] @ F.T + Q
+    last = {k: n + 1 for n, (_, _, k) in enumerate(models)}  # the state's number at a row
+    picked, z, R = [], [], []
+    for k in range(1, rows):
+        for value, first, noise in ((rho[k], 0, small * 0.005 / 4), (x[k], 6, small * 0.001)):
+            if not np.isfinite((q if first == 0 else x)[k, 0]):
+                continue
+            picked += [18 * last[k] + first + i for i in range(3)]
+            z, R = [*z, *value], [*R, *[noise**2] * 3]
+    scale = np.sqrt(np.diag(joint))
+    S = joint[np.ix_(picked, picked)] + np.diag(R)
+    gain = np.linalg.solve(S, joint[picked]).T
+    mean, covariance = gain @ np.array(z), joint - gain @ joint[picked]
+    assert np.all(scale > 0)
+    for k in range(rows):
+        at = slice(18 * last[k], 18 * last[k] + 18) if k else slice(0, 18)
+        deviation = np.sqrt(np.diag(covariance[at, at]))
+        ours = np.concatenate(
+            [
+                found.quaternion[k, 1:] / 2,
+                found.angular_velocity[k],
+                found.position[k],
+                found.velocity[k],
+                found.torque[k],
+                found.force[k],
+            ]
+        )
+        assert np.allclose((ours - mean[at]) / deviation, 0.0, atol=2e-3)
+        outer = np.outer(deviation, deviation)
+        assert np.allclose(found.covariance[k] / outer, covariance[at, at] / outer, atol=1e-3)
+
+
+def smoothed_nees(runs, steps, vehicle=VEHICLE, tuning=None, missing=()):
+    """Return the NEES (3, runs, steps) of the whole state, torque and force after smoothing."""
+    tuning = UKFTuning() if tuning is None else tuning
+    out = np.empty((3, runs, steps))
+    for r in range(runs):
+        run = simulate_model(
+            vehicle, tuning, np.full((steps, 4), vehicle.hover_rate), seed=r, **YAWED
+        )
+        ukf = RecordingUKF(vehicle, tuning)
+        ukf.reset(
+            run.initial_position,
+            run.initial_quaternion,
+            run.initial_covariance,
+            run.initial_velocity,
+            run.initial_angular_velocity,
+        )
+        for k in range(steps):
+            if k in missing:
+                ukf.predict(run.rotor_speeds[k])
+            else:
+                ukf.step(run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k])
+        found = ukf.smooth(covariance=True)
+        for k in range(steps):
+            e = found.estimate(1 + k)
+            error, P = state_error(e, *run.truth(k)), e.covariance
+            for n, part in enumerate((slice(0, 18), slice(12, 15), slice(15, 18))):
+                out[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
+    return out
+
+
+@pytest.mark.slow
+def test_the_smoother_is_consistent():
+    """Truth drawn from the filter's own model, 100 runs of 4 s with 0.2 s without a pose: whole
+    state, torque and force.
+    """
+    for dof, values in zip(
+        (18, 3, 3), smoothed_nees(100, 800, missing=range(400, 440)), strict=True
+    ):
+        low, high = chi2_band(dof, 100)
+        mean = values.mean(axis=0)
+        assert np.mean((mean >= low) & (mean <= high)) >= 0.85
+        assert low <= mean.mean() <= high
+
+
+def test_consistent_with_effects_and_anisotropic_noise():
+    vehicle = VEHICLE.with_effects(
+        EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
+    )
+    values = smoothed_nees(20, 150, vehicle, ANISOTROPIC)
+    for dof, nees in zip((18, 3, 3), values, strict=True):
+        low, high = chi2_band(dof, 20, 0.999)
+        assert low <= nees.mean() <= high
+
+
+def test_the_last_estimate_is_the_filters_and_earlier_ones_are_better():
+    run = model_run(1500)
+    found = smooth(VEHICLE, UKFTuning(), *log_of(run))
+    ukf = WrenchUKF(VEHICLE, UKFTuning())
+    ukf.reset(run.measured_position[0], run.measured_quaternion[0])
+    filtered = []
+    for k in range(1, 1500):
+        e = ukf.step(
+            0.5 * (run.rotor_speeds[k - 1] + run.rotor_speeds[k]),
+            run.measured_position[k],
+            run.measured_quaternion[k],
+        )
+        filtered.append(e.state)
+    # but for rounding: a log's periods are differences of its times
+    assert np.allclose(found.state[-1, :19], e.state[:19], rtol=1e-9)
+    assert np.allclose(found.std[-1], np.sqrt(np.diag(e.covariance)), rtol=1e-9)
+    assert np.allclose(found.nis[1:], np.array(filtered)[:, 19], rtol=1e-6)
+    settled = slice(300, None)
+    force, torque = np.array(filtered)[settled, 16:19], np.array(filtered)[settled, 13:16]
+    assert rms(found.force[301:] - run.force[301:]) < 0.8 * rms(force - run.force[301:])
+    assert rms(found.torque[301:] - run.torque[301:]) < 0.8 * rms(torque - run.torque[301:])
+
+
+def test_a_gap_is_bridged_better_than_the_filter_coasts():
+    gap, steps = slice(500, 600), 800  # half a second
+    coasted, bridged, claimed = [], [], []
+    for seed in range(8):
+        run = model_run(steps, seed)
+        _, speeds, x, q = log_of(run)
+        x[gap], q[gap] = np.nan, np.nan
+        ukf = RecordingUKF(VEHICLE, UKFTuning(), PERIOD)
+        ukf.reset(x[0], q[0])
+        filtered = [ukf.step(speeds[k], x[k], q[k]).state for k in range(1, steps)]
+        found = ukf.smooth()
+        truth = np.column_stack([run.position, run.torque, run.force])[gap]
+        in_gap = np.array([ukf.estimate.state, *filtered])[gap]
+        coasted.append(np.delete(in_gap[:, :19], slice(3, 13), axis=1) - truth)
+        bridged.append(np.column_stack([found.position, found.torque, found.force])[gap] - truth)
+        claimed.append(np.column_stack([found.std[:, 6:9], found.std[:, 12:]])[gap])
+    for part, share in ((slice(0, 3), 0.3), (slice(3, 6), 0.7), (slice(6, 9), 0.7)):
+        assert rms(np.array(bridged)[..., part]) < share * rms(np.array(coasted)[..., part])
+        ratio = rms((np.array(bridged) / np.array(claimed))[..., part])
+        assert 0.6 < ratio < 1.5
+
+
+def test_nothing_is_smoothed_across_a_restart():
+    run = model_run(600)
+    t, speeds, x, q = log_of(run)
+    flags = np.zeros(600, dtype=bool)
+    flags[[0, 250]] = True
+    whole = smooth(VEHICLE, None, t, speeds, x, q, restarted=flags, covariance=True)
+    before = smooth(VEHICLE, None, t[:250], speeds[:250], x[:250], q[:250])
+    after = smooth(VEHICLE, None, t[250:], speeds[250:], x[250:], q[250:])
+    for found, part in ((before, slice(0, 250)), (after, slice(250, None))):
+        # times are rounded, and so are their differences
+        assert np.allclose(whole.state[part, :19], found.state[:, :19], rtol=0, atol=1e-9)
+        assert np.allclose(whole.std[part], found.std, rtol=1e-9)
+    moved = x.copy()
+    moved[250:] += [100.0, 0, 0]
+    jump = smooth(VEHICLE, None, t, speeds, moved, q, restarted=flags)
+    assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
+    assert rms(jump.force - whole.force) < 1e-9
+
+
+def test_a_link_is_cut_where_there_is_no_joint_distribution():
+    """As between a covariance and one that was held at a bound."""
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((18, 18))
+    P, F = A @ A.T + np.eye(18), np.eye(18) + 0.1 * rng.standard_normal((18, 18))
+    G, K = np.empty((18, 18)), np.empty((18, 18))
+    C, after = P @ F.T, F @ P @ F.T + np.eye(18)
+    rauch_tung_striebel.link_back(P, C.copy(), after, G, K)
+    gain = C @ np.linalg.inv(after)
+    assert np.allclose(G.T, gain)
+    assert np.allclose(K, P - gain @ C.T, atol=1e-9)
+    rauch_tung_striebel.link_back(P, C.copy(), 0.5 * after, G, K)
+    assert not G.any()
+    assert np.array_equal(K, P)
+    rauch_tung_striebel.link_back(P, C.copy(), np.full((18, 18), np.nan), G, K)
+    assert not G.any()
+
+    ukf = WrenchUKF(VEHICLE, UKFTuning())
+    ukf.reset((0, 0, 1), (1, 0, 0, 0))
+    link = np.zeros(1, dtype=rauch_tung_striebel.LINK)[0]
+    work = np.empty(rauch_tung_striebel.WORK)
+    z = np.array([*[VEHICLE.hover_rate] * 4, 0, 0, 1, 1, 0, 0, 0], dtype=float)
+    rauch_tung_striebel.step_with_link(ukf.record[0], z, 3, PERIOD, 0.0, link, work)
+    assert link["G"].any()
+
+
+@pytest.mark.parametrize("block", [1, 7, 100])
+def test_blocks_change_nothing(block, monkeypatch):
+    log = log_of(model_run(300))
+    log[2][100:120] = np.nan
+    whole = smooth(VEHICLE, None, *log, covariance=True)
+    monkeypatch.setattr(smoother, "_BLOCK", block)
+    pieces = smooth(VEHICLE, None, *log, covariance=True)
+    assert np.array_equal(whole.state, pieces.state, equal_nan=True)
+    assert np.array_equal(whole.covariance, pieces.covariance)
+
+
+def test_a_recording_filter_is_the_filter_and_smooths_as_the_arrays_do():
+    run = model_run(200)
+    _, speeds, x, q = log_of(run)
+    x[40:50], q[45:60] = np.nan, np.nan
+    plain, recording = WrenchUKF(VEHICLE, None, PERIOD), RecordingUKF(VEHICLE, None, PERIOD)
+    for ukf in (plain, recording):
+        ukf.reset(x[0], q[0])
+    ends = [0]
+    for k in range(1, 200):
+        mean = 0.5 * (speeds[k - 1] + speeds[k])
+        a, b = (ukf.step(mean, x[k], q[k]) for ukf in (plain, recording))
+        assert np.array_equal(a.state, b.state, equal_nan=True)
+        ends.append(recording.events - 1)
+    steady = PERIOD * np.arange(200)
+    found = recording.smooth(ends)
+    arrays = smooth(VEHICLE, UKFTuning.for_vehicle(VEHICLE, PERIOD), steady, speeds, x, q)
+    assert np.allclose(found.state[:, :19], arrays.state[:, :19], rtol=0, atol=1e-8)
+    with pytest.raises(InputError, match="inertial"):
+        recording.correct_imu(np.zeros(3))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_covariances_stay_positive_definite_whatever_was_flown(seed):
+    rng = np.random.default_rng(seed)
+    _, speeds, x, q = log_of(model_run(400, seed))
+    x += np.cumsum(rng.choice([0.0, 1.0], (400, 1), p=[0.98, 0.02]) * rng.normal(0, 2, (400, 3)), 0)
+    lost = slice(150, 150 + 40 * (seed + 1))
+    x[lost], q[lost] = np.nan, np.nan
+    t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
+    found = smooth(VEHICLE, None, t, speeds, x, q, covariance=True)
+    assert np.isfinite(found.state[:, :19]).all()
+    scale = 1.0 / found.std
+    eigenvalues = np.linalg.eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
+    assert eigenvalues.min() > 0
+
+
+def test_bad_input_is_refused():
+    t, speeds, x, q = log_of(model_run(20))
+    for bad, words in (
+        ((t[:5], speeds, x, q), "got shapes"),
+        ((t[::-1], speeds, x, q), "strictly increase"),
+        ((t, speeds, x, 2 * q), "length 1"),
+        ((t, speeds, np.full_like(x, np.nan), q), "at least one row"),
+    ):
+        with pytest.raises(InputError, match=words):
+            smooth(VEHICLE, None, *bad)
+    with pytest.raises(InputError, match="voltage"):
+        smooth(VEHICLE, None, t, speeds, x, q, voltage=[12.0])
+    with pytest.raises(InputError, match="restarted"):
+        smooth(VEHICLE, None, t, speeds, x, q, restarted=[True])
+    with pytest.raises(InputError, match=r"covariance=True"):
+        smooth(VEHICLE, None, t, speeds, x, q).estimate(0)
+    with pytest.raises(InputError, match="start"):
+        RecordingUKF(VEHICLE).smooth()
