@@ -70,6 +70,7 @@ class FlightLog:
     )  # (N,) or (N, ...) SI; what a reader found besides
     # rotor speeds are computed from commands: scale of thrust unknown, moments not to be trusted
     commanded: bool = False
+    vehicle: str = ""  # name of the vehicle that flew, where the log or its reader knows it
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
