@@ -12,13 +12,16 @@ One row a sample, time strictly increasing. Columns of the file:
 ``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
 ``ax, ay, az`` (optional)      m/s2     accelerometer at the centre: specific force, body; +g along z in a hover
 ``gx, gy, gz`` (optional)      rad/s    gyro: angular velocity, body
+``vehicle=NAME`` (optional)    1        1 in every row: the vehicle that flew, named by the column's own name
 =============================  =======  ==========================================================================
 
 A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
 A row whose three fields of an inertial sensor are all empty is one in which it was not read, so a sensor faster than the
-pose has rows of its own. Other columns are ignored.
+pose has rows of its own. Other columns are ignored. The name of the vehicle stands in a header, so that whatever reads a table of
+numbers still reads one.
 """  # noqa: E501
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -38,6 +41,8 @@ TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
 ACCELEROMETER = ("ax", "ay", "az")
 GYRO = ("gx", "gy", "gz")
 REQUIRED = ("t", *POSE, *ROTORS)
+
+VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
 
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
 _GAP = 3.0  # median time steps
@@ -219,4 +224,6 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     for names, sensor in ((ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)):
         if sensor is not None:
             columns |= {name: sensor[:, i] for i, name in enumerate(names)}
+    if VEHICLE.fullmatch(named := f"vehicle={log.vehicle}"):
+        columns[named] = np.ones(len(log.t))
     write_table(columns, Path(path))

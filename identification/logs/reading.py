@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from .flight_log import (
     ACCELEROMETER,
@@ -15,6 +16,7 @@ from .flight_log import (
     REQUIRED,
     ROTORS,
     TRUTH,
+    VEHICLE,
     Array,
     FlightLog,
     Mask,
@@ -41,7 +43,7 @@ def read_log(
             that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
             for the kit's own.
         vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
-            into rotor speeds.
+            into rotor speeds; None: the one that the log or its reader names, where it is a preset.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -84,6 +86,8 @@ def read_log(
             )
         with np.errstate(over="ignore", invalid="ignore"):
             log = _canonical(table)
+    if vehicle is None and log.vehicle in preset_names():
+        vehicle = load_vehicle(log.vehicle)
     return _with_doubts(log, vehicle)
 
 
@@ -131,7 +135,22 @@ def _canonical(table: Table) -> FlightLog:
             *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
         ),
         valid=~lost,
+        vehicle=_vehicle_name(table),
     )
+
+
+def _vehicle_name(table: Table) -> str:
+    """Return the name of the vehicle that a column's name gives, or nothing.
+
+    Raises:
+        InputError: two columns name one each.
+    """
+    found = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
+    if len(found) > 1:
+        raise InputError(
+            f"{table.path}: the columns name the vehicles {' and '.join(found)}; expected one"
+        )
+    return found[0] if found else ""
 
 
 def _all_or_none(table: Table, group: tuple[str, ...]) -> tuple[str, ...]:

@@ -127,6 +127,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         valid=valid,
         extra=extra,
         commanded=True,
+        vehicle="crazyflie",
     )
 
 
