@@ -75,6 +75,11 @@ def scalar_last(log):
     return replace(log, quaternion=log.quaternion[:, [1, 2, 3, 0]])
 
 
+def scalar_first_as_last(log):
+    """The values w, x, y, z under the headers qx, qy, qz, qw."""
+    return replace(log, quaternion=log.quaternion[:, [3, 0, 1, 2]])
+
+
 def conjugate(log):
     return replace(log, quaternion=log.quaternion * [1, -1, -1, -1])
 
@@ -87,6 +92,26 @@ HOSTILE = {
     "scalar last": (
         scalar_last,
         "quaternion is scalar last; expected scalar first.*reorder the columns",
+    ),
+    "scalar first as last": (
+        scalar_first_as_last,
+        "quaternion is scalar first under the headers of scalar last.*rename the columns",
+    ),
+    "scalar first as last, conjugate": (
+        lambda log: scalar_first_as_last(conjugate(log)),
+        "scalar first under the headers of scalar last.*world to body",
+    ),
+    "scalar first as last, NED": (
+        lambda log: scalar_first_as_last(ned(log)),
+        "scalar first under the headers of scalar last.*world is z down",
+    ),
+    "scalar first as last, y up": (
+        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R)),
+        "scalar first under the headers of scalar last.*world is y up",
+    ),
+    "scalar first as last, y up body": (
+        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T)),
+        "scalar first under the headers of scalar last.*world and the body are y up",
     ),
     "conjugate": (conjugate, "quaternion is world to body; expected body to world"),
     "scalar last, conjugate": (
