@@ -257,7 +257,6 @@ def _held_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     seen = np.flatnonzero(log.valid)
     pose = np.column_stack([log.position, log.quaternion])[seen]
     same = np.concatenate([[False], np.all(pose[1:] == pose[:-1], axis=1)])
-    same[:-1] |= same[1:]  # with the pose that is repeated
     same &= _carrying(log, vehicle)[seen]
     held = [(a, b) for a, b in _stretches(same, log.t[seen]) if b - a > _HELD]
     if not held:
