@@ -193,7 +193,7 @@ def record(
     drag.csv
     """
     from ..dynamics.effects import parse_setting
-    from ..dynamics.vehicle_file import load_vehicle
+    from ..dynamics.vehicle_file import load_vehicle, preset_names
     from ..envs.recording import record_flight
     from ..identification.logs.flight_log import FlightLog, log_name, write_log
     from ..identification.logs.tables import file_kind
@@ -212,6 +212,10 @@ def record(
         columns["force"],
         columns["torque"],
         name=out.stem,
+        # a file's vehicle may differ from the preset of its name
+        vehicle=model.name
+        if vehicle in (known := preset_names()) or model.name not in known
+        else "",
     )
     write_log(log, out)
     run.record = out.with_name(f"{log_name(out)}.run.json")

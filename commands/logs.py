@@ -6,9 +6,11 @@ import shlex
 import sys
 import time
 import warnings
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import box
@@ -18,15 +20,29 @@ from ..runtime.errors import InputError
 from .terminal import (
     Out,
     ReaderOption,
-    VehicleOption,
     console,
     effect_names,
     note,
     offering,
     results_folder,
     say,
+    vehicle_names,
     working,
 )
+
+if TYPE_CHECKING:
+    from ..dynamics.vehicle import Vehicle
+    from ..identification.logs.flight_log import FlightLog
+
+LogVehicleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="Vehicle that flew: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; "
+        "required unless the log names it.",
+        autocompletion=offering(vehicle_names),
+    ),
+]
 
 # of a diagnosis' time, where its stages begin
 _STAGES = {
@@ -38,39 +54,76 @@ _STAGES = {
 }
 
 
+def _read(
+    paths: Sequence[Path], reader: str | None, vehicle: str | None
+) -> "tuple[list[FlightLog], Vehicle]":
+    """Read flights of one vehicle, the one given or the one that the logs name.
+
+    Raises:
+        InputError: a log cannot be read; or no vehicle is given, and the logs name none, none that
+            comes with the kit, or several.
+    """
+    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..identification.logs.reading import read_log
+
+    model = None if vehicle is None else load_vehicle(vehicle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        flights = [read_log(path, reader, model) for path in paths]
+    if model is not None:
+        return flights, model
+    expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
+    for path, flight in zip(paths, flights, strict=True):
+        if not flight.vehicle:
+            raise InputError(f"{path}: the log does not name its vehicle; expected {expected}")
+        if flight.vehicle != flights[0].vehicle:
+            raise InputError(
+                f"{path}: names the vehicle {flight.vehicle}, {paths[0]} names "
+                f"{flights[0].vehicle}; expected logs of one vehicle, or {expected}"
+            )
+        if flight.vehicle not in preset_names():
+            raise InputError(
+                f"{path}: names the vehicle {flight.vehicle}, which does not come with the kit; "
+                f"expected {expected}"
+            )
+    return flights, load_vehicle(flights[0].vehicle)
+
+
+def _notes(texts: Iterable[str]) -> None:
+    """Say notes on standard error, each once, and how often where that was more than once."""
+    for text, count in Counter(texts).items():
+        note(text if count == 1 else f"{text} ({count} times)")
+
+
 def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
-    vehicle: VehicleOption = "ardrone2",
+    vehicle: LogVehicleOption = None,
     out: Out = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
-    from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.logs.reading import read_log
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import estimate_log, truth_rmse, write_wrench
 
-    model = load_vehicle(vehicle)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flight = read_log(log, reader, model)
+    (flight,), model = _read([log], reader, vehicle)
     folder = results_folder(out)
     with working("estimating") as progress:
         series = estimate_log(flight, model, report=progress)
     path = write_wrench(series, folder)
     picture = plot_wrench(series, flight, folder / "wrench.png")
-    for text in dict.fromkeys((*flight.notes, *series.notes)):
-        note(text)
+    _notes(series.notes)
     console.print(
-        f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s",
+        f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s, vehicle "
+        f"{model.name}",
         highlight=False,
     )
     table = Table("", "x", "y", "z", box=box.SIMPLE_HEAD)
     result: dict[str, Any] = {
         "log": flight.name,
+        "vehicle": model.name,
         "samples": len(flight.t),
         "seconds": flight.t[-1] - flight.t[0],
     }
@@ -110,7 +163,7 @@ def diagnose(
             autocompletion=offering(effect_names),
         ),
     ] = None,
-    vehicle: VehicleOption = "ardrone2",
+    vehicle: LogVehicleOption = None,
     out: Out = Path("results/diagnose"),
 ) -> dict[str, Any]:
     """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
@@ -118,17 +171,12 @@ def diagnose(
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
-    from ..dynamics.vehicle_file import load_vehicle
     from ..identification.diagnosis import diagnose as run
-    from ..identification.logs.reading import read_log
     from ..identification.report.files import report_data, write_report
     from ..identification.report.words import error_sentences, headline, remainder_sentence
 
-    model = load_vehicle(vehicle)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flights = [read_log(path, reader, model) for path in logs]
-        unseen = [read_log(path, reader, model) for path in test or []]
+    every, model = _read([*logs, *(test or [])], reader, vehicle)
+    flights, unseen = every[: len(logs)], every[len(logs) :]
     folder = results_folder(out)
     with working("looking at the logs") as progress:
         found = run(
@@ -136,8 +184,8 @@ def diagnose(
         )
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
-    for text in found.notes:
-        note(text)
+    _notes(found.notes)
+    console.print(f"vehicle: {model.name}", highlight=False, markup=False)
     for sentence in (headline(found), *error_sentences(found), remainder_sentence(found)):
         console.print(sentence, highlight=False, markup=False)
     if found.effects:
@@ -179,7 +227,7 @@ def diagnose(
 def replay(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
-    vehicle: VehicleOption = "ardrone2",
+    vehicle: LogVehicleOption = None,
     video: Annotated[
         bool, typer.Option("--video", help="Also write a video, replay.mp4 (video extra).")
     ] = False,
@@ -211,17 +259,12 @@ def replay(
     """
     import numpy as np
 
-    from ..dynamics.vehicle_file import load_vehicle
     from ..envs.drawing import Viewer
     from ..envs.replay import Flight, pictures
     from ..envs.video import FPS, Film, save_picture
-    from ..identification.logs.reading import read_log
     from ..identification.wrench_series import estimate_log
 
-    model = load_vehicle(vehicle)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flight = read_log(log, reader, model)
+    (flight,), model = _read([log], reader, vehicle)
     length = float(flight.t[-1] - flight.t[0])
     if begin >= length:
         raise InputError(
@@ -276,11 +319,12 @@ def replay(
 
         write_rrd(whole, model, folder / "replay.rrd")
         written.append(folder / "replay.rrd")
-    for text in dict.fromkeys((*flight.notes, *series.notes)):
-        note(text)
+    _notes(series.notes)
+    console.print(f"{flight.name}: vehicle {model.name}", highlight=False, markup=False)
     say(*written)
     return {
         "log": flight.name,
+        "vehicle": model.name,
         "samples": len(flight.t),
         "seconds": length,
         "largest_force_N": np.linalg.norm(part.force, axis=1).max(),

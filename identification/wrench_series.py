@@ -12,6 +12,7 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning, WrenchUKF
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
+from .logs.screening import screen_for_estimate
 from .logs.tables import write_csv
 
 Array = NDArray[np.float64]
@@ -61,20 +62,17 @@ def estimate_log(
         report: called now and then with the share that is done.
 
     Raises:
-        InputError: the log has no pose at all, or its rotor speeds make the filter's numbers
-            overflow.
+        InputError: the log has no pose at all, is of other units or conventions than it declares
+            (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
+    log, doubts = screen_for_estimate(log, vehicle)
     seen = np.flatnonzero(log.valid)
-    if not seen.size:
-        raise InputError(
-            f"{log.source or log.name}: no row has a pose; expected at least one to start from"
-        )
     period = log.period
     ukf = WrenchUKF(vehicle, tuning, period=period)
     count = len(log.t)
     state, deviation = np.empty((count, 19)), np.empty((count, 6))
     nis = np.full(count, np.nan)
-    notes = list(log.notes)
+    restarts: list[tuple[float, float]] = []  # s, the last pose before and the next
 
     first = int(seen[0])
     ukf.reset(log.position[first], log.quaternion[first])
@@ -93,10 +91,7 @@ def estimate_log(
                         nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
                 elif log.valid[k]:
                     ukf.reset(log.position[k], log.quaternion[k])
-                    notes.append(
-                        f"no pose from t = {last_pose:.6g} s to {t:.6g} s: the filter restarts "
-                        f"there"
-                    )
+                    restarts.append((last_pose, t))
             if log.valid[k]:
                 last_pose = t
             estimate = ukf.estimate
@@ -121,8 +116,17 @@ def estimate_log(
         velocity=state[:, 7:10],
         angular_velocity=state[:, 10:13],
         vehicle=vehicle,
-        notes=tuple(notes),
+        notes=(*log.notes, *doubts, *_restart_notes(restarts)),
     )
+
+
+def _restart_notes(restarts: list[tuple[float, float]]) -> tuple[str, ...]:
+    """Return one note on all gaps (s) after which the filter restarted."""
+    if not restarts:
+        return ()
+    begin, end = max(restarts, key=lambda gap: gap[1] - gap[0])
+    often = "" if len(restarts) == 1 else f" ({len(restarts)} such gaps, this is the longest)"
+    return (f"no pose from t = {begin:.6g} s to {end:.6g} s: the filter restarts there{often}",)
 
 
 def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:

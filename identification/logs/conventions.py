@@ -71,7 +71,7 @@ class Reading:
 
     kind: str
     says: str  # what the log looks like, and what to do
-    scalar_last: bool = False
+    quaternion: tuple[int, ...] = (0, 1, 2, 3)  # columns qw..qz, from 0, that hold w, x, y, z
     conjugate: bool = False
     position: Array = field(
         default_factory=lambda: _I
@@ -90,18 +90,24 @@ _Z_DOWN = (
     "down"
 )
 _ROTATE = "expected z up: p = (px, -pz, py)"
-_SCALAR_LAST = (
+_SCALAR_LAST = 3, 0, 1, 2  # the columns qw, qx, qy, qz hold x, y, z, w
+_SCALAR_FIRST = 1, 2, 3, 0  # the columns qx, qy, qz, qw hold w, x, y, z
+_FROM_LAST = (
     "expected scalar first: qx, qy, qz, qw stand in the columns qw, qx, qy, qz; reorder the columns"
+)
+_FROM_FIRST = (
+    "the quaternion is scalar first under the headers of scalar last: qw, qx, qy, qz stand in the "
+    "columns qx, qy, qz, qw; rename the columns"
 )
 _CONJUGATE = "expected body to world: negate qx, qy and qz"
 
 POSE_READINGS = (
-    Reading("scalar last", f"the quaternion is scalar last; {_SCALAR_LAST}", scalar_last=True),
+    Reading("scalar last", f"the quaternion is scalar last; {_FROM_LAST}", quaternion=_SCALAR_LAST),
     Reading("conjugate", f"the quaternion is world to body; {_CONJUGATE}", conjugate=True),
     Reading(
         "scalar last, conjugate",
-        f"the quaternion is scalar last and world to body; {_SCALAR_LAST}, then {_CONJUGATE}",
-        scalar_last=True,
+        f"the quaternion is scalar last and world to body; {_FROM_LAST}, then {_CONJUGATE}",
+        quaternion=_SCALAR_LAST,
         conjugate=True,
     ),
     Reading(
@@ -197,9 +203,9 @@ POSE_READINGS = (
     ),
     Reading(
         "scalar last, NED",
-        f"the quaternion is scalar last and the world z down (north, east, down); {_SCALAR_LAST}; "
+        f"the quaternion is scalar last and the world z down (north, east, down); {_FROM_LAST}; "
         f"{_Z_DOWN}",
-        scalar_last=True,
+        quaternion=_SCALAR_LAST,
         position=_DOWN,
         world=_DOWN,
         body=_DOWN,
@@ -207,16 +213,48 @@ POSE_READINGS = (
     Reading(
         "scalar last, y up",
         f"the quaternion is scalar last and the world y up, with body axes forward, left, up; "
-        f"{_SCALAR_LAST}; {_ROTATE}, and the attitude turned by 90 degrees about x likewise",
-        scalar_last=True,
+        f"{_FROM_LAST}; {_ROTATE}, and the attitude turned by 90 degrees about x likewise",
+        quaternion=_SCALAR_LAST,
         position=_Y_UP,
         world=_Y_UP,
     ),
     Reading(
         "scalar last, y up",
-        f"the quaternion is scalar last, the world and the body y up; {_SCALAR_LAST}; {_ROTATE} "
+        f"the quaternion is scalar last, the world and the body y up; {_FROM_LAST}; {_ROTATE} "
         "and the quaternion (qw, qx, -qz, qy)",
-        scalar_last=True,
+        quaternion=_SCALAR_LAST,
+        position=_Y_UP,
+        world=_Y_UP,
+        body=_Y_UP.T,
+    ),
+    Reading("scalar first", _FROM_FIRST, quaternion=_SCALAR_FIRST),
+    Reading(
+        "scalar first, conjugate",
+        f"{_FROM_FIRST}; and it is world to body; {_CONJUGATE}",
+        quaternion=_SCALAR_FIRST,
+        conjugate=True,
+    ),
+    Reading(
+        "scalar first, NED",
+        f"{_FROM_FIRST}; and the world is z down (north, east, down); {_Z_DOWN}",
+        quaternion=_SCALAR_FIRST,
+        position=_DOWN,
+        world=_DOWN,
+        body=_DOWN,
+    ),
+    Reading(
+        "scalar first, y up",
+        f"{_FROM_FIRST}; and the world is y up, with body axes forward, left, up; {_ROTATE}, and "
+        "the attitude turned by 90 degrees about x likewise",
+        quaternion=_SCALAR_FIRST,
+        position=_Y_UP,
+        world=_Y_UP,
+    ),
+    Reading(
+        "scalar first, y up",
+        f"{_FROM_FIRST}; and the world and the body are y up; {_ROTATE} and the quaternion "
+        "(qw, qx, -qz, qy)",
+        quaternion=_SCALAR_FIRST,
         position=_Y_UP,
         world=_Y_UP,
         body=_Y_UP.T,
@@ -345,7 +383,7 @@ class Balances:
         self._log = log
         signals = log_signals(log)
         self._masks = _flying(signals, vehicle)
-        self._motion = {False: _motion(signals, self._masks, vehicle)}
+        self._motion = {(0, 1, 2, 3): _motion(signals, self._masks, vehicle)}
         self._rotors = _Rotors(
             [
                 (
@@ -377,18 +415,18 @@ class Balances:
         """Number of samples compared."""
         return int(sum(mask.size for mask in self._masks))
 
-    def motion(self, scalar_last: bool) -> _Motion:
-        """Return the motion by the quaternion as it stands, or read as scalar last."""
-        if scalar_last not in self._motion:
+    def motion(self, order: tuple[int, ...] = (0, 1, 2, 3)) -> _Motion:
+        """Return the motion by the quaternion whose w, x, y, z are these columns of the log's."""
+        if order not in self._motion:
             signals = log_signals(
-                replace(self._log, quaternion=self._log.quaternion[:, [3, 0, 1, 2]])
+                replace(self._log, quaternion=self._log.quaternion[:, list(order)])
             )
-            self._motion[scalar_last] = _motion(signals, self._masks, self._vehicle)
-        return self._motion[scalar_last]
+            self._motion[order] = _motion(signals, self._masks, self._vehicle)
+        return self._motion[order]
 
     def fit(self, reading: Reading) -> Fit:
         """Return how well a reading of pose columns explains the log."""
-        motion = self.motion(reading.scalar_last)
+        motion = self.motion(reading.quaternion)
         up = np.array([0.0, 0.0, self._vehicle.gravity])
         force = motion.acceleration @ reading.position.T * reading.scale + up
         frame = motion.thrust_frame.transpose(0, 2, 1) if reading.conjugate else motion.thrust_frame
@@ -404,7 +442,7 @@ class Balances:
 
     def needed_torque(self, reading: Reading) -> Array:
         """Return the torque (n, 3) in Nm, body, that the motion needs."""
-        motion = self.motion(reading.scalar_last)
+        motion = self.motion(reading.quaternion)
         pair = (
             (motion.inverse_rate, motion.inverse_angular_acceleration)
             if reading.conjugate
@@ -472,7 +510,7 @@ class Balances:
         The share is the mean of the three torques' and that of the thrust along its own axis.
         """
         needed = self.needed_torque(Reading("", ""))
-        motion = self.motion(False)
+        motion = self.motion()
         axis = motion.thrust_frame[:, :, 2] / np.linalg.norm(
             motion.thrust_frame[:, :, 2], axis=1, keepdims=True
         )

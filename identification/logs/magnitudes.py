@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...runtime.errors import InputError
-from .flight_log import POSE, ROTORS, TRUTH, FlightLog
+from .flight_log import ACCELEROMETER, GYRO, POSE, ROTORS, TRUTH, FlightLog
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,8 @@ def check_magnitudes(log: FlightLog, limits: Magnitudes | None = None) -> None:
         (("vbat",), None if log.voltage is None else log.voltage[:, None]),
         (TRUTH[:3], log.force),
         (TRUTH[3:], log.torque),
+        (ACCELEROMETER, log.accelerometer),
+        (GYRO, log.gyro),
     )
     for names, values in groups:
         if values is None:

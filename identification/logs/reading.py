@@ -8,21 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from .flight_log import (
+    ACCELEROMETER,
+    GYRO,
     POSE,
     REQUIRED,
     ROTORS,
     TRUTH,
+    VEHICLE,
     Array,
     FlightLog,
     Mask,
     check_finite,
     check_times,
     log_name,
+    sensor_columns,
     time_notes,
     unit_quaternions,
 )
+from .inertial import check_inertial
 from .magnitudes import check_magnitudes
 from .readers import READERS, find_reader
 from .tables import Table, open_table
@@ -39,7 +45,7 @@ def read_log(
             that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
             for the kit's own.
         vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
-            into rotor speeds.
+            into rotor speeds; None: the one that the log or its reader names, where it is a preset.
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -83,25 +89,22 @@ def read_log(
         with np.errstate(over="ignore", invalid="ignore"):
             log = _canonical(table)
     check_magnitudes(log)
+    if vehicle is None and log.vehicle in preset_names():
+        vehicle = load_vehicle(log.vehicle)
     return _with_doubts(log, vehicle)
 
 
 def _canonical(table: Table) -> FlightLog:
     path = table.path
-    truth = [name for name in TRUTH if name in table.header]
-    if truth and len(truth) < len(TRUTH):
-        absent = [name for name in TRUTH if name not in truth]
-        raise InputError(
-            f"{path}: missing column(s) {', '.join(absent)}; expected all of {', '.join(TRUTH)} or "
-            f"none"
-        )
+    truth, *sensors = (_all_or_none(table, group) for group in (TRUTH, ACCELEROMETER, GYRO))
     names = [*REQUIRED, *(["vbat"] if "vbat" in table.header else []), *truth]
-    columns = table.read(names)
+    columns = table.read([*names, *(name for sensor in sensors for name in sensor)])
 
     pose = np.column_stack([columns[name] for name in POSE])
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
+    accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
     check_times(table, columns["t"])
     quaternion = unit_quaternions(table, pose[:, 3:], ~lost, "qw, qx, qy, qz")
     rotor_speeds = np.column_stack([columns[name] for name in ROTORS])
@@ -126,16 +129,54 @@ def _canonical(table: Table) -> FlightLog:
         voltage=columns.get("vbat"),
         force=np.column_stack([columns[name] for name in TRUTH[:3]]) if truth else None,
         torque=np.column_stack([columns[name] for name in TRUTH[3:]]) if truth else None,
+        accelerometer=accelerometer,
+        gyro=gyro,
         name=log_name(path),
         source=str(path),
-        notes=(*time_notes(columns["t"]), *_pose_notes(columns["t"], lost)),
+        notes=(
+            *time_notes(columns["t"]),
+            *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
+        ),
         valid=~lost,
+        vehicle=_vehicle_name(table),
     )
 
 
-def _pose_notes(t: Array, lost: Mask) -> tuple[str, ...]:
+def _vehicle_name(table: Table) -> str:
+    """Return the name of the vehicle that a column's name gives, or nothing.
+
+    Raises:
+        InputError: two columns name one each.
+    """
+    found = [match[1] for name in table.header if (match := VEHICLE.fullmatch(name))]
+    if len(found) > 1:
+        raise InputError(
+            f"{table.path}: the columns name the vehicles {' and '.join(found)}; expected one"
+        )
+    return found[0] if found else ""
+
+
+def _all_or_none(table: Table, group: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a group of optional columns, or nothing where the table has none of them.
+
+    Raises:
+        InputError: it has some of them only.
+    """
+    absent = [name for name in group if name not in table.header]
+    if absent and len(absent) < len(group):
+        raise InputError(
+            f"{table.path}: missing column(s) {', '.join(absent)}; expected all of "
+            f"{', '.join(group)} or none"
+        )
+    return () if absent else group
+
+
+def _pose_notes(t: Array, lost: Mask, fast_sensor: bool) -> tuple[str, ...]:
+    """Return a note on rows without a pose; beside a faster inertial sensor, on its gaps alone."""
     if not lost.any():
         return ()
+    if fast_sensor:
+        return tuple(f"of the pose: {text}" for text in time_notes(t[~lost]))
     return (
         f"{int(lost.sum())} of {len(t)} rows without a pose (motion capture lost the vehicle), the "
         f"first at "
@@ -174,6 +215,8 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
                 f"{vehicle.name}: "
                 "are omega1..omega4 in revolutions per second? Expected rad/s"
             )
+    log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
+    doubts += wrong
     if not doubts:
         return log
     for doubt in doubts:

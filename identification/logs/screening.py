@@ -1,11 +1,18 @@
-"""Is a flight log what it claims to be? Asked before it is diagnosed, so that no effect is found
-where a column is wrong.
+"""Is a flight log what it claims to be? Asked before it is diagnosed, estimated or drawn, so that
+no effect and no force is found where a column is wrong.
 
 A log that is too short, too slow, torn, from a clock that jumps, or in other units or conventions
 is refused with a message that says what it looks like and what to do. Whatever a quadrotor may do
 under effects that its model lacks passes.
+
+What is a fault depends on the use. Other units, frames and orders, and a vehicle that did not fly,
+spoil every number of any answer: refused in every use. A leap of the pose, a clock that jumps, a
+pose that is held, a rotor that was not read for a while spoil an estimate of the wrench for a time
+that can be stated, so there they are notes; a diagnosis fits the whole log at once, and refuses
+them. Length, rate and even steps are what a diagnosis needs to have evidence; an estimate does not.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +20,16 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass
 from .conventions import Balances, recognise, time_shift
+from .excerpt import excerpt
 from .flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
 LEAST_SECONDS = 10.0  # of unbroken pose in flight
-_LEAST_PIECE = 3.0  # s; a shorter piece is all edge to the filters
+_LEAST_PIECE = SIGNALS.shortest_piece  # s; a shorter piece is all edge to the filters
 _LEAST_RATE_HZ = 50.0
 _SLACK = 1.1  # of a period: jitter
 
@@ -44,6 +53,14 @@ _JUMP = 0.3  # s: a step so long over which the vehicle did not move is a jump o
 _MOVING = 0.3  # m/s
 _SAME = 0.25  # of the way that the speed would have taken it in half the step
 _LOST_SHARE = 0.1  # of the rows in flight: losing more is a note
+_MOST_LEAPS = 0.25  # of the poses: with more, the rest says nothing either
+_HELD = (
+    0.2  # s in flight that a pose may repeat itself to the last digit: four of the slowest period
+)
+_NEVER = 1.0  # s of log in which some pose must differ from another
+_STOPPED = 0.3  # s that one rotor may read 0 while the others carry the vehicle
+_ABOVE_MOST = 1.5  # of the vehicle's fastest rotor speed: no rotor turns that fast
+_BEYOND = 20.0  # of the median rotor speed: the same where the vehicle states no fastest
 
 
 def screen_log(
@@ -65,27 +82,115 @@ def screen_log(
             jumps, its pose leaps, nothing flew, or it follows another convention than it declares;
             the message names the file, what was found and what to do.
     """
-    where = log.source or log.name or "log"
-    if not log.valid.any():
-        raise InputError(f"{where}: no row has a pose; expected px..qz in the rows of a flight")
-    notes = _check_rotors(log, vehicle, where)
-    _check_time_unit(log, where)
-    notes += _check_steps(log, where)
-    log = _without_repeats(log)
-    _check_pose_rate(log, where)
-    pieces = _pieces(log)
-    if not pieces:
-        longest = max(float(log.t[run[-1]] - log.t[run[0]]) for run in _runs(log))
-        raise InputError(
-            f"{where}: {_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; "
-            f"expected at "
-            f"least {least_seconds:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
+    return _Screening(log, vehicle, refuses_parts=True).run(least_seconds)[1]
+
+
+def screen_for_estimate(log: FlightLog, vehicle: Vehicle) -> tuple[FlightLog, tuple[str, ...]]:
+    """Return a log as a filter is to see it and doubts about it, or refuse it, in the words of
+    ``screen_log``.
+
+    Of a pose that repeats the one before to the last digit only the first is valid in the log that
+    comes back: the others are no measurements. A log too short to tell its conventions (3 s of
+    unbroken pose) is taken at its word.
+
+    Args:
+        log: the flight as it was read.
+        vehicle: as declared.
+
+    Returns:
+        The log, and notes: what spoils a part of the estimate, and which part.
+
+    Raises:
+        InputError: every number of an estimate would be wrong: other units or conventions than the
+            log declares, nothing flew, or no pose is another one.
+    """
+    return _Screening(log, vehicle, refuses_parts=False).run(None)
+
+
+class _Screening:
+    """The checks in their order; a fault of a part of the log is refused or noted."""
+
+    def __init__(self, log: FlightLog, vehicle: Vehicle, refuses_parts: bool) -> None:
+        self.log, self.vehicle = log, vehicle
+        self.where = log.source or log.name or "log"
+        self.refuses_parts = refuses_parts
+        self.notes: list[str] = []
+
+    def part(self, check: Callable[..., tuple[str, ...] | None], *arguments: object) -> None:
+        """Make a check whose fault spoils a part of the log alone."""
+        try:
+            self.notes += check(*arguments, self.where) or ()
+        except InputError as error:
+            if self.refuses_parts:
+                raise
+            self.notes.append(f"warning: {str(error).removeprefix(f'{self.where}: ')}")
+
+    def turning(self, log: FlightLog) -> FlightLog:
+        """Return the log with rotor speeds that no rotor reaches interpolated, where that is only a
+        note.
+        """
+        most, above = _too_fast(log, self.vehicle)
+        if not above.any():
+            return log
+        row, rotor = np.argwhere(above)[0]
+        found = (
+            f"omega{rotor + 1} reads {log.rotor_speeds[row, rotor]:.4g} rad/s at t = "
+            f"{log.t[row]:.6g} s ({int(above.sum())} such value(s)), faster than "
+            f"{self.vehicle.name} turns its rotors; expected at most {most:.4g} rad/s"
         )
-    balances = Balances(log, vehicle)
-    _check_conventions(balances, where)
-    _check_leaps(log, where)
-    _check_clock(log, where)
-    notes += _check_length(log, vehicle, pieces, least_seconds, where)
+        if self.refuses_parts:
+            raise InputError(f"{self.where}: {found}")
+        self.notes.append(f"warning: {found}. They were interpolated")
+        speeds = log.rotor_speeds.copy()
+        for column, bad in zip(speeds.T, above.T, strict=True):
+            column[bad] = np.interp(log.t[bad], log.t[~bad], column[~bad])
+        return replace(log, rotor_speeds=speeds)
+
+    def run(self, least_seconds: float | None) -> tuple[FlightLog, tuple[str, ...]]:
+        """Return the log without held poses, and the notes."""
+        log, vehicle, where = self.log, self.vehicle, self.where
+        if not log.valid.any():
+            raise InputError(f"{where}: no row has a pose; expected at least one to start from")
+        if log.vehicle and log.vehicle != vehicle.name:
+            self.notes.append(
+                f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
+            )
+        self.notes += _check_rotors(log, vehicle, where)
+        _check_time_unit(log, where, short=not self.refuses_parts)
+        self.part(_check_stopped, log, vehicle)
+        log = self.turning(log)
+        if self.refuses_parts:  # a filter predicts over steps of any length
+            self.notes += _check_steps(log, where)
+        _check_moved(log, where)
+        log, held = _without_repeats(log), log
+        self.notes += _held_notes(held, vehicle)
+        if self.refuses_parts:
+            _check_pose_rate(log, where)
+        pieces = _pieces(log)
+        if not pieces and least_seconds is not None:
+            longest = max(float(log.t[run[-1]] - log.t[run[0]]) for run in _runs(log))
+            raise InputError(
+                f"{where}: {_lost_words(log)}the longest unbroken run of poses is {longest:.3g} s; "
+                f"expected at "
+                f"least {least_seconds:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
+            )
+        balances = Balances(excerpt([log])[0], vehicle) if pieces else None
+        if balances is not None:
+            _check_conventions(balances, where)
+        _, _, far, turned = _leaps(log)
+        if far.size and np.mean(far | turned) > _MOST_LEAPS:
+            _check_leaps(log, where)
+        self.part(_check_leaps, log)
+        self.part(_check_clock, log)
+        if least_seconds is not None:
+            self.notes += _check_length(log, vehicle, pieces, least_seconds, where)
+        if balances is not None:
+            self.part(_check_shift, balances)
+        return log, tuple(self.notes)
+
+
+def _check_shift(balances: Balances, where: str) -> None:
+    """Check that rotor speeds and pose are on one clock."""
     shift = time_shift(balances)
     if shift is not None:
         late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
@@ -94,7 +199,74 @@ def screen_log(
             f"expected both on one "
             f"clock: put omega1..omega4 {abs(shift):.2f} s {sooner}"
         )
-    return notes
+
+
+def _stretches(rows: NDArray[np.bool_], t: Array) -> list[tuple[float, float]]:
+    """Return the first and the last time (s) of each run of rows (N,)."""
+    edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
+    return [(float(t[a]), float(t[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _carrying(log: FlightLog, vehicle: Vehicle) -> NDArray[np.bool_]:
+    """Return in which rows (N,) the fastest rotors make half of the thrust that they usually
+    make.
+    """
+    fastest = np.square(log.rotor_speeds).max(axis=1) * float(vehicle.k.mean())
+    turning = fastest > 0.1 * float(np.quantile(fastest, 0.9))
+    level = float(np.median(fastest[turning])) if turning.any() else np.inf
+    return np.asarray(fastest > 0.5 * level)
+
+
+def _check_stopped(log: FlightLog, vehicle: Vehicle, where: str) -> None:
+    """Check that no rotor reads 0 for long while the others carry the vehicle."""
+    carrying = _carrying(log, vehicle)
+    for i, column in enumerate(log.rotor_speeds.T):
+        stopped = [
+            (a, b) for a, b in _stretches((column == 0.0) & carrying, log.t) if b - a > _STOPPED
+        ]
+        if stopped:
+            begin, end = max(stopped, key=lambda run: run[1] - run[0])
+            raise InputError(
+                f"{where}: omega{i + 1} is 0 while the other rotors turn, for {end - begin:.3g} s "
+                f"from t = {begin:.6g} s ({len(stopped)} such stretch(es)); expected the rotor "
+                f"speeds of all four"
+            )
+
+
+def _too_fast(log: FlightLog, vehicle: Vehicle) -> tuple[float, NDArray[np.bool_]]:
+    """Return the speed (rad/s) that no rotor reaches, and which values (N, 4) are above it."""
+    middle = float(np.median(log.rotor_speeds[log.rotor_speeds.max(axis=1) > 0.0]))
+    most = min(_ABOVE_MOST * vehicle.omega_max, _BEYOND * max(middle, vehicle.hover_rate))
+    return most, log.rotor_speeds > most
+
+
+def _check_moved(log: FlightLog, where: str) -> None:
+    """Check that some pose differs from another."""
+    seen = np.flatnonzero(log.valid)
+    pose = np.column_stack([log.position, log.quaternion])[seen]
+    if log.t[seen[-1]] - log.t[seen[0]] > _NEVER and np.all(pose == pose[0]):
+        raise InputError(
+            f"{where}: the pose never changes, to the last digit; expected the poses of a flight"
+        )
+
+
+def _held_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
+    """Return a note where a pose is held in flight for longer than a slow motion capture holds
+    it.
+    """
+    seen = np.flatnonzero(log.valid)
+    pose = np.column_stack([log.position, log.quaternion])[seen]
+    same = np.concatenate([[False], np.all(pose[1:] == pose[:-1], axis=1)])
+    same &= _carrying(log, vehicle)[seen]
+    held = [(a, b) for a, b in _stretches(same, log.t[seen]) if b - a > _HELD]
+    if not held:
+        return ()
+    begin, end = max(held, key=lambda run: run[1] - run[0])
+    return (
+        f"warning: the pose is frozen for {end - begin:.3g} s from t = {begin:.6g} s ({len(held)} "
+        f"such stretch(es)): it repeats to the last digit while the rotors turn. These rows count "
+        f"as without a pose",
+    )
 
 
 def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ...]:
@@ -139,7 +311,10 @@ def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ..
     )
 
 
-def _check_time_unit(log: FlightLog, where: str) -> None:
+def _check_time_unit(log: FlightLog, where: str, short: bool) -> None:
+    """Check the unit of time; a log that may be ``short`` need not have a whole piece once it is
+    right.
+    """
     period = float(np.median(np.diff(log.t[log.valid]))) if log.valid.sum() > 1 else log.period
     if period <= _LEAST_PIECE * _PERIODS[1]:
         return
@@ -147,7 +322,7 @@ def _check_time_unit(log: FlightLog, where: str) -> None:
         if not _PERIODS[0] <= period / factor <= _PERIODS[1]:
             continue
         rescaled = replace(log, t=(log.t - log.t[0]) / factor)
-        if not max((len(piece) for piece in _pieces(rescaled)), default=0):
+        if not short and not max((len(piece) for piece in _pieces(rescaled)), default=0):
             continue
         raise InputError(
             f"{where}: t looks like {unit}: its median step is {period:.4g}; expected seconds: "
@@ -236,16 +411,25 @@ def _check_conventions(balances: Balances, where: str) -> None:
         )
 
 
-def _check_leaps(log: FlightLog, where: str) -> None:
-    """Check that no pose is farther from the one before than a quadrotor gets."""
+def _leaps(log: FlightLog) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return of each step from pose to pose (n,) its way (m) and angle (rad), and whether they are
+    farther than a quadrotor gets.
+    """
     seen = np.flatnonzero(log.valid)
     step = np.diff(log.t[seen])
     way = np.linalg.norm(np.diff(log.position[seen], axis=0), axis=1)
     q = log.quaternion[seen]
     angle = 2.0 * np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=1)), 0.0, 1.0))
-    far, turned = way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
+    return way, angle, way > _LEAP[0] + _LEAP[1] * step, angle > _TURN[0] + _TURN[1] * step
+
+
+def _check_leaps(log: FlightLog, where: str) -> None:
+    """Check that no pose is farther from the one before than a quadrotor gets."""
+    way, angle, far, turned = _leaps(log)
     if not (far.any() or turned.any()):
         return
+    seen = np.flatnonzero(log.valid)
+    step = np.diff(log.t[seen])
     i = int(np.argmax(far | turned))
     what = f"{way[i]:.3g} m" if far[i] else f"{np.degrees(angle[i]):.0f} degrees"
     units = ": are px, py, pz in metres?" if far.mean() > 0.05 else ""

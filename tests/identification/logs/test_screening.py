@@ -2,6 +2,7 @@
 whatever they lack.
 """
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import permutations
@@ -17,7 +18,8 @@ from windwrench.envs.recording import record_flight
 from windwrench.identification.logs.conventions import Balances, Reading, recognise
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
-from windwrench.identification.logs.screening import screen_log
+from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.wrench_series import estimate_log
 from windwrench.studies.trials.held_back_outsiders import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
@@ -75,6 +77,11 @@ def scalar_last(log):
     return replace(log, quaternion=log.quaternion[:, [1, 2, 3, 0]])
 
 
+def scalar_first_as_last(log):
+    """The values w, x, y, z under the headers qx, qy, qz, qw."""
+    return replace(log, quaternion=log.quaternion[:, [3, 0, 1, 2]])
+
+
 def conjugate(log):
     return replace(log, quaternion=log.quaternion * [1, -1, -1, -1])
 
@@ -87,6 +94,26 @@ HOSTILE = {
     "scalar last": (
         scalar_last,
         "quaternion is scalar last; expected scalar first.*reorder the columns",
+    ),
+    "scalar first as last": (
+        scalar_first_as_last,
+        "quaternion is scalar first under the headers of scalar last.*rename the columns",
+    ),
+    "scalar first as last, conjugate": (
+        lambda log: scalar_first_as_last(conjugate(log)),
+        "scalar first under the headers of scalar last.*world to body",
+    ),
+    "scalar first as last, NED": (
+        lambda log: scalar_first_as_last(ned(log)),
+        "scalar first under the headers of scalar last.*world is z down",
+    ),
+    "scalar first as last, y up": (
+        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R)),
+        "scalar first under the headers of scalar last.*world is y up",
+    ),
+    "scalar first as last, y up body": (
+        lambda log: scalar_first_as_last(turned(log, Y_UP, lambda R: Y_UP @ R @ Y_UP.T)),
+        "scalar first under the headers of scalar last.*world and the body are y up",
     ),
     "conjugate": (conjugate, "quaternion is world to body; expected body to world"),
     "scalar last, conjugate": (
@@ -407,3 +434,115 @@ def test_a_file_cut_within_its_last_line_says_so(tmp_path, cut):
         match=r"flight.csv: .*row 20 \(line 21\) (has \d+ field\(s\); expected 19|is empty)",
     ):
         read_log(path)
+
+
+# for an estimate
+
+SHIFTED = ("rotors late", "rotors early")
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_an_estimate_refuses_what_a_diagnosis_refuses(kind):
+    make, expected = HOSTILE[kind]
+    log = make(flight())
+    if kind in SHIFTED:
+        (note,) = screen_for_estimate(log, VEHICLE)[1]
+        assert re.search(f"warning: {expected}", note.replace("the rotor", "rotor"))
+        return
+    with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
+        estimate_log(log, VEHICLE)
+
+
+ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
+PARTS = ("clock jump", "rows cut out")
+
+
+@pytest.mark.parametrize("kind", TORN)
+def test_an_estimate_needs_less_than_a_diagnosis(kind):
+    make, expected = TORN[kind]
+    log = make(flight())
+    if kind in ENOUGH:
+        assert screen_for_estimate(log, VEHICLE)[1] == ()
+    elif kind in PARTS:
+        (note,) = screen_for_estimate(log, VEHICLE)[1]
+        assert re.search(expected, note)
+        assert note.startswith("warning: ")
+    else:
+        with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
+            screen_for_estimate(log, VEHICLE)
+
+
+def test_two_seconds_and_a_hover_are_enough_for_an_estimate():
+    log = flight("hover")
+    for seconds in (2.0, 10.0):
+        assert screen_for_estimate(rows(log, log.t < seconds), VEHICLE)[1] == ()
+    with pytest.raises(InputError, match="t looks like milliseconds"):
+        screen_for_estimate(replace(rows(log, log.t < 2.0), t=1e3 * log.t[log.t < 2.0]), VEHICLE)
+
+
+def test_a_frozen_pose_counts_as_none():
+    log = flight()
+    frozen = (log.t >= 5.0) & (log.t <= 6.0)
+    first = int(np.argmax(frozen))
+    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position[frozen], quaternion[frozen] = position[first], quaternion[first]
+    checked, notes = screen_for_estimate(
+        replace(log, position=position, quaternion=quaternion), VEHICLE
+    )
+    assert any("pose is frozen for 0.995 s from t = 5.005 s (1 such" in note for note in notes)
+    np.testing.assert_array_equal(
+        checked.valid, ~(frozen & (np.arange(len(log.t)) != first)) & log.valid
+    )
+    with pytest.raises(InputError, match=r"flight.csv: the pose never changes"):
+        screen_for_estimate(
+            replace(log, position=0 * log.position + 1, quaternion=0 * log.quaternion + 0.5),
+            VEHICLE,
+        )
+
+
+def test_rotors_that_stop_or_race_are_named():
+    log = flight()
+    stopped, racing = log.rotor_speeds.copy(), log.rotor_speeds.copy()
+    stopped[(log.t > 7.0) & (log.t < 8.0), 2] = 0.0
+    racing[[700, 1500], 1] = 4e4
+    for speeds, words in (
+        (stopped, r"omega3 is 0 while the other rotors turn, for 0.99 s from t = 7.005 s"),
+        (racing, r"omega2 reads 4e\+04 rad/s at t = 3.5 s \(2 such value"),
+    ):
+        spoiled = replace(log, rotor_speeds=speeds)
+        checked, notes = screen_for_estimate(spoiled, VEHICLE)
+        assert any(re.search(words, note) for note in notes)
+        with pytest.raises(InputError, match=words):
+            screen_log(spoiled, VEHICLE)
+    assert checked.rotor_speeds.max() < 1.5 * log.rotor_speeds.max()
+
+
+def test_another_vehicle_than_the_log_names_is_doubted():
+    (note,) = screen_log(replace(flight(), vehicle="crazyflie"), VEHICLE)
+    assert note == "warning: the log names the vehicle crazyflie; it is read as ardrone2"
+
+
+def test_a_log_names_its_vehicle(tmp_path):
+    log = rows(flight(), flight().t < 0.1)
+    for name, suffix in (("crazyflie", ".csv"), ("my own-1", ".parquet"), ("no,name\x1b", ".csv")):
+        path = tmp_path / f"flight{suffix}"
+        write_log(replace(log, vehicle=name), path)
+        assert read_log(path).vehicle == ("" if "," in name else name)
+        if suffix == ".csv":
+            assert np.loadtxt(path, delimiter=",", skiprows=1).shape[0] == len(log.t)
+    header, _, body = path.read_text().partition("\n")
+    lines = [f"{line},1" for line in body.splitlines()]
+    path.write_text(
+        "\n".join([f"{header},rest", *lines])
+        .replace("vbat", "vehicle=a", 1)
+        .replace("rest", "vehicle=b", 1)
+    )
+    with pytest.raises(InputError, match="name the vehicles a and b; expected one"):
+        read_log(path)
+
+
+def test_restarts_are_one_note():
+    log = flight(seconds=20.0)
+    series = estimate_log(without_pose(log, log.t % 5.0 < 2.2), VEHICLE)
+    (note,) = [note for note in series.notes if "restarts" in note]
+    assert "3 such gaps" in note
