@@ -8,6 +8,7 @@ also knows the truth.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,7 +183,7 @@ def run(seeds: int, progress: Progress) -> Result:
     peaks = {r: strongest_torque(Fan(radius=r), vehicle, PROFILE_X)[1] for r in RADII}
     torque_map = as_map(points, estimate[:, :, 5].mean(axis=0))
     error = (estimate - truth)[:, inside]
-    figures = {
+    figures: dict[str, Any] = {
         "seeds": seeds,
         "points_in_jet": int(inside.sum()),
         "correlation_force_x": _correlation(estimate[:, inside, 0], truth[:, inside, 0]),
