@@ -280,6 +280,11 @@ def _check_rotors(log: FlightLog, vehicle: Vehicle, where: str) -> tuple[str, ..
             f"rotor speeds in rad/s "
             f"(about {vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
         )
+    if not np.isfinite(most):
+        raise InputError(
+            f"{where}: omega1..omega4 are beyond all rotors; expected rotor speeds in rad/s (about "
+            f"{vehicle.hover_rate:.3g} when {vehicle.name} hovers)"
+        )
     turning = thrust > 0.3 * most
     for i, column in enumerate(log.rotor_speeds[turning].T):
         if float(np.max(column)) <= 0.0:

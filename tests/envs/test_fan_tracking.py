@@ -309,8 +309,9 @@ def test_a_state_that_is_no_number_is_lost(what, tmp_path, monkeypatch):
     else:
         env.loop.state[16] = np.nan
     observation, _, lost, _, info = env.step(np.zeros(1, np.float32))
-    assert lost
-    assert info["lost"]
+    # the filter starts over at the last pose; the plant cannot
+    assert lost == info["lost"] == (what == "plant")
+    assert np.isfinite(env.loop.state[:19]).all()
     assert observation in env.observation_space
 
 

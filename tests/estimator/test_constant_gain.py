@@ -109,7 +109,7 @@ def test_a_part_of_a_pose_is_taken_in(turning):
     for parts in ((True, True), (True, False), (False, True), (False, False)):
         f.reset(turning["position"][0], turning["quaternion"][0])
         pose = [
-            turning[name][5] if given else None
+            turning[name][1] if given else None
             for name, given in zip(("position", "quaternion"), parts, strict=True)
         ]
         e = f.step(turning["rotors"][1], *pose)

@@ -399,7 +399,7 @@ def forms() -> dict[str, Form]:
         (spoil_table, spoil_table, spoil_bytes),
         (spoil_text, spoil_text, spoil_text, spoil_bytes),
     )
-    estimate = ("estimate", "--out", "out")
+    estimate = ("estimate", "--out", "out", "--vehicle", "ardrone2")
     found = [
         Form("CSV", "log.csv", partial(_own_log, "log.csv"), table, _log, estimate),
         Form(

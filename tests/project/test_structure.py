@@ -27,7 +27,8 @@ FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 STOREYS = (
     {"logs"},
     {"motion"},
-    {"logs.conventions", "logs.screening", "findings", "wrench_series"},
+    {"logs.conventions", "logs.screening", "findings"},
+    {"wrench_series"},
     {"prediction", "inference"},
     {"diagnosis"},
     {"report"},
