@@ -183,7 +183,8 @@ def lost_position(f: Record) -> bool:
     wide = P[6, 6] > lost[6]
     for i in range(7, 12):
         wide = wide | (P[i, i] > lost[i])
-    return wide & (f.gap[0] > f.patience)
+    lost_now: bool = wide & (f.gap[0] > f.patience)
+    return lost_now
 
 
 @compiled
@@ -193,7 +194,8 @@ def lost_attitude(f: Record) -> bool:
     wide = P[0, 0] > lost[0]
     for i in range(1, 6):
         wide = wide | (P[i, i] > lost[i])
-    return wide & (f.gap[1] > f.patience)
+    lost_now: bool = wide & (f.gap[1] > f.patience)
+    return lost_now
 
 
 @compiled
@@ -263,7 +265,8 @@ def judge(
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
     f.status = choose(restarted, RESTARTED, f.status)
     remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)
-    return taken & (choose(restarted, 1.0, refused) < 0.5)
+    plain: bool = taken & (choose(restarted, 1.0, refused) < 0.5)
+    return plain
 
 
 @compiled
@@ -299,7 +302,8 @@ def continues(
                 6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
             )
         far += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
-    return far < 0.5
+    near: bool = far < 0.5
+    return near
 
 
 @compiled

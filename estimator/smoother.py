@@ -150,23 +150,27 @@ class FilterInputs:
     def _smooth_segment(self, begin: int, end: int, states: Array, std: Array, full: Array) -> None:
         """Smooth the events from a start to before the next one into the arrays of all."""
         record = self.starts[begin].copy()
-        inputs = self.z, self.parts, self.dt, self.voltage
+        z, parts, dt, voltage = self.z, self.parts, self.dt, self.voltage
         blocks = []
         for first in range(begin + 1, end, _BLOCK):
             last = min(first + _BLOCK, end)
             blocks.append((first, last, record.copy()))
-            _forward(record, *(array[first:last] for array in inputs))
+            here = slice(first, last)
+            _forward(record, z[here], parts[here], dt[here], voltage[here])
         x, P, work = record["x"][0].copy(), record["P"][0].copy(), np.empty(WORK)
         links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
         for first, last, memory in reversed(blocks):
             links["x"][0] = memory["x"][0]
-            _forward_with_links(memory, *(array[first:last] for array in inputs), links, work)
-            _backward(links, x, P, work, states[first:last], std[first:last], full[first:last])
+            here = slice(first, last)
+            _forward_with_links(memory, z[here], parts[here], dt[here], voltage[here], links, work)
+            _backward(links, x, P, work, states[here], std[here], full[here])
         _write(x, P, states, std, full, begin)
 
 
 @compiled
-def _forward(record: np.ndarray, z: Array, parts: Array, dt: Array, voltage: Array) -> None:
+def _forward(
+    record: np.ndarray, z: Array, parts: NDArray[np.int64], dt: Array, voltage: Array
+) -> None:
     f = record[0]
     for k in range(len(z)):
         f.z[:] = z[k]  # a step brings its quaternion to length 1 in place
@@ -177,7 +181,7 @@ def _forward(record: np.ndarray, z: Array, parts: Array, dt: Array, voltage: Arr
 def _forward_with_links(
     record: np.ndarray,
     z: Array,
-    parts: Array,
+    parts: NDArray[np.int64],
     dt: Array,
     voltage: Array,
     links: np.ndarray,
@@ -330,7 +334,7 @@ def smooth(
     gaps = np.diff(times)
     if not np.all(gaps > 0):
         raise InputError("smooth: t must be finite and strictly increase")
-    seen = np.isfinite(x).all(axis=1) + 2 * np.isfinite(q).all(axis=1)
+    seen = np.isfinite(np.column_stack([x.sum(axis=1), q.sum(axis=1)])) @ np.array([1, 2])
     length = np.linalg.norm(q, axis=1)
     bad = np.flatnonzero((seen >= 2) & ~((length > 0.9) & (length < 1.1)))
     if bad.size:

@@ -71,7 +71,12 @@ class Reading:
 
     kind: str
     says: str  # what the log looks like, and what to do
-    quaternion: tuple[int, ...] = (0, 1, 2, 3)  # columns qw..qz, from 0, that hold w, x, y, z
+    quaternion: tuple[int, int, int, int] = (
+        0,
+        1,
+        2,
+        3,
+    )  # columns qw..qz, from 0, that hold w, x, y, z
     conjugate: bool = False
     position: Array = field(
         default_factory=lambda: _I
@@ -415,7 +420,7 @@ class Balances:
         """Number of samples compared."""
         return int(sum(mask.size for mask in self._masks))
 
-    def motion(self, order: tuple[int, ...] = (0, 1, 2, 3)) -> _Motion:
+    def motion(self, order: tuple[int, int, int, int] = (0, 1, 2, 3)) -> _Motion:
         """Return the motion by the quaternion whose w, x, y, z are these columns of the log's."""
         if order not in self._motion:
             signals = log_signals(
