@@ -33,12 +33,18 @@ ULOG = find_spec("pyulog") is not None
 
 # each file is read in one process, so that the peak of its memory is that of the worst
 CHILD = """
-import json, resource, sys, time
+import json, sys, time
 from pathlib import Path
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.identification import read_log
 from windwrench.runtime.errors import InputError
+
+# of this program alone: resource's maximum starts from that of whoever started it
+def peak_memory():
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.split("VmHWM:")[1].split()[0])
+
 for path in sys.argv[1:]:
     began = time.perf_counter()
     try:
@@ -53,8 +59,7 @@ for path in sys.argv[1:]:
         said = "read"
     except InputError as error:
         said = str(error)
-    memory = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    print(json.dumps([path, said, time.perf_counter() - began, memory]), flush=True)
+    print(json.dumps([path, said, time.perf_counter() - began, peak_memory()]), flush=True)
 """
 
 
@@ -115,6 +120,9 @@ NESTED_ULOG = ulog(
 TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in range(4096)] * 60)
 
 
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="memory is read as Linux tells it"
+)
 def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
     expected = {"zeros.csv.gz": "more than 1000000 in line 2"}
     (tmp_path / "zeros.csv.gz").write_bytes(packed_often(b"0" * 2**26, 20))
