@@ -22,7 +22,8 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array, WrenchEstimate
-from .filter_record import N, drive, filter_record, propagate
+from .filter_record import BIASES, N, drive, filter_record, propagate
+from .imu import expected_imu
 from .tuning import UKFTuning
 from .ukf import default_covariance
 
@@ -235,6 +236,10 @@ class ModelRun:
     angular_velocity: Array  # (K, 3) rad/s, body
     torque: Array  # (K, 3) Nm, world
     force: Array  # (K, 3) N, world
+    gyro: Array  # (K, 3) rad/s, body, as measured
+    accelerometer: Array  # (K, 3) m/s2, body, as measured
+    gyro_bias: Array  # (K, 3) rad/s, in them
+    accelerometer_bias: Array  # (K, 3) m/s2
 
     def truth(self, k: int) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return the true state after step ``k`` in the order in which ``nees`` takes it."""
@@ -266,7 +271,8 @@ def simulate_model(
     Every step draws a rotor torque error (body frame) and a rotor force error (body frame), moves
     the external torque and force (world) by their walks, and measures the pose, all normal with the
     deviations of ``tuning``. The start is drawn from ``covariance`` about the given pose and twist,
-    with no external wrench in the mean.
+    with no external wrench in the mean. Gyro and accelerometer measure at the end of each step;
+    their biases are drawn from ``tuning`` and walk.
 
     Args:
         vehicle: with its declared effects.
@@ -323,6 +329,7 @@ def simulate_model(
     measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
     measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)
     states, measured = np.empty((steps, 20)), np.empty((steps, 7))
+    imu, biases = _inertial_noise(tuning, steps, seed)
     record = filter_record(vehicle, tuning, period, 0.0, 1)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
     unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
@@ -339,6 +346,7 @@ def simulate_model(
         vehicle.voltage_ref,
         states,
         measured,
+        imu,
     )
     return ModelRun(
         start[POSITION],
@@ -355,7 +363,28 @@ def simulate_model(
         states[:, RATE],
         states[:, TORQUE],
         states[:, FORCE],
+        imu[:, :3],
+        imu[:, 3:],
+        biases[:, :3],
+        biases[:, 3:],
     )
+
+
+def _inertial_noise(tuning: UKFTuning, steps: int, seed: int) -> tuple[Array, Array]:
+    """Return what gyro and accelerometer (K, 6) measure beside the truth, and the biases in it."""
+    rng = np.random.default_rng([seed, 1])
+
+    def deviations(gyro: ArrayLike, accelerometer: ArrayLike) -> Array:
+        return np.concatenate([np.broadcast_to(gyro, 3), np.broadcast_to(accelerometer, 3)])
+
+    walk = rng.standard_normal((steps, BIASES))
+    walk *= deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
+    walk[0] += rng.standard_normal(BIASES) * deviations(
+        tuning.gyro_bias_std, tuning.accelerometer_bias_std
+    )
+    biases = np.cumsum(walk, axis=0)
+    white = rng.standard_normal((steps, BIASES))
+    return biases + white * deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
 
 
 @compiled
@@ -372,9 +401,11 @@ def _simulate(
     voltage: float,
     states: Array,
     measured: Array,
+    imu: Array,
 ) -> None:
     f = record[0]
     x, after = f.x, f.next
+    inertial = np.empty(6)
     quaternion_from_mrp(error[0:3], f.q)
     quaternion_multiply(f.q, start[3:7], x[3:7])
     normalise(x[3:7])
@@ -416,3 +447,8 @@ def _simulate(
         quaternion_multiply(f.q, x[3:7], measured[k, 3:7])
         for i in range(3):
             measured[k, i] = x[i] + measurement[k, 3 + i]
+        # the accelerometer feels the step's noise: the torque's is in the rotors' wrench already
+        expected_imu(f, x, inertial)
+        for i in range(3):
+            imu[k, i] += inertial[i]
+            imu[k, 3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass

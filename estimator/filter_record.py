@@ -11,6 +11,25 @@ from .estimate import STATE_SIZE
 from .tuning import UKFTuning
 
 N = 18  # error state (rho, omega, x, v, torque, force)
+BIASES = 6  # of gyro and accelerometer
+COMPANIONS = 12  # the biases, and the noise of the last step: ``bias_states``
+
+IMU = np.dtype(
+    [
+        ("used", "i8"),  # whether ``correct_imu`` was ever called
+        ("known", "i8"),  # whether the last step's noise is: there was one
+        ("refused", "i8"),
+        ("gate", "f8", (2,)),  # largest NIS of three numbers and of six
+        ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not
+        ("prior", "f8", (BIASES,)),  # variances
+        ("walk", "f8", (BIASES,)),  # likewise, a period
+        ("mean", "f8", (COMPANIONS,)),
+        ("regression", "f8", (N, COMPANIONS)),  # on the error state
+        ("rest", "f8", (COMPANIONS, COMPANIONS)),  # covariance of what that leaves
+        ("bias_covariance", "f8", (BIASES, BIASES)),
+        ("sensitivity", "f8", (6, COMPANIONS)),  # of gyro and accelerometer
+    ]
+)
 
 FILTER = np.dtype(
     [
@@ -72,6 +91,7 @@ FILTER = np.dtype(
         # of the innovation
         ("gain", "f8", (N, 6)),
         ("information", "f8", (6, 6)),
+        ("imu", IMU),
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P

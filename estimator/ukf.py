@@ -31,6 +31,16 @@ from ..runtime.addresses import address_of
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose
+from .bias_states import (
+    after_correction,
+    after_prediction,
+    begin_imu,
+    carry_with_points,
+    cross_covariance,
+    joint_covariance,
+    load_imu,
+    reset_imu,
+)
 from .covariance import (
     add_more_pairs,
     add_noise,
@@ -43,7 +53,7 @@ from .covariance import (
 )
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, STATE_SIZE, Array, WrenchEstimate
-from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, move, propagate
+from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
@@ -223,6 +233,28 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
+@compiled
+def correct_with_biases(f: Record, sample: Array, parts: int) -> None:
+    """Correct like ``correct_parts``, and the biases of an IMU with it."""
+    x, variances = f.x.copy(), np.diag(f.P)
+    correct_parts(f, sample, parts)
+    after_correction(f, x, variances)
+
+
+@compiled
+def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
+    f = record[0]
+    usable: int = check_sample(f, f.z, parts)
+    if usable >= 0:
+        sample = undo_sensing(f, f.z, usable, dt)
+        if dt > 0.0:
+            cross = cross_covariance(f, BIASES)
+            predict(f, sample[0:4], dt, voltage)
+            after_prediction(f, dt, carry_with_points(f, dt, cross))
+        correct_with_biases(f, sample, usable)
+    return usable
+
+
 def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
     f = carray(pointer, 1, FILTER)[0]
     return step(f, f.z, parts, dt, voltage)
@@ -249,6 +281,7 @@ class WrenchUKF:
     """
 
     _compiled_step = staticmethod(_step_record)
+    _compiled_step_with_biases = staticmethod(_step_with_biases)
     _step_by_address = staticmethod(_step_at)
 
     def __init__(
@@ -270,6 +303,7 @@ class WrenchUKF:
         largest = 0.0 if gate is None else _chi2_quantile(gate)
         patience = max(1, round(_PATIENCE / period))
         self.record = filter_record(vehicle, self.tuning, self.period, largest, patience)
+        load_imu(self.record[0], self.tuning, gate)
         self._voltage = vehicle.voltage_ref
         self._bind()
 
@@ -348,12 +382,19 @@ class WrenchUKF:
         f = self.record[0]
         f["x"], f["P"] = x, P
         f["refused"] = 0
+        reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
 
     @property
     def step_address(self) -> int:
-        """Address of the step for ``call_step``, in compiled loops."""
+        """Address of the step for ``call_step``, in compiled loops; it knows nothing of an IMU.
+
+        Raises:
+            InputError: ``correct_imu`` was called.
+        """
+        if self.record[0]["imu"]["used"]:
+            raise InputError("step_address: a filter that was given an IMU steps in Python only")
         return address_of(self._step_by_address)
 
     @property
@@ -362,6 +403,38 @@ class WrenchUKF:
         world-frame MRP.
         """
         return np.array(self.record[0]["P"])
+
+    @property
+    def covariance_with_biases(self) -> Array:
+        """Covariance (24, 24) of the same and of the biases of gyro and accelerometer, last."""
+        return joint_covariance(self.record[0])
+
+    @property
+    def gyro_bias(self) -> Array:
+        """Estimated bias (3,) of the gyro, rad/s, body."""
+        return np.array(self.record[0]["imu"]["mean"][:3])
+
+    @property
+    def accelerometer_bias(self) -> Array:
+        """Estimated bias (3,) of the accelerometer, m/s2, body."""
+        return np.array(self.record[0]["imu"]["mean"][3:BIASES])
+
+    @property
+    def gyro_bias_std(self) -> Array:
+        """Standard deviation (3,) of the gyro's estimated bias, rad/s."""
+        return np.array(np.sqrt(np.diagonal(self.record[0]["imu"]["bias_covariance"])[:3]))
+
+    @property
+    def accelerometer_bias_std(self) -> Array:
+        """Standard deviation (3,) of the accelerometer's estimated bias, m/s2."""
+        return np.array(np.sqrt(np.diagonal(self.record[0]["imu"]["bias_covariance"])[3:]))
+
+    @property
+    def imu_refused(self) -> int:
+        """How many inertial measurements the gate has refused, wholly or in part, since
+        ``reset``.
+        """
+        return int(self.record[0]["imu"]["refused"])
 
     @property
     def estimate(self) -> WrenchEstimate:
@@ -409,10 +482,13 @@ class WrenchUKF:
     ) -> WrenchEstimate:
         """Take in an inertial measurement made now, at the geometric centre; see ``estimator.imu``.
 
+        From the first call on the filter also estimates the biases of both. The accelerometer is
+        left out while nothing is known of the rotors: before the first step after ``reset``.
+
         Args:
-            gyro: (3,) rad/s, body, without bias, or None.
-            accelerometer: (3,) m/s2, body, specific force (+g along z at hover), without bias, or
-                None.
+            gyro: (3,) rad/s, body, or None.
+            accelerometer: (3,) m/s2, body, specific force (+g along z at hover) at the end of the
+                last step or averaged over it, or None.
 
         Raises:
             InputError: a shape is wrong or a number is not finite; the filter stays as it was.
@@ -429,13 +505,18 @@ class WrenchUKF:
                         f"correct_imu: {name} must be three finite numbers, got {value!r}"
                     )
                 z[where] = array
+        if not self.record[0]["imu"]["used"]:
+            begin_imu(self.record)
+            self._call = None
         take_in_imu(self.record, z, gyro is not None, accelerometer is not None)
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         call = self._call
         if call is None:
-            call = self._call = specialised(self._compiled_step, self.record, parts, dt, 0.0)
+            biases = self.record[0]["imu"]["used"]
+            step = self._compiled_step_with_biases if biases else self._compiled_step
+            call = self._call = specialised(step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return WrenchEstimate(self._now.copy())
