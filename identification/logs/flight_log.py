@@ -10,9 +10,13 @@ One row a sample, time strictly increasing. Columns of the file:
 ``vbat`` (optional)            V        battery voltage
 ``fx, fy, fz`` (optional)      N        true external force, world
 ``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
+``ax, ay, az`` (optional)      m/s2     accelerometer at the centre: specific force, body; +g along z in a hover
+``gx, gy, gz`` (optional)      rad/s    gyro: angular velocity, body
 =============================  =======  ==========================================================================
 
-A row whose seven pose fields are all empty is one in which motion capture lost the vehicle. Other columns are ignored.
+A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
+A row whose three fields of an inertial sensor are all empty is one in which it was not read, so a sensor faster than the
+pose has rows of its own. Other columns are ignored.
 """  # noqa: E501
 
 from collections.abc import Mapping
@@ -31,6 +35,8 @@ Mask = NDArray[np.bool_]
 POSE = ("px", "py", "pz", "qw", "qx", "qy", "qz")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")
 TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
+ACCELEROMETER = ("ax", "ay", "az")
+GYRO = ("gx", "gy", "gz")
 REQUIRED = ("t", *POSE, *ROTORS)
 
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
@@ -48,6 +54,9 @@ class FlightLog:
     voltage: Array | None = None  # (N,) V
     force: Array | None = None  # (N, 3) N, world, truth
     torque: Array | None = None  # (N, 3) Nm, world, truth
+    # (N, 3) m/s2, body: specific force, +g along z in a hover; NaN rows: not measured
+    accelerometer: Array | None = None
+    gyro: Array | None = None  # (N, 3) rad/s, body; NaN rows: not measured
     name: str = ""
     source: str = ""  # the file and the reader
     notes: tuple[
@@ -85,9 +94,12 @@ def check_finite(table: Table, name: str, column: Array, where: Mask | None = No
     if bad.any():
         i = int(np.flatnonzero(bad)[0])
         found = "empty or NaN" if np.isnan(column[i]) else "infinite"
+        sensor = next((names for names in (ACCELEROMETER, GYRO) if name in names), None)
         more = (
             "; only all seven pose columns together may be empty (pose lost)"
             if name in POSE
+            else f"; only {', '.join(sensor)} together may be empty (not measured)"
+            if sensor
             else ""
         )
         raise InputError(
@@ -129,10 +141,28 @@ def unit_quaternions(table: Table, quaternions: Array, where: Mask, columns: str
     return unit
 
 
+def sensor_columns(
+    table: Table, columns: Mapping[str, Array], names: tuple[str, ...]
+) -> Array | None:
+    """Return what an inertial sensor's three columns hold (N, 3), NaN in rows where it was not
+    read; None where ``names`` is empty or it was never read.
+
+    Raises:
+        InputError: a row has one or two of the three, or a number that is not finite.
+    """
+    if not names:
+        return None
+    values = np.column_stack([columns[name] for name in names])
+    read: Mask = ~np.all(np.isnan(values), axis=1)
+    for name in names:
+        check_finite(table, name, columns[name], read)
+    return values if read.any() else None
+
+
 def time_notes(t: Array) -> tuple[str, ...]:
     """Return a note on the gaps in times (N,) in s: steps of more than 3 median ones."""
     step = np.diff(t)
-    gaps = np.flatnonzero(step > _GAP * np.median(step))
+    gaps = np.flatnonzero(step > _GAP * np.median(step)) if step.size else step
     if not gaps.size:
         return ()
     longest = gaps[np.argmax(step[gaps])]
@@ -162,6 +192,8 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
         voltage=cut(log.voltage),
         force=cut(log.force),
         torque=cut(log.torque),
+        accelerometer=cut(log.accelerometer),
+        gyro=cut(log.gyro),
         valid=log.valid[keep],
         extra={name: x[keep] for name, x in log.extra.items()},
     )
@@ -183,4 +215,7 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     if log.force is not None and log.torque is not None:
         truth = np.column_stack([log.force, log.torque])
         columns |= {name: truth[:, i] for i, name in enumerate(TRUTH)}
+    for names, sensor in ((ACCELEROMETER, log.accelerometer), (GYRO, log.gyro)):
+        if sensor is not None:
+            columns |= {name: sensor[:, i] for i, name in enumerate(names)}
     write_table(columns, Path(path))

@@ -9,6 +9,8 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .flight_log import (
+    ACCELEROMETER,
+    GYRO,
     POSE,
     REQUIRED,
     ROTORS,
@@ -19,9 +21,11 @@ from .flight_log import (
     check_finite,
     check_times,
     log_name,
+    sensor_columns,
     time_notes,
     unit_quaternions,
 )
+from .inertial import check_inertial
 from .readers import READERS, find_reader
 from .tables import Table, open_table
 
@@ -85,20 +89,15 @@ def read_log(
 
 def _canonical(table: Table) -> FlightLog:
     path = table.path
-    truth = [name for name in TRUTH if name in table.header]
-    if truth and len(truth) < len(TRUTH):
-        absent = [name for name in TRUTH if name not in truth]
-        raise InputError(
-            f"{path}: missing column(s) {', '.join(absent)}; expected all of {', '.join(TRUTH)} or "
-            f"none"
-        )
+    truth, *sensors = (_all_or_none(table, group) for group in (TRUTH, ACCELEROMETER, GYRO))
     names = [*REQUIRED, *(["vbat"] if "vbat" in table.header else []), *truth]
-    columns = table.read(names)
+    columns = table.read([*names, *(name for sensor in sensors for name in sensor)])
 
     pose = np.column_stack([columns[name] for name in POSE])
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
+    accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
     check_times(table, columns["t"])
     quaternion = unit_quaternions(table, pose[:, 3:], ~lost, "qw, qx, qy, qz")
     rotor_speeds = np.column_stack([columns[name] for name in ROTORS])
@@ -123,16 +122,39 @@ def _canonical(table: Table) -> FlightLog:
         voltage=columns.get("vbat"),
         force=np.column_stack([columns[name] for name in TRUTH[:3]]) if truth else None,
         torque=np.column_stack([columns[name] for name in TRUTH[3:]]) if truth else None,
+        accelerometer=accelerometer,
+        gyro=gyro,
         name=log_name(path),
         source=str(path),
-        notes=(*time_notes(columns["t"]), *_pose_notes(columns["t"], lost)),
+        notes=(
+            *time_notes(columns["t"]),
+            *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
+        ),
         valid=~lost,
     )
 
 
-def _pose_notes(t: Array, lost: Mask) -> tuple[str, ...]:
+def _all_or_none(table: Table, group: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a group of optional columns, or nothing where the table has none of them.
+
+    Raises:
+        InputError: it has some of them only.
+    """
+    absent = [name for name in group if name not in table.header]
+    if absent and len(absent) < len(group):
+        raise InputError(
+            f"{table.path}: missing column(s) {', '.join(absent)}; expected all of "
+            f"{', '.join(group)} or none"
+        )
+    return () if absent else group
+
+
+def _pose_notes(t: Array, lost: Mask, fast_sensor: bool) -> tuple[str, ...]:
+    """Return a note on rows without a pose; beside a faster inertial sensor, on its gaps alone."""
     if not lost.any():
         return ()
+    if fast_sensor:
+        return tuple(f"of the pose: {text}" for text in time_notes(t[~lost]))
     return (
         f"{int(lost.sum())} of {len(t)} rows without a pose (motion capture lost the vehicle), the "
         f"first at "
@@ -171,6 +193,8 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
                 f"{vehicle.name}: "
                 "are omega1..omega4 in revolutions per second? Expected rad/s"
             )
+    log, wrong = check_inertial(log, 9.81 if vehicle is None else vehicle.gravity)
+    doubts += wrong
     if not doubts:
         return log
     for doubt in doubts:

@@ -16,6 +16,9 @@ What differs from the kit's own format:
 * **Stray samples**: logs begin with a few samples and then a gap; everything before the gap
   is dropped.
 
+* **Inertial sensors** are those of the Crazyflie's body, forward, left, up, in SI units:
+  ``omega_*`` is the gyro, ``acc_*`` the accelerometer.
+
 ``extra`` keeps, where logged: ``onboard_quaternion`` (N, 4), ``angular_velocity`` (N, 3) rad/s
 body, ``onboard_position`` (N, 3) m, ``onboard_velocity`` (N, 3) m/s, ``specific_force`` (N, 3) m/s2
 body, ``commanded_thrust`` (N,) N, ``commanded_torque`` (N, 3) Nm, ``payload_position`` (N, 3) m,
@@ -119,6 +122,8 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         name=log_name(path),
         source=f"{path} (reader crazyswarm2)",
         notes=(*notes, *time_notes(t)),
+        accelerometer=extra.get("specific_force"),
+        gyro=extra.get("angular_velocity"),
         valid=valid,
         extra=extra,
         commanded=True,

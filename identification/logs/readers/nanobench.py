@@ -14,6 +14,9 @@ The polynomial is Foerster's (System Identification of the Crazyflie 2.0 Nano Qu
 2.130295e-11 u^2 + 1.032633e-6 u + 5.484560e-4 N per motor at ``u = PWM * voltage_ref / 4.2 V``: his counts are taken to be
 those of a full cell. A motor without PWM gives no thrust, not the polynomial's constant.
 
+**Accelerometer.** In g, of the Crazyflie's body (forward, left, up); read where all three axes are in the file. The
+gyro is not: the file states no unit for it.
+
 **Voltage.** It is read ten times a second and comes late: put 0.05 to 0.1 s sooner it leaves the least in the vertical
 force of four flights, 0.0909 m/s2 (0.1 s) and 0.0911 (0.05 s) instead of 0.0934 pooled (4 Hz; exponent, motor lag and a scale
 for each flight fitted), and 0.0971 put 0.1 s later. It is put 0.075 s sooner. The motor lag that fits goes with it: 65 ms
@@ -55,6 +58,7 @@ from ..flight_log import (
     check_finite,
     check_times,
     log_name,
+    sensor_columns,
     time_notes,
     unit_quaternions,
 )
@@ -71,6 +75,8 @@ _MOTORS = (
     "motor_motor_m2",
     "motor_motor_m1",
 )  # in the kit's order of rotors
+_ACCELEROMETER = ("imu_acc_x", "imu_acc_y", "imu_acc_z")  # g, body axes forward, left, up
+_G = 9.81  # m/s2
 _FULL_COUNT = 65535.0
 _FULL_VOLTAGE = 4.2  # V
 _VOLTAGE_LATE = 0.075  # s
@@ -92,7 +98,9 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         raise InputError(
             f"{path}: missing column(s) {', '.join(missing)}; expected those of a nanobench log"
         )
-    columns = table.read(names)
+    inertial = _ACCELEROMETER if set(_ACCELEROMETER) <= set(table.header) else ()
+    columns = table.read([*names, *inertial])
+    accelerometer = sensor_columns(table, columns, inertial)
     pose = np.column_stack([columns[name] for name in _POSE])
     valid: Mask = ~np.all(np.isnan(pose), axis=1)
     for name in names:
@@ -134,6 +142,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         quaternion=unit_quaternions(table, pose[:, 3:], valid, "qw, qx, qy, qz"),
         rotor_speeds=np.sqrt(motor_thrust(pwm, np.full(len(pwm), reference)) / vehicle.k),
         voltage=sooner,
+        accelerometer=None if accelerometer is None else _G * accelerometer,
         name=log_name(path),
         source=f"{path} (reader nanobench)",
         notes=(*notes, *time_notes(columns["t"])),

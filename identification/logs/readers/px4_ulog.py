@@ -14,6 +14,8 @@ to 1, with relative thrust ``f x^2 + (1 - f) x`` and f the parameter THR_MDL_FAC
 is set so that the median thrust in flight is the declared vehicle's weight: mass and a factor on
 thrust cannot be found from such a log.
 
+**Gyro and accelerometer.** ``sensor_combined``, rad/s and m/s2 in forward, right, down.
+
 Motors are renumbered by the positions in the parameters CA_ROTORn_PX and PY where the log has them,
 else PX4's quad x is assumed: 1 front-right, 2 rear-left, 3 front-left, 4 rear-right.
 """
@@ -42,7 +44,8 @@ SUFFIXES = (".ulg",)
 _ODOMETRY = ("vehicle_mocap_odometry", "vehicle_visual_odometry")
 _ONBOARD = ("vehicle_local_position", "vehicle_attitude")
 _ROTORS = ("esc_status", "actuator_motors", "actuator_outputs")
-_TOPICS = (*_ODOMETRY, *_ONBOARD, *_ROTORS, "battery_status", "vehicle_land_detected")
+_INERTIAL = "sensor_combined"
+_TOPICS = (*_ODOMETRY, *_ONBOARD, *_ROTORS, _INERTIAL, "battery_status", "vehicle_land_detected")
 _QUAD_X = (
     2,
     1,
@@ -98,7 +101,14 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     notes = [*pose_notes, order_note, *rotor_notes]
     if log.damaged:
         notes.append("the file is damaged; what could be read of it was used")
-    return flight_log(path, "px4_ulog", pose, rotors, _voltage(log), tuple(notes))
+    accelerometer, gyro = (_inertial(log, field) for field in ("accelerometer_m_s2", "gyro_rad"))
+    if accelerometer is not None or gyro is not None:
+        notes.append(
+            f"gyro and accelerometer: {_INERTIAL}, with what PX4 calibrated, at the pose's times"
+        )
+    return flight_log(
+        path, "px4_ulog", pose, rotors, _voltage(log), tuple(notes), accelerometer, gyro
+    )
 
 
 def _open(path: Path) -> _Log:
@@ -399,5 +409,17 @@ def _voltage(log: _Log) -> Stream | None:
             values = log.columns("battery_status", fields, ("voltage_v",))
             return Stream(
                 "battery_status", 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64), values
+            )
+    return None
+
+
+def _inertial(log: _Log, field: str) -> Stream | None:
+    """Return one inertial sensor in the kit's body axes, or None where it was not logged."""
+    names = tuple(f"{field}[{i}]" for i in range(3))
+    for fields in log.topics.get(_INERTIAL, []):
+        if set(names) <= set(fields):
+            t = 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64)
+            return Stream(
+                _INERTIAL, t, log.columns(_INERTIAL, fields, names) * np.array([1.0, -1.0, -1.0])
             )
     return None

@@ -6,6 +6,7 @@ file given as the reader's option, ``rosbag:FILE.yaml``::
     pose: {topic: /vicon/drone, frame: flu}        # or ned; default flu
     rotors: {topic: /motors, unit: rad/s, order: [3, 2, 4, 1]}
     voltage: {topic: /battery}                     # optional
+    imu: {topic: /imu, frame: flu}                 # optional; or ned, for body axes forward, right, down
 
 ``/topic`` alone stands for ``{topic: /topic}``. What the file does not name is the bag's only topic of a type that fits.
 
@@ -16,6 +17,8 @@ rotors     mav_msgs/Actuators (``angular_velocities``) or std_msgs/Float32MultiA
            ``rad/s`` (default for Actuators), ``rpm`` or ``rev/s``. ``order``: which elements, from 1, are rotors 1
            front-left, 2 rear-left, 3 rear-right, 4 front-right; PX4's quad x is [3, 2, 4, 1]; default [1, 2, 3, 4]
 voltage    sensor_msgs/BatteryState
+imu        sensor_msgs/Imu, without its attitude: specific force (m/s2) and angular velocity (rad/s), as ROS's REP 145 has
+           them. Only where the file names it: a bag may hold several, mounted in any way
 =========  =============================================================================================================
 
 A sample's time is its header's, where that runs within a second of the bag's clock, else the time it was recorded.
@@ -57,8 +60,14 @@ _TYPES = {
     ),
     "rotors": (_ACTUATORS, _ARRAY),
     "voltage": ("sensor_msgs/msg/BatteryState",),
+    "imu": ("sensor_msgs/msg/Imu",),
 }
-_KEYS = {"pose": ("topic", "frame"), "rotors": ("topic", "unit", "order"), "voltage": ("topic",)}
+_KEYS = {
+    "pose": ("topic", "frame"),
+    "rotors": ("topic", "unit", "order"),
+    "voltage": ("topic",),
+    "imu": ("topic", "frame"),
+}
 _UNITS = {"rad/s": 1.0, "rpm": 2.0 * math.pi / 60.0, "rev/s": 2.0 * math.pi}
 _FRAMES = ("flu", "ned")
 _SAME_CLOCK = 1.0  # s between a header's time and the recording's
@@ -118,12 +127,26 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         for part, (nanoseconds, values, _) in streams.items()
     }
     return flight_log(
-        path, "rosbag", made["pose"], made["rotors"], made.get("voltage"), tuple(notes)
+        path,
+        "rosbag",
+        made["pose"],
+        made["rotors"],
+        made.get("voltage"),
+        tuple(notes),
+        *_inertial(made.get("imu")),
     )
 
 
+def _inertial(imu: Stream | None) -> tuple[Stream | None, Stream | None]:
+    """Return accelerometer and gyro of an IMU's stream."""
+    if imu is None:
+        return None, None
+    force, turn = imu.values[:, :3], imu.values[:, 3:]
+    return Stream(imu.name, imu.t, force), Stream(imu.name, imu.t, turn)
+
+
 def _topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]:
-    """Return the settings of pose, rotors and voltage, checked, and the name of the file that they
+    """Return the settings of each part, checked, and the name of the file that they
     are from.
     """
     stem = path.name if path.is_dir() else path.stem
@@ -265,10 +288,12 @@ def _check_definition(path: Path, connection: Any, store: Any, ros1: bool) -> No
 
 
 def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> str | None:
-    """Return the topic of pose, rotors or voltage: the one named, or the only one that fits; None:
-    no voltage.
+    """Return the topic of a part: the one named, or the only one that fits; None:
+    no voltage, no named IMU.
     """
     fitting = _TYPES[part]
+    if part == "imu" and "topic" not in setting:
+        return None
     if "topic" in setting:
         topic = str(setting["topic"])
         if topic not in bag.types:
@@ -326,6 +351,8 @@ def _stream(
             f"{bag.path}: {part}: topic {topic} has no messages; expected at least two"
         )
     numbers = np.array(values, dtype=np.float64)
+    if part == "imu" and setting.get("frame") == "ned":
+        numbers = numbers * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
     if part == "pose" and setting.get("frame") == "ned":
         numbers = np.column_stack(from_ned(numbers[:, :3], numbers[:, 3:]))
     received_at, sampled_at = np.array(recorded, dtype=np.int64), np.array(stamped, dtype=np.int64)
@@ -365,9 +392,14 @@ def _rotor_values(message: Any, kind: str, setting: Mapping[str, Any], where: st
 
 
 def _values(message: Any, kind: str) -> list[float]:
-    """Return position and scalar-first quaternion, or the voltage."""
+    """Return position and scalar-first quaternion, the voltage, or specific force and angular
+    velocity.
+    """
     if kind == "sensor_msgs/msg/BatteryState":
         return [message.voltage]
+    if kind == "sensor_msgs/msg/Imu":
+        force, turn = message.linear_acceleration, message.angular_velocity
+        return [force.x, force.y, force.z, turn.x, turn.y, turn.z]
     if kind == "geometry_msgs/msg/TransformStamped":
         place, turn = message.transform.translation, message.transform.rotation
     else:

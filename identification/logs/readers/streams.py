@@ -15,6 +15,7 @@ from ..flight_log import FlightLog, Mask, time_notes
 Array = NDArray[np.float64]
 
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
+_SENSOR_GAP = 3.5  # median steps, across which an inertial sensor is not interpolated
 _ROTOR_GAP = 0.5  # s without rotor speeds that deserves a note
 
 
@@ -46,6 +47,17 @@ class Stream:
         first and the last.
         """
         return np.column_stack([np.interp(t, self.t, column) for column in self.values.T])
+
+    def between(self, t: Array) -> Array:
+        """Return the values (M, K) at times (M,) in s, linear between samples; NaN beyond the first
+        and the last, and where samples are missing.
+        """
+        out = self.at(t)
+        step = np.diff(self.t)
+        after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
+        there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
+        out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
+        return out
 
 
 def from_ned(position: Array, quaternion: Array) -> tuple[Array, Array]:
@@ -81,9 +93,12 @@ def flight_log(
     rotors: Stream,
     voltage: Stream | None,
     notes: tuple[str, ...],
+    accelerometer: Stream | None = None,
+    gyro: Stream | None = None,
 ) -> FlightLog:
     """Return the log of a pose (position and scalar-first quaternion), rotor speeds and, where
-    there is one, a voltage.
+    they are there, a voltage, an accelerometer (m/s2) and a gyro (rad/s), body axes forward, left,
+    up.
 
     Rows are the pose's samples within the span of the rotor speeds; the others are interpolated to
     their times. A pose with a number that is not finite is not valid.
@@ -155,8 +170,25 @@ def flight_log(
         quaternion=values[:, 3:] / length[:, None],
         rotor_speeds=np.abs(speeds),
         voltage=None if voltage is None else voltage.at(t)[:, 0],
+        accelerometer=_sensor(accelerometer, t),
+        gyro=_sensor(gyro, t),
         name=path.stem if path.is_file() else path.name,
         source=f"{path} (reader {reader})",
         notes=(*notes, *time_notes(t - t[0])),
         valid=valid,
     )
+
+
+def _sensor(sensor: Stream | None, t: Array) -> Array | None:
+    """Return what an inertial sensor measured (M, 3) at times (M,) in s, or None where it did not.
+
+    A sensor that is faster than the pose is thinned to the pose's times.
+    """
+    if sensor is None:
+        return None
+    good = np.isfinite(sensor.values).all(axis=1)
+    sensor, _ = Stream(sensor.name, sensor.t[good], sensor.values[good]).forward()
+    if len(sensor.t) < 2:
+        return None
+    values = sensor.between(t)
+    return values if np.isfinite(values[:, 0]).any() else None

@@ -45,7 +45,8 @@ def path(tmp_path):
 
 
 def assert_same(one, other):
-    for name in ("t", "position", "rotor_speeds", "voltage", "force", "torque", "valid"):
+    columns = ("t", "position", "rotor_speeds", "voltage", "force", "torque", "valid")
+    for name in (*columns, "accelerometer", "gyro"):
         a, b = getattr(one, name), getattr(other, name)
         assert (a is None) == (b is None)
         if a is not None:
@@ -259,6 +260,12 @@ def flight_logs(draw):
         np.nan,
     )
     optional = draw(st.booleans())
+    inertial = np.where(
+        draw(arrays(bool, (count, 2, 1))),
+        draw(arrays(float, (count, 2, 3), elements=finite)),
+        np.nan,
+    )
+    read = np.isfinite(inertial[:, :, 0]).any(axis=0)
     return FlightLog(
         t=np.cumsum(steps),
         position=pose[:, :3],
@@ -268,6 +275,8 @@ def flight_logs(draw):
         voltage=draw(arrays(float, count, elements=st.floats(0, 20))) if optional else None,
         force=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
         torque=draw(arrays(float, (count, 3), elements=finite)) if optional else None,
+        accelerometer=inertial[:, 0] if read[0] else None,
+        gyro=inertial[:, 1] if read[1] else None,
     )
 
 

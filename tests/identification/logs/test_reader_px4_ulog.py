@@ -32,6 +32,13 @@ def motion(t):
     return position, turn
 
 
+def inertial(t):
+    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
+    turn, after = motion(t)[1], motion(t + 1e-5)[1]
+    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
+    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
+
+
 def ned(t):
     position, turn = motion(t)
     return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP).as_quat()[
@@ -132,6 +139,27 @@ def test_motion_capture_and_turn_rates(write, t, topic, new, vehicle):
     np.testing.assert_allclose(log.voltage, 12.0 - 0.1 * t, atol=1e-5)
     assert any(topic in note and "y west" in note for note in log.notes)
     assert any("3, 2, 4, 1" in note for note in log.notes)
+
+
+def test_inertial_sensors_come_in_the_kits_axes(write, t, vehicle):
+    times = wide(t)
+    gyro, force = inertial(times)
+    fields = {
+        "uint64_t timestamp": stamps(times),
+        "float gyro_rad": gyro @ FLIP,
+        "float accelerometer_m_s2": force @ FLIP,
+    }
+    topics = {"vehicle_mocap_odometry": odometry(t), "esc_status": esc(times)}
+    log = read_log(write(topics | {"sensor_combined": fields}), "px4_ulog", vehicle)
+    np.testing.assert_allclose(log.gyro, inertial(log.t)[0], atol=1e-3)
+    np.testing.assert_allclose(log.accelerometer, inertial(log.t)[1], atol=1e-3)
+    # half a second in which nothing was read stays empty
+    lost = (times > 0.7) & (times < 1.2)
+    fields = {name: column[~lost] for name, column in fields.items()}
+    log = read_log(write(topics | {"sensor_combined": fields}), "px4_ulog", vehicle)
+    missing = np.isnan(log.gyro).all(axis=1)
+    assert 48 <= missing.sum() <= 51
+    assert read_log(write(topics), "px4_ulog", vehicle).gyro is None
 
 
 def test_level_and_facing_north_is_the_unit_quaternion(write, t, vehicle):

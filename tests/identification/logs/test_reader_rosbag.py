@@ -50,6 +50,13 @@ def motion(t):
     return position, turn
 
 
+def inertial(t):
+    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
+    turn, after = motion(t)[1], motion(t + 1e-5)[1]
+    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
+    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
+
+
 def growth(t):
     return 1.0 + 0.1 * t
 
@@ -104,6 +111,14 @@ class Messages:
         layout = self.types["std_msgs/msg/MultiArrayLayout"]([], 0)
         return self.types["std_msgs/msg/Float32MultiArray"](
             layout, (np.asarray(speeds) * growth(t)).astype(np.float32)
+        )
+
+    def imu(self, t):
+        make = self.types["geometry_msgs/msg/Vector3"]
+        zero, turn = np.zeros(9), self.types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+        (gyro,), (force,) = inertial(np.array([t]))
+        return self.types["sensor_msgs/msg/Imu"](
+            self.header(t), turn, zero, make(*(FLIP @ gyro)), zero, make(*(FLIP @ force)), zero
         )
 
     def battery(self, t):
@@ -235,6 +250,22 @@ def test_a_map_states_topics_frames_units_and_order(write, kind, pose, vehicle):
     assert any("half a turn about x" in note for note in log.notes)
 
 
+@pytest.mark.parametrize("kind", ["bag", "mcap"])
+def test_an_imu_is_taken_where_the_map_names_it(write, kind, vehicle):
+    topics = {
+        "/a": pose_topic(),
+        "/motors": actuator_topic(),
+        "/imu": ("sensor_msgs/msg/Imu", WIDE, lambda messages, t: messages.imu(t)),
+    }
+    path = write(kind, topics)
+    assert read_log(path, "rosbag", vehicle).gyro is None
+    path.with_name("flight.topics.yaml").write_text("imu: {topic: /imu, frame: ned}")
+    log = read_log(path, "rosbag", vehicle)
+    gyro, force = inertial(log.t)
+    np.testing.assert_allclose(log.gyro, gyro, atol=2e-3)
+    np.testing.assert_allclose(log.accelerometer, force, atol=2e-3)
+
+
 def test_a_map_may_lie_elsewhere(write, tmp_path, vehicle):
     path = write("bag", {"/a": pose_topic(), "/b": pose_topic(), "/motors": actuator_topic()})
     (tmp_path / "other.yaml").write_text("pose: /b\n")
@@ -295,7 +326,7 @@ def test_messages_out_of_order_are_left_out(write, vehicle):
             "pose: topic /motors is of type mav_msgs/msg/Actuators; expected "
             "geometry_msgs/msg/PoseStamped",
         ),
-        ("pos: /a", "unknown key 'pos'; expected one of pose, rotors, voltage"),
+        ("pos: /a", "unknown key 'pos'; expected one of imu, pose, rotors, voltage"),
         (
             "pose: {topic: /a, frames: ned}",
             "pose: unknown key 'frames'; expected one of frame, topic",
@@ -308,7 +339,7 @@ def test_messages_out_of_order_are_left_out(write, vehicle):
         ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
         ("rotors: {order: 5}", "order: expected four different elements"),
         ("rotors: /n", "states no unit; expected unit: rad/s, rpm, rev/s"),
-        ("- pose", "expected a mapping of pose, rotors, voltage to topics, got list"),
+        ("- pose", "expected a mapping of pose, rotors, voltage, imu to topics, got list"),
         ("pose: [", "not valid YAML"),
     ],
 )

@@ -1,0 +1,153 @@
+"""Inertial sensors in a log: read whole or not at all, and left out where the pose contradicts
+them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.inertial import check_inertial
+from windwrench.identification.logs.reading import read_log
+
+VEHICLE = load_vehicle("ardrone2")
+FRD = np.array([1.0, -1.0, -1.0])
+
+
+def flight(seconds=6.0, rate=200.0, moving=1.0, noise=0.003, bias=0.1, seed=0):
+    """A log with a biased, noisy IMU in every row."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    position, angles = _path(t, moving)
+    turn = Rotation.from_euler("ZYX", angles)
+    after = Rotation.from_euler("ZYX", _path(t + 1e-5, moving)[1])
+    acceleration = (
+        _path(t + 1e-3, moving)[0] - 2 * position + _path(t - 1e-3, moving)[0]
+    ) / 1e-6 + [0.0, 0.0, 9.81]
+    shaken = turn * Rotation.from_rotvec(noise * rng.standard_normal((len(t), 3)))
+    return FlightLog(
+        t,
+        position + noise * rng.standard_normal(position.shape),
+        shaken.as_quat(scalar_first=True),
+        np.full((len(t), 4), VEHICLE.hover_rate),
+        accelerometer=turn.inv().apply(acceleration) + bias + rng.normal(0, 0.3, (len(t), 3)),
+        gyro=(turn.inv() * after).as_rotvec() / 1e-5 + bias + rng.normal(0, 0.05, (len(t), 3)),
+        source="flight.csv",
+    )
+
+
+def _path(t, moving):
+    swing = moving * np.sin(np.multiply.outer(t, [2.0, 3.1, 1.3]))
+    return np.array([0, 0, 2]) + swing, 0.3 * moving * np.sin(
+        np.multiply.outer(t, [1.7, 2.9, 3.3]) + 0.4
+    )
+
+
+@pytest.mark.parametrize("moving", [0.0, 1.0])
+@pytest.mark.parametrize("seconds", [1.0, 6.0])
+def test_honest_sensors_pass(moving, seconds):
+    log = flight(seconds, moving=moving)
+    checked, notes = check_inertial(log)
+    assert notes == ()
+    assert checked is log
+
+
+WRONG = {
+    "gyro": {
+        "degrees per second; expected rad/s": 180 / np.pi,
+        "forward, right, down": FRD,
+        "degrees per second.*forward, right, down": 180 / np.pi * FRD,
+        "inverted": -1.0,
+        "contradict the attitude's rate": [0.0, 0.0, 3.0],
+    },
+    "accelerometer": {
+        "look like g; expected m/s2": 1 / 9.80665,
+        "forward, right, down": FRD,
+        "look like g.*forward, right, down": FRD / 9.80665,
+        "inverted": -1.0,
+        "contradict the position": 3.0,
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("sensor", "words", "factor"),
+    [(sensor, words, factor) for sensor, cases in WRONG.items() for words, factor in cases.items()],
+)
+def test_wrong_sensors_are_left_out(tmp_path, sensor, words, factor):
+    log = flight()
+    other = "gyro" if sensor == "accelerometer" else "accelerometer"
+    write_log(replace(log, **{sensor: factor * getattr(log, sensor)}), tmp_path / "flight.csv")
+    with pytest.warns(UserWarning, match=f"{words}.*They were left out"):
+        read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
+    assert getattr(read, sensor) is None
+    np.testing.assert_array_equal(getattr(read, other), getattr(log, other))
+    assert any("left out" in note for note in read.notes)
+
+
+@pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
+def test_units_are_told_in_a_short_hover(sensor):
+    log = flight(1.0, moving=0.0, bias=0.01)
+    factor = {"gyro": 180 / np.pi, "accelerometer": 1 / 9.81}[sensor]
+    (note,) = check_inertial(replace(log, **{sensor: factor * getattr(log, sensor)}))[1]
+    assert {"gyro": "degrees per second", "accelerometer": "look like g"}[sensor] in note
+
+
+def test_an_acceleration_without_gravity_is_told():
+    log = flight()
+    up = Rotation.from_quat(log.quaternion, scalar_first=True).inv().apply([0.0, 0.0, 9.81])
+    (note,) = check_inertial(replace(log, accelerometer=log.accelerometer - up))[1]
+    assert "without gravity" in note
+
+
+def test_a_sensor_that_stands_still_was_not_read():
+    log = flight()
+    (note,) = check_inertial(replace(log, gyro=np.zeros_like(log.gyro)))[1]
+    assert "never change" in note
+
+
+def test_leaps_and_gaps_of_the_pose_are_no_sensors_fault():
+    log = flight()
+    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position[400:] += 5.0
+    quaternion[700] = [0.0, 1.0, 0.0, 0.0]
+    position[900:1000] = quaternion[900:1000] = np.nan
+    log = replace(log, position=position, quaternion=quaternion, valid=np.empty(0, dtype=bool))
+    assert check_inertial(log)[1] == ()
+
+
+def test_a_sensor_faster_than_the_pose_has_rows_of_its_own(tmp_path):
+    log = flight(rate=1000.0)
+    every = np.arange(len(log.t)) % 10 == 0
+    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position[~every] = quaternion[~every] = np.nan
+    log = replace(log, position=position, quaternion=quaternion, valid=every)
+    write_log(log, tmp_path / "flight.csv")
+    read = read_log(tmp_path / "flight.csv", vehicle=VEHICLE)
+    assert read.notes == ()  # no pose was lost between two poses
+    np.testing.assert_array_equal(read.gyro, log.gyro)
+    thinned = with_rows(read, every)
+    np.testing.assert_array_equal(thinned.accelerometer, log.accelerometer[every])
+
+
+@pytest.mark.parametrize("sensor", ["ax,ay,az", "gx,gy,gz"])
+def test_three_columns_come_together(tmp_path, sensor):
+    names = sensor.split(",")
+    path = tmp_path / "flight.csv"
+    write_log(flight(1.0), path)
+    header, *rows = path.read_text().splitlines()
+    at = header.split(",").index(names[1])
+    cut = [",".join(x for i, x in enumerate(row.split(",")) if i != at) for row in [header, *rows]]
+    path.write_text("\n".join(cut))
+    with pytest.raises(InputError, match=rf"missing column\(s\) {names[1]}; expected all of"):
+        read_log(path)
+    fields = rows[2].split(",")
+    fields[at] = ""
+    path.write_text("\n".join([header, *rows[:2], ",".join(fields), *rows[3:]]))
+    with pytest.raises(
+        InputError, match=f"column {names[1]}, row 3 .* only {', '.join(names)} together may be"
+    ):
+        read_log(path)
