@@ -28,7 +28,7 @@ from ..runtime.compiled import Record, compiled
 from .covariance import carry_rows
 from .error_state import error_from
 from .estimate import NIS, Array
-from .filter_record import BIASES, COMPANIONS, N
+from .filter_record import AGREEING, BIASES, COMPANIONS, N
 from .tuning import UKFTuning
 
 _WIDER = 1.0 + 1e-6  # of a variance: by more than rounding
@@ -50,14 +50,14 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
     if gate is not None:
         from scipy.stats import chi2
 
-        imu["gate"] = chi2.ppf(gate, 3), chi2.ppf(gate, 6)
+        imu["gate"] = chi2.ppf(gate, (3, 6, 3 * (AGREEING - 1)))
     _forget(f)
 
 
 @compiled
 def _forget(f: Record) -> None:
     imu = f.imu
-    imu.known, imu.refused = 0, 0
+    imu.known, imu.refused, imu.in_row = 0, 0, 0
     for s in range(2):
         imu.doubt[s] = -1.0
     for i in range(COMPANIONS):

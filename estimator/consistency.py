@@ -265,6 +265,7 @@ def simulate_model(
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     covariance: ArrayLike | None = None,
     rate_gain: float = 20.0,
+    push: ArrayLike | None = None,
 ) -> ModelRun:
     """Return a flight in which the filter's assumptions hold to the letter.
 
@@ -289,6 +290,8 @@ def simulate_model(
         rate_gain: 1/s, of a loop on the true body rate about ``angular_velocity``, without which a
             walk of the torque spins the vehicle up; the rotor speeds that it asks for are those of
             the result. Position and attitude drift.
+        push: (K, 6) Nm and N, world, that the external torque and force change by after each step
+            beside their walks: what the filter does not expect.
 
     Raises:
         InputError: a shape is wrong.
@@ -325,6 +328,14 @@ def simulate_model(
         (tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk)
     ):
         process[:, 3 * n : 3 * n + 3] *= np.asarray(deviation, dtype=np.float64)
+    if push is not None:
+        change = np.asarray(push, dtype=np.float64)
+        if change.shape != (steps, 6):
+            raise InputError(
+                f"simulate_model: push must be ({steps}, 6) like rotor_speeds, got shape "
+                f"{change.shape}"
+            )
+        process[:, 6:] += change
     measurement = rng.standard_normal((steps, MEASURED))
     measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
     measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)

@@ -23,7 +23,7 @@ from ..runtime.compiled import Record, compiled
 from .bias_states import cross_covariance, divide, lower_root, restore_bias_prior, split
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
-from .filter_record import COMPANIONS, N
+from .filter_record import AGREEING, COMPANIONS, N
 
 # s of nothing but refusals after which a sensor's bias is no longer believed: longer than the burst
 # of vibration of a touch-down
@@ -128,21 +128,27 @@ def _nis(covariance: Array, innovation: Array, first: int, last: int) -> float:
 def _believed(
     f: Record, covariance: Array, innovation: Array, first: int, last: int
 ) -> tuple[int, int]:
-    """Return the rows that the gate lets in. Where both sensors together are unlikely, the likelier
-    may be right: one that saturates does not cost the other.
+    """Return the rows that the gate lets in. Where both sensors together are unlikely, one may be
+    right: an accelerometer that saturates does not cost the gyro.
     """
-    imu = f.imu
-    if f.x[NIS] <= imu.gate[1 if last - first == 6 else 0]:
+    imu, gate = f.imu, f.imu.gate
+    if f.x[NIS] <= gate[1 if last - first == 6 else 0]:
         for s in range(first // 3, last // 3):
             imu.doubt[s] = -1.0
+        if last == 6:
+            imu.in_row = 0
         return first, last
-    imu.refused += 1
-    begin, end = first, first
-    if last - first == 6:
-        gyro = _nis(covariance, innovation, 0, 3)
-        accelerometer = _nis(covariance, innovation, 3, 6)
-        if min(gyro, accelerometer) <= imu.gate[0]:
-            begin, end = (0, 3) if gyro < accelerometer else (3, 6)
+    gyro = _nis(covariance, innovation, 0, 3) if first == 0 else math.inf
+    accelerometer = _nis(covariance, innovation, 3, 6) if last == 6 else math.inf
+    pushed = last == 6 and accelerometer > gate[0] and _is_push(f, covariance, innovation)
+    if last == 6 and accelerometer <= gate[0]:
+        imu.in_row = 0
+    # unlikely only together: the likelier of the two
+    take_gyro = gyro <= gate[0] and (pushed or gyro < accelerometer)
+    take_accelerometer = pushed or (accelerometer <= gate[0] and not take_gyro)
+    begin, end = 0 if take_gyro else 3, 6 if take_accelerometer else 3
+    if end - begin < last - first:
+        imu.refused += 1
     for s in range(first // 3, last // 3):
         if begin <= 3 * s < end:
             imu.doubt[s] = -1.0
@@ -154,6 +160,33 @@ def _believed(
             # the innovation at hand is that of the old bias
             return first, first
     return begin, end
+
+
+@compiled
+def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
+    """Return whether the accelerometer samples that were unlikely in a row are a push: far from what
+    the filter expects, and no farther from each other than noise alone makes them, nor than two
+    weights from the expected. Vibration does not agree with itself, and a saturated sensor is too
+    far.
+    """
+    imu = f.imu
+    for i in range(3):
+        imu.unlikely[imu.in_row % AGREEING, i] = innovation[3 + i]
+    imu.in_row += 1
+    if imu.in_row < AGREEING:
+        return False
+    apart = np.zeros((3, AGREEING))
+    for i in range(3):
+        mean = 0.0
+        for k in range(AGREEING):
+            mean += imu.unlikely[k, i] / AGREEING
+        if abs(mean) > 2.0 * f.body.gravity:
+            return False
+        for k in range(AGREEING):
+            apart[i, k] = imu.unlikely[k, i] - mean
+    whitened = divide(lower_root(covariance[3:6, 3:6]), apart)
+    agreed: bool = np.sum(whitened * whitened) <= imu.gate[2]
+    return agreed
 
 
 @compiled
