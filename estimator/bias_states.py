@@ -1,4 +1,4 @@
-"""Biases of gyro and accelerometer, and the noise of the last step, beside the filter's error state.
+"""Biases of gyro and accelerometer, and the last step's noise, beside the filter's error state.
 
 Neither enters the dynamics. A bias walks on its own; the noise of a step ends with it. So both are
 kept as what the error state e says of them and a rest that it says nothing of,
@@ -337,7 +337,8 @@ def carry_with_jacobian(f: Record, dt: float, cross: Array) -> Array:
     """Return the same for the prediction of ``ekf.py``, which leaves the first rows of F - 1 in
     ``f.S``.
     """
-    return cross + np.concatenate((f.S @ cross, np.zeros((N - 12, cross.shape[1]))))
+    out: Array = cross + np.concatenate((f.S @ cross, np.zeros((N - 12, cross.shape[1]))))
+    return out
 
 
 @compiled

@@ -20,7 +20,11 @@ IMU = np.dtype(
         ("used", "i8"),  # whether ``correct_imu`` was ever called
         ("known", "i8"),  # whether the last step's noise is: there was one
         ("refused", "i8"),
-        ("gate", "f8", (3,)),  # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
+        (
+            "gate",
+            "f8",
+            (3,),
+        ),  # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
         ("in_row", "i8"),  # accelerometer samples that the gate would refuse
         ("unlikely", "f8", (AGREEING, 3)),  # innovations (m/s2) of the last of them
         ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not

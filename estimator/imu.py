@@ -164,10 +164,9 @@ def _believed(
 
 @compiled
 def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
-    """Return whether the accelerometer samples that were unlikely in a row are a push: far from what
-    the filter expects, and no farther from each other than noise alone makes them, nor than two
-    weights from the expected. Vibration does not agree with itself, and a saturated sensor is too
-    far.
+    """Return whether the accelerometer samples that were unlikely in a row are a push: far from
+    what the filter expects, by no more than two weights, and no farther from each other than noise
+    alone makes them. Vibration does not agree with itself, and a saturated sensor is too far.
     """
     imu = f.imu
     for i in range(3):

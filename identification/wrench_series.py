@@ -49,9 +49,9 @@ def estimate_log(
 
     The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
     those of the row before, in steps of at most one median period; a row without a pose is
-    prediction alone, and what gyro and accelerometer measured, if they did. After 2 s without a pose the estimate is held, and the filter starts anew at
-    the next pose. Rows before the first pose hold the filter's estimate at that pose: no wrench,
-    and its standard deviation.
+    prediction alone, and what gyro and accelerometer measured, if they did. After 2 s without a
+    pose the estimate is held, and the filter starts anew at the next pose. Rows before the first
+    pose hold the filter's estimate at that pose: no wrench, and its standard deviation.
 
     Args:
         log: the flight.

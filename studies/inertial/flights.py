@@ -31,8 +31,9 @@ class Flight:
 def fly(
     vehicle: Vehicle, noise: tuple[float, float], seconds: float, push: Array | None, seed: int
 ) -> Flight:
-    """Hover with a slow yaw, without a wrench but the ``push`` (K, 6) that each step adds; ``noise``
-    is that of the pose, m and rad.
+    """Hover with a slow yaw, without a wrench but the ``push`` (K, 6) that each step adds.
+
+    ``noise`` is that of the pose, m and rad.
     """
     base = UKFTuning.for_vehicle(vehicle, FINE)
     quiet = replace(

@@ -1,5 +1,5 @@
-"""Rise time against spread of the estimated wrench, consistency, faults and biases, with and without
-an IMU.
+"""Rise time against spread of the estimated wrench, consistency, faults and biases, with an IMU and
+without.
 """
 
 import time
@@ -84,7 +84,9 @@ def interval(values: Array) -> list[float]:
     return [float(v) for v in np.percentile(values, [2.5, 97.5])]
 
 
-def sweep(vehicle: Vehicle, runs: int, seed: int, progress: Callable[[float], None]) -> list[Result]:
+def sweep(
+    vehicle: Vehicle, runs: int, seed: int, progress: Callable[[float], None]
+) -> list[Result]:
     """Return rise time and spread of force and torque for every pose noise, trust and IMU rate."""
     rows, done = [], 0
     draws = np.random.default_rng(seed).integers(0, runs, size=(_DRAWS, runs))
@@ -101,7 +103,10 @@ def sweep(vehicle: Vehicle, runs: int, seed: int, progress: Callable[[float], No
                     done += 1
                     progress(done / (len(NOISES) * len(TRUSTS) * len(RATES) * len(RISES)))
                     curves.append(
-                        [[f @ FORCE / (FORCE @ FORCE), t @ TORQUE / (TORQUE @ TORQUE)] for f, t in found]
+                        [
+                            [f @ FORCE / (FORCE @ FORCE), t @ TORQUE / (TORQUE @ TORQUE)]
+                            for f, t in found
+                        ]
                     )
                     squares.append([[np.mean(w[settled] ** 2) for w in pair] for pair in found])
                 rows.append(
@@ -127,9 +132,13 @@ def _judge(curves: Array, squares: Array, draws: Array, rate: int) -> Result:
         drawn = [figures(chosen) for chosen in draws]
         out[kind] = {
             "spread": spread.tolist(),
-            "spread_ci95": [interval(np.array([d[0][r] for d in drawn])) for r in range(len(RISES))],
+            "spread_ci95": [
+                interval(np.array([d[0][r] for d in drawn])) for r in range(len(RISES))
+            ],
             "rise_s": rise.tolist(),
-            "rise_s_ci95": [interval(np.array([d[1][r] for d in drawn])) for r in range(len(RISES))],
+            "rise_s_ci95": [
+                interval(np.array([d[1][r] for d in drawn])) for r in range(len(RISES))
+            ],
             "at_s": at_spread(spread, rise, level),
             "at_s_ci95": interval(np.array([at_spread(*d, level) for d in drawn])),
         }
@@ -292,7 +301,7 @@ def observability(vehicle: Vehicle, seed: int) -> list[Result]:
 
 
 def costs(vehicle: Vehicle) -> Result:
-    """Return the least time (us) of a step with pose, of one with an IMU, and of ``correct_imu``."""
+    """Return the least time (us) of a step, of one that carries biases, and of ``correct_imu``."""
     ukf = WrenchUKF(vehicle)
     ukf.reset((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
     speeds, up = np.full(4, vehicle.hover_rate), np.array([0.0, 0.0, vehicle.gravity])
@@ -333,4 +342,3 @@ def run(runs: int, seed: int, progress: Callable[[str, float], None]) -> Result:
         "observability": observability(vehicle, seed),
         "costs": costs(vehicle),
     }
-
