@@ -22,7 +22,8 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array, WrenchEstimate
-from .filter_record import N, drive, filter_record, propagate
+from .filter_record import BIASES, N, drive, filter_record, propagate
+from .imu import expected_imu
 from .tuning import UKFTuning
 from .ukf import default_covariance
 
@@ -235,6 +236,10 @@ class ModelRun:
     angular_velocity: Array  # (K, 3) rad/s, body
     torque: Array  # (K, 3) Nm, world
     force: Array  # (K, 3) N, world
+    gyro: Array  # (K, 3) rad/s, body, as measured
+    accelerometer: Array  # (K, 3) m/s2, body, as measured
+    gyro_bias: Array  # (K, 3) rad/s, in them
+    accelerometer_bias: Array  # (K, 3) m/s2
 
     def truth(self, k: int) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return the true state after step ``k`` in the order in which ``nees`` takes it."""
@@ -260,13 +265,15 @@ def simulate_model(
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
     covariance: ArrayLike | None = None,
     rate_gain: float = 20.0,
+    push: ArrayLike | None = None,
 ) -> ModelRun:
     """Return a flight in which the filter's assumptions hold to the letter.
 
     Every step draws a rotor torque error (body frame) and a rotor force error (body frame), moves
     the external torque and force (world) by their walks, and measures the pose, all normal with the
     deviations of ``tuning``. The start is drawn from ``covariance`` about the given pose and twist,
-    with no external wrench in the mean.
+    with no external wrench in the mean. Gyro and accelerometer measure at the end of each step;
+    their biases are drawn from ``tuning`` and walk.
 
     Args:
         vehicle: with its declared effects.
@@ -283,6 +290,8 @@ def simulate_model(
         rate_gain: 1/s, of a loop on the true body rate about ``angular_velocity``, without which a
             walk of the torque spins the vehicle up; the rotor speeds that it asks for are those of
             the result. Position and attitude drift.
+        push: (K, 6) Nm and N, world, that the external torque and force change by after each step
+            beside their walks: what the filter does not expect.
 
     Raises:
         InputError: a shape is wrong.
@@ -319,10 +328,19 @@ def simulate_model(
         (tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk)
     ):
         process[:, 3 * n : 3 * n + 3] *= np.asarray(deviation, dtype=np.float64)
+    if push is not None:
+        change = np.asarray(push, dtype=np.float64)
+        if change.shape != (steps, 6):
+            raise InputError(
+                f"simulate_model: push must be ({steps}, 6) like rotor_speeds, got shape "
+                f"{change.shape}"
+            )
+        process[:, 6:] += change
     measurement = rng.standard_normal((steps, MEASURED))
     measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
     measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)
     states, measured = np.empty((steps, 20)), np.empty((steps, 7))
+    imu, biases = _inertial_noise(tuning, steps, seed)
     record = filter_record(vehicle, tuning, period)
     drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
     unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
@@ -339,6 +357,7 @@ def simulate_model(
         vehicle.voltage_ref,
         states,
         measured,
+        imu,
     )
     return ModelRun(
         start[POSITION],
@@ -355,7 +374,28 @@ def simulate_model(
         states[:, RATE],
         states[:, TORQUE],
         states[:, FORCE],
+        imu[:, :3],
+        imu[:, 3:],
+        biases[:, :3],
+        biases[:, 3:],
     )
+
+
+def _inertial_noise(tuning: UKFTuning, steps: int, seed: int) -> tuple[Array, Array]:
+    """Return what gyro and accelerometer (K, 6) measure beside the truth, and the biases in it."""
+    rng = np.random.default_rng([seed, 1])
+
+    def deviations(gyro: ArrayLike, accelerometer: ArrayLike) -> Array:
+        return np.concatenate([np.broadcast_to(gyro, 3), np.broadcast_to(accelerometer, 3)])
+
+    walk = rng.standard_normal((steps, BIASES))
+    walk *= deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
+    walk[0] += rng.standard_normal(BIASES) * deviations(
+        tuning.gyro_bias_std, tuning.accelerometer_bias_std
+    )
+    biases = np.cumsum(walk, axis=0)
+    white = rng.standard_normal((steps, BIASES))
+    return biases + white * deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
 
 
 @compiled
@@ -372,9 +412,11 @@ def _simulate(
     voltage: float,
     states: Array,
     measured: Array,
+    imu: Array,
 ) -> None:
     f = record[0]
     x, after = f.x, f.next
+    inertial = np.empty(6)
     quaternion_from_mrp(error[0:3], f.q)
     quaternion_multiply(f.q, start[3:7], x[3:7])
     normalise(x[3:7])
@@ -416,3 +458,8 @@ def _simulate(
         quaternion_multiply(f.q, x[3:7], measured[k, 3:7])
         for i in range(3):
             measured[k, i] = x[i] + measurement[k, 3 + i]
+        # the accelerometer feels the step's noise: the torque's is in the rotors' wrench already
+        expected_imu(f, x, inertial)
+        for i in range(3):
+            imu[k, i] += inertial[i]
+            imu[k, 3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass

@@ -208,6 +208,14 @@ def carry_linear_part(f: Record, dt: float) -> None:
     _linear_rows(f, dt, f.Z, f.P, N)
 
 
+@compiled_for_vectors
+def carry_rows(f: Record, dt: float, rows: Array, out: Array) -> None:
+    """Write what the linear part of the model makes of ``rows`` (12, n), (x, v, torque, force),
+    into ``out`` (18, n).
+    """
+    _linear_rows(f, dt, rows, out, rows.shape[1])
+
+
 @compiled_inline
 def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
     """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for

@@ -10,13 +10,19 @@ import math
 
 from ..dynamics.motion import effect_wrench
 from ..runtime.compiled import Record, compiled
+from .bias_states import (
+    carry_companions,
+    carry_with_jacobian,
+    cross_covariance,
+    restart_biases,
+)
 from .covariance import add_noise
 from .error_state import symmetrise
 from .estimate import NIS, Array
-from .filter_record import N, drive, propagate
+from .filter_record import BIASES, N, drive, propagate
 from .recovery import after_prediction
 from .sample import check_sample, undo_sensing
-from .ukf import WrenchUKF, correct_parts
+from .ukf import WrenchUKF, correct_parts, correct_with_biases
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
 _STEP = 1e-5  # m, m/s and rad/s
@@ -265,6 +271,22 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return usable
 
 
+@compiled
+def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
+    f = record[0]
+    usable: int = check_sample(f, f.z, parts)
+    if usable >= 0:
+        sample = undo_sensing(f, f.z, usable, dt)
+        if dt > 0.0:
+            cross, restarts = cross_covariance(f, BIASES), f.restarts
+            predict(f, sample[0:4], dt, voltage)
+            carry_companions(f, dt, carry_with_jacobian(f, dt, cross))
+            if f.restarts > restarts:
+                restart_biases(f)
+        correct_with_biases(f, sample, usable)
+    return usable
+
+
 class WrenchEKF(WrenchUKF):
     """Extended Kalman filter for the external force and torque on a quadrotor: ``WrenchUKF``,
     linearised.
@@ -275,3 +297,4 @@ class WrenchEKF(WrenchUKF):
     """
 
     _compiled_step = staticmethod(_step_record)
+    _compiled_step_with_biases = staticmethod(_step_with_biases)

@@ -13,6 +13,32 @@ from .recovery import Recovery, load_recovery
 from .tuning import UKFTuning
 
 N = 18  # error state (rho, omega, x, v, torque, force)
+BIASES = 6  # of gyro and accelerometer
+AGREEING = 5  # accelerometer samples in a row that make a push
+COMPANIONS = 12  # the biases, and the noise of the last step: ``bias_states``
+
+IMU = np.dtype(
+    [
+        ("used", "i8"),  # whether ``correct_imu`` was ever called
+        ("known", "i8"),  # whether the last step's noise is: there was one
+        ("refused", "i8"),
+        (
+            "gate",
+            "f8",
+            (3,),
+        ),  # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
+        ("in_row", "i8"),  # accelerometer samples that the gate would refuse
+        ("unlikely", "f8", (AGREEING, 3)),  # innovations (m/s2) of the last of them
+        ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not
+        ("prior", "f8", (BIASES,)),  # variances
+        ("walk", "f8", (BIASES,)),  # likewise, a period
+        ("mean", "f8", (COMPANIONS,)),
+        ("regression", "f8", (N, COMPANIONS)),  # on the error state
+        ("rest", "f8", (COMPANIONS, COMPANIONS)),  # covariance of what that leaves
+        ("bias_covariance", "f8", (BIASES, BIASES)),
+        ("sensitivity", "f8", (6, COMPANIONS)),  # of gyro and accelerometer
+    ]
+)
 
 FILTER = np.dtype(
     [
@@ -89,6 +115,7 @@ FILTER = np.dtype(
         ("information", "f8", (6, 6)),
         ("steady", "i8"),  # whether that gain holds now
         ("converged", "f8", (N, N)),  # the covariance that goes with it
+        ("imu", IMU),
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P

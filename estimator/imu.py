@@ -1,11 +1,15 @@
 """Gyro and accelerometer as further measurements of the same filter.
 
-The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate. An
-accelerometer at the geometric centre measures the specific force ``R' (a + g)``, with the
-acceleration ``a`` of (4): it sees the external force at once, where a pose sees it only after two
-integrations. What the rotor model misses (``thrust_noise``) is in the measured acceleration too and
-cannot be told from the force in one sample, so it counts as noise of the measurement. Sensors with
-a bias must be corrected before.
+The paper says that it "can easily be extended to GPS and IMU". A gyro measures the body rate and
+its bias. An accelerometer at the geometric centre measures its bias and the specific force
+``R' (a + g)``, with the acceleration ``a`` of (4) over the step that just ended: it sees the
+external force at once, where a pose sees it only after two integrations. What the rotor model
+misses in that step (``thrust_noise``) is in the specific force and in the velocity: it is a state
+of its own until the next step (``bias_states``).
+
+An accelerometer says nothing of the external force while the rotors' is unknown: before the first
+prediction, and between a restart and the next one, the gyro alone is taken in. A gyro measures the
+rate after the step, which has the torque noise in it already.
 """
 
 import math
@@ -16,14 +20,21 @@ from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.compiled import Record, compiled
+from .bias_states import cross_covariance, divide, lower_root, restore_bias_prior, split
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
-from .filter_record import N
+from .filter_record import AGREEING, COMPANIONS, N
+
+# s of nothing but refusals after which a sensor's bias is no longer believed: longer than the burst
+# of vibration of a touch-down
+_PATIENCE = 0.5
 
 
 @compiled
 def expected_imu(f: Record, x: Array, out: Array) -> None:
-    """Write what gyro and accelerometer would measure in a state ``x`` into ``out`` (6,)."""
+    """Write what gyro and accelerometer without bias would measure in a state ``x`` into ``out``
+    (6,).
+    """
     R = f.rotation
     quaternion_to_matrix(x[3:7], R)
     apply_effects(f, x[0:3], R, x[7:10], x[10:13])
@@ -38,20 +49,43 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
 
 @compiled
 def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> None:
-    """Correct with what is measured of ``z`` (6,), gyro and accelerometer: (27)-(37) with its 37
-    sigma points.
+    """Correct with what is measured of ``z`` (6,), gyro and accelerometer, unless the gate refuses
+    it: (27)-(37) with the 37 sigma points of the error state; biases and noise are linear in it.
     """
     f = record[0]
-    x, P = f.x, f.P
-    first, last = 0 if gyro else 3, 6 if accelerometer else 3
+    x, imu = f.x, f.imu
+    x[NIS] = math.nan
+    first, last = 0 if gyro else 3, 6 if accelerometer and imu.known > 0 else 3
     if first >= last:
         return
+    C, T = imu.sensitivity, imu.regression
+    root = lower_root(f.P)
+    covariance, innovation, pairs = _innovation(f, z, root, T.T @ root)
+    # of the error state and of the companions with what is measured
+    cross = root @ pairs
+    companions = T.T @ cross + imu.rest @ C.T
+    covariance += C @ imu.rest @ C.T
+    innovation -= C @ imu.mean
+    for i in range(6):
+        covariance[i, i] += f.imu_noise[i]
+    x[NIS] = _nis(covariance, innovation, first, last)
+    first, last = _believed(f, covariance, innovation, first, last)
+    if first < last:
+        _correct(f, covariance, innovation, cross, companions, first, last)
+
+
+@compiled
+def _innovation(f: Record, z: Array, root: Array, turned: Array) -> tuple[Array, Array, Array]:
+    """Return the part of the innovation's covariance (6, 6) that is the error state's, the
+    innovation (6,) without the companions' mean, and the scaled half differences (18, 6) of pairs.
+
+    ``turned`` (12, 18) is what the companions do along each column of the root.
+    """
+    x, C = f.x, f.imu.sensitivity
     spread, weight = math.sqrt(N + f.kappa), 0.5 / (N + f.kappa)  # (28)
-    root = np.linalg.cholesky(P)
     centre, plus, minus = np.empty(6), np.empty(6), np.empty(6)
     expected_imu(f, x, centre)
-    differences, sums = np.zeros((N, 6)), np.zeros(6)
-    S = np.zeros((6, 6))
+    pairs, mean, S = np.empty((N, 6)), np.zeros(6), np.zeros((6, 6))
     column = np.empty(N)
     for j in range(N):
         for i in range(N):
@@ -61,32 +95,125 @@ def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> No
         displace(x, column, -spread, f.rho, f.q, f.point)
         expected_imu(f, f.point, minus)
         for a in range(6):
-            differences[j, a] = 0.5 * (plus[a] - minus[a])
-            sums[a] += weight * (plus[a] + minus[a] - 2.0 * centre[a])
-            for b in range(a + 1):
-                S[a, b] += weight * (
-                    (plus[a] - centre[a]) * (plus[b] - centre[b])
-                    + (minus[a] - centre[a]) * (minus[b] - centre[b])
-                )
-    count = last - first
-    covariance, cross, innovation = np.empty((count, count)), np.zeros((N, count)), np.empty(count)
-    for a in range(count):
-        innovation[a] = z[first + a] - centre[first + a] - sums[first + a]
-        for b in range(a + 1):
-            covariance[a, b] = S[first + a, first + b] - sums[first + a] * sums[first + b]
-            covariance[b, a] = covariance[a, b]
-        covariance[a, a] += f.imu_noise[first + a]
-        if first + a >= 3:
-            covariance[a, a] += f.thrust[first + a - 3] / (f.body.mass * f.body.mass)
-        # a column and its difference are both ``spread`` long, and 2 weight spread^2 = 1
-        for i in range(N):
-            for j in range(i + 1):
-                cross[i, a] += root[i, j] * differences[j, first + a] / spread
-    gain = np.linalg.solve(covariance, cross.T).T
-    step = gain @ innovation
-    P -= gain @ cross.T
+            pairs[j, a] = 0.5 * (plus[a] - minus[a]) / spread
+            for k in range(COMPANIONS):
+                pairs[j, a] += C[a, k] * turned[k, j]
+            plus[a] = plus[a] + minus[a] - 2.0 * centre[a]
+            mean[a] += weight * plus[a]
+        # with a pair of deviations p and m: pp' + mm' = ((p - m)(p - m)' + (p + m)(p + m)') / 2,
+        # and 2 weight spread^2 = 1
+        for a in range(6):
+            for b in range(6):
+                S[a, b] += pairs[j, a] * pairs[j, b] + 0.5 * weight * plus[a] * plus[b]
+    innovation = np.empty(6)
+    for a in range(6):
+        innovation[a] = z[a] - centre[a] - mean[a]
+        for b in range(6):
+            S[a, b] -= mean[a] * mean[b]
+    return S, innovation, pairs
+
+
+@compiled
+def _nis(covariance: Array, innovation: Array, first: int, last: int) -> float:
+    y = divide(
+        lower_root(covariance[first:last, first:last]), innovation[first:last].reshape(-1, 1)
+    )
+    total = 0.0
+    for i in range(last - first):
+        total += y[i, 0] * y[i, 0]
+    return total
+
+
+@compiled
+def _believed(
+    f: Record, covariance: Array, innovation: Array, first: int, last: int
+) -> tuple[int, int]:
+    """Return the rows that the gate lets in. Where both sensors together are unlikely, one may be
+    right: an accelerometer that saturates does not cost the gyro.
+    """
+    imu, gate = f.imu, f.imu.gate
+    if f.x[NIS] <= gate[1 if last - first == 6 else 0]:
+        for s in range(first // 3, last // 3):
+            imu.doubt[s] = -1.0
+        if last == 6:
+            imu.in_row = 0
+        return first, last
+    gyro = _nis(covariance, innovation, 0, 3) if first == 0 else math.inf
+    accelerometer = _nis(covariance, innovation, 3, 6) if last == 6 else math.inf
+    pushed = last == 6 and accelerometer > gate[0] and _is_push(f, covariance, innovation)
+    if last == 6 and accelerometer <= gate[0]:
+        imu.in_row = 0
+    # unlikely only together: the likelier of the two
+    take_gyro = gyro <= gate[0] and (pushed or gyro < accelerometer)
+    take_accelerometer = pushed or (accelerometer <= gate[0] and not take_gyro)
+    begin, end = 0 if take_gyro else 3, 6 if take_accelerometer else 3
+    if end - begin < last - first:
+        imu.refused += 1
+    for s in range(first // 3, last // 3):
+        if begin <= 3 * s < end:
+            imu.doubt[s] = -1.0
+        elif imu.doubt[s] < 0.0:
+            imu.doubt[s] = 0.0
+        elif imu.doubt[s] > _PATIENCE:
+            restore_bias_prior(f, 3 * s)
+            imu.doubt[s] = 0.0
+            # the innovation at hand is that of the old bias
+            return first, first
+    return begin, end
+
+
+@compiled
+def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
+    """Return whether the accelerometer samples that were unlikely in a row are a push: far from
+    what the filter expects, by no more than two weights, and no farther from each other than noise
+    alone makes them. Vibration does not agree with itself, and a saturated sensor is too far.
+    """
+    imu = f.imu
+    for i in range(3):
+        imu.unlikely[imu.in_row % AGREEING, i] = innovation[3 + i]
+    imu.in_row += 1
+    if imu.in_row < AGREEING:
+        return False
+    apart = np.zeros((3, AGREEING))
+    for i in range(3):
+        mean = 0.0
+        for k in range(AGREEING):
+            mean += imu.unlikely[k, i] / AGREEING
+        if abs(mean) > 2.0 * f.body.gravity:
+            return False
+        for k in range(AGREEING):
+            apart[i, k] = imu.unlikely[k, i] - mean
+    whitened = divide(lower_root(covariance[3:6, 3:6]), apart)
+    agreed: bool = np.sum(whitened * whitened) <= imu.gate[2]
+    return agreed
+
+
+@compiled
+def _correct(
+    f: Record,
+    covariance: Array,
+    innovation: Array,
+    cross: Array,
+    companions: Array,
+    first: int,
+    last: int,
+) -> None:
+    """Update error state and companions with rows ``first`` to ``last`` of the innovation."""
+    x, P, imu = f.x, f.P, f.imu
+    root = lower_root(covariance[first:last, first:last])
+    W = divide(root, np.ascontiguousarray(cross[:, first:last].T))
+    V = divide(root, np.ascontiguousarray(companions[:, first:last].T))
+    y = divide(root, innovation[first:last].reshape(-1, 1))
+    covariances = cross_covariance(f, COMPANIONS)
+    T = imu.regression
+    joint = T.T @ covariances + imu.rest - V.T @ V
+    covariances -= W.T @ V
+    P -= W.T @ W
     symmetrise(P)
     for i in range(NIS):
         f.centre[i] = x[i]
-    fold(f, f.centre, step)
-    x[NIS] = innovation @ np.linalg.solve(covariance, innovation)
+    fold(f, f.centre, (W.T @ y)[:, 0])
+    move = (V.T @ y)[:, 0]
+    for i in range(COMPANIONS):
+        imu.mean[i] += move[i]
+    split(f, covariances, joint)

@@ -25,6 +25,11 @@ class UKFTuning:
     ``2.2 * period * thrust_noise / force_walk``, and of the torque estimate likewise: about 1 s as
     given. A ``motor_torque_noise`` far below the model's real error makes the filter lose the
     attitude when the torque steps, which shows as a wrong lateral force.
+
+    The biases of an IMU begin with the switch-on deviations that PX4's EKF2 assumes (``GBIAS_INIT``
+    0.1 rad/s, ``ABIAS_INIT`` 0.2 m/s2) and walk as its process noise has it to within a factor of
+    five (``GYR_B_NOISE`` 1e-3 rad/s2, ``ACC_B_NOISE`` 3e-3 m/s3, at its 10 ms per update 7e-6 rad/s
+    and 2e-5 m/s2 in 5 ms); of the accelerometer the walk is faster, for temperature and vibration.
     """
 
     motor_torque_noise: ArrayLike = (
@@ -40,6 +45,10 @@ class UKFTuning:
     kappa: float = 2.0  # spread of the sigma points, (28)
     gyro_noise: ArrayLike = 0.005  # rad/s, one measurement of ``correct_imu``
     accelerometer_noise: ArrayLike = 0.05  # m/s2, likewise
+    gyro_bias_walk: ArrayLike = 1e-5  # rad/s: change of the gyro's bias in a step
+    accelerometer_bias_walk: ArrayLike = 1e-4  # m/s2: change of the accelerometer's in a step
+    gyro_bias_std: ArrayLike = 0.1  # rad/s: of the gyro's bias, before it is estimated
+    accelerometer_bias_std: ArrayLike = 0.2  # m/s2: of the accelerometer's, likewise
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -85,4 +94,6 @@ class UKFTuning:
             force_walk=3.26e-3 * force * walk,
             position_noise=vehicle.mocap.sigma_pos_m,
             attitude_noise=vehicle.mocap.sigma_att_rad,
+            gyro_bias_walk=1e-5 * slower,
+            accelerometer_bias_walk=1e-4 * slower,
         )

@@ -31,6 +31,17 @@ from ..runtime.addresses import address_of
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose
+from .bias_states import (
+    begin_imu,
+    carry_companions,
+    carry_with_points,
+    correct_companions,
+    cross_covariance,
+    joint_covariance,
+    load_imu,
+    reset_imu,
+    restart_biases,
+)
 from .covariance import (
     add_more_pairs,
     add_noise,
@@ -43,7 +54,7 @@ from .covariance import (
 )
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import ESTIMATE_SIZE, NIS, STATE_SIZE, TRACKING, Array, WrenchEstimate
-from .filter_record import ESTIMATE, FILTER, N, drive, filter_record, move, propagate
+from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
 from .recovery import Recovery, after_prediction, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
@@ -257,6 +268,33 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
+@compiled
+def correct_with_biases(f: Record, sample: Array, parts: int) -> None:
+    """Correct like ``correct_parts``, and the biases of an IMU with it."""
+    x, restarts = f.x.copy(), f.restarts
+    correct_parts(f, sample, parts)
+    if f.restarts > restarts:
+        restart_biases(f)
+    else:
+        correct_companions(f, x)
+
+
+@compiled
+def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
+    f = record[0]
+    usable: int = check_sample(f, f.z, parts)
+    if usable >= 0:
+        sample = undo_sensing(f, f.z, usable, dt)
+        if dt > 0.0:
+            cross, restarts = cross_covariance(f, BIASES), f.restarts
+            predict(f, sample[0:4], dt, voltage)
+            carry_companions(f, dt, carry_with_points(f, dt, cross))
+            if f.restarts > restarts:
+                restart_biases(f)
+        correct_with_biases(f, sample, usable)
+    return usable
+
+
 def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
     f = carray(pointer, 1, FILTER)[0]
     return step(f, f.z, parts, dt, voltage)
@@ -290,6 +328,7 @@ class WrenchUKF:
     """
 
     _compiled_step = staticmethod(_step_record)
+    _compiled_step_with_biases = staticmethod(_step_with_biases)
     _step_by_address = staticmethod(_step_at)
 
     def __init__(
@@ -312,6 +351,7 @@ class WrenchUKF:
         self.gate = gate
         self.recovery = Recovery() if recovery is None else recovery
         self.record = filter_record(vehicle, self.tuning, self.period, gate, self.recovery)
+        load_imu(self.record[0], self.tuning, gate)
         self._voltage = vehicle.voltage_ref
         self._bind()
 
@@ -389,6 +429,7 @@ class WrenchUKF:
                 raise InputError("reset: covariance must be positive definite")
         f = self.record[0]
         f["x"], f["P"] = x, P
+        reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
         for name in ("status", "restarts", "gap", "refused", "lasting"):
@@ -397,7 +438,13 @@ class WrenchUKF:
 
     @property
     def step_address(self) -> int:
-        """Address of the step for ``call_step``, in compiled loops."""
+        """Address of the step for ``call_step``, in compiled loops; it knows nothing of an IMU.
+
+        Raises:
+            InputError: ``correct_imu`` was called.
+        """
+        if self.record[0]["imu"]["used"]:
+            raise InputError("step_address: a filter that was given an IMU steps in Python only")
         return address_of(self._step_by_address)
 
     @property
@@ -411,6 +458,38 @@ class WrenchUKF:
         world-frame MRP.
         """
         return np.array(self.record[0]["P"])
+
+    @property
+    def covariance_with_biases(self) -> Array:
+        """Covariance (24, 24) of the same and of the biases of gyro and accelerometer, last."""
+        return joint_covariance(self.record[0])
+
+    @property
+    def gyro_bias(self) -> Array:
+        """Estimated bias (3,) of the gyro, rad/s, body."""
+        return np.array(self.record[0]["imu"]["mean"][:3])
+
+    @property
+    def accelerometer_bias(self) -> Array:
+        """Estimated bias (3,) of the accelerometer, m/s2, body."""
+        return np.array(self.record[0]["imu"]["mean"][3:BIASES])
+
+    @property
+    def gyro_bias_std(self) -> Array:
+        """Standard deviation (3,) of the gyro's estimated bias, rad/s."""
+        return np.array(np.sqrt(np.diagonal(self.record[0]["imu"]["bias_covariance"])[:3]))
+
+    @property
+    def accelerometer_bias_std(self) -> Array:
+        """Standard deviation (3,) of the accelerometer's estimated bias, m/s2."""
+        return np.array(np.sqrt(np.diagonal(self.record[0]["imu"]["bias_covariance"])[3:]))
+
+    @property
+    def imu_refused(self) -> int:
+        """How many inertial measurements the gate has refused, wholly or in part, since
+        ``reset``.
+        """
+        return int(self.record[0]["imu"]["refused"])
 
     @property
     def estimate(self) -> WrenchEstimate:
@@ -458,10 +537,13 @@ class WrenchUKF:
     ) -> WrenchEstimate:
         """Take in an inertial measurement made now, at the geometric centre; see ``estimator.imu``.
 
+        From the first call on the filter also estimates the biases of both. The accelerometer is
+        left out while nothing is known of the rotors: before the first step after ``reset``.
+
         Args:
-            gyro: (3,) rad/s, body, without bias, or None.
-            accelerometer: (3,) m/s2, body, specific force (+g along z at hover), without bias, or
-                None.
+            gyro: (3,) rad/s, body, or None.
+            accelerometer: (3,) m/s2, body, specific force (+g along z at hover) at the end of the
+                last step or averaged over it, or None.
 
         Raises:
             InputError: a shape is wrong or a number is not finite; the filter stays as it was.
@@ -478,13 +560,18 @@ class WrenchUKF:
                         f"correct_imu: {name} must be three finite numbers, got {value!r}"
                     )
                 z[where] = array
+        if not self.record[0]["imu"]["used"]:
+            begin_imu(self.record)
+            self._call = None
         take_in_imu(self.record, z, gyro is not None, accelerometer is not None)
         return self.estimate
 
     def _run(self, parts: int, dt: float, voltage: float | None) -> WrenchEstimate:
         call = self._call
         if call is None:
-            call = self._call = specialised(self._compiled_step, self.record, parts, dt, 0.0)
+            biases = self.record[0]["imu"]["used"]
+            step = self._compiled_step_with_biases if biases else self._compiled_step
+            call = self._call = specialised(step, self.record, parts, dt, 0.0)
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return WrenchEstimate(self._now.copy())

@@ -50,9 +50,9 @@ def estimate_log(
 
     The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
     those of the row before, in steps of at most one median period; a row without a pose is
-    prediction alone. After 2 s without a pose the estimate is held, and the filter starts anew at
-    the next pose. Rows before the first pose hold the filter's estimate at that pose: no wrench,
-    and its standard deviation.
+    prediction alone, and what gyro and accelerometer measured, if they did. After 2 s without a
+    pose the estimate is held, and the filter starts anew at the next pose. Rows before the first
+    pose hold the filter's estimate at that pose: no wrench, and its standard deviation.
 
     Args:
         log: the flight.
@@ -87,6 +87,7 @@ def estimate_log(
             if k > first:
                 if t - last_pose <= _LOST:
                     _predict(ukf, log, k, period)
+                    _take_in_imu(ukf, log, k)
                     if log.valid[k]:
                         nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
                 elif log.valid[k]:
@@ -137,6 +138,16 @@ def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
     steps = max(1, math.ceil(dt / period - _SLACK))
     for _ in range(steps):
         ukf.predict(speeds, dt / steps, voltage)
+
+
+def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
+    """Correct with what gyro and accelerometer measured in row ``k``, if they did."""
+    gyro, accelerometer = (
+        None if sensor is None or not np.isfinite(sensor[k, 0]) else sensor[k]
+        for sensor in (log.gyro, log.accelerometer)
+    )
+    if gyro is not None or accelerometer is not None:
+        ukf.correct_imu(gyro, accelerometer)
 
 
 def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:

@@ -1,12 +1,19 @@
 """Inertial measurements in the wrench filter."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.support.flights import PERIOD, yawing_flight
 from tests.support.literal_ukf import matrix
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
-from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.estimator import UKFTuning, WrenchEKF, WrenchUKF
+from windwrench.estimator.bias_states import restart_biases
+from windwrench.estimator.consistency import chi2_band, simulate_model, state_error
+from windwrench.estimator.error_state import displace
+from windwrench.estimator.imu import expected_imu
 
 VEHICLE = load_vehicle("ardrone2")
 FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])
@@ -105,3 +112,395 @@ def test_bad_inertial_measurements_are_named(arguments):
     with pytest.raises(InputError, match=next(iter(arguments))):
         ukf.correct_imu(**arguments)
     np.testing.assert_array_equal(ukf.estimate.state, before.state)
+
+
+def drawn(steps, dt=0.005, seed=0, tuning=None, vehicle=VEHICLE, **settings):
+    tuning = tuning or UKFTuning.for_vehicle(vehicle, dt)
+    hover = np.full((steps, 4), vehicle.hover_rate)
+    return simulate_model(vehicle, tuning, hover, dt, seed=seed, **settings)
+
+
+def started(flight, tuning=None, period=0.005, kind=WrenchUKF, vehicle=VEHICLE, gate=None):
+    f = kind(vehicle, tuning or UKFTuning.for_vehicle(vehicle, period), period, gate)
+    f.reset(
+        flight.initial_position,
+        flight.initial_quaternion,
+        flight.initial_covariance,
+        flight.initial_velocity,
+        flight.initial_angular_velocity,
+    )
+    return f
+
+
+def fly(f, flight, steps, dt=None, every=4, first="imu", begin=0):
+    """Run a filter over steps of a flight, with a pose at each ``every``-th."""
+    for k in range(begin, begin + steps):
+        f.predict(flight.rotor_speeds[k], dt)
+        pose = (k + 1) % every == 0
+        if pose and first == "pose":
+            f.correct(flight.measured_position[k], flight.measured_quaternion[k])
+        f.correct_imu(flight.gyro[k], flight.accelerometer[k])
+        if pose and first == "imu":
+            f.correct(flight.measured_position[k], flight.measured_quaternion[k])
+
+
+OFFSET = replace(VEHICLE, com=np.array([0.02, -0.015, 0.01]))
+
+
+@pytest.mark.parametrize("vehicle", [VEHICLE, OFFSET], ids=["centred", "offset"])
+@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
+def test_the_noise_of_a_step_is_in_its_velocity_and_in_its_specific_force(kind, vehicle):
+    """With x' = F x + G w and z = h(x') + D w + v: P_xz = P H' + G Q D', S = H P H' + H G Q D' +
+    D Q G' H' + D Q D' + R, and biases beside it.
+    """
+    period = 0.002
+    flight = drawn(41, period, vehicle=vehicle, velocity=(1.0, 0.0, 0.0))
+    tuning = UKFTuning.for_vehicle(vehicle, period)
+    f = started(flight, tuning, period, kind, vehicle)
+    fly(f, flight, 40)
+    f.predict(flight.rotor_speeds[40])
+    P, x = f.covariance_with_biases, f.estimate.state
+    b = np.concatenate([f.gyro_bias, f.accelerometer_bias])
+    z = np.concatenate([flight.gyro[40], flight.accelerometer[40]])
+
+    # h and its Jacobian by the error state, from the filter's own model, at the estimate
+    record, point, out = f.record[0], np.zeros(20), np.zeros((2, 6))
+    H, columns = np.zeros((6, 24)), 1e-6 * np.eye(18)
+    rho, q = np.zeros(3), np.zeros(4)
+    for j in range(18):
+        for s, sign in enumerate((1.0, -1.0)):
+            displace(x, columns[j], sign, rho, q, point)
+            expected_imu(record, point, out[s])
+        H[:, j] = (out[0] - out[1]) / 2e-6
+    H[:, 18:] = np.eye(6)
+    expected_imu(record, x, out[0])
+    # the noise of a step: torque n_m and thrust n_c in body axes, through centre of mass and mass
+    R, com = record["centre_rotation"].copy(), vehicle.com
+    GQ, DQ = np.zeros((24, 6)), np.zeros((6, 6))
+    for n in range(3):
+        alpha = np.linalg.inv(vehicle.inertia)[:, n] * tuning.motor_torque_noise
+        centre = np.cross(com, alpha)
+        GQ[3:6, n], DQ[3:6, n] = period * alpha, centre
+        GQ[9:12, n], GQ[6:9, n] = period * R @ centre, period**2 / 2 * R @ centre
+        push = np.eye(3)[n] * tuning.thrust_noise / vehicle.mass
+        GQ[9:12, 3 + n], GQ[6:9, 3 + n] = period * R @ push, period**2 / 2 * R @ push
+        DQ[3:6, 3 + n] = push
+    noise = np.repeat([tuning.gyro_noise**2, tuning.accelerometer_noise**2], 3)
+    cross = P @ H.T + GQ @ DQ.T
+    S = H @ P @ H.T + H @ GQ @ DQ.T + (H @ GQ @ DQ.T).T + DQ @ DQ.T + np.diag(noise)
+    innovation = z - out[0] - b
+    expected = cross @ np.linalg.solve(S, innovation)
+
+    after = f.correct_imu(flight.gyro[40], flight.accelerometer[40])
+    deviation = np.sqrt(np.diagonal(P))
+    step = np.concatenate(
+        [
+            after.angular_velocity - x[10:13],
+            after.position - x[0:3],
+            after.velocity - x[7:10],
+            after.torque - x[13:16],
+            after.force - x[16:19],
+            f.gyro_bias - b[:3],
+            f.accelerometer_bias - b[3:],
+        ]
+    )
+    assert np.max(np.abs(step - expected[3:]) / deviation[3:]) < 2e-3
+    assert np.max(np.abs(expected) / deviation) > 0.1
+    left = P - cross @ np.linalg.solve(S, cross.T)
+    scale = np.sqrt(np.outer(np.diagonal(left), np.diagonal(left)))
+    assert np.max(np.abs(f.covariance_with_biases - left) / scale) < 5e-3
+    assert after.nis == pytest.approx(innovation @ np.linalg.solve(S, innovation), rel=2e-3)
+
+
+def test_pose_and_imu_of_one_moment_may_come_in_either_order():
+    flight = drawn(80)
+    one, other, apart = started(flight), started(flight), started(flight)
+    fly(one, flight, 80)
+    fly(other, flight, 80, first="pose")
+    for k in range(80):
+        apart.predict(flight.rotor_speeds[k])
+        apart.correct_imu(None, flight.accelerometer[k])
+        if (k + 1) % 4 == 0:
+            apart.correct(flight.measured_position[k], flight.measured_quaternion[k])
+        apart.correct_imu(flight.gyro[k], None)
+    deviation = np.sqrt(np.diagonal(one.covariance_with_biases))
+    for f in (other, apart):
+        difference = np.concatenate(
+            [
+                state_error(one.estimate, *_state_of(f.estimate)),
+                f.gyro_bias - one.gyro_bias,
+                f.accelerometer_bias - one.accelerometer_bias,
+            ]
+        )
+        assert np.max(np.abs(difference) / deviation) < 0.02
+
+
+def _state_of(e):
+    return e.position, e.quaternion, e.velocity, e.angular_velocity, e.torque, e.force
+
+
+def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VEHICLE):
+    """Return mean IMU-NIS (6), force-NEES (3), NEES (18) and NEES with biases (24), and the bands
+    of one step's mean over the runs. ``fine`` steps make a period of the filter.
+    """
+    dt = 1.0 / rate
+    tuning = UKFTuning.for_vehicle(vehicle, dt * fine)
+    drawn_with = UKFTuning.for_vehicle(vehicle, dt)
+    steps, every = round(seconds * rate), rate // pose_hz
+    found = np.empty((4, runs, steps))
+    for r in range(runs):
+        flight = drawn(steps, dt, r, drawn_with, vehicle, angular_velocity=(0.0, 0.0, 1.0))
+        f = started(flight, tuning, dt * fine, kind, vehicle)
+        for k in range(steps):
+            fly(f, flight, 1, dt, every=steps + 1, begin=k)
+            nis = f.estimate.nis
+            if (k + 1) % every == 0:
+                f.correct(flight.measured_position[k], flight.measured_quaternion[k])
+            e, P = f.estimate, f.covariance_with_biases
+            error = np.concatenate(
+                [
+                    state_error(e, *flight.truth(k)),
+                    flight.gyro_bias[k] - f.gyro_bias,
+                    flight.accelerometer_bias[k] - f.accelerometer_bias,
+                ]
+            )
+            found[0, r, k] = nis
+            for i, rows in ((1, slice(15, 18)), (2, slice(0, 18)), (3, slice(0, 24))):
+                found[i, r, k] = error[rows] @ np.linalg.solve(P[rows, rows], error[rows])
+    return found.mean(axis=(1, 2)), [chi2_band(dof, runs) for dof in (6, 3, 18, 24)]
+
+
+def assert_consistent(mean, bands, runs, steps):
+    for value, (low, high) in zip(mean, bands, strict=True):
+        assert low <= value <= high
+    # innovations are independent from step to step, so all of them have a narrow band
+    low, high = chi2_band(6, runs * steps, 0.999)
+    assert low <= mean[0] <= high
+
+
+def test_the_filter_with_an_imu_is_consistent():
+    assert_consistent(*consistency(500, 50, 25, 0.6), 25, 300)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
+@pytest.mark.parametrize(
+    ("rate", "pose_hz", "fine"),
+    [(200, 50, 1), (500, 50, 1), (1000, 100, 1), (1000, 50, 1), (1000, 100, 10)],
+)
+def test_nis_and_nees_are_in_their_bands_at_every_rate(kind, rate, pose_hz, fine):
+    """100 runs; the last case predicts in tenths of the period for which its tuning is stated."""
+    assert_consistent(*consistency(rate, pose_hz, 100, 2.0, fine, kind), 100, round(2.0 * rate))
+
+
+@pytest.mark.slow
+def test_a_centre_of_mass_off_the_centre_is_consistent_too():
+    """The torque's noise is in the specific force then."""
+    assert_consistent(*consistency(500, 50, 100, 1.0, vehicle=OFFSET), 100, 500)
+
+
+def test_biases_are_found_and_cost_nothing():
+    """The filter of the first day had 0.03 N of 0.02 rad/s and 0.1 m/s2."""
+    tuning = replace(
+        UKFTuning(), thrust_noise=0.03, motor_torque_noise=0.003, force_walk=1e-3, torque_walk=1e-4
+    )
+    known = replace(tuning, gyro_bias_std=1e-9, accelerometer_bias_std=1e-9)
+    flight = drawn(1200, tuning=replace(known, gyro_bias_walk=1e-9, accelerometer_bias_walk=1e-9))
+    turn = np.array([0.0, 0.02, 0.0])
+    biased = replace(flight, gyro=flight.gyro + turn, accelerometer=flight.accelerometer - 0.1)
+    f, g = started(biased, tuning), started(flight, tuning)
+    fly(f, biased, 1200)
+    fly(g, flight, 1200)
+    assert np.all(np.abs(f.gyro_bias - turn) < 4 * f.gyro_bias_std)
+    assert np.all(np.abs(f.accelerometer_bias + 0.1) < 4 * f.accelerometer_bias_std)
+    assert np.all(f.gyro_bias_std < 0.002)
+    assert np.all(f.accelerometer_bias_std < 0.02)
+    np.testing.assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
+
+
+def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
+    for flown in (False, True):
+        f = WrenchUKF(VEHICLE)
+        f.reset([0, 0, 1], [1, 0, 0, 0])
+        if flown:  # another flight, whose rotors are no longer those that turn
+            f.step(np.full(4, VEHICLE.hover_rate), [0, 0, 1], [1, 0, 0, 0])
+            f.correct_imu(np.zeros(3), [0, 0, VEHICLE.gravity])
+            f.reset([0, 0, 1], [1, 0, 0, 0])
+        P = f.covariance
+        e = f.correct_imu(accelerometer=[0.0, 0.0, VEHICLE.gravity])
+        assert np.isnan(e.nis)
+        np.testing.assert_array_equal(e.force, 0.0)
+        np.testing.assert_array_equal(f.covariance, P)
+        e = f.correct_imu(np.zeros(3), [0.0, 0.0, 30.0])
+        assert e.nis == 0.0  # of the gyro
+        assert e.covariance[3, 3] < P[3, 3]
+        np.testing.assert_array_equal(e.force, 0.0)
+        # from the first step on it does
+        f.predict(np.full(4, VEHICLE.hover_rate))
+        e = f.correct_imu(accelerometer=[0.0, 0.0, VEHICLE.gravity + 0.1])
+        assert e.force[2] > 0.001
+
+
+def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
+    flight = drawn(50)
+    f, g = started(flight), started(flight)
+    fly(g, flight, 5)
+    g.reset(
+        flight.initial_position,
+        flight.initial_quaternion,
+        flight.initial_covariance,
+        flight.initial_velocity,
+        flight.initial_angular_velocity,
+    )
+    for k in range(50):
+        speeds, x, q = (
+            flight.rotor_speeds[k],
+            flight.measured_position[k],
+            flight.measured_quaternion[k],
+        )
+        one, other = f.step(speeds, x, q), g.step(speeds, x, q)
+        # nor do biases that nothing measures change the pose's part
+        np.testing.assert_array_equal(one.state, other.state)
+        np.testing.assert_array_equal(one.covariance, other.covariance)
+    assert f.covariance.shape == (18, 18)
+    np.testing.assert_array_equal(f.gyro_bias, 0.0)
+    np.testing.assert_allclose(f.gyro_bias_std, UKFTuning().gyro_bias_std)
+    assert isinstance(f.step_address, int)
+    with pytest.raises(InputError, match="IMU"):
+        _ = g.step_address
+
+
+def test_reset_gives_the_biases_their_prior_again():
+    flight = drawn(200)
+    f = started(flight)
+    fly(f, flight, 200)
+    assert np.all(f.gyro_bias_std < 0.05)
+    f.reset([0, 0, 1], [1, 0, 0, 0])
+    np.testing.assert_array_equal(np.concatenate([f.gyro_bias, f.accelerometer_bias]), 0.0)
+    np.testing.assert_allclose(f.gyro_bias_std, 0.1)
+    np.testing.assert_allclose(f.accelerometer_bias_std, 0.2)
+    assert f.imu_refused == 0
+
+
+def test_a_pickled_filter_goes_on_alike():
+    flight = drawn(60)
+    f = started(flight, gate=0.999)
+    fly(f, flight, 30)
+    g = pickle.loads(pickle.dumps(f))
+    fly(f, flight, 30, begin=30)
+    fly(g, flight, 30, begin=30)
+    np.testing.assert_array_equal(f.estimate.state, g.estimate.state)
+    np.testing.assert_array_equal(f.covariance_with_biases, g.covariance_with_biases)
+
+
+def test_a_restart_leaves_the_biases_alone():
+    """What a restart does to pose and twist, their wide covariance, is no news of the biases."""
+    flight = drawn(400)
+    f = started(flight)
+    fly(f, flight, 400)
+    before, bias = f.covariance_with_biases[18:, 18:], f.gyro_bias
+    assert np.any(f.covariance_with_biases[:18, 18:])
+    restart_biases(f.record[0])
+    np.testing.assert_array_equal(f.covariance_with_biases[:18, 18:], 0.0)
+    np.testing.assert_allclose(f.covariance_with_biases[18:, 18:], before, rtol=1e-9)
+    f.correct([5.0, 5.0, 5.0], [0, 1, 0, 0])
+    np.testing.assert_array_equal(f.gyro_bias, bias)
+
+
+@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
+def test_a_pose_that_jumps_for_good_says_nothing_of_the_biases(kind):
+    flight = drawn(100)
+    f = started(flight, kind=kind)
+    fly(f, flight, 100)
+    spread, bias = f.covariance_with_biases[18:, 18:], f.accelerometer_bias
+    estimate = f.correct([50.0, 0.0, 1.0], flight.measured_quaternion[-1])
+    assert (estimate.status, estimate.restarts) == ("restarted", 1)
+    np.testing.assert_array_equal(f.accelerometer_bias, bias)
+    np.testing.assert_allclose(f.covariance_with_biases[18:, 18:], spread, rtol=1e-9)
+    np.testing.assert_array_equal(f.covariance_with_biases[:12, 18:], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("shaking", "constant"), [(30.0, 0.0), (0.0, 157.0)], ids=["vibration", "saturation"]
+)
+def test_the_gate_keeps_faults_of_an_imu_out(shaking, constant):
+    flight = drawn(500)
+    bad = flight.accelerometer.copy()
+    count = slice(200, 300)  # 0.5 s
+    bad[count] += shaking * np.random.default_rng(1).standard_normal((100, 3))
+    bad[count, 0] += constant
+    spoiled = replace(flight, accelerometer=bad)
+    gated, open_, clean = started(flight, gate=0.999), started(flight), started(flight)
+    errors = []
+    for f, seen in ((gated, spoiled), (open_, spoiled), (clean, flight)):
+        worst = 0.0
+        for k in range(500):
+            fly(f, seen, 1, begin=k)
+            if k >= 200:
+                worst = max(worst, np.max(np.abs(f.estimate.force - flight.force[k])))
+        errors.append(worst)
+    assert gated.imu_refused > 90
+    assert open_.imu_refused == 0
+    assert errors[0] < 2.0 * errors[2]
+    assert errors[1] > 5.0 * errors[2]
+    deviation = np.sqrt(np.diagonal(gated.covariance)[15:18])
+    assert np.all(np.abs(gated.estimate.force - flight.force[-1]) < 5 * deviation)
+
+
+def test_a_gate_leaves_the_gyro_in_where_the_accelerometer_saturates():
+    flight = drawn(60)
+    f, g = started(flight, gate=0.999), started(flight)
+    fly(f, flight, 59)
+    fly(g, flight, 59)
+    for h in (f, g):
+        h.predict(flight.rotor_speeds[59])
+    e = f.correct_imu(flight.gyro[59], [157.0, 157.0, 157.0])
+    expected = g.correct_imu(flight.gyro[59])
+    assert e.nis > 1000
+    assert f.imu_refused == 1
+    np.testing.assert_allclose(e.state[:19], expected.state[:19], atol=1e-9)
+
+
+def test_a_push_is_believed_although_it_is_unlikely():
+    """Five samples that agree are no vibration, and two weights are no saturated sensor."""
+    push = np.zeros((400, 6))
+    push[200, 3] = 6.0
+    flight = drawn(400, push=push)
+    f, g = started(flight, gate=0.999), started(flight)
+    fly(f, flight, 230)
+    fly(g, flight, 230)
+    assert 0 < f.imu_refused < 15
+    fly(f, flight, 170, begin=230)
+    fly(g, flight, 170, begin=230)
+    assert abs(f.estimate.force[0] - g.estimate.force[0]) < 0.1 * 6.0
+
+
+def test_a_bias_that_jumps_is_found_again_through_the_gate():
+    tuning = UKFTuning(thrust_noise=0.03, motor_torque_noise=0.002, torque_walk=1e-5)
+    flight = drawn(1200, tuning=tuning)
+    gyro = flight.gyro.copy()
+    gyro[400:, 1] += 0.25
+    f = started(flight, tuning, gate=0.999)
+    fly(f, replace(flight, gyro=gyro), 1200)
+    assert f.imu_refused > 50
+    assert abs(f.gyro_bias[1] - flight.gyro_bias[-1, 1] - 0.25) < 5 * f.gyro_bias_std[1]
+    assert f.gyro_bias_std[1] < 0.02
+
+
+def test_whatever_an_imu_says_numbers_stay_finite():
+    rng = np.random.default_rng(0)
+    for gate in (None, 0.999):
+        f = WrenchUKF(VEHICLE, gate=gate)
+        f.reset([0, 0, 1], [1, 0, 0, 0])
+        for k in range(300):
+            f.predict(np.full(4, VEHICLE.hover_rate), float(rng.choice([1e-3, 5e-3, 0.02])))
+            size = 10.0 ** rng.uniform(-3, 200)
+            f.correct_imu(size * rng.standard_normal(3), size * rng.standard_normal(3))
+            if k % 3 == 0:
+                f.correct([0, 0, 1], [1, 0, 0, 0])
+            J = f.covariance_with_biases
+            assert np.isfinite(J).all()
+            scale = 1.0 / np.sqrt(np.diagonal(J))
+            assert np.linalg.eigvalsh(J * np.outer(scale, scale))[0] > 0
+            assert np.isfinite(f.estimate.state[:19]).all()
+            assert np.isfinite(f.accelerometer_bias).all()

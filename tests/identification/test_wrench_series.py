@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning
+from windwrench.estimator.consistency import simulate_model
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import (
     FLIGHT,
@@ -278,3 +279,35 @@ def test_simulated_flights(name):
     series = estimate_log(log, vehicle)
     assert finite(series)
     assert np.abs(series.force).max() < vehicle.weight
+
+
+def test_gyro_and_accelerometer_of_a_log_sharpen_its_estimate(vehicle):
+    """A sensor at 200 Hz beside a pose at 50 Hz, in a log whose other rows have no pose."""
+    steps, every = 600, 4
+    # rotors that are known well, or neither sensor has much to add
+    tuning = UKFTuning(thrust_noise=0.03, motor_torque_noise=0.003)
+    run = simulate_model(vehicle, tuning, np.full((steps, 4), vehicle.hover_rate), seed=3)
+    seen = np.arange(steps) % every == 0
+    blank = np.where(seen, 1.0, np.nan)[:, None]
+    sensors = {"gyro": run.gyro.copy(), "accelerometer": run.accelerometer.copy()}
+    sensors["accelerometer"][7::10] = np.nan  # not read
+
+    def error(**sensors):
+        log = FlightLog(
+            t=0.005 * np.arange(steps),
+            position=run.measured_position * blank,
+            quaternion=run.measured_quaternion * blank,
+            # a row's prediction uses the mean of its speeds and those of the row before
+            rotor_speeds=run.rotor_speeds,
+            valid=seen,
+            **sensors,
+        )
+        series = estimate_log(log, vehicle, tuning)
+        np.testing.assert_array_equal(np.isfinite(series.nis[1:]), seen[1:])
+        wrong = np.hstack([series.force - run.force, series.torque - run.torque])
+        return np.sqrt(np.mean(wrong[200:].reshape(-1, 2, 3) ** 2, axis=(0, 2)))
+
+    with_both, without = error(**sensors), error()
+    assert np.all(with_both < 0.8 * without)
+    gyro = error(gyro=sensors["gyro"])
+    assert gyro[1] < 0.8 * without[1]
