@@ -34,11 +34,10 @@ def reproduce(
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """
-    import json
-
     from ..paper import NAMES
     from ..paper.reproduce import chosen, is_done, numbers_of_seeds, write_page
     from ..paper.reproduce import reproduce as run
+    from ..runtime.regular_files import read_json
 
     names = chosen(figure)
     numbers = numbers_of_seeds(names, seeds)
@@ -60,7 +59,7 @@ def reproduce(
     write_page(NAMES, folder, target)
     result: dict[str, Any] = {}
     for name in names:
-        kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        kept = read_json(folder / f"{name}.json", "a figure's results")
         result[name] = {
             "title": kept["title"],
             "figures": kept["figures"],

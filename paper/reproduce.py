@@ -4,7 +4,6 @@ paper.
 
 import csv
 import io
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -20,6 +19,7 @@ from .. import __version__
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.page_files import write_figure, write_json, write_text
 from ..runtime.provenance import commit, made_by
+from ..runtime.regular_files import read_json
 from ..runtime.workers import shared_dict, workers
 from . import NAMES
 from .result import Result
@@ -99,8 +99,8 @@ def is_done(folder: Path, name: str, seeds: int) -> bool:
     The SVG, which no page shows, may be missing.
     """
     try:
-        kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        kept = read_json(folder / f"{name}.json", "a figure's results")
+    except InputError:
         return False
     files = all((folder / f"{name}.{kind}").is_file() for kind in ("csv.gz", "png"))
     return bool(
@@ -187,8 +187,8 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
     where = Path(os.path.relpath(folder, page.parent)).as_posix()
     for name in names:
         try:
-            kept = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            kept = read_json(folder / f"{name}.json", "a figure's results")
+        except InputError:
             continue
         parts += [
             f"## {kept['title']}",
@@ -206,7 +206,7 @@ def write_page(names: Sequence[str], folder: Path, page: Path) -> None:
         ]
         timing = folder / f"{name}.timing.json"
         rows = kept["comparison"] + (
-            json.loads(timing.read_text(encoding="utf-8")) if timing.is_file() else []
+            read_json(timing, "a figure's timing") if timing.is_file() else []
         )
         parts += [f"| {row['quantity']} | {row['paper']} | {row['here']} |" for row in rows]
         for remark in kept["remarks"]:

@@ -17,9 +17,12 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "real-flights.md",
     "leaderboard.md",
     "speed.md",
+    "imu.md",
 )
 MADE = re.compile(
-    r"^Made by `windwrench [^`]+`, windwrench \d[\w.]*, commits? ([0-9a-f, ]+)\.$", re.M
+    r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
+    r"windwrench \d[\w.]*, commits? ([0-9a-f, ]+)\.$",
+    re.M,
 )
 
 
