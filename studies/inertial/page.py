@@ -154,8 +154,7 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         f"A step of {0.72:.2f} N and 30 mNm; the time in which the mean estimate of "
         f"{result['runs']} flights rises from 10 to 90 %, for the tuning whose scatter at rest is "
         "as stated, with the 95 % interval (flights drawn anew, 1,000 times). The rotors' true "
-        "noise is a tenth of the default tuning's. What the filter is told of it decides whether "
-        "an IMU helps: the accelerometer sees the rotors' noise as force.",
+        "noise is a tenth of the default tuning's; the filter is told the one or the other.",
         "",
         *_at_equal_spread(sweep),
         f"![Rise time against spread]({picture.relative_to(page.parent).as_posix()})",
