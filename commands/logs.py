@@ -99,6 +99,26 @@ def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
     vehicle: LogVehicleOption = None,
+    smooth: Annotated[
+        bool | None,
+        typer.Option(
+            "--smooth/--no-smooth",
+            help="Use the whole log for each time's estimate, or the past alone as on the vehicle; "
+            "default: smooth, unless the log has a gyro or an accelerometer, which the smoother "
+            "does not take.",
+        ),
+    ] = None,
+    gate: Annotated[
+        float | None,
+        typer.Option(
+            help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none. "
+            "Default: 0.9999.",
+        ),
+    ] = None,
+    tune: Annotated[
+        bool,
+        typer.Option("--tune", help="Fit the filter's noise to this log first (some seconds)."),
+    ] = False,
     out: Out = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
@@ -106,12 +126,32 @@ def estimate(
     Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
     """
     from ..identification.report.wrench_picture import plot_wrench
-    from ..identification.wrench_series import estimate_log, truth_rmse, write_wrench
+    from ..identification.wrench_series import (
+        GATE,
+        counts,
+        estimate_log,
+        truth_rmse,
+        tune_to_log,
+        tuning_note_of,
+        write_wrench,
+    )
 
+    if gate is None:
+        gate = GATE
+    elif gate != 0.0 and not 0.5 <= gate < 1.0:
+        raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
     (flight,), model = _read([log], reader, vehicle)
     folder = results_folder(out)
+    if smooth is None:
+        smooth = flight.gyro is None and flight.accelerometer is None
+    fit = None
+    if tune:
+        with working("fitting the tuning"):
+            fit = tune_to_log(flight, model)
     with working("estimating") as progress:
-        series = estimate_log(flight, model, report=progress)
+        series = estimate_log(
+            flight, model, fit.tuning if fit else None, progress, smooth, gate or None
+        )
     path = write_wrench(series, folder)
     picture = plot_wrench(series, flight, folder / "wrench.png")
     _notes(series.notes)
@@ -126,7 +166,15 @@ def estimate(
         "vehicle": model.name,
         "samples": len(flight.t),
         "seconds": flight.t[-1] - flight.t[0],
+        "smoothed": smooth,
+        "status": counts(series),
+        "restarts": series.restarts,
     }
+    if fit is not None:
+        result["tuning"] = fit.as_dict()
+        console.print(str(fit), highlight=False, markup=False)
+    elif unsuited := tuning_note_of(flight, model):
+        note(f"{unsuited} Use --tune to fit the tuning to this log.")
     for name, values, unit in (("force", series.force, "N"), ("torque", series.torque, "Nm")):
         result |= {
             f"{name}_mean_{unit}": values.mean(axis=0),

@@ -5,19 +5,27 @@ are consistent.
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
+from .fixed_lag import FixedLagSmoother
 from .late_poses import TimedFilter
 from .mass_ukf import WrenchMassUKF
+from .noise_fit import NoiseFit, NoiseFitSettings, fit_noise
 from .observer import NonlinearObserver, ObserverTuning
 from .recovery import Recovery
+from .smoother import RecordingUKF, SmoothedSeries, smooth
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
 from .ukf_batch import WrenchEstimates, WrenchUKFBatch
 
 __all__ = [
     "ConstantGainFilter",
+    "FixedLagSmoother",
+    "NoiseFit",
+    "NoiseFitSettings",
     "NonlinearObserver",
     "ObserverTuning",
+    "RecordingUKF",
     "Recovery",
+    "SmoothedSeries",
     "TimedFilter",
     "UKFTuning",
     "WrenchEKF",
@@ -27,4 +35,6 @@ __all__ = [
     "WrenchMassUKF",
     "WrenchUKF",
     "WrenchUKFBatch",
+    "fit_noise",
+    "smooth",
 ]

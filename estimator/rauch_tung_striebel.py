@@ -30,6 +30,7 @@ from .covariance import add_squares
 from .error_state import displace, error_from
 from .estimate import NIS, STATE_SIZE, Array
 from .filter_record import N
+from .recovery import lost_attitude, lost_position
 from .sample import check_sample, undo_sensing
 from .ukf import correct_parts, predict
 
@@ -37,7 +38,6 @@ _ROUNDING = 1e-13  # of a variance: the smallest that is left of it
 # of a variance: P and P- that leave less than minus this have no joint distribution; rounding
 # stays four orders below
 _NO_JOINT = 1e-8
-_GREW = 1e-6  # of a variance: a measurement only ever takes from it, a restart may add
 
 # An estimate of the filter, and what leads from it back to the one before
 LINK = np.dtype(
@@ -182,7 +182,7 @@ def step_with_link(
     if usable < 0:
         return usable
     sample = undo_sensing(f, z, usable, dt)
-    P, before, G, K = f.P, work[0:N], link.G, link.K
+    P, before, G, K, restarts = f.P, work[0:N], link.G, link.K, f.restarts
     for i in range(N):
         for j in range(N):
             before[i, j] = P[i, j]
@@ -192,15 +192,13 @@ def step_with_link(
         predict(f, sample[0:4], dt, voltage)
         cross_covariance(f, link.C)
         link_back(before, link.C, P, G, K)
+        if lost_position(f) or lost_attitude(f):  # held, and no longer predicted
+            cut(before, G, K)
     for i in range(STATE_SIZE):
         link.predicted[i] = f.x[i]
-    for i in range(N):
-        work[N, i] = P[i, i]
     correct_parts(f, sample, usable)
-    for i in range(N):
-        if P[i, i] > work[N, i] * (1.0 + _GREW):
-            cut(before, G, K)
-            break
+    if f.restarts > restarts:
+        cut(before, G, K)
     for i in range(STATE_SIZE):
         link.x[i] = f.x[i]
     return usable

@@ -28,6 +28,7 @@ from .estimate import (
 )
 from .filter_record import N
 from .rauch_tung_striebel import LINK, WORK, step_back, step_with_link
+from .recovery import Recovery
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 
@@ -236,8 +237,9 @@ class RecordingUKF(WrenchUKF):
         tuning: UKFTuning | None = None,
         period: float = 0.005,
         gate: float | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
-        super().__init__(vehicle, tuning, period, gate)
+        super().__init__(vehicle, tuning, period, gate, recovery)
         self._kept: list[tuple[bytes, int, float, float]] = []
         self._starts: dict[int, np.ndarray] = {}
 

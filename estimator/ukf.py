@@ -216,10 +216,20 @@ def believable(
 
 
 @compiled
+def take_in(f: Record) -> None:
+    """Correct with the innovation that ``innovate`` left, whatever its size: (27)-(37)."""
+    whiten(f)
+    subtract_squares(f)
+    for i in range(NIS):
+        f.centre[i] = f.x[i]
+    fold(f, f.centre, f.mean)
+
+
+@compiled
 def correct(
     f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
 ) -> None:
-    """Take in what was measured of a pose, (rho, x), (27)-(37), unless it is not to be believed."""
+    """Take in what was measured of a pose, (rho, x), unless it is not to be believed."""
     x, scales, y = f.x, f.scales, f.innovation
     nis = innovate(f, position, quaternion, with_position, with_attitude)
     taken = believable(f, position, quaternion, with_position, with_attitude, nis)
@@ -228,11 +238,7 @@ def correct(
             return
         for i in range(6):
             scales[i], y[i] = choose(taken, scales[i], 0.0), choose(taken, y[i], 0.0)
-    whiten(f)
-    subtract_squares(f)
-    for i in range(NIS):
-        f.centre[i] = x[i]
-    fold(f, f.centre, f.mean)
+    take_in(f)
     if not all_of(taken):  # a quaternion brought to length 1 once more may change in its last digit
         for i in range(3, 7):
             x[i] = choose(taken, x[i], f.centre[i])

@@ -1,7 +1,7 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import UKFTuning, WrenchUKF
+from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchUKF, fit_noise
+from ..estimator.estimate import STATUSES
+from ..estimator.noise_fit import tuning_note
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_for_estimate
@@ -17,8 +19,12 @@ from .logs.tables import write_csv
 
 Array = NDArray[np.float64]
 
-_LOST = 2.0  # s without a pose, after which the filter starts anew at the next one
+# probability beyond which a pose is asked whether it jumped: one good pose in 10,000 is, at 200 Hz
+# every 50 s, and it is refused only if it also lies away from the pose before
+GATE = 0.9999
 _REPORTED = 10_000  # rows between two reports of progress
+# s without a row after which the filter holds its pose, and steps of any length do; at most so many
+_FORGETS, _REST = 20.0, 1000
 _SLACK = 0.1  # of a period: a step so little too long is still one step
 
 
@@ -37,6 +43,11 @@ class WrenchSeries:
     velocity: Array  # (N, 3) m/s, world
     angular_velocity: Array  # (N, 3) rad/s, body
     vehicle: Vehicle  # as it was declared to the filter
+    tuning: UKFTuning  # of the filter
+    # (N,) what became of each row's pose, an index of ``estimator.estimate.STATUSES``; the
+    # filter's, smoothed or not
+    status: NDArray[np.int64]
+    restarts: int  # of the filter
     notes: tuple[str, ...] = ()
 
 
@@ -45,14 +56,16 @@ def estimate_log(
     vehicle: Vehicle,
     tuning: UKFTuning | None = None,
     report: Callable[[float], None] = lambda share: None,
+    smooth: bool = False,
+    gate: float | None = GATE,
 ) -> WrenchSeries:
     """Estimate the external force and torque at every row of a log.
 
     The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
     those of the row before, in steps of at most one median period; a row without a pose is
-    prediction alone, and what gyro and accelerometer measured, if they did. After 2 s without a
-    pose the estimate is held, and the filter starts anew at the next pose. Rows before the first
-    pose hold the filter's estimate at that pose: no wrench, and its standard deviation.
+    prediction alone, and what gyro and accelerometer measured, if they did. Poses that jump are
+    refused; after gaps and lasting jumps the filter restarts (``estimator.recovery``). Rows before
+    the first pose hold the filter's estimate at that pose: no wrench, and its standard deviation.
 
     Args:
         log: the flight.
@@ -60,6 +73,12 @@ def estimate_log(
             explain.
         tuning: default ``UKFTuning.for_vehicle(vehicle, log.period)``.
         report: called now and then with the share that is done.
+        smooth: whether each row's estimate also uses the rows after it (``estimator.smoother``):
+            the best one of a whole log. Default: those before it alone, as the filter on the
+            vehicle would have it. ``nis`` is that of the filter either way, and nothing is smoothed
+            across a restart. The smoother takes poses alone: gyro and accelerometer are left out.
+        gate: probability; poses whose NIS is beyond it and which jump from the pose before are
+            refused. None: none are, and each jump restarts the filter.
 
     Raises:
         InputError: the log has no pose at all, is of other units or conventions than it declares
@@ -68,36 +87,36 @@ def estimate_log(
     log, doubts = screen_for_estimate(log, vehicle)
     seen = np.flatnonzero(log.valid)
     period = log.period
-    ukf = WrenchUKF(vehicle, tuning, period=period)
+    ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, period=period, gate=gate)
     count = len(log.t)
     state, deviation = np.empty((count, 19)), np.empty((count, 6))
-    nis = np.full(count, np.nan)
-    restarts: list[tuple[float, float]] = []  # s, the last pose before and the next
+    nis, status = np.full(count, np.nan), np.full(count, STATUSES.index("coasting"))
+    events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
+    restarts: list[float] = []  # s
 
     first = int(seen[0])
     ukf.reset(log.position[first], log.quaternion[first])
-    last_pose = float(log.t[first])
+    status[first] = STATUSES.index("tracking")
     with np.errstate(
         over="ignore", invalid="ignore"
     ):  # an estimate that overflows is refused below
         for k in range(first, count):
-            t = float(log.t[k])
             if k % _REPORTED == 0:
                 report(k / count)
             if k > first:
-                if t - last_pose <= _LOST:
-                    _predict(ukf, log, k, period)
+                _predict(ukf, log, k, period)
+                if not smooth:
                     _take_in_imu(ukf, log, k)
-                    if log.valid[k]:
-                        nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
-                elif log.valid[k]:
-                    ukf.reset(log.position[k], log.quaternion[k])
-                    restarts.append((last_pose, t))
-            if log.valid[k]:
-                last_pose = t
+                if log.valid[k]:
+                    nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
+                status[k] = STATUSES.index(ukf.estimate.status)
+                if ukf.estimate.restarts > len(restarts):
+                    restarts.append(float(log.t[k]))
             estimate = ukf.estimate
             state[k] = estimate.state[:19]
             deviation[k] = np.sqrt(np.diagonal(estimate.covariance)[12:18])
+            if isinstance(ukf, RecordingUKF):
+                events[k] = ukf.events - 1
     state[:first], deviation[:first] = state[first], deviation[first]
     if not (np.isfinite(state).all() and np.isfinite(deviation).all()):
         bad = int(np.flatnonzero(~np.isfinite(np.column_stack([state, deviation])).all(axis=1))[0])
@@ -105,6 +124,9 @@ def estimate_log(
             f"{log.source or log.name}: the estimate overflows at t = {log.t[bad]:.6g} s; expected "
             f"rotor speeds and poses that {vehicle.name} can fly"
         )
+    if isinstance(ukf, RecordingUKF):
+        smoothed = ukf.smooth(events)
+        state, deviation = smoothed.state[:, :19], smoothed.std[:, 12:18]
     return WrenchSeries(
         t=log.t,
         force=state[:, 16:19],
@@ -117,17 +139,70 @@ def estimate_log(
         velocity=state[:, 7:10],
         angular_velocity=state[:, 10:13],
         vehicle=vehicle,
-        notes=(*log.notes, *doubts, *_restart_notes(restarts)),
+        tuning=ukf.tuning,
+        status=status,
+        restarts=len(restarts),
+        notes=(*log.notes, *doubts, *_notes(log, status, restarts, smooth)),
     )
 
 
-def _restart_notes(restarts: list[tuple[float, float]]) -> tuple[str, ...]:
-    """Return one note on all gaps (s) after which the filter restarted."""
-    if not restarts:
-        return ()
-    begin, end = max(restarts, key=lambda gap: gap[1] - gap[0])
-    often = "" if len(restarts) == 1 else f" ({len(restarts)} such gaps, this is the longest)"
-    return (f"no pose from t = {begin:.6g} s to {end:.6g} s: the filter restarts there{often}",)
+def counts(series: WrenchSeries) -> dict[str, int]:
+    """Return how many rows have each status: tracking, coasting, rejected, restarted."""
+    return {name: int(np.sum(series.status == i)) for i, name in enumerate(STATUSES)}
+
+
+def _notes(
+    log: FlightLog, status: NDArray[np.int64], restarts: list[float], smooth: bool
+) -> Iterator[str]:
+    """Say what became of measurements that were not simply taken in."""
+    refused = np.flatnonzero(status == STATUSES.index("rejected"))
+    if refused.size:
+        yield (
+            f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "
+            f"refused, the first at t = {log.t[refused[0]]:.6g} s"
+        )
+    if restarts:
+        often = f", {len(restarts)} times in all" if len(restarts) > 1 else ""
+        yield (
+            f"the filter restarted at t = {restarts[0]:.6g} s{often}: after a gap in the poses, or "
+            "where they went on from elsewhere; there the wrench is uncertain for a while"
+        )
+    if smooth and (log.gyro is not None or log.accelerometer is not None):
+        yield "smoothing takes poses alone: gyro and accelerometer were not used"
+
+
+def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
+    """Find the tuning that suits a log; see ``estimator.noise_fit``.
+
+    Args:
+        log: the flight.
+        vehicle: the declared vehicle.
+        tuning: to compare with; default ``UKFTuning.for_vehicle(vehicle, log.period)``.
+
+    Raises:
+        InputError: the log is none to estimate a wrench from (``screen_for_estimate``), or too few
+            poses are left to fit a tuning to.
+    """
+    screened, _ = screen_for_estimate(log, vehicle)
+    try:
+        return fit_noise(vehicle, *_columns(screened), tuning)
+    except InputError as error:
+        raise InputError(f"{log.source or log.name}: {error}") from error
+
+
+def tuning_note_of(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> str | None:
+    """Return a sentence for the user if a log contradicts the tuning, else None; no fit.
+
+    Raises:
+        InputError: the log is none to estimate a wrench from.
+    """
+    screened, _ = screen_for_estimate(log, vehicle)
+    return tuning_note(vehicle, *_columns(screened), tuning)
+
+
+def _columns(log: FlightLog) -> tuple[Array, Array, Array, Array, Array | None]:
+    position = np.where(log.valid[:, None], log.position, np.nan)
+    return log.t, log.rotor_speeds, position, log.quaternion, log.voltage
 
 
 def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
@@ -135,9 +210,14 @@ def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
     dt = float(log.t[k] - log.t[k - 1])
     speeds = 0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k])
     voltage = None if log.voltage is None else 0.5 * float(log.voltage[k - 1] + log.voltage[k])
-    steps = max(1, math.ceil(dt / period - _SLACK))
+    near = min(dt, _FORGETS)
+    steps = max(1, math.ceil(near / period - _SLACK))
     for _ in range(steps):
-        ukf.predict(speeds, dt / steps, voltage)
+        ukf.predict(speeds, near / steps, voltage)
+    if dt > _FORGETS:
+        steps = min(math.ceil((dt - near) / period), _REST)
+        for _ in range(steps):
+            ukf.predict(speeds, (dt - near) / steps, voltage)
 
 
 def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
@@ -151,8 +231,8 @@ def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
 
 
 def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
-    """Write ``wrench.csv`` (t, force, torque, their standard deviations, nis) into a folder and
-    return its path.
+    """Write ``wrench.csv`` (t, force, torque, their standard deviations, nis, and status: 0
+    tracking, 1 coasting, 2 rejected, 3 restarted) into a folder and return its path.
 
     Raises:
         InputError: the file cannot be written.
@@ -165,6 +245,7 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
         columns |= {f"{prefix}f{axis}": force[:, i] for i, axis in enumerate("xyz")}
         columns |= {f"{prefix}t{axis}": torque[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
+    columns["status"] = series.status
     path = Path(out_dir) / "wrench.csv"
     write_csv(columns, path)
     return path

@@ -1,4 +1,5 @@
 import csv
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ from tests.support.data_paths import NANOBENCH, data_file
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.estimator.consistency import simulate_model
+from windwrench.estimator.estimate import STATUSES
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import (
     FLIGHT,
@@ -20,7 +22,12 @@ from windwrench.identification.logs.flight_phases import (
 )
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.report.wrench_picture import plot_wrench
-from windwrench.identification.wrench_series import estimate_log, truth_rmse, write_wrench
+from windwrench.identification.wrench_series import (
+    counts,
+    estimate_log,
+    truth_rmse,
+    write_wrench,
+)
 
 HEADER = [
     "t",
@@ -37,6 +44,7 @@ HEADER = [
     "std_ty",
     "std_tz",
     "nis",
+    "status",
 ]
 
 
@@ -125,7 +133,9 @@ def test_a_gap_widens_the_band_and_is_bridged(vehicle):
     t[1000:] += 1.0
     series = estimate_log(held_flight(vehicle, t), vehicle)
     assert np.all(series.std_force[1000] > 1.05 * series.std_force[999])
-    assert series.notes == ()
+    # at its default noise the filter has lost the attitude in a second
+    assert (series.restarts, STATUSES[series.status[1000]]) == (1, "restarted")
+    assert "the filter restarted at t = 6 s: after a gap" in series.notes[0]
     assert finite(series)
     # one prediction of a second instead of 200 would leave the attitude's covariance no meaning
     np.testing.assert_allclose(series.force[1400:].mean(axis=0), [0, 0, 0.3], atol=0.05)
@@ -141,10 +151,59 @@ def test_after_a_long_gap_the_filter_starts_anew(vehicle, rows_between):
         t[1000:] += 3600.0
     series = estimate_log(held_flight(vehicle, t, lost=lost), vehicle)
     again = 1500 if rows_between else 1000
-    assert "the filter restarts" in series.notes[0]
-    np.testing.assert_array_equal(series.force[again], 0.0)
+    assert "the filter restarted" in series.notes[0]
+    assert STATUSES[series.status[again]] == "restarted"
+    assert set(series.status[again + 1 :]) == {STATUSES.index("tracking")}
+    error = np.abs(series.force[again] - [0, 0, 0.3])
+    assert np.all(error < 3.0 * series.std_force[again])
+    assert np.all(series.std_force[again] > 1.3 * series.std_force[999])
     np.testing.assert_allclose(series.force[-100:].mean(axis=0), [0, 0, 0.3], atol=0.05)
     assert finite(series)
+
+
+def test_gaps_of_years_cost_nothing(vehicle):
+    t = 0.005 * np.arange(400)
+    t[200:] += 1e8
+    series = estimate_log(held_flight(vehicle, t), vehicle)
+    assert finite(series)
+    assert np.all(series.std_force[200] > 0.5 * vehicle.weight)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_wild_poses_are_refused_and_said(vehicle, smooth):
+    log = held_flight(vehicle, 0.005 * np.arange(1200))
+    position = log.position.copy()
+    position[500:1100:100] += [0.1, -0.1, 0.1]
+    spoiled = replace(log, position=position)
+    series = estimate_log(spoiled, vehicle, smooth=smooth)
+    assert "6 of 1200 poses jump from those before and were refused" in series.notes[-1]
+    assert counts(series)["rejected"] == 6
+    clean = estimate_log(log, vehicle, smooth=smooth)
+    assert np.max(np.abs(series.force - clean.force)) < 0.03
+    # no gate: each of them, and each way back, is a jump for good
+    trusting = estimate_log(spoiled, vehicle, gate=None)
+    assert trusting.restarts >= 6
+
+
+def test_smoothing_is_the_filters_nis_with_a_narrower_band(vehicle):
+    lost = slice(400, 440)
+    log = held_flight(vehicle, 0.005 * np.arange(1200), lost=lost)
+    filtered, smoothed = estimate_log(log, vehicle), estimate_log(log, vehicle, smooth=True)
+    assert np.allclose(filtered.nis, smoothed.nis, equal_nan=True)
+    assert np.allclose(filtered.force[-1], smoothed.force[-1])
+    inner = slice(100, -100)
+    assert (smoothed.std_force[inner] < 0.9 * filtered.std_force[inner]).all()
+    assert (smoothed.std_torque[inner] < 0.9 * filtered.std_torque[inner]).all()
+    # nothing crosses a new start
+    t = np.concatenate([0.005 * np.arange(600), 20.0 + 0.005 * np.arange(600)])
+    apart = held_flight(vehicle, t, lost=slice(590, 610))
+    found = estimate_log(apart, vehicle, smooth=True)
+    first = {
+        name: getattr(apart, name)[:590] for name in ("t", "position", "quaternion", "rotor_speeds")
+    }
+    alone = estimate_log(FlightLog(**first), vehicle, smooth=True)
+    assert np.allclose(found.force[:590], alone.force, rtol=0, atol=1e-6)
+    assert np.allclose(found.std_force[:590], alone.std_force, rtol=1e-6)
 
 
 def test_rows_before_the_first_pose_have_a_wrench(vehicle):

@@ -1,0 +1,396 @@
+"""The tuning that makes a flight's innovations likeliest.
+
+Maximum likelihood of the innovations: Mehra, *On the identification of variances and adaptive
+Kalman filtering*, IEEE Trans. Automatic Control 15, 1970; Astrom, *Maximum likelihood and
+prediction error methods*, Automatica 16, 1980. What is fitted, in logarithms:
+
+* walk of the force and of the torque, each horizontally (x and y are alike) and vertically;
+* white noise of thrust and motor torque, and noise of position and attitude, one number each.
+
+Pose noise and walks are well determined: they shape the innovations at short and at long times.
+White noise often is not: below some size it changes nothing, and then it stays where it is or
+comes to rest on its bound.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..dynamics.vehicle import Vehicle
+from ..runtime.errors import InputError
+from .consistency import MEASURED, chi2_band
+from .estimate import Array
+from .innovations import Innovations, Piece, check_flight, innovations, pieces_of
+from .likelihood_search import climb
+from .rise_time import rise_times
+from .tuning import UKFTuning
+
+_PARAMETERS: tuple[tuple[str, tuple[int, ...]], ...] = (
+    ("force_walk", (0, 1)),
+    ("force_walk", (2,)),
+    ("torque_walk", (0, 1)),
+    ("torque_walk", (2,)),
+    ("thrust_noise", (0, 1, 2)),
+    ("motor_torque_noise", (0, 1, 2)),
+    ("position_noise", (0, 1, 2)),
+    ("attitude_noise", (0, 1, 2)),
+)
+
+
+@dataclass(frozen=True)
+class NoiseFitSettings:
+    """What the fit looks at, and how far it may go.
+
+    Walks are bounded as a random walk over a second, white noise as a deviation at 200 Hz; both
+    are shares of the vehicle's weight, or of weight times arm. Bounds keep the filter sane where a
+    log was filtered before it was written and has no noise to find.
+    """
+
+    startup: float = 1.0  # s after each start of the filter that do not count
+    longest_gap: float = 0.5  # s without a pose, after which the filter starts anew
+    rows: int = 12_000  # of the log that are fitted; a longer one is thinned to spread excerpts
+    excerpt: float = 4.0  # s, each of them; the first ``startup`` s do not count
+    fewest_poses: int = 100  # that count: 600 numbers for 8 parameters
+    outlier_chance: float = 0.01  # of a pose, before it is looked at
+    outlier_range: float = 1.0  # m from the truth, along each axis
+    # share of the weight by which a force may change in a second: from a breath to a tumble
+    walk: tuple[float, float] = (1e-4, 10.0)
+    # share of the weight: no rotor is known better than 0.1 %, none is worse than its own thrust
+    white: tuple[float, float] = (6e-4, 0.6)
+    position: tuple[float, float] = (2e-5, 0.3)  # m: the best motion capture, a poor radio
+    attitude: tuple[float, float] = (1e-4, 0.5)  # rad
+    rise_times: tuple[float, ...] = (1.0, 0.3, 0.1)  # s, of tunings among which the search starts
+    quieter: tuple[float, ...] = (0.1,)  # factors on their white noise
+    # mean NIS by 6 within which a tuning counts as consistent for a user: far wider than the 95 %
+    # band of a long log, which the smallest imperfection leaves
+    consistent: tuple[float, float] = (0.9, 1.1)
+    notable_gain: float = 0.05  # log-likelihood of a pose by which another tuning is clearly better
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFit:
+    """A tuning found in a log, and how it compares with the one that was given.
+
+    Figures "before" are those of the given tuning and "after" those of the fitted one, both over
+    the whole log without start-ups and outliers.
+    """
+
+    tuning: UKFTuning
+    given: UKFTuning
+    poses: int  # that count
+    outliers: int  # of them, to the fitted tuning
+    nis_before: float  # mean; 6 is expected
+    nis_after: float
+    nis_band: tuple[float, float]  # of a mean over so many poses, 95 %
+    log_likelihood_before: float  # sum over the poses, outliers included
+    log_likelihood_after: float
+    rise_before: tuple[Array, Array]  # (3,) s of the force, (3,) s of the torque, 10-90 %
+    rise_after: tuple[Array, Array]
+    # standard deviation of the logarithm of each fitted number (8,), in the order of force walk
+    # (horizontal, vertical), torque walk (the same), thrust, motor torque, position and attitude
+    # noise; NaN where it came to rest on a bound
+    deviation: Array
+    consistent: tuple[float, float]  # from the settings
+
+    @property
+    def given_is_consistent(self) -> bool:
+        """Whether the mean NIS of the given tuning is near 6, and the fitted one is no likelier
+        than its eight numbers alone would make it (Schwarz, *Estimating the dimension of a model*,
+        Annals of Statistics 6, 1978).
+        """
+        low, high = self.consistent
+        gain = self.log_likelihood_after - self.log_likelihood_before
+        return low <= self.nis_before / MEASURED <= high and gain <= 0.5 * len(
+            _PARAMETERS
+        ) * math.log(MEASURED * self.poses)
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the fitted numbers, NIS and rise times as plain data."""
+        names = dict.fromkeys(name for name, _ in _PARAMETERS)
+        return {name: np.asarray(getattr(self.tuning, name)).tolist() for name in names} | {
+            "nis_before": self.nis_before,
+            "nis_after": self.nis_after,
+            "nis_band": list(self.nis_band),
+            "log_likelihood_before": self.log_likelihood_before,
+            "log_likelihood_after": self.log_likelihood_after,
+            "force_rise_time_s": self.rise_after[0].tolist(),
+            "torque_rise_time_s": self.rise_after[1].tolist(),
+        }
+
+    def __str__(self) -> str:
+        if self.given_is_consistent:
+            return f"The tuning suits this flight: {_nis(self.nis_before, self.nis_band)}."
+        gain = (self.log_likelihood_after - self.log_likelihood_before) / self.poses
+        (force, torque), (force_before, torque_before) = self.rise_after, self.rise_before
+        return (
+            f"{nis_sentence(self.nis_before, self.nis_band, self.consistent)} Fitted to the log, "
+            f"NIS is {self.nis_after:.2f} and each pose {_likelier(gain)} times as "
+            f"likely: the estimated force rises in {_times(force)} s instead of "
+            f"{_times(force_before)} s, the torque in {_times(torque)} s instead of "
+            f"{_times(torque_before)} s."
+        )
+
+
+def nis_sentence(
+    nis: float, band: tuple[float, float], consistent: tuple[float, float] | None = None
+) -> str:
+    """Return what a mean NIS over a flight says of the tuning, for a user.
+
+    Args:
+        nis: mean over the poses.
+        band: in which 95 % of such means lie.
+        consistent: see ``NoiseFitSettings``.
+    """
+    low, high = NoiseFitSettings().consistent if consistent is None else consistent
+    ratio = (nis / MEASURED) ** 0.5
+    found = _nis(nis, band)
+    if low <= nis / MEASURED <= high:
+        return f"The tuning expects innovations about as large as this flight shows ({found})."
+    size = f"{ratio:.3g} times smaller" if ratio > 1.0 else f"{1.0 / ratio:.3g} times larger"
+    return f"The tuning expects innovations {size} than this flight shows ({found})."
+
+
+def _nis(nis: float, band: tuple[float, float]) -> str:
+    return f"NIS {nis:.2f}, expected {MEASURED}, 95 % band {band[0]:.2f} to {band[1]:.2f}"
+
+
+def _likelier(gain: float) -> str:
+    return f"{math.exp(gain):.2g}" if gain < 5.0 else "over 100"
+
+
+def _times(seconds: Array) -> str:
+    low, high = f"{seconds.min():.2g}", f"{seconds.max():.2g}"
+    return low if low == high else f"{low} to {high}"
+
+
+def tuning_note(
+    vehicle: Vehicle,
+    t: ArrayLike,
+    rotor_speeds: ArrayLike,
+    position: ArrayLike,
+    quaternion: ArrayLike,
+    voltage: ArrayLike | None = None,
+    tuning: UKFTuning | None = None,
+    settings: NoiseFitSettings | None = None,
+) -> str | None:
+    """Return a sentence for the user if a flight contradicts the given tuning, without a fit: by
+    its NIS, or because one of a few other tunings is clearly likelier. None if it does not, or if
+    too few poses count.
+
+    Arguments and errors are those of ``fit_noise``.
+    """
+    flight = _prepare(vehicle, t, rotor_speeds, position, quaternion, voltage, tuning, settings)
+    if flight.poses < flight.use.fewest_poses:
+        return None
+    passes = [flight.evaluate(made, flight.whole) for made in _starts(flight)]
+    per_pose = [float(each.log_likelihood.mean()) for each in passes]
+    gain = max(per_pose) - per_pose[0]
+    nis = _mean_nis(passes[0])
+    low, high = flight.use.consistent
+    if low <= nis / MEASURED <= high and gain <= flight.use.notable_gain:
+        return None
+    sentence = nis_sentence(nis, chi2_band(MEASURED, flight.poses), flight.use.consistent)
+    if gain > flight.use.notable_gain:
+        sentence += f" Another tuning makes each pose {_likelier(gain)} times as likely."
+    return sentence
+
+
+def fit_noise(
+    vehicle: Vehicle,
+    t: ArrayLike,
+    rotor_speeds: ArrayLike,
+    position: ArrayLike,
+    quaternion: ArrayLike,
+    voltage: ArrayLike | None = None,
+    tuning: UKFTuning | None = None,
+    settings: NoiseFitSettings | None = None,
+) -> NoiseFit:
+    """Find the tuning that makes the innovations of one flight likeliest.
+
+    Args:
+        vehicle: the declared vehicle, whose declared effects are part of the filter's model.
+        t: (N,) s, increasing.
+        rotor_speeds: (N, 4) rad/s, at the instants of the rows; a step uses the mean of its ends.
+        position: (N, 3) m, world; rows that are not finite have no pose.
+        quaternion: (N, 4) body to world, scalar first; likewise.
+        voltage: (N,) V; default: the vehicle's nominal one.
+        tuning: the given one, to compare with; what is not fitted (``kappa``, the noise of inertial
+            sensors) stays as it is there. Default: ``UKFTuning.for_vehicle``.
+        settings: default ``NoiseFitSettings()``.
+
+    Raises:
+        InputError: shapes differ, times do not increase, or fewer than 100 poses are left once
+            held poses and start-ups are taken out.
+    """
+    flight = _prepare(vehicle, t, rotor_speeds, position, quaternion, voltage, tuning, settings)
+    if flight.poses < flight.use.fewest_poses:
+        raise InputError(
+            f"fit_noise: {flight.poses} of {len(flight.columns[0])} rows have a pose that does not "
+            f"repeat the last one and comes {flight.use.startup:g} s or more after a start; "
+            f"expected at least {flight.use.fewest_poses} to fit the tuning to"
+        )
+    use, period, given = flight.use, flight.period, flight.given
+    pieces = flight.whole if len(flight.columns[0]) <= use.rows else _excerpts(flight)
+    if sum(int(piece.counted.sum()) for piece in pieces) < use.fewest_poses:
+        pieces = flight.whole
+
+    def evaluate(x: Array) -> Innovations:
+        return flight.evaluate(_tuning(x, given), pieces)
+
+    bounds = np.log(_bounds(vehicle, period, use))
+    starts = [np.clip(_numbers(made), *bounds.T) for made in _starts(flight)]
+    with ThreadPoolExecutor(min(len(bounds), os.cpu_count() or 1)) as threads:
+        likelihoods = [each.log_likelihood.sum() for each in threads.map(evaluate, starts)]
+        found, deviation = climb(evaluate, starts[int(np.argmax(likelihoods))], bounds, threads)
+    fitted = _tuning(found, given)
+    before = flight.evaluate(given, flight.whole)
+    after = flight.evaluate(fitted, flight.whole)
+    return NoiseFit(
+        fitted,
+        given,
+        flight.poses,
+        int(after.outlier.sum()),
+        _mean_nis(before),
+        _mean_nis(after),
+        chi2_band(MEASURED, flight.poses),
+        float(before.log_likelihood.sum()),
+        float(after.log_likelihood.sum()),
+        rise_times(vehicle, given, period),
+        rise_times(vehicle, fitted, period),
+        deviation,
+        use.consistent,
+    )
+
+
+def _mean_nis(found: Innovations) -> float:
+    kept = found.nis[~found.outlier]
+    return float(kept.mean()) if kept.size else float("inf")
+
+
+def _tuning(x: Array, given: UKFTuning) -> UKFTuning:
+    """Return the tuning whose fitted numbers have the logarithms ``x`` (8,)."""
+    values: dict[str, Array] = {name: np.empty(3) for name, _ in _PARAMETERS}
+    for (name, axes), value in zip(_PARAMETERS, np.exp(x), strict=True):
+        values[name][list(axes)] = value
+    return replace(
+        given,
+        force_walk=values["force_walk"],
+        torque_walk=values["torque_walk"],
+        thrust_noise=values["thrust_noise"],
+        motor_torque_noise=values["motor_torque_noise"],
+        position_noise=values["position_noise"],
+        attitude_noise=values["attitude_noise"],
+    )
+
+
+def _numbers(tuning: UKFTuning) -> Array:
+    """Return the logarithms (8,) of a tuning's numbers; of several axes, their mean."""
+    return np.array(
+        [
+            np.log(np.broadcast_to(np.asarray(getattr(tuning, name)), 3)[list(axes)]).mean()
+            for name, axes in _PARAMETERS
+        ]
+    )
+
+
+def _starts(flight: "_Flight") -> list[UKFTuning]:
+    """Return the given tuning, and what it is with other walks and less white noise."""
+    tunings = []
+    for rise in flight.use.rise_times:
+        made = UKFTuning.for_vehicle(flight.vehicle, flight.period, rise)
+        tunings += [
+            replace(
+                flight.given,
+                force_walk=made.force_walk,
+                torque_walk=made.torque_walk,
+                thrust_noise=factor * np.asarray(made.thrust_noise),
+                motor_torque_noise=factor * np.asarray(made.motor_torque_noise),
+            )
+            for factor in flight.use.quieter
+        ]
+    return [flight.given, *tunings]
+
+
+def _bounds(vehicle: Vehicle, period: float, use: NoiseFitSettings) -> Array:
+    """Return the smallest and the largest value (8, 2) of each fitted number."""
+    moment = vehicle.weight * vehicle.arm_l
+    walk = np.array(use.walk) * period**0.5  # in a step
+    white = np.array(use.white) * (0.005 / period) ** 0.5
+    bounds = {
+        "force_walk": walk * vehicle.weight,
+        "torque_walk": walk * moment,
+        "thrust_noise": white * vehicle.weight,
+        "motor_torque_noise": white * moment,
+        "position_noise": np.array(use.position),
+        "attitude_noise": np.array(use.attitude),
+    }
+    return np.array([bounds[name] for name, _ in _PARAMETERS])
+
+
+def _excerpts(flight: "_Flight") -> list[Piece]:
+    """Return excerpts of a long flight, spread evenly over it."""
+    use, t = flight.use, flight.columns[0]
+    count = max(2, round(use.rows * flight.period / use.excerpt))
+    pieces: list[Piece] = []
+    for start in np.linspace(t[0], t[-1] - use.excerpt, count):
+        rows = slice(*np.searchsorted(t, [start, start + use.excerpt]))
+        pieces += flight.pieces(rows)
+    return pieces
+
+
+@dataclass(frozen=True, eq=False)
+class _Flight:
+    """One flight, checked, as the fit and the note look at it."""
+
+    vehicle: Vehicle
+    columns: tuple[Array, Array, Array, Array, Array | None]  # t, rotor speeds, pose, voltage
+    period: float
+    given: UKFTuning
+    use: NoiseFitSettings
+    whole: list[Piece] = field(default_factory=list)
+
+    @property
+    def poses(self) -> int:
+        """How many count."""
+        return sum(int(piece.counted.sum()) for piece in self.whole)
+
+    def pieces(self, rows: slice) -> list[Piece]:
+        """Return the pieces of some rows."""
+        *columns, voltage = self.columns
+        t, speeds, position, quaternion = (x[rows] for x in columns if x is not None)
+        volts = None if voltage is None else voltage[rows]
+        gap, startup = self.use.longest_gap, self.use.startup
+        return pieces_of(self.vehicle, t, speeds, position, quaternion, volts, gap, startup)
+
+    def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
+        """Return what a pass of the filter with this tuning finds."""
+        chance, reach = self.use.outlier_chance, self.use.outlier_range
+        return innovations(self.vehicle, tuning, self.period, pieces, chance, reach)
+
+
+def _prepare(
+    vehicle: Vehicle,
+    t: ArrayLike,
+    rotor_speeds: ArrayLike,
+    position: ArrayLike,
+    quaternion: ArrayLike,
+    voltage: ArrayLike | None,
+    tuning: UKFTuning | None,
+    settings: NoiseFitSettings | None,
+) -> _Flight:
+    times, speeds, x, q = (
+        np.asarray(value, dtype=np.float64) for value in (t, rotor_speeds, position, quaternion)
+    )
+    volts = None if voltage is None else np.asarray(voltage, dtype=np.float64)
+    check_flight(times, speeds, x, q, volts)
+    period = float(np.median(np.diff(times)))
+    given = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
+    use = NoiseFitSettings() if settings is None else settings
+    flight = _Flight(vehicle, (times, speeds, x, q, volts), period, given, use)
+    flight.whole.extend(flight.pieces(slice(None)))
+    return flight

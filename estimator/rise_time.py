@@ -1,0 +1,69 @@
+"""How fast the estimated force and torque follow a step: the steady filter along one axis."""
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from ..dynamics.vehicle import Vehicle
+from .estimate import Array
+from .tuning import UKFTuning
+
+_LONGEST = 1_000_000  # steps
+
+
+def rise_times(vehicle: Vehicle, tuning: UKFTuning, period: float) -> tuple[Array, Array]:
+    """Return the 10-90 % rise times (3,) s of the estimated force and (3,) s of the torque, along
+    x, y, z near hover, with a pose every period.
+
+    Where the white noise of the model dominates that of the pose this is about
+    ``2.2 * period * thrust_noise / force_walk``; where it does not, the pose's noise slows the
+    filter down further.
+
+    Args:
+        vehicle: whose mass and inertia are used.
+        tuning: deviations per step.
+        period: s.
+    """
+    force, torque = np.empty(3), np.empty(3)
+    thrust, motor, force_walk, torque_walk, position, attitude = (
+        np.broadcast_to(np.asarray(value, dtype=np.float64), 3)
+        for value in (
+            tuning.thrust_noise,
+            tuning.motor_torque_noise,
+            tuning.force_walk,
+            tuning.torque_walk,
+            tuning.position_noise,
+            tuning.attitude_noise,
+        )
+    )
+    for i in range(3):
+        force[i] = _rise(period, vehicle.mass, thrust[i], force_walk[i], position[i])
+        inertia = float(vehicle.inertia[i, i])
+        torque[i] = _rise(period, inertia, motor[i], torque_walk[i], attitude[i])
+    return force, torque
+
+
+def _rise(dt: float, inertia: float, white: float, walk: float, noise: float) -> float:
+    """Return the rise time (s) of the wrench w in ``inertia * x'' = w``, x being measured."""
+    # in units of the noise, time in periods: w is then the change of x in a step squared
+    scale = dt * dt / inertia / noise
+    A = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
+    b = np.array([0.5, 1.0, 0.0]) * white * scale
+    Q = np.outer(b, b)
+    Q[2, 2] = (walk * scale) ** 2
+    C = np.array([[1.0, 0.0, 0.0]])
+    P = solve_discrete_are(A.T, C.T, Q, np.eye(1))
+    gain = P[:, 0] / (P[0, 0] + 1.0)
+    error = np.array([0.0, 0.0, 1.0])  # a step of one: truth minus estimate
+    previous, start = 0.0, 0.0
+    for k in range(1, _LONGEST):
+        error = A @ error
+        error = error - gain * error[0]
+        now = 1.0 - float(error[2])
+        for level in (0.1, 0.9):
+            if previous < level <= now:
+                when = k - (now - level) / (now - previous)
+                if level == 0.9:
+                    return (when - start) * dt
+                start = when
+        previous = now
+    return float("inf")

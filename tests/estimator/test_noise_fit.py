@@ -1,0 +1,254 @@
+"""Tuning from a log: noise that is known is found back, and bad logs are taken or refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.estimator.consistency import simulate_model
+from windwrench.estimator.innovations import fisher_information, innovations, pieces_of
+from windwrench.estimator.noise_fit import NoiseFitSettings, fit_noise, nis_sentence, tuning_note
+from windwrench.estimator.rise_time import rise_times
+
+VEHICLE = load_vehicle("ardrone2")
+PERIOD = 0.005
+# white noise as large as the default, walks faster, and no two axes and sensors in proportion
+TRUE = UKFTuning(
+    force_walk=(0.02, 0.02, 0.008),
+    torque_walk=(6e-4, 6e-4, 2e-4),
+    thrust_noise=0.3,
+    motor_torque_noise=0.03,
+    position_noise=0.002,
+    attitude_noise=0.003,
+)
+WALKS = ("force_walk", "torque_walk")
+NOISES = ("thrust_noise", "motor_torque_noise", "position_noise", "attitude_noise")
+
+
+def flight(tuning=TRUE, seconds=20.0, seed=0, vehicle=VEHICLE, whole=False):
+    """t, rotor speeds, position and quaternion of a flight drawn from the filter's own model.
+
+    Its rotor speeds hold over a step where the fit takes the mean of two rows; with a rate loop of
+    5 / s the difference is about 1 % of one step's motor torque noise.
+    """
+    steps = round(seconds / PERIOD)
+    speeds = np.full((steps, 4), vehicle.hover_rate)
+    run = simulate_model(vehicle, tuning, speeds, PERIOD, seed, rate_gain=5.0)
+    log = (
+        PERIOD * np.arange(1, steps + 1),
+        run.rotor_speeds,
+        run.measured_position.copy(),
+        run.measured_quaternion.copy(),
+    )
+    return (log, run) if whole else log
+
+
+def logarithms(tuning):
+    """The eight fitted numbers of a tuning, in the order of ``NoiseFit.deviation``."""
+    walks = [np.broadcast_to(getattr(tuning, name), 3)[i] for name in WALKS for i in (0, 2)]
+    noises = [np.broadcast_to(getattr(tuning, name), 3)[0] for name in NOISES]
+    return np.log(walks + noises)
+
+
+@pytest.fixture(scope="module")
+def fits():
+    return [fit_noise(VEHICLE, *flight(seed=seed)) for seed in range(3)]
+
+
+def test_known_noise_is_found_back_within_its_uncertainty(fits):
+    """Over three flights the eight errors in their own deviations are like 24 normal numbers."""
+    errors = np.array([(logarithms(fit.tuning) - logarithms(TRUE)) / fit.deviation for fit in fits])
+    assert np.all(np.abs(errors) < 3.5)
+    assert 0.5 < np.sqrt(np.mean(errors**2)) < 1.5
+    # and that is not little said: pose noise is known to 2 %, walks to 40 %
+    for fit in fits:
+        assert np.all(fit.deviation[6:] < 0.02)
+        assert np.all(fit.deviation[:4] < 0.4)
+
+
+def test_nis_is_in_its_band_after_the_fit_and_not_before(fits):
+    for fit in fits:
+        low, high = fit.nis_band
+        assert low <= fit.nis_after <= high
+        assert fit.nis_before > high
+        assert fit.log_likelihood_after > fit.log_likelihood_before
+        assert not fit.given_is_consistent
+        assert "smaller than this flight shows" in str(fit)
+        assert "instead of 1 s" in str(fit)
+        assert fit.outliers == 0
+
+
+def test_a_tuning_that_is_right_is_said_to_be():
+    log = flight()
+    fit = fit_noise(VEHICLE, *log, tuning=TRUE)
+    assert fit.given_is_consistent
+    assert "suits this flight" in str(fit)
+    assert tuning_note(VEHICLE, *log, tuning=TRUE) is None
+    assert "times smaller than this flight shows" in tuning_note(VEHICLE, *log)
+    slow = replace(TRUE, thrust_noise=3.0, motor_torque_noise=0.3)
+    assert "times as likely" in tuning_note(VEHICLE, *log, tuning=slow)
+
+
+def test_the_likelihood_is_that_of_the_filters_own_steps():
+    """Against the filter stepped from Python: NIS and log det S of every pose."""
+    t, speeds, position, quaternion = flight(seconds=1.0)
+    pieces = pieces_of(VEHICLE, t, speeds, position, quaternion, None, 0.5, 0.2)
+    found = innovations(VEHICLE, TRUE, PERIOD, pieces, 1e-12, 1.0)
+    (piece,) = pieces
+    ukf = WrenchUKF(VEHICLE, TRUE, PERIOD)
+    ukf.reset(
+        piece.position,
+        piece.quaternion,
+        velocity=piece.velocity,
+        angular_velocity=piece.angular_velocity,
+    )
+    noise = np.diag(np.r_[np.full(3, (0.003 / 4) ** 2), np.full(3, 0.002**2)])
+    seen = [0, 1, 2, 6, 7, 8]
+    expected = []
+    for k in range(1, len(t)):
+        before = ukf.predict(0.5 * (speeds[k - 1] + speeds[k])).covariance
+        nis = ukf.correct(position[k], quaternion[k]).nis
+        S = before[np.ix_(seen, seen)] + noise
+        expected.append(-0.5 * (nis + np.linalg.slogdet(2.0 * np.pi * S)[1]))
+    late = t[1:] > t[0] + 0.2
+    assert np.allclose(found.log_likelihood, np.array(expected)[late], rtol=0, atol=1e-6)
+
+
+def test_the_information_is_the_variance_of_the_scores():
+    """Of thrust, position and attitude noise over 40 short flights."""
+    step = 1e-3
+    names = ("thrust_noise", "position_noise", "attitude_noise")
+    scores, informations = [], []
+    for seed in range(40):
+        pieces = pieces_of(VEHICLE, *flight(seconds=2.0, seed=seed), None, 0.5, 1.0)
+        found, *moved = (
+            innovations(VEHICLE, made, PERIOD, pieces, 1e-12, 1.0)
+            for made in (
+                TRUE,
+                *(replace(TRUE, **{name: getattr(TRUE, name) * np.exp(step)}) for name in names),
+            )
+        )
+        total = found.log_likelihood.sum()
+        scores.append([(m.log_likelihood.sum() - total) / step for m in moved])
+        informations.append(np.diagonal(fisher_information(found, moved, step)))
+    ratios = np.mean(np.square(scores), axis=0) / np.mean(informations, axis=0)
+    assert np.all((ratios > 0.45) & (ratios < 1.8))
+
+
+def test_bounds_hold_where_there_is_no_noise_to_find():
+    """A log filtered before it was written: no noise floor."""
+    quiet = UKFTuning(
+        force_walk=1e-9,
+        torque_walk=1e-10,
+        thrust_noise=1e-9,
+        motor_torque_noise=1e-10,
+        position_noise=1e-9,
+        attitude_noise=1e-9,
+    )
+    use = NoiseFitSettings()
+    log, truth = flight(quiet, seconds=4.0, whole=True)
+    fit = fit_noise(VEHICLE, *log)
+    assert np.all(np.asarray(fit.tuning.position_noise) >= use.position[0] * (1 - 1e-9))
+    assert np.all(np.asarray(fit.tuning.attitude_noise) >= use.attitude[0] * (1 - 1e-9))
+    assert np.all(np.asarray(fit.tuning.thrust_noise) >= use.white[0] * VEHICLE.weight * (1 - 1e-9))
+    assert np.isnan(fit.deviation[6:]).all()
+    estimator = WrenchUKF(VEHICLE, fit.tuning, PERIOD)
+    estimator.reset(log[2][0], log[3][0])
+    for k in range(1, len(log[0])):
+        estimate = estimator.step(log[1][k], log[2][k], log[3][k])
+    assert np.isfinite(estimate.covariance).all()
+    assert np.linalg.norm(estimate.force - truth.force[-1]) < 0.05
+
+
+def test_lost_held_and_wild_poses_change_little():
+    t, speeds, position, quaternion = flight(seconds=20.0)
+    clean = fit_noise(VEHICLE, t, speeds, position, quaternion)
+    rng = np.random.default_rng(1)
+    wild = rng.choice(len(t), len(t) // 100, replace=False)
+    position[wild] += rng.uniform(-0.3, 0.3, (len(wild), 3))
+    position[700:760], quaternion[700:760] = np.nan, np.nan  # lost for 0.3 s
+    position[1500:1700], quaternion[1500:1700] = np.nan, np.nan  # for 1 s: the filter starts anew
+    position[2500:2560], quaternion[2500:2560] = position[2499], quaternion[2499]  # held
+    spoiled = fit_noise(VEHICLE, t, speeds, position, quaternion)
+    assert 25 <= spoiled.outliers <= 60
+    apart = (logarithms(spoiled.tuning) - logarithms(clean.tuning)) / clean.deviation
+    assert np.all(np.abs(apart) < 2.0)
+    low, high = spoiled.nis_band
+    assert low <= spoiled.nis_after <= high
+
+
+def test_short_logs_work_or_are_refused_in_one_line():
+    t, speeds, position, quaternion = flight(seconds=3.0)
+    fit = fit_noise(VEHICLE, t, speeds, position, quaternion)
+    assert 300 < fit.poses <= 400
+    assert 0.5 < fit.nis_after / 6.0 < 2.0
+    short = slice(0, 250)
+    with pytest.raises(InputError, match="expected at least 100") as caught:
+        fit_noise(VEHICLE, t[short], speeds[short], position[short], quaternion[short])
+    assert "\n" not in str(caught.value)
+    assert tuning_note(VEHICLE, t[short], speeds[short], position[short], quaternion[short]) is None
+    for spoil in (np.full_like(position, np.nan), np.tile(position[:1], (len(t), 1))):
+        held = np.tile(quaternion[:1], (len(t), 1))
+        with pytest.raises(InputError, match="0 of 600 rows"):
+            fit_noise(VEHICLE, t, speeds, spoil, held)
+
+
+def test_bad_arrays_are_refused():
+    t, speeds, position, quaternion = flight(seconds=1.0)
+    for bad, words in (
+        ((t, speeds[:-1], position, quaternion), "rotor_speeds must have shape"),
+        ((t[::-1], speeds, position, quaternion), "increase strictly"),
+        ((t, np.where(speeds > 0, np.nan, 0), position, quaternion), "rotor_speeds must be finite"),
+        ((t, speeds, position, quaternion, t[:3]), "voltage must have shape"),
+    ):
+        with pytest.raises(InputError, match=words):
+            fit_noise(VEHICLE, *bad)
+
+
+def test_a_long_log_is_thinned_and_a_slow_one_is_scaled():
+    log = flight(seconds=30.0)
+    fit = fit_noise(VEHICLE, *log, settings=NoiseFitSettings(rows=2000))
+    assert fit.poses == len(log[0]) - 200  # figures are those of the whole log
+    assert np.all(np.abs(logarithms(fit.tuning) - logarithms(TRUE)) < 4.0 * fit.deviation)
+
+
+def test_declared_effects_are_part_of_the_model():
+    vehicle = VEHICLE.with_effects(
+        EffectSetting("com_offset", {"cx": 0.01, "cz": -0.02}),
+        EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}),
+    )
+    fit = fit_noise(vehicle, *flight(seconds=5.0, vehicle=vehicle))
+    assert fit.nis_band[0] <= fit.nis_after <= fit.nis_band[1]
+
+
+def test_rise_times_are_those_of_the_filter():
+    """A step of the force and of the torque, fed to the filter itself."""
+    assert np.allclose(rise_times(VEHICLE, UKFTuning(), PERIOD), 1.0, rtol=0.02)
+    quick = replace(TRUE, thrust_noise=0.003, motor_torque_noise=3e-4)
+    force, _ = rise_times(VEHICLE, quick, PERIOD)
+    assert force[0] < force[2]
+    assert force[0] > 2.0 * (2.2 * PERIOD * 0.003 / 0.02)  # the pose's noise is what slows it down
+    ukf = WrenchUKF(VEHICLE, quick, PERIOD)
+    ukf.reset((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    speeds, push, position, velocity = np.full(4, VEHICLE.hover_rate), 0.2, 1.0, 0.0
+    seen = []
+    for k in range(800):
+        a = push / VEHICLE.mass if k >= 400 else 0.0
+        position, velocity = (
+            position + PERIOD * (velocity + 0.5 * PERIOD * a),
+            velocity + PERIOD * a,
+        )
+        seen.append(ukf.step(speeds, (0.0, 0.0, position), (1.0, 0.0, 0.0, 0.0)).force[2])
+    seen = np.array(seen[400:])
+    measured = PERIOD * (np.argmax(seen > 0.9 * push) - np.argmax(seen > 0.1 * push))
+    assert measured == pytest.approx(force[2], abs=2 * PERIOD)
+
+
+def test_what_nis_says_is_a_sentence():
+    band = (5.9, 6.1)
+    assert "1.1 times smaller" in nis_sentence(7.3, band)
+    assert "NIS 7.30, expected 6, 95 % band 5.90 to 6.10" in nis_sentence(7.3, band)
+    assert "1.41 times larger" in nis_sentence(3.0, band)
+    assert "about as large" in nis_sentence(6.2, band)
