@@ -1,0 +1,1 @@
+"""How good the wrench is that ``windwrench estimate`` finds in a log."""
