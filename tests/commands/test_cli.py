@@ -155,9 +155,19 @@ def test_a_recorded_flight_can_be_estimated(log, tmp_path):
         "std_ty",
         "std_tz",
         "nis",
+        "status",
     ]
     late = [float(row["fx"]) for row in rows if float(row["t"]) > 5.0]
     assert np.mean(late) == pytest.approx(0.2, abs=0.03)
+
+
+def test_an_estimate_says_its_tuning_and_how_it_used_the_log(log, tmp_path):
+    text = succeed(tmp_path, "estimate", log, "--tune", "--no-smooth", "--out", "out", "--json")
+    found = json.loads(text)["result"]
+    assert found["smoothed"] is False
+    assert found["tuning"]["nis_band"][0] < found["tuning"]["nis_after"]
+    assert found["status"]["tracking"] == found["samples"]
+    assert found["restarts"] == 0
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "wrench.csv",
         "wrench.png",
@@ -217,6 +227,7 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
         (("estimate", "nowhere.csv"), "nowhere.csv"),
         (("estimate", "nowhere.txt"), ".csv.gz"),
         (("estimate",), "argument"),
+        (("estimate", "log.csv", "--gate", "1.5"), "--gate: expected 0, or a probability"),
         (("record", "--out", "out/log.txt"), ".csv.gz"),
         (("record", "--out", "out/log.csv", "--seconds", "0"), "--seconds"),
         (("record", "--out", "out/log.csv", "--seconds", "nan"), "--seconds"),
