@@ -204,6 +204,13 @@ def diagnose(
         ),
     ] = None,
     reader: ReaderOption = None,
+    against: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Log of the same vehicle before a change; may be repeated. Then only what changed "
+            "is looked for (which rotor, which side), and no model has to be true.",
+        ),
+    ] = None,
     without: Annotated[
         list[str] | None,
         typer.Option(
@@ -219,6 +226,8 @@ def diagnose(
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
+    if against:
+        return _compare(logs, against, reader, vehicle, out)
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.words import error_sentences, headline, remainder_sentence
@@ -270,6 +279,34 @@ def diagnose(
         console.print(line, highlight=False, markup=False)
     say(*written)
     return report_data(found)
+
+
+def _compare(
+    logs: Sequence[Path],
+    against: Sequence[Path],
+    reader: str | None,
+    vehicle: str | None,
+    out: Path,
+) -> dict[str, Any]:
+    """Find what changed between two sets of flights; write change.json and change.png."""
+    from ..identification.comparison.change import compare
+    from ..identification.comparison.trim import trim_of_log
+    from ..identification.comparison.words import change_data, headline, write_change
+
+    every, model = _read([*logs, *against], reader, vehicle)
+    folder = results_folder(out)
+    trims = [trim_of_log(log, model) for log in every]
+    change = compare(trims[: len(logs)], trims[len(logs) :])
+    written = write_change(change, folder)
+    _notes(text for log in every for text in log.notes)
+    console.print(f"vehicle: {model.name}", highlight=False, markup=False)
+    console.print(headline(change), highlight=False, markup=False)
+    table = Table("where something changed", "probability", box=box.SIMPLE_HEAD)
+    for name, chance in sorted(change.places.items(), key=lambda item: -item[1]):
+        table.add_row(name, f"{chance:.3f}")
+    console.print(table)
+    say(*written)
+    return change_data(change)
 
 
 def replay(

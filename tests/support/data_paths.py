@@ -31,6 +31,9 @@ SOURCES = {
         "the logs of github.com/IMRCLab/crazyswarm2-tools, converted to CSV with the columns that "
         "tests/data/README.md lists"
     ),
+    "crazypad": (
+        "the flights of github.com/AerialRoboticsUUST/CrazyPAD (Data 2024, 9, 79), converted to CSV"
+    ),
     "px4": "the logs of the test folder in github.com/PX4/pyulog",
     "flights": (
         "simulated flights of another simulator, which are not published; those of RotorPy "

@@ -1,0 +1,228 @@
+"""Which rotor or side changed between two sets of flights, and how sure that is.
+
+Each flight has four numbers: the differences of left and right, of front and rear, and of the
+diagonals, each in parts of the total, and the total itself, as a logarithm. Between flights of one
+unchanged vehicle they scatter, for a battery is never put in twice at the same place. Of that
+scatter little is known from two or three flights, so its covariance has an inverse-Wishart prior,
+and the difference of two sets is a multivariate Student's t (Gelman and others, *Bayesian Data
+Analysis*, third edition, section 3.6).
+
+What may have changed, each by an amount that is integrated over:
+
+* nothing;
+* a rotor delivers less than before for the same command (a cut propeller, a weak motor): its own
+  thrust is asked to rise, alone;
+* the vehicle weighs more near a rotor or at a side: the centre of mass moves there;
+* all rotors are asked for more (the vehicle is heavier, the air thinner, the battery weaker).
+
+A weaker rotor and a weight under it move the centre of thrust alike. They differ in the diagonals,
+where a real rotor near its limit does what neither says; so the place has a probability of its own,
+summed over the kinds.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ...runtime.errors import InputError
+from .trim import Trim
+
+Array = NDArray[np.float64]
+
+NOWHERE = "nowhere"
+# unit vectors to the left and the front
+_ROTORS = {
+    "rotor 1 (front-left)": (1.0, 1.0),
+    "rotor 2 (rear-left)": (1.0, -1.0),
+    "rotor 3 (rear-right)": (-1.0, -1.0),
+    "rotor 4 (front-right)": (-1.0, 1.0),
+}
+_SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
+
+_AMOUNTS = 80  # of a change, over which its evidence is summed
+
+
+@dataclass(frozen=True)
+class ChangeSettings:
+    """What is assumed of unchanged flights, and of changes."""
+
+    # standard deviations between flights of one unchanged vehicle: of the differences of sides, in
+    # parts of the total (a centre of mass that moves by 1 % of the arm), of the diagonals, whose
+    # balance hangs on each rotor's drag, and of the total's logarithm (battery and air)
+    scatter: tuple[float, float, float, float] = (0.01, 0.01, 0.015, 0.02)
+    prior_flights: float = 8.0  # degrees of freedom of that scatter: how many flights it is worth
+    # share of the weight, or of one rotor's thrust, by which something that changed has changed:
+    # the scale of a half-normal prior
+    amount: float = 0.15
+    # how far a real rotor's request leaves what a linear one would need, as a share of the change:
+    # thrust that bends near full power shows in diagonals and total, little in the sides
+    bend: tuple[float, float, float, float] = (0.25, 0.25, 1.0, 0.5)
+    unchanged: float = 0.5  # probability of nothing, before the flights are looked at
+    sure: float = 0.95  # probability from which a place is named without a doubt
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """What changed from the flights ``before`` to the flights ``after``."""
+
+    before: tuple[Trim, ...]
+    after: tuple[Trim, ...]
+    difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
+    std: Array  # (4,) of it, if nothing changed
+    # of "nowhere", each rotor, each side and "all rotors"; they sum to one
+    places: dict[str, float]
+    # of the likeliest place, if it is a rotor: that the rotor is weaker, that it carries more
+    weaker: float
+    carries_more: float
+    amount: float  # share of one rotor's thrust, or of the weight: mean, given that place and kind
+    amount_std: float
+    sure_from: float
+
+    @property
+    def place(self) -> str:
+        """The likeliest place."""
+        return max(self.places, key=self.places.__getitem__)
+
+    @property
+    def sure(self) -> bool:
+        """Whether the likeliest place is sure."""
+        return self.places[self.place] >= self.sure_from
+
+
+def features(trim: Trim) -> Array:
+    """Return the four numbers (4,) of a flight."""
+    return np.append(trim.shares, math.log(trim.total))
+
+
+def compare(
+    after: Sequence[Trim], before: Sequence[Trim], settings: ChangeSettings | None = None
+) -> Change:
+    """Find what changed between two sets of flights of one vehicle.
+
+    Args:
+        after: the flights in question.
+        before: those that they are compared with.
+        settings: default ``ChangeSettings()``.
+
+    Raises:
+        InputError: a set is empty.
+    """
+    use = ChangeSettings() if settings is None else settings
+    if not (len(after) and len(before)):
+        raise InputError("compare: expected at least one flight in each of the two sets")
+    a, b = (np.array([features(trim) for trim in group]) for group in (after, before))
+    scatter, freedom = _scatter(a, b, use)
+    share = 1.0 / len(a) + 1.0 / len(b)
+    difference = a.mean(axis=0) - b.mean(axis=0)
+    shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
+    nothing = float(_log_t(difference, np.zeros((1, 4)), share * scatter[None], freedom)[0])
+    found: list[tuple[str, str, float, float, float]] = []  # place, kind, evidence, amount, spread
+    for place, kind in _hypotheses():
+        amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
+        prior = np.exp(-0.5 * np.square(amounts / use.amount))
+        prior /= prior.sum()
+        means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
+        size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
+        scales = share * scatter + size[:, :, None] ** 2 * np.eye(4)
+        logs = _log_t(difference, means, scales, freedom)
+        weights = prior * np.exp(logs - logs.max())
+        total = weights.sum()
+        middle = float(amounts @ weights / total)
+        spread = math.sqrt(float(np.square(amounts - middle) @ weights / total))
+        found.append((place, kind, float(logs.max() + math.log(total)), middle, spread))
+    return _weigh(after, before, difference, share * scatter, nothing, found, use)
+
+
+def _hypotheses() -> list[tuple[str, str]]:
+    """Return every place and kind of change."""
+    weaker = [(place, "weaker") for place in _ROTORS]
+    heavier = [(place, "carries more") for place in (*_ROTORS, *_SIDES)]
+    return [*weaker, *heavier, ("all rotors", "carries more")]
+
+
+def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
+    """Return how the four numbers move if something changed by ``amount``."""
+    if kind == "weaker":
+        rotor = list(_ROTORS).index(place)
+        thrust = shares.copy()
+        thrust[rotor] /= 1.0 - min(amount, 0.9)
+        return features(Trim("", thrust, 0.0)) - features(Trim("", shares, 0.0))
+    if place == "all rotors":
+        return np.array([0.0, 0.0, 0.0, math.log1p(amount)])
+    left, front = {**_ROTORS, **_SIDES}[place]
+    # a weight m at a rotor moves the centre of mass by m / (1 + m) of the way there
+    way = amount / (1.0 + amount)
+    return np.array([way * left, way * front, 0.0, math.log1p(amount)])
+
+
+def _scatter(a: Array, b: Array, use: ChangeSettings) -> tuple[Array, float]:
+    """Return the scale (4, 4) and the degrees of freedom of one flight's scatter."""
+    freedom = use.prior_flights + len(a) + len(b) - 2
+    total = use.prior_flights * np.diag(np.square(use.scatter))
+    for group in (a, b):
+        apart = group - group.mean(axis=0)
+        total = total + apart.T @ apart
+    return total / freedom, freedom
+
+
+def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
+    """Return the logarithms (n,) of multivariate Student's t densities with ``means`` (n, 4) and
+    ``scales`` (n, 4, 4) at ``x`` (4,).
+    """
+    dof = len(x)
+    root = np.linalg.cholesky(scales)
+    y = np.linalg.solve(root, (x - means)[:, :, None])[:, :, 0]
+    constant = (
+        gammaln(0.5 * (freedom + dof))
+        - gammaln(0.5 * freedom)
+        - 0.5 * dof * math.log(freedom * math.pi)
+    )
+    diagonal = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    bent: Array = np.log1p(np.square(y).sum(axis=1) / freedom)
+    found: Array = constant - diagonal - 0.5 * (freedom + dof) * bent
+    return found
+
+
+def _weigh(
+    after: Sequence[Trim],
+    before: Sequence[Trim],
+    difference: Array,
+    scale: Array,
+    nothing: float,
+    found: list[tuple[str, str, float, float, float]],
+    use: ChangeSettings,
+) -> Change:
+    """Return the probabilities of places, each place as likely as the other beforehand."""
+    names = [*_ROTORS, *_SIDES, "all rotors"]
+    kinds = {name: [f for f in found if f[0] == name] for name in names}
+    logs = {NOWHERE: nothing + math.log(use.unchanged)}
+    for name, group in kinds.items():
+        each = (1.0 - use.unchanged) / (len(names) * len(group))
+        logs[name] = float(np.logaddexp.reduce([f[2] + math.log(each) for f in group]))
+    whole = np.logaddexp.reduce(list(logs.values()))
+    places = {name: math.exp(log - whole) for name, log in logs.items()}
+    likeliest = max(places, key=places.__getitem__)
+    chances = {"weaker": 0.0, "carries more": 0.0}
+    amount, spread = 0.0, 0.0
+    if likeliest != NOWHERE:
+        group = kinds[likeliest]
+        best = max(group, key=lambda f: f[2])
+        amount, spread = best[3], best[4]
+        total = np.logaddexp.reduce([f[2] for f in group])
+        chances |= {f[1]: math.exp(f[2] - total) for f in group}
+    return Change(
+        tuple(before),
+        tuple(after),
+        difference,
+        np.sqrt(np.diagonal(scale)),
+        places,
+        chances["weaker"],
+        chances["carries more"],
+        amount,
+        spread,
+        use.sure,
+    )
