@@ -15,6 +15,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -199,6 +200,20 @@ def share_bars() -> Progress:
         transient=True,
         disable=errors.quiet,
     )
+
+
+@contextmanager
+def share_bars_by_part() -> Iterator[Callable[[str, float], None]]:
+    """Show a bar for each part of the work from when its first share is told: ``(part, share)``."""
+    with share_bars() as progress:
+        tasks: dict[str, TaskID] = {}
+
+        def report(part: str, share: float) -> None:
+            if part not in tasks:
+                tasks[part] = progress.add_task(part, total=1.0)
+            progress.update(tasks[part], completed=share)
+
+        yield report
 
 
 @contextmanager

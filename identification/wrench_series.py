@@ -245,7 +245,7 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
         columns |= {f"{prefix}f{axis}": force[:, i] for i, axis in enumerate("xyz")}
         columns |= {f"{prefix}t{axis}": torque[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
-    columns["status"] = series.status
+    columns["status"] = series.status.astype(np.float64)
     path = Path(out_dir) / "wrench.csv"
     write_csv(columns, path)
     return path

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from windwrench.commands.terminal import share_bars
+from windwrench.commands.terminal import share_bars_by_part
 from windwrench.runtime.page_files import write_figure, write_json
 from windwrench.runtime.regular_files import read_json
 from windwrench.studies.inertial.page import draw, write_page
@@ -23,14 +23,7 @@ def study(
     """Measure rise time, consistency and faults of the filter with an IMU (15 minutes)."""
     data = out / "results.json"
     if not page_only:
-        with share_bars() as progress:
-            tasks: dict[str, int] = {}
-
-            def report(part: str, share: float) -> None:
-                if part not in tasks:
-                    tasks[part] = progress.add_task(part, total=1.0)
-                progress.update(tasks[part], completed=share)
-
+        with share_bars_by_part() as report:
             # a rise time that no tuning reaches is not a number
             write_json(run(runs, seed, report), data, allow_nan=True)
     result = read_json(data, "results of this study")

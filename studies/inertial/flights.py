@@ -3,6 +3,7 @@ rates, and a filter run over them.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,7 @@ def filter_tuning(
     noise of the rotors; the ratio of walk and noise sets the rise time.
     """
     base = UKFTuning.for_vehicle(vehicle, period, rise)
-    scaled = {
+    scaled: dict[str, Any] = {
         name: trust * np.asarray(getattr(base, name))
         for name in ("motor_torque_noise", "thrust_noise", "torque_walk", "force_walk")
     }

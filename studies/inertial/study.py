@@ -25,6 +25,7 @@ from windwrench.studies.inertial.flights import (
 )
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.integer[Any]]
 Result = dict[str, Any]
 
 VEHICLE = "ardrone2"
@@ -59,7 +60,7 @@ def rise_time(curve: Array, rate: int) -> float:
         k = int(after[0])
         if k == 0:
             return 0.0
-        return k - 1 + (level - rising[k - 1]) / (rising[k] - rising[k - 1])
+        return k - 1 + float((level - rising[k - 1]) / (rising[k] - rising[k - 1]))
 
     return float((crossing(0.9) - crossing(0.1)) / rate)
 
@@ -116,14 +117,14 @@ def sweep(
     return rows
 
 
-def _judge(curves: Array, squares: Array, draws: Array, rate: int) -> Result:
+def _judge(curves: Array, squares: Array, draws: Indices, rate: int) -> Result:
     """Return figures and intervals from responses (rises, runs, 2, n) and mean squares (rises,
     runs, 2) of force and torque.
     """
     out: Result = {}
     for i, (kind, level) in enumerate((("force", AT_FORCE), ("torque", AT_TORQUE))):
 
-        def figures(chosen: Array, i: int = i) -> tuple[Array, Array]:
+        def figures(chosen: Indices, i: int = i) -> tuple[Array, Array]:
             spread = np.sqrt(squares[:, chosen, i].mean(axis=1))
             rise = np.array([rise_time(c, rate) for c in curves[:, chosen, i].mean(axis=1)])
             return spread, rise

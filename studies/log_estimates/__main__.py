@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from windwrench.commands.terminal import share_bars
+from windwrench.commands.terminal import share_bars_by_part
 from windwrench.runtime.page_files import write_figure, write_json
 from windwrench.runtime.regular_files import read_json
 from windwrench.studies.log_estimates.page import draw, write_page
@@ -26,14 +26,7 @@ def study(
     """Measure accuracy by tuning and the cost of bad poses (half an hour; needs RotorPy)."""
     data = out / "results.json"
     if not page_only:
-        with share_bars() as progress:
-            tasks: dict[str, int] = {}
-
-            def report(part: str, share: float) -> None:
-                if part not in tasks:
-                    tasks[part] = progress.add_task(part, total=1.0)
-                progress.update(tasks[part], completed=share)
-
+        with share_bars_by_part() as report:
             write_json(run(seconds, flights, seed, report), data)
     result = read_json(data, "results of this study")
     picture = write_figure(draw(result), out, "errors")

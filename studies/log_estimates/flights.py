@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ def _flown(trajectory: str, seconds: float, seed: int, wind: Wind) -> FlightLog:
 def plant_flight(name: str, seconds: float, seed: int) -> Flight:
     """Fly one of the kit's vehicles in its own plant, calmly or fast by turns, in turbulence."""
     vehicle = load_vehicle(name)
-    columns = record_flight(
+    columns: dict[str, Any] = record_flight(
         vehicle,
         trajectory=("gentle", "fast")[seed % 2],
         seconds=seconds,
@@ -118,4 +119,5 @@ def _stretches(log: FlightLog, seconds: float, every: float) -> tuple[Mask, NDAr
 
 def _directions(count: int, rng: np.random.Generator) -> Array:
     drawn = rng.standard_normal((count, 3))
-    return drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    unit: Array = drawn / np.linalg.norm(drawn, axis=1, keepdims=True)
+    return unit

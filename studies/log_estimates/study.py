@@ -12,7 +12,12 @@ from scipy.optimize import minimize
 from windwrench import __version__
 from windwrench.estimator import UKFTuning
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.wrench_series import WrenchSeries, estimate_log, tune_to_log
+from windwrench.identification.wrench_series import (
+    GATE,
+    WrenchSeries,
+    estimate_log,
+    tune_to_log,
+)
 from windwrench.runtime.provenance import commit
 from windwrench.studies.log_estimates.flights import (
     PLANT_VEHICLES,
@@ -27,6 +32,8 @@ from windwrench.studies.log_estimates.flights import (
 )
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Spoil = Callable[[FlightLog, np.random.Generator], tuple[FlightLog, Mask]]
 Result = dict[str, Any]
 
 SHARE, FAR = 0.01, 0.1  # of the poses; m
@@ -42,14 +49,15 @@ def errors(series: WrenchSeries, log: FlightLog, kind: str) -> Array:
     return error
 
 
-def rms(error: Array, rows: NDArray[np.bool_]) -> float:
+def rms(error: Array, rows: Mask) -> float:
     """Return the root mean square length of the error's vector over some rows."""
     return float(np.sqrt(np.mean(np.sum(np.square(error[rows]), axis=1))))
 
 
-def settled(log: FlightLog) -> NDArray[np.bool_]:
+def settled(log: FlightLog) -> Mask:
     """Return the rows (N,) that count."""
-    return log.t >= log.t[0] + SETTLED
+    late: Mask = log.t >= log.t[0] + SETTLED
+    return late
 
 
 def _best(flight: Flight, start: UKFTuning, kind: str) -> float:
@@ -131,29 +139,16 @@ def outliers(
             [replace(f, tuning=tune_to_log(f.log, f.vehicle).tuning) for f in fast],
         )
     )
-    cases: list[tuple[str, Callable[[FlightLog, Any], tuple[FlightLog, Any]]]] = [
-        (
-            f"{100 * SHARE:g} % of the poses {100 * FAR:g} cm off",
-            lambda log, rng: (isolated(log, SHARE, FAR, rng), settled(log)),
-        )
+    cases: list[tuple[str, Spoil]] = [
+        (f"{100 * SHARE:g} % of the poses {100 * FAR:g} cm off", _isolated)
     ]
     for length in BURSTS:
-        # what nothing can do better than: no pose at all for that long
-        cases.append(
-            (
-                f"no pose for {length:g} s",
-                lambda log, rng, length=length: gaps(log, length, EVERY),
-            )
-        )
-        for together in (True, False):
-            cases.append(
-                (
-                    f"bursts of {length:g} s, {'one' if together else 'each pose its own'} offset",
-                    lambda log, rng, length=length, together=together: bursts(
-                        log, length, EVERY, FAR, together, rng
-                    ),
-                )
-            )
+        cases += [
+            # what nothing can do better than: no pose at all for that long
+            (f"no pose for {length:g} s", _gap(length)),
+            (f"bursts of {length:g} s, one offset", _burst(length, together=True)),
+            (f"bursts of {length:g} s, each pose its own offset", _burst(length, together=False)),
+        ]
     filters: tuple[tuple[str, dict[str, Any]], ...] = (
         ("filter", {}),
         ("smoothed", {"smooth": True}),
@@ -183,6 +178,18 @@ def outliers(
     return rows
 
 
+def _isolated(log: FlightLog, rng: np.random.Generator) -> tuple[FlightLog, Mask]:
+    return isolated(log, SHARE, FAR, rng), settled(log)
+
+
+def _gap(length: float) -> Spoil:
+    return lambda log, _: gaps(log, length, EVERY)
+
+
+def _burst(length: float, together: bool) -> Spoil:
+    return lambda log, rng: bursts(log, length, EVERY, FAR, together, rng)
+
+
 def _ratio(pairs: Sequence[tuple[float, float]], seed: int) -> Result:
     """Return the ratio of pooled errors, its 95 % interval over flights, and the greatest."""
     squares = np.square(np.array(pairs))
@@ -201,7 +208,7 @@ def jumps(seconds: float, seed: int, flights: int) -> list[Result]:
     """
     rows = []
     for name in PLANT_VEHICLES:
-        for label, options in (("gate", {}), ("no gate", {"gate": None})):
+        for label, gate in (("gate", GATE), ("no gate", None)):
             after, pairs = [], []
             for i in range(flights):
                 flight = plant_flight(name, seconds, seed + i)
@@ -210,7 +217,7 @@ def jumps(seconds: float, seed: int, flights: int) -> list[Result]:
                 moved = log.position.copy()
                 moved[at:] += np.array([JUMP, 0.0, 0.0])
                 series = estimate_log(
-                    replace(log, position=moved), flight.vehicle, flight.tuning, **options
+                    replace(log, position=moved), flight.vehicle, flight.tuning, gate=gate
                 )
                 clean = estimate_log(log, flight.vehicle, flight.tuning)
                 restarted = np.flatnonzero(series.status[at:] == 3)
