@@ -57,7 +57,7 @@ def normalise(q: Array) -> None:
 
 @compiled
 def quaternion_from_mrp(rho: Array, out: Array) -> None:
-    """Write the quaternion (4,) of the modified Rodrigues parameters (3,) into ``out``, (15).
+    """Write the quaternion (4,) of the modified Rodrigues parameters (3,) into ``out``, (17).
 
     An MRP is axis * tan(angle / 4): about a quarter of a small rotation vector.
     """
@@ -70,7 +70,7 @@ def quaternion_from_mrp(rho: Array, out: Array) -> None:
 
 @compiled
 def mrp_from_quaternion(q: Array, out: Array) -> None:
-    """Write the modified Rodrigues parameters (3,) of a unit quaternion (4,) into ``out``, (17).
+    """Write the modified Rodrigues parameters (3,) of a unit quaternion (4,) into ``out``, (16).
 
     A quaternion and its negative are one attitude: the one with a non-negative scalar part is
     taken, so that the result never exceeds 1 in length (half a turn).
@@ -84,7 +84,7 @@ def mrp_from_quaternion(q: Array, out: Array) -> None:
 @compiled
 def attitude_error(q: Array, reference: Array, out: Array) -> None:
     """Write the world-frame MRP (3,) that takes ``reference`` to ``q`` into ``out``:
-    ``q * conj(reference)``, (24).
+    ``q * conj(reference)``, (25).
     """
     w = q[0] * reference[0] + q[1] * reference[1] + q[2] * reference[2] + q[3] * reference[3]
     x = -q[0] * reference[1] + q[1] * reference[0] - q[2] * reference[3] + q[3] * reference[2]
@@ -99,7 +99,7 @@ def attitude_error(q: Array, reference: Array, out: Array) -> None:
 
 @compiled
 def turn_body(q: Array, wx: float, wy: float, wz: float, dt: float, out: Array) -> None:
-    """Write ``q`` turned at the body rate (wx, wy, wz) rad/s for ``dt`` s into ``out``: (13), (14),
+    """Write ``q`` turned at the body rate (wx, wy, wz) rad/s for ``dt`` s into ``out``: (11), (13),
     ``-[psi]x``.
     """
     half = 0.5 * dt

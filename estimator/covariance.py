@@ -282,7 +282,7 @@ def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
 
 @compiled_for_vectors
 def add_noise(f: Record, rotation: Array, dt: float) -> None:
-    """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (16)."""
+    """Add ``B Q B'`` to P: what 24 of the 61 sigma points come to, (27)."""
     P, J, c, B = f.P, f.body.inverse_inertia, f.body.com, f.B
     # stated per period: white noise averages over a longer step, a walk grows with it
     white, walk = f.period / dt, dt / f.period

@@ -27,7 +27,7 @@ def displace(x: Array, column: Array, spread: float, rho: Array, q: Array, out: 
 @compiled
 def error_from(after: Array, centre: Array, error: Array) -> None:
     """Write the error state (18,) of one sigma point, seen from the central one, into ``error``,
-    (24).
+    (25).
     """
     attitude_error(after[3:7], centre[3:7], error[0:3])
     for i in range(3):
@@ -40,7 +40,7 @@ def error_from(after: Array, centre: Array, error: Array) -> None:
 
 @compiled
 def fold(f: Record, base: Array, error: Array) -> None:
-    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (25), (35),
+    """Make ``base`` plus the error state (18,) the estimate; the mean MRP folds into q, (26), (35),
     (37).
     """
     x = f.x

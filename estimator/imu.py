@@ -50,7 +50,7 @@ def expected_imu(f: Record, x: Array, out: Array) -> None:
 @compiled
 def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> None:
     """Correct with what is measured of ``z`` (6,), gyro and accelerometer, unless the gate refuses
-    it: (27)-(37) with the 37 sigma points of the error state; biases and noise are linear in it.
+    it: (29)-(37) with the 37 sigma points of the error state; biases and noise are linear in it.
     """
     f = record[0]
     x, imu = f.x, f.imu

@@ -57,7 +57,7 @@ def _step_with_mass(
 def _predict(
     f: Record, rotor_speeds: Array, dt: float, voltage: float, mass_walk: float, P: Array
 ) -> None:
-    """(18)-(26) with 39 sigma points, each with its own mass."""
+    """(18)-(27) with 39 sigma points, each with its own mass."""
     drive(f, rotor_speeds, dt, voltage)
     mass = f.body.mass
     spread = math.sqrt(N + 1 + NOISE + 1 + f.kappa)
@@ -111,7 +111,7 @@ def _predict(
 
 @compiled
 def _correct(f: Record, z: Array, parts: int, P: Array, first_variance: float) -> None:
-    """(27)-(37): the correction of ``ukf``, with a nineteenth row."""
+    """(29)-(37): the correction of ``ukf``, with a nineteenth row."""
     position, quaternion = z[4:7], z[7:11]
     with_position, with_attitude = parts & 1 != 0, parts & 2 != 0
     nis = innovate(f, position, quaternion, with_position, with_attitude)

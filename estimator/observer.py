@@ -439,7 +439,7 @@ def _seat_attitude(f: Record, o: Record, q: Array) -> None:
 
 @compiled
 def _spin(o: Record) -> None:
-    """Set the rate of the filtered quaternion to that of a turn at ``omega``: (13), halved."""
+    """Set the rate of the filtered quaternion to that of a turn at ``omega``: (11), (13)."""
     q, d, omega = o.q, o.dq, o.omega
     d[0] = 0.5 * (-q[1] * omega[0] - q[2] * omega[1] - q[3] * omega[2])
     d[1] = 0.5 * (q[0] * omega[0] + q[2] * omega[2] - q[3] * omega[1])

@@ -29,7 +29,7 @@ def spread_points(f: Record, spread: float) -> None:
             D[i + 1, j], D[i + 1, PAIRS + j] = b, -b
     q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
     for k in range(POINTS):
-        # (15)
+        # (17)
         r0, r1, r2 = D[0, k], D[1, k], D[2, k]
         square = r0 * r0 + r1 * r1 + r2 * r2
         scale = 1.0 / (1.0 + square)
@@ -121,7 +121,7 @@ def propagate_points(f: Record, dt: float) -> None:
         )
     half = 0.5 * dt
     for k in range(POINTS):
-        # (13), (14); the series of ``turn_body``
+        # (11), (13); the series of ``turn_body``
         wx, wy, wz = X[10, k], X[11, k], X[12, k]
         square = half * half * (wx * wx + wy * wy + wz * wz)
         C[0, k] = square
@@ -163,7 +163,7 @@ def propagate_points(f: Record, dt: float) -> None:
 @compiled_for_vectors
 def errors_of_points(f: Record) -> None:
     """Write the error states of ``f.points`` seen from ``f.centre`` into ``f.errors`` (18, 12), as
-    ``error_from``, (24).
+    ``error_from``, (25).
     """
     X, c, D = f.points, f.centre, f.errors
     q0, q1, q2, q3 = c[3], c[4], c[5], c[6]
@@ -202,4 +202,4 @@ def halve_pairs(f: Record, scale: float, weight: float) -> None:
         for i in range(12):
             total = T[j, i] + T[PAIRS + j, i]
             E[j, i] = scale * total
-            mean[i] += weight * total  # (25)
+            mean[i] += weight * total  # (26)

@@ -82,12 +82,12 @@ def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weigh
         for i in range(12):
             total = error[0, i] + error[1, i]
             E[j, i] = scale * total
-            mean[i] += weight * total  # (25)
+            mean[i] += weight * total  # (26)
 
 
 @compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
-    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(26)."""
+    """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(27)."""
     drive(f, rotor_speeds, dt, voltage)
     if f.wrench_count == 0:
         quaternion_to_matrix(f.x[3:7], f.rotation)
@@ -217,7 +217,7 @@ def believable(
 
 @compiled
 def take_in(f: Record) -> None:
-    """Correct with the innovation that ``innovate`` left, whatever its size: (27)-(37)."""
+    """Correct with the innovation that ``innovate`` left, whatever its size: (29)-(37)."""
     whiten(f)
     subtract_squares(f)
     for i in range(NIS):

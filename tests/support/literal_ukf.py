@@ -38,12 +38,12 @@ def matrix(q):
 
 
 def to_quaternion(rho):
-    """(15)"""
+    """(17)"""
     return np.array([1 - rho @ rho, *(2 * rho)]) / (1 + rho @ rho)
 
 
 def to_mrp(q):
-    """(17), of the sign with a non-negative scalar part"""
+    """(16), of the sign with a non-negative scalar part"""
     q = q if q[0] >= 0 else -q
     return q[1:] / (1 + q[0])
 
@@ -164,10 +164,10 @@ class LiteralUKF:
                 )
                 for s in after
             ]
-        )  # (24)
+        )  # (25)
         w = self.weights(L)
-        mean = w @ errors  # (25)
-        self.P = (w[:, None] * (errors - mean)).T @ (errors - mean)  # (26)
+        mean = w @ errors  # (26)
+        self.P = (w[:, None] * (errors - mean)).T @ (errors - mean)  # (27)
         self.fold(centre, mean)
 
     def correct(self, position, quaternion):
