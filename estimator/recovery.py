@@ -14,9 +14,10 @@ by what each of them breaks:
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
   that the filter restarts there; without a gate it does so at once.
 
-A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates;
-where a contradiction led to the restart, they are doubted as well and their variances widened, for
-a wrench that the model took for impossible explains it as well as a pose that jumped.
+A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates
+and are doubted, their variances widened: a wrench that the model took for impossible explains a
+contradiction as well as a pose that jumped, and after a gap nothing says that the wrench of before
+still acts.
 """
 
 import math
@@ -260,7 +261,6 @@ def judge(
         quaternion,
         restarted & with_position,
         restarted & with_attitude,
-        restarted & contradicted,
     )
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
     f.status = choose(restarted, RESTARTED, f.status)
@@ -313,12 +313,10 @@ def _restart(
     quaternion: Array,
     at_position: bool,
     at_attitude: bool,
-    contradicted: bool,
 ) -> None:
-    """Start pose and twist anew at what was measured; doubt the wrench too where the measurement
-    contradicts the estimate.
-    """
+    """Start pose and twist anew at what was measured, and doubt the wrench."""
     x, P, prior = f.x, f.P, f.prior
+    restarted = at_position | at_attitude
     _forget(f, at_position, at_attitude)
     for i in range(4):
         x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
@@ -333,11 +331,11 @@ def _restart(
             x[k] = choose(mad, 0.0, x[k])
     for i in range(12, N):
         for j in range(12):
-            P[i, j] = choose(contradicted, 0.0, P[i, j])
-            P[j, i] = choose(contradicted, 0.0, P[j, i])
-        P[i, i] = choose(contradicted & (P[i, i] < prior[i]), prior[i], P[i, i])
+            P[i, j] = choose(restarted, 0.0, P[i, j])
+            P[j, i] = choose(restarted, 0.0, P[j, i])
+        P[i, i] = choose(restarted & (P[i, i] < prior[i]), prior[i], P[i, i])
         # a wrench that itself is out of all reason was made by what is now forgotten
-        mad = contradicted & (x[1 + i] * x[1 + i] > 16.0 * prior[i])
+        mad = restarted & (x[1 + i] * x[1 + i] > 16.0 * prior[i])
         x[1 + i] = choose(mad, 0.0, x[1 + i])
 
 
