@@ -1,0 +1,1 @@
+"""What faults of poses and rotor speeds do to the estimators."""

@@ -1,0 +1,76 @@
+"""The page of faults: every number from the results."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from windwrench.runtime.page_files import write_text
+from windwrench.runtime.provenance import made_by
+from windwrench.studies.faults.study import LONGEST
+
+Result = Mapping[str, Any]  # as ``study.run`` returns it
+
+
+def write_page(result: Result, data: Path, page: Path) -> None:
+    """Write the page from results that lie in a file."""
+    lines = [
+        "# What faults do to the estimators",
+        "",
+        made_by(
+            f"python -m studies.faults --count {result['count']} --steps {result['steps']} "
+            f"--seed {result['seed']}",
+            [result["commit"]],
+            result["version"],
+        ),
+        "",
+        "A hover under an upward force of a tenth of the weight, that is seen badly: poses that "
+        "stay away for up to 30 s, jump by 1 mm to 1 km once, for good or back and forth, upside "
+        "down or at random, a position or an attitude alone, rotor speeds that are wrong; starts "
+        "up to 180 degrees off; steps of 1 ms to 0.1 s; with gates and without. Every step is "
+        "checked: the state is finite and the covariance positive definite.",
+        "",
+        "## After one to three faults",
+        "",
+        "Wrong: two rise times after good samples are back (and 0.7 s with a gate, which needs "
+        "0.6 s to believe a jump) a component of the wrench is off by more than three of its own "
+        "standard deviations, or the estimator is not tracking. All estimators get the same "
+        "sequences.",
+        "",
+        "| estimator | sequences | not finite | wrong | 95 % | of these at steps of 50 ms or more "
+        "| faults most often among them |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in sorted(result["sequences"], key=lambda row: -row["wrong"]):
+        low, high = (100 * v for v in row["ci95"])
+        kinds = ", ".join(f"{name} ({count})" for name, count in row["worst_kinds"])
+        lines.append(
+            f"| {row['estimator']} | {row['count']} | {row['not_finite']} | {row['wrong']} "
+            f"({100 * row['wrong'] / row['count']:.1f} %) | {low:.1f}-{high:.1f} % "
+            f"| {row['long_steps']} | {kinds} |"
+        )
+    lines += [
+        "",
+        "What is left are faults that no pose shows: rotor speeds that lie make a wrench of a whole "
+        "weight that never acted, and poses that are upside down or turn at random for longer "
+        "than the gate's patience are believed, with the wrench that they mean. Both die away with "
+        "the filter's rise time, to 1 % after two of them, and its standard deviation, which knows "
+        "of the random walk alone, does not say so. An estimated mass takes a part of such a wrench "
+        "and keeps it: with rotor speeds that lie the mass is wrong.",
+        "",
+        "## A long flight",
+        "",
+        f"Faults of up to {LONGEST:g} s and 2.7 s of good samples by turns, AR.Drone at 200 Hz, "
+        "gate 0.999. Right: the wrench is within three standard deviations before the next fault.",
+        "",
+        "| estimator | steps | faults | restarts | right | 95 % |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in result["soak"]:
+        low, high = (100 * v for v in row["ci95"])
+        lines.append(
+            f"| {row['estimator']} | {row['steps']:,} | {row['faults']} | {row['restarts']} "
+            f"| {row['right']} ({100 * row['right'] / row['faults']:.0f} %) "
+            f"| {low:.0f}-{high:.0f} % |"
+        )
+    lines += ["", f"Data: [{data.name}]({data.relative_to(page.parent).as_posix()}).", ""]
+    write_text("\n".join(lines), page)
