@@ -18,6 +18,8 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "leaderboard.md",
     "speed.md",
     "imu.md",
+    "log-estimates.md",
+    "faults.md",
 )
 MADE = re.compile(
     r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
