@@ -25,6 +25,7 @@ from ..motion.smoothing import CUTOFFS, low_pass
 from .conventions import Balances, recognise, time_shift
 from .excerpt import excerpt
 from .flight_log import FlightLog
+from .stuck_channels import stuck_notes
 
 Array = NDArray[np.float64]
 
@@ -164,6 +165,7 @@ class _Screening:
         _check_moved(log, where)
         log, held = _without_repeats(log), log
         self.notes += _held_notes(held, vehicle)
+        self.notes += stuck_notes(log, vehicle)
         if self.refuses_parts:
             _check_pose_rate(log, where)
         pieces = _pieces(log)

@@ -51,11 +51,11 @@ def write_page(result: Result, data: Path, page: Path) -> None:
     lines += [
         "",
         "What is left are faults that no pose shows: rotor speeds that lie make a wrench of a "
-        "whole weight that never acted, and poses that are upside down or turn at random for longer "
-        "than the gate's patience are believed, with the wrench that they mean. Both die away with "
-        "the filter's rise time, to 1 % after two of them, and its standard deviation, which knows "
-        "of the random walk alone, does not say so. An estimated mass takes a part of such a "
-        "wrench and keeps it: with rotor speeds that lie the mass is wrong.",
+        "whole weight that never acted, and poses that are upside down or turn at random for "
+        "longer than the gate's patience are believed, with the wrench that they mean. Both die "
+        "away with the filter's rise time, to 1 % after two of them, and its standard deviation, "
+        "which knows of the random walk alone, does not say so. An estimated mass takes a part "
+        "of such a wrench and keeps it: with rotor speeds that lie the mass is wrong.",
         "",
         "## A long flight",
         "",

@@ -1,0 +1,75 @@
+"""Channels that stand still while their sisters change: what a hung sensor leaves in a log."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import Vehicle
+from .flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+LEAST_SECONDS = 0.5  # that a channel stands still; a busy link repeats a few samples
+# changes of each sister meanwhile: of channels that change equally often, the chance that one does
+# not at all is at most exp(-20)
+SISTERS_CHANGE = 20
+_AT_LIMIT = 0.99  # of the fastest rotor speed: a rotor at its limit stands still rightly
+
+
+def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
+    """Return a note for each channel that repeats to the last digit, for half a second or more in
+    flight, while the other channels of its kind change.
+
+    Args:
+        log: the flight.
+        vehicle: whose rotors may stand at their limit.
+    """
+    seen = np.flatnonzero(log.valid)
+    thrust = np.square(log.rotor_speeds) @ vehicle.k
+    flying = thrust > 0.3 * vehicle.weight
+    notes = []
+    rotors = [log.rotor_speeds[:, i] for i in range(4)]
+    for i, speeds in enumerate(rotors):
+        still = np.append(False, speeds[1:] == speeds[:-1]) & flying & (speeds > 0.0)
+        if vehicle.omega_max > 0.0:
+            still &= speeds < _AT_LIMIT * vehicle.omega_max
+        notes += _note(f"omega{i + 1}", "the other rotor speeds", log.t, still, rotors, i)
+    axes = [log.position[seen, i] for i in range(3)]
+    turning = [log.quaternion[seen, i] for i in range(4)]
+    for i, position in enumerate(axes):
+        still = np.append(False, position[1:] == position[:-1]) & flying[seen]
+        notes += _note(f"p{'xyz'[i]}", "the other coordinates", log.t[seen], still, axes, i)
+    held = np.append(False, np.all(np.diff(np.column_stack(turning), axis=0) == 0.0, axis=1))
+    notes += _note(
+        "the attitude", "the coordinates", log.t[seen], held & flying[seen], [turning[0], *axes], 0
+    )
+    return tuple(notes)
+
+
+def _note(
+    name: str, others: str, t: Array, still: NDArray[np.bool_], sisters: list[Array], own: int
+) -> list[str]:
+    """Return a note on the longest stretch (s) in which a channel stands still and its sisters do
+    not, if there is one.
+    """
+    changes = [
+        np.append(0, np.cumsum(np.diff(other) != 0.0))
+        for i, other in enumerate(sisters)
+        if i != own
+    ]
+    edges = np.flatnonzero(np.diff(still, prepend=False, append=False))
+    found = []
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        last = end - 1
+        seconds = float(t[last] - t[first])
+        if seconds < LEAST_SECONDS:
+            continue
+        if min(int(count[last] - count[first]) for count in changes) >= SISTERS_CHANGE:
+            found.append((seconds, float(t[first])))
+    if not found:
+        return []
+    seconds, begin = max(found)
+    return [
+        f"warning: {name} stands still for {seconds:.3g} s from t = {begin:.6g} s "
+        f"({len(found)} such stretch(es)) while {others} change: "
+        "what depends on it there is wrong if its sensor hung"
+    ]
