@@ -29,7 +29,13 @@ from .findings import (
 )
 from .inference.candidate_regressors import explanatory_variables
 from .inference.coefficient_range import implausible_coefficients
-from .inference.commanded_rotors import without_deviations
+from .inference.commanded_rotors import (
+    COMMANDED,
+    THRUST_FACTORS,
+    assumed_thrust_doubts,
+    thrust_is_assumed,
+    without_deviations,
+)
 from .inference.equivalence import (
     composite_doubts,
     equivalents,
@@ -178,7 +184,12 @@ def diagnose(
         effect.tentative for effect in effects
     ):  # what one effect explains too much, another one explains too little
         effects = tuple(replace(effect, tentative=True) for effect in effects)
-    sure = remainder == "none" and not any(effect.tentative for effect in effects)
+    if thrust_is_assumed(every, vehicle):
+        effects = tuple(_with_assumed_thrust(effect, vehicle) for effect in effects)
+        notes += assumed_thrust_doubts(fit.effects)
+    sure = remainder == "none" and not any(
+        effect.tentative or effect.indistinguishable_from for effect in effects
+    )
     verdict = (
         ("explained" if sure else "partly explained")
         if effects
@@ -266,6 +277,25 @@ def _named(
             "energy_explained_in_noise_units": gain,
             "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
         },
+    )
+
+
+def _with_assumed_thrust(effect: NamedEffect, vehicle: Vehicle) -> NamedEffect:
+    """Return an effect as it is where nobody knows how much thrust a command makes: a factor on
+    thrust and a mass are tentative, may be each other, and are no better known than that thrust.
+    """
+    if effect.name not in THRUST_FACTORS:
+        return effect
+    size = COMMANDED.unstated_thrust_std * (vehicle.mass if effect.name == "mass" else 1.0)
+    return replace(
+        effect,
+        tentative=True,
+        std={name: float(np.hypot(std, size)) for name, std in effect.std.items()},
+        indistinguishable_from=tuple(
+            dict.fromkeys(
+                (*effect.indistinguishable_from, *(x for x in THRUST_FACTORS if x != effect.name))
+            )
+        ),
     )
 
 
