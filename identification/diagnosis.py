@@ -58,6 +58,7 @@ from .inference.transient_disturbances import transient_disturbances
 from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
+from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
 
@@ -83,6 +84,11 @@ class DiagnosisSettings:
 
 
 DIAGNOSIS = DiagnosisSettings()
+FILTERED_NAMES = (
+    "the pose was filtered before the log was written: whether the named effects act on the vehicle, "
+    "or follow from the flight loop's answer to disturbances, shows only in the sensors' own noise. "
+    "All names are tentative. Log the pose as it was measured"
+)
 
 
 def diagnose(
@@ -121,6 +127,7 @@ def diagnose(
     doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
+    notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = find_effects(search)
     rotor_delay = delay_kind(search, fit)
@@ -140,8 +147,11 @@ def diagnose(
     fit = refitted_by_likelihood(search, fit)
     name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
     if not flights.commanded:
+        name_doubts += implausible_coefficients(search, fit)
+    if flights.filtered and fit.effects:
+        name_doubts.append(FILTERED_NAMES)
+    elif not flights.commanded:
         name_doubts += [
-            *implausible_coefficients(search, fit),
             *contradicted_by_innovations(flights, fit.setting),
             *delay_doubts(search, fit, rotor_delay),
         ]
@@ -154,12 +164,13 @@ def diagnose(
     floor = _rms(flights.sensor_noise)
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     noisy = (
-        error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
+        flights.filtered
+        or error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
         or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
     )
     disturbances = (
         ()
-        if flights.commanded
+        if flights.commanded or flights.filtered
         else tuple(
             Disturbance(channel, *found)
             for channel, found in zip(
@@ -170,12 +181,16 @@ def diagnose(
     calm = vehicle.weight * np.repeat(
         [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
     )
-    transients = () if flights.commanded else tuple(transient_disturbances(flights, fit.setting))
+    transients = (
+        ()
+        if flights.commanded or flights.filtered
+        else tuple(transient_disturbances(flights, fit.setting))
+    )
     disturbed = bool(transients) or any(
         found.below(CUTOFFS.calm_hz) > most for found, most in zip(disturbances, calm, strict=False)
     )
     remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
-    large = noisy if flights.commanded else disturbed
+    large = noisy if flights.commanded or flights.filtered else disturbed
     effects = tuple(
         _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
@@ -207,6 +222,11 @@ def diagnose(
         notes.append(
             f"the rotor speeds act {abs(1000 * offset):.1f} ms "
             f"{'later' if offset > 0 else 'earlier'} than they are logged"
+            + (
+                ", or the filter of the pose delays it by as much"
+                if flights.filtered and offset > 0
+                else ""
+            )
         )
     return Diagnosis(
         verdict=verdict,
@@ -231,6 +251,7 @@ def diagnose(
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
+        floor_is_bound=flights.filtered or any(map(pose_was_filtered, every)),
     )
 
 

@@ -78,7 +78,6 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "notes": diagnosis.notes,
         "headline": headline(diagnosis),
         "floor_is_lower_bound": diagnosis.floor_is_bound,
-        "floor_is_lower_bound": diagnosis.floor_is_bound,
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],
