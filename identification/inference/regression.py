@@ -79,9 +79,9 @@ REGRESSION = RegressionSettings()
 FAST_MOTION_EFFECTS = frozenset(
     {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
 )
-# effects that a low-pass of the pose makes or hides: a delay, an inertia, an attitude that moves less
+# effects that a low-pass of the pose makes or hides: it delays, and weakens fast turns
 FILTER_LIKE_EFFECTS = frozenset(
-    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "attitude_gain"}
+    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset"}
 )
 DELAY_EFFECTS = frozenset({"latency", "clock_offset"})  # each contains the rotors' time offset
 LATE_ROTOR_EFFECTS = DELAY_EFFECTS | {"motor_lag"}
@@ -177,8 +177,8 @@ class Flights:
         )  # torque is left out, and only the time in the air counts
         if self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
-        # the noise of a filtered pose cannot be read from its log, nor can what a filter's delay and
-        # bandwidth took away
+        # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
+        # and bandwidth took away
         self.filtered = not self.commanded and any(pose_was_filtered(log) for log in self.logs)
         self.logs = tuple(excerpt(self.logs))
         self.deviating_flights = (

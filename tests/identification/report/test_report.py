@@ -542,8 +542,8 @@ def test_the_page_says_what_is_in_doubt(reports):
     made, (_, path, _) = reports["hard"]
     page = Page(path.read_text("utf-8"))
     for words in (
-        "These logs cannot tell rotor_drag from body_drag or attitude_gain: the model lacked one of "
-        "them. The model lacked com_offset, and perhaps wind, and an unexplained error is left.",
+        "These logs cannot tell rotor_drag from body_drag or attitude_gain: the model lacked one "
+        "of them. The model lacked com_offset, and perhaps wind, and an unexplained error is left.",
         "cannot distinguish rotor_drag from body_drag or attitude_gain",
         "wind is tentative",
         "could not be computed",
