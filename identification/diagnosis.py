@@ -50,7 +50,14 @@ from .inference.likelihood_refit import (
     refitted_by_likelihood,
     with_lag,
 )
-from .inference.regression import CENTRAL, ROTOR_TIME_OFFSET, Flights, coefficient, typical_size
+from .inference.regression import (
+    CENTRAL,
+    FILTER_LIKE_EFFECTS,
+    ROTOR_TIME_OFFSET,
+    Flights,
+    coefficient,
+    typical_size,
+)
 from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.stepwise_search import find_effects
@@ -237,7 +244,9 @@ def diagnose(
         after=_errors(flights, amended, segments, error_after),
         floor_force_rms=floor[0],
         floor_torque_rms=floor[1],
-        advice=tuple(_advice(effects, sorted(flights.not_identifiable), remainder)),
+        advice=tuple(
+            _advice(effects, sorted(flights.not_identifiable), remainder, flights.filtered)
+        ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
         traces=tuple(_traces(flights, before, after)),
@@ -407,9 +416,19 @@ def _signature(flights: Flights, fit: FittedEffects, effect: str, after: Array) 
 
 
 def _advice(
-    effects: Sequence[NamedEffect], not_identifiable: Sequence[str], remainder: str
+    effects: Sequence[NamedEffect],
+    not_identifiable: Sequence[str],
+    remainder: str,
+    filtered: bool,
 ) -> list[str]:
     out = []
+    if filtered:
+        out.append(
+            "Log the pose as it was measured, before any filter or estimator. Behind one, no flight "
+            f"identifies {', '.join(sorted(FILTER_LIKE_EFFECTS))}, and no name is more than "
+            "tentative."
+        )
+        not_identifiable = [x for x in not_identifiable if x not in FILTER_LIKE_EFFECTS]
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)

@@ -7,16 +7,14 @@ shows how much noise there is at the frequencies of the motion: what is left at 
 bound of it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
 from ..logs.flight_log import FlightLog
-from .smoothing import continuous
 
 Array = NDArray[np.float64]
 
@@ -28,6 +26,7 @@ class NoiseSpectrumSettings:
     # shares of half the sampling rate between which the slope is read: above a vehicle's motion,
     # below the last bins, which rounding and jitter of the clock fill
     band: tuple[float, float] = (0.5, 0.95)
+    gap: float = 2.5  # median time steps, from which a piece ends; a single lost sample is none
     segment: int = 128  # samples of a spectrum's segment
     least_segments: int = 8  # half overlapping; of fewer the slope's own error is above 0.2
     # power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
@@ -73,8 +72,8 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
     never change, are left out.
     """
     out = []
-    for channel, x, period in _channels(log):
-        found = _amplitudes(x[:, np.ptp(x, axis=0) > 0.0])
+    for channel, pieces, period in _channels(log):
+        found = _amplitudes(pieces)
         if found is not None:
             nyquist = 0.5 / period
             low, high = NOISE_SPECTRUM.band
@@ -86,38 +85,58 @@ def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
     return out
 
 
-def _channels(log: FlightLog) -> Iterator[tuple[str, Array, float]]:
-    """Yield each channel's name, samples (n, k) at even steps, and period (s)."""
-    seen = np.flatnonzero(log.valid)
-    if len(seen) > 2:
-        period = float(np.median(np.diff(log.t[seen])))
-        turned = Rotation.from_quat(continuous(log.quaternion[seen]), scalar_first=True)
-        angle = np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0)
-        yield "position", log.position[seen], period
-        yield "attitude", angle, period
+def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
+    """Yield each channel's name, its unbroken pieces (n, k) and its period (s)."""
+    quaternion = np.where(log.valid[:, None], log.quaternion, [1.0, 0.0, 0.0, 0.0])
+    position = np.where(log.valid[:, None], log.position, np.nan)
     for name, x in (
+        ("position", position),
+        ("attitude", position),
         ("gyro", log.gyro),
         ("accelerometer", log.accelerometer),
         ("rotor speeds", None if log.commanded else log.rotor_speeds),
     ):
-        if x is not None:
-            rows = np.flatnonzero(np.isfinite(x).all(axis=1))
-            if len(rows) > 2:
-                yield name, x[rows], float(np.median(np.diff(log.t[rows])))
+        rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
+        if x is None or len(rows) <= NOISE_SPECTRUM.segment:
+            continue
+        steps = np.diff(log.t[rows])
+        period = float(np.median(steps))
+        breaks = np.flatnonzero(steps > NOISE_SPECTRUM.gap * period) + 1
+        pieces = [piece for piece in np.split(rows, breaks) if len(piece) > NOISE_SPECTRUM.segment]
+        turning = name == "attitude"
+        yield name, [_angle(quaternion[r]) if turning else x[r] for r in pieces], period
 
 
-def _amplitudes(x: Array) -> tuple[Array, Array] | None:
-    """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of ``x``
-    (n, k) there; None where there is too little to tell.
+def _angle(quaternion: Array) -> Array:
+    """Return the sum (n - 1, 3) of the rotations (rad) between quaternions (n, 4): white noise
+    stays white in it, but for a small share that the motion turns.
+    """
+    turned = Rotation.from_quat(quaternion, scalar_first=True)
+    return np.asarray(np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0))
+
+
+def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
+    """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
+    pieces (n, k) there; None where there is too little to tell.
+
+    The power is the median of half overlapping segments: a leap of the pose, or a touch of the
+    ground, spoils some of them.
     """
     n, order = NOISE_SPECTRUM.segment, NOISE_SPECTRUM.differences
-    if x.shape[1] == 0 or len(x) < NOISE_SPECTRUM.least_segments * n // 2 + order:
+    rough = [np.diff(piece, order, axis=0) for piece in pieces]
+    segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
+    if len(segments) < NOISE_SPECTRUM.least_segments:
         return None
-    share, power = welch(
-        np.diff(x, order, axis=0), 2.0, nperseg=n, axis=0, average="median", detrend=False
+    power = np.square(
+        np.abs(np.fft.rfft(np.hanning(n)[None, :, None] * np.array(segments), axis=1))
     )
-    undone = (2.0 * np.sin(0.5 * np.pi * share[1:])) ** (2 * order)
-    return share[1:], 0.5 * np.log(np.maximum(power[1:] / undone[:, None], 1e-300))
+    power = np.median(power[:, 1:], axis=0)
+    moving = power.max(axis=0) > 0.0
+    if not moving.any():
+        return None
+    share = np.arange(1, n // 2 + 1) / (n // 2)
+    undone = (2.0 * np.sin(0.5 * np.pi * share)) ** (2 * order)
+    return share, 0.5 * np.log(np.maximum(power[:, moving] / undone[:, None], 1e-300))
 
 
 def _slope(share: Array, amplitude: Array) -> float:
@@ -144,31 +163,37 @@ def filtering_notes(log: FlightLog) -> tuple[str, ...]:
     """Return, as sentences, which of a log's channels were filtered before it was written, how that
     is known, and what it means.
     """
-    return tuple(_sentence(noise) for noise in noise_spectra(log) if noise.filtered)
+    found = [noise for noise in noise_spectra(log) if noise.filtered]
+    pose = [noise for noise in found if noise.channel in POSE_CHANNELS]
+    others = [[noise] for noise in found if noise not in pose]
+    return tuple(_sentence(group) for group in ([pose] if pose else []) + others)
 
 
-def _sentence(noise: ChannelNoise) -> str:
-    low, high = noise.band_hz
-    if noise.slope > NOISE_SPECTRUM.most_slope:
+def _sentence(group: Sequence[ChannelNoise]) -> str:
+    """Return what is said of channels of one kind; the clearest of them is the evidence."""
+    clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
+    low, high = clearest.band_hz
+    if clearest.slope > NOISE_SPECTRUM.most_slope:
         known = (
-            f"between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, its amplitude falls "
-            f"with the power {noise.slope:.1f} of the frequency"
+            f"between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, the amplitude of the "
+            f"{clearest.channel} falls with the power {clearest.slope:.1f} of the frequency"
         )
     else:
         first, last = (share * high / NOISE_SPECTRUM.band[1] for share in NOISE_SPECTRUM.lower_band)
         known = (
-            f"between {first:.3g} and {last:.3g} Hz, above a vehicle's motion, its amplitude is "
-            f"{noise.fall:.1f} times that near {high:.3g} Hz"
+            f"between {first:.3g} and {last:.3g} Hz, above a vehicle's motion, the amplitude of "
+            f"the {clearest.channel} is {clearest.fall:.1f} times that near {high:.3g} Hz"
         )
     means = (
         "The log does not show how large the sensors' noise is, so the noise floor is a lower bound"
-        if noise.channel in POSE_CHANNELS
+        if clearest.channel in POSE_CHANNELS
         else "Its noise cannot be read from this log"
     )
-    were = "were" if noise.channel.endswith("s") else "was"
+    what = " and ".join(noise.channel for noise in group)
+    were = "were" if len(group) > 1 or what.endswith("s") else "was"
     return (
-        f"the {noise.channel} {were} filtered before the log was written, by a low-pass, an "
-        f"estimator or a resampling: {known}, where a sensor's own noise is level. {means}"
+        f"the {what} {were} filtered before the log was written, by a low-pass, an estimator or a "
+        f"resampling: {known}, where a sensor's own noise is level. {means}"
     )
 
 

@@ -14,7 +14,6 @@ from studies.trials.practice_flights import practise, shown_in
 from studies.trials.scores import coefficient_errors, match
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
-from windwrench.envs.recording import TRAJECTORIES
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.motion.noise_spectrum import noise_spectra, pose_was_filtered
 from windwrench.runtime.errors import InputError
@@ -22,6 +21,7 @@ from windwrench.runtime.whole_files import replaced
 from windwrench.runtime.workers import workers
 
 VEHICLE = "ardrone2"
+EMPTY = ("excite", "fast", "hover")  # trajectories flown with nothing added
 SECONDS = 40.0  # of each flight
 _ATTEMPTS = 4  # draws of a flight that a flight loop may be unable to fly
 
@@ -32,8 +32,8 @@ def flights(seeds: Iterable[int] = (0,)) -> list[tuple[str, str, int]]:
         flight
         for seed in seeds
         for flight in (
+            *(("", trajectory, seed) for trajectory in EMPTY),
             *((name, shown_in(name)[0], seed) for name in names()),
-            *(("", trajectory, seed) for trajectory in TRAJECTORIES),
         )
     ]
 
