@@ -424,8 +424,8 @@ def _advice(
     out = []
     if filtered:
         out.append(
-            "Log the pose as it was measured, before any filter or estimator. Behind one, no flight "
-            f"identifies {', '.join(sorted(FILTER_LIKE_EFFECTS))}, and no name is more than "
+            "Log the pose as it was measured, before any filter or estimator. Behind one, no "
+            f"flight identifies {', '.join(sorted(FILTER_LIKE_EFFECTS))}, and no name is more than "
             "tentative."
         )
         not_identifiable = [x for x in not_identifiable if x not in FILTER_LIKE_EFFECTS]

@@ -9,7 +9,6 @@ from ..findings import CHANNELS, Diagnosis, NamedEffect
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MISSING = "–"
 _SPACE = "\N{NO-BREAK SPACE}"
-_MOST_RANKED = 3  # bars, from the top, whose absence among the names is worth a sentence
 _TELLING = 1.3  # times the floor, from which an error is worth a word in the first sentence
 
 
@@ -260,20 +259,26 @@ def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
     """
     named = [c for c in diagnosis.candidates if c.named]
     lowest = min((c.gain for c in named), default=math.inf)
-    told = []
-    for candidate in diagnosis.candidates[:_MOST_RANKED]:
-        if candidate.named or not candidate.gain > lowest:
-            continue
+    above = [c for c in diagnosis.candidates if not c.named and c.gain > lowest]
+    told, rest = [], []
+    for candidate in above:
         mates = [e.name for e in diagnosis.effects if candidate.name in e.indistinguishable_from]
+        if not mates:
+            rest.append(candidate)
+            continue
         below = [c.name for c in named if c.gain < candidate.gain]
         told.append(
-            f"{candidate.name} alone explains more than {in_words(below)} alone. "
-            + (
-                f"It may be the cause: these logs cannot tell {in_words(mates, 'or')} from it."
-                if mates
-                else f"It was not named: beside {in_words([c.name for c in named])} it adds too "
-                "little to be worth a name."
-            )
+            f"{candidate.name} alone explains more than {in_words(below)} alone. It may be the "
+            f"cause: these logs cannot tell {in_words(mates, 'or')} from it."
+        )
+    if rest:
+        last = min(named, key=lambda c: c.gain).name
+        one = len(rest) == 1
+        told.append(
+            f"{in_words([c.name for c in rest])} {'explains' if one else 'each explain'} more "
+            f"alone than {last} does, but {'was' if one else 'were'} not named: beside "
+            f"{in_words([c.name for c in named])} {'it adds' if one else 'they add'} too little to "
+            "be worth a name."
         )
     return told
 

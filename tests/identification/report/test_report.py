@@ -439,7 +439,7 @@ def test_chart_and_names_agree_or_it_is_said_why_not(diagnosis):
     assert ranking_sentences(made) == [
         "rotor_efficiency alone explains more than rotor_drag alone. It may be the cause: these "
         "logs cannot tell rotor_drag from it.",
-        "mass alone explains more than rotor_drag alone. It was not named: beside rotor_drag it "
+        "mass explains more alone than rotor_drag does, but was not named: beside rotor_drag it "
         "adds too little to be worth a name.",
     ]
     assert ranking_sentences(replace(made, candidates=ranked[2:])) == []
