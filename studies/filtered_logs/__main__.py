@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from studies.filtered_logs.filtered_logs import run, save
-from studies.filtered_logs.page import write_table
+from windwrench.studies.filtered_logs.filtered_logs import run, save
+from windwrench.studies.filtered_logs.page import write_table
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.filtered_logs")

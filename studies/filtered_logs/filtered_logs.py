@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from studies.filtered_logs.filters import FILTERS
-from studies.trials.practice_flights import practise, shown_in
-from studies.trials.scores import coefficient_errors, match
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
@@ -19,6 +16,9 @@ from windwrench.identification.motion.noise_spectrum import noise_spectra, pose_
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.whole_files import replaced
 from windwrench.runtime.workers import workers
+from windwrench.studies.filtered_logs.filters import FILTERS
+from windwrench.studies.trials.practice_flights import practise, shown_in
+from windwrench.studies.trials.scores import coefficient_errors, match
 
 VEHICLE = "ardrone2"
 EMPTY = ("excite", "fast", "hover")  # trajectories flown with nothing added

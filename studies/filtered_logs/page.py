@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from studies.filtered_logs.filtered_logs import kind
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.whole_files import replaced
+from windwrench.studies.filtered_logs.filtered_logs import kind
 
 KINDS = ("wrong, sure", "wrong, tentative", "silent", "refused", "right, tentative", "right, sure")
 BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
-from studies.filtered_logs.filters import FILTERS
 from tests.support.data_paths import DATA
 from windwrench.dynamics import load_vehicle
 from windwrench.envs.recording import record_flight
@@ -18,6 +17,7 @@ from windwrench.identification.motion.noise_spectrum import (
     noise_spectra,
     pose_was_filtered,
 )
+from windwrench.studies.filtered_logs.filters import FILTERS
 
 VEHICLE = load_vehicle("ardrone2")
 
