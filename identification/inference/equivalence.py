@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gram_matrix import GRAM, gram
-from .regression import CENTRAL, ROTOR_TIME_OFFSET, Flights, coefficient, range_of
+from .regression import CENTRAL, REGRESSION, ROTOR_TIME_OFFSET, Flights, coefficient
 from .search import SEARCH, FittedEffects, Search, coefficient_count
 from .turning_delay import SAME_DELAY_EFFECTS
 
@@ -262,13 +262,10 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             "library"
         )
     offset = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
-    if (
-        names
-        and offset < EQUIVALENCE.share_of_bound * range_of(ROTOR_TIME_OFFSET, flights.filtered)[0]
-    ):
+    if names and offset < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
         found.append(
-            "the fitted rotor speeds act earlier than they are logged, by as much as is allowed: "
-            "an effect outside the library may be the cause"
+            f"the fitted rotor speeds act at least {-1000.0 * offset:.1f} ms earlier than they are "
+            "logged: an effect outside the library may be the cause"
         )
     if (
         max(fit.setting.get("rotor_efficiency", {"": 0.0}).values())
