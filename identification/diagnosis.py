@@ -168,7 +168,7 @@ def diagnose(
         flights.residual(without_deviations(fit.setting)),
     )  # no flight's own thrust scale or tilt
     held_out = ~flights.fit_rows
-    floor = _rms(flights.sensor_noise)
+    floor = _rms(flights.visible_noise)
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     noisy = (
         flights.filtered

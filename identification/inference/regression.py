@@ -221,6 +221,7 @@ class Flights:
         self.t: Array = np.concatenate(t)
         self.period = float(np.median(np.diff(self.t)))
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
+        self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
         self.not_identifiable: frozenset[
             str
         ]  # effects whose columns are sensor noise to a large part
@@ -250,6 +251,12 @@ class Flights:
         )
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
+        self.visible_noise = floor
+        if self.filtered:
+            # what is identifiable depends on the noise that there is, not on what shows of it
+            noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
+            noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
+            floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
         not_identifiable = set()
         own: list[Column] = [

@@ -22,7 +22,7 @@ from windwrench.studies.trials.scores import coefficient_errors, match
 
 VEHICLE = "ardrone2"
 EMPTY = ("excite", "fast", "hover")  # trajectories flown with nothing added
-SECONDS = 40.0  # of each flight
+SECONDS = 25.0  # of each flight
 _ATTEMPTS = 4  # draws of a flight that a flight loop may be unable to fly
 
 
