@@ -230,7 +230,12 @@ def diagnose(
         return _compare(logs, against, reader, vehicle, out)
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
-    from ..identification.report.words import error_sentences, headline, remainder_sentence
+    from ..identification.report.words import (
+        error_sentences,
+        headline,
+        name_in_words,
+        remainder_sentence,
+    )
 
     every, model = _read([*logs, *(test or [])], reader, vehicle)
     flights, unseen = every[: len(logs)], every[len(logs) :]
@@ -249,7 +254,7 @@ def diagnose(
         table = Table("effect", "coefficient", "value", "+-", "unit", box=box.SIMPLE_HEAD)
         for effect in found.effects:
             for i, (name, value) in enumerate(effect.coefficients.items()):
-                title = effect.name + (" (tentative)" if effect.tentative else "") if i == 0 else ""
+                title = name_in_words(effect) if i == 0 else ""
                 table.add_row(
                     title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
                 )

@@ -29,7 +29,13 @@ from .findings import (
 )
 from .inference.candidate_regressors import explanatory_variables
 from .inference.coefficient_range import implausible_coefficients
-from .inference.commanded_rotors import without_deviations
+from .inference.commanded_rotors import (
+    COMMANDED,
+    THRUST_FACTORS,
+    assumed_thrust_doubts,
+    thrust_is_assumed,
+    without_deviations,
+)
 from .inference.equivalence import (
     composite_doubts,
     equivalents,
@@ -44,7 +50,14 @@ from .inference.likelihood_refit import (
     refitted_by_likelihood,
     with_lag,
 )
-from .inference.regression import CENTRAL, ROTOR_TIME_OFFSET, Flights, coefficient, typical_size
+from .inference.regression import (
+    CENTRAL,
+    FILTER_LIKE_EFFECTS,
+    ROTOR_TIME_OFFSET,
+    Flights,
+    coefficient,
+    typical_size,
+)
 from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.stepwise_search import find_effects
@@ -52,6 +65,7 @@ from .inference.transient_disturbances import transient_disturbances
 from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
+from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
 
@@ -77,6 +91,11 @@ class DiagnosisSettings:
 
 
 DIAGNOSIS = DiagnosisSettings()
+FILTERED_NAMES = (
+    "the pose was filtered before the log was written. Whether the named effects act on the "
+    "vehicle, or follow from the flight loop's answer to disturbances, shows only in the sensors' "
+    "own noise, so all names are tentative. Log the pose as it was measured"
+)
 
 
 def diagnose(
@@ -115,6 +134,7 @@ def diagnose(
     doubts = [f"{log.name}: {note}" for log in every for note in screen_log(log, vehicle, least)]
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
+    notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = find_effects(search)
     rotor_delay = delay_kind(search, fit)
@@ -134,8 +154,11 @@ def diagnose(
     fit = refitted_by_likelihood(search, fit)
     name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
     if not flights.commanded:
+        name_doubts += implausible_coefficients(search, fit)
+    if flights.filtered and fit.effects:
+        name_doubts.append(FILTERED_NAMES)
+    elif not flights.commanded:
         name_doubts += [
-            *implausible_coefficients(search, fit),
             *contradicted_by_innovations(flights, fit.setting),
             *delay_doubts(search, fit, rotor_delay),
         ]
@@ -145,15 +168,16 @@ def diagnose(
         flights.residual(without_deviations(fit.setting)),
     )  # no flight's own thrust scale or tilt
     held_out = ~flights.fit_rows
-    floor = _rms(flights.sensor_noise)
+    floor = _rms(flights.visible_noise)
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     noisy = (
-        error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
+        flights.filtered
+        or error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
         or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
     )
     disturbances = (
         ()
-        if flights.commanded
+        if flights.commanded or flights.filtered
         else tuple(
             Disturbance(channel, *found)
             for channel, found in zip(
@@ -164,12 +188,16 @@ def diagnose(
     calm = vehicle.weight * np.repeat(
         [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
     )
-    transients = () if flights.commanded else tuple(transient_disturbances(flights, fit.setting))
+    transients = (
+        ()
+        if flights.commanded or flights.filtered
+        else tuple(transient_disturbances(flights, fit.setting))
+    )
     disturbed = bool(transients) or any(
         found.below(CUTOFFS.calm_hz) > most for found, most in zip(disturbances, calm, strict=False)
     )
     remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
-    large = noisy if flights.commanded else disturbed
+    large = noisy if flights.commanded or flights.filtered else disturbed
     effects = tuple(
         _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
@@ -178,7 +206,12 @@ def diagnose(
         effect.tentative for effect in effects
     ):  # what one effect explains too much, another one explains too little
         effects = tuple(replace(effect, tentative=True) for effect in effects)
-    sure = remainder == "none" and not any(effect.tentative for effect in effects)
+    if thrust_is_assumed(every, vehicle):
+        effects = tuple(_with_assumed_thrust(effect, vehicle) for effect in effects)
+        notes += assumed_thrust_doubts(fit.effects)
+    sure = remainder == "none" and not any(
+        effect.tentative or effect.indistinguishable_from for effect in effects
+    )
     verdict = (
         ("explained" if sure else "partly explained")
         if effects
@@ -196,6 +229,11 @@ def diagnose(
         notes.append(
             f"the rotor speeds act {abs(1000 * offset):.1f} ms "
             f"{'later' if offset > 0 else 'earlier'} than they are logged"
+            + (
+                ", or the filter of the pose delays it by as much"
+                if flights.filtered and offset > 0
+                else ""
+            )
         )
     return Diagnosis(
         verdict=verdict,
@@ -206,7 +244,9 @@ def diagnose(
         after=_errors(flights, amended, segments, error_after),
         floor_force_rms=floor[0],
         floor_torque_rms=floor[1],
-        advice=tuple(_advice(effects, sorted(flights.not_identifiable), remainder)),
+        advice=tuple(
+            _advice(effects, sorted(flights.not_identifiable), remainder, flights.filtered)
+        ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
         traces=tuple(_traces(flights, before, after)),
@@ -220,6 +260,7 @@ def diagnose(
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
+        floor_is_bound=flights.filtered or any(map(pose_was_filtered, every)),
     )
 
 
@@ -266,6 +307,25 @@ def _named(
             "energy_explained_in_noise_units": gain,
             "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
         },
+    )
+
+
+def _with_assumed_thrust(effect: NamedEffect, vehicle: Vehicle) -> NamedEffect:
+    """Return an effect as it is where nobody knows how much thrust a command makes: a factor on
+    thrust and a mass are tentative, may be each other, and are no better known than that thrust.
+    """
+    if effect.name not in THRUST_FACTORS:
+        return effect
+    size = COMMANDED.unstated_thrust_std * (vehicle.mass if effect.name == "mass" else 1.0)
+    return replace(
+        effect,
+        tentative=True,
+        std={name: float(np.hypot(std, size)) for name, std in effect.std.items()},
+        indistinguishable_from=tuple(
+            dict.fromkeys(
+                (*effect.indistinguishable_from, *(x for x in THRUST_FACTORS if x != effect.name))
+            )
+        ),
     )
 
 
@@ -356,9 +416,19 @@ def _signature(flights: Flights, fit: FittedEffects, effect: str, after: Array) 
 
 
 def _advice(
-    effects: Sequence[NamedEffect], not_identifiable: Sequence[str], remainder: str
+    effects: Sequence[NamedEffect],
+    not_identifiable: Sequence[str],
+    remainder: str,
+    filtered: bool,
 ) -> list[str]:
     out = []
+    if filtered:
+        out.append(
+            "Log the pose as it was measured, before any filter or estimator. Behind one, no "
+            f"flight identifies {', '.join(sorted(FILTER_LIKE_EFFECTS))}, and no name is more than "
+            "tentative."
+        )
+        not_identifiable = [x for x in not_identifiable if x not in FILTER_LIKE_EFFECTS]
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)

@@ -155,3 +155,6 @@ class Diagnosis:
     logs: tuple[str, ...]
     test_logs: tuple[str, ...]  # those the error is on, if they were given apart
     seconds: float  # of flight in all
+    # whether the logs' noise was filtered before they were written (or is not white for another
+    # reason): then the floor is a lower bound
+    floor_is_bound: bool = False

@@ -33,6 +33,9 @@ class CommandedSettings:
     # typical size and range of a flight's deviation from the others: relative, and rad
     thrust_scale_size: tuple[float, float] = (0.02, 0.5)
     tilt_size: tuple[float, float] = (0.01, 0.2)
+    # relative standard deviation of the thrust that a command makes where nobody stated the motor
+    # curve: cells, propellers and the air differ by that much between two vehicles of one kind
+    unstated_thrust_std: float = 0.2
 
 
 COMMANDED = CommandedSettings()
@@ -65,6 +68,8 @@ SIMILAR_EFFECTS = (
     frozenset({"rotor_drag", "body_drag"}),
     frozenset({"thrust_scale", "mass"}),
 )
+# effects that an error of the assumed thrust makes exactly
+THRUST_FACTORS = ("thrust_scale", "mass")
 # effects that change the thrust curve further, once it follows the battery's voltage: without that
 # they would explain whatever thrust lacks
 AFTER_SAG_EFFECTS = frozenset({"thrust_curvature", "thrust_fade"})
@@ -160,6 +165,24 @@ def without_deviations(setting: Mapping[str, Mapping[str, float]]) -> dict[str, 
         effect: {name: x for name, x in values.items() if effect or deviation_size(name) is None}
         for effect, values in setting.items()
     }
+
+
+def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
+    """Return whether rotor speeds are worked out from commands, and the vehicle states no curve
+    (``motor_curve``) that says how much thrust a command makes.
+    """
+    return any_commanded(logs) and getattr(vehicle, "motor_curve", None) is None
+
+
+def assumed_thrust_doubts(effects: Sequence[str]) -> list[str]:
+    """Return, as sentences, which effects rest on a thrust that nobody measured."""
+    found = [effect for effect in effects if effect in THRUST_FACTORS]
+    return [
+        f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
+        "how much thrust a command makes is an assumption, and this effect may be its error alone. "
+        "State motor_curve in the vehicle file, or log rotor speeds"
+        for effect in found
+    ]
 
 
 def any_commanded(logs: Sequence[FlightLog]) -> bool:

@@ -264,8 +264,8 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
     offset = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
     if names and offset < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
         found.append(
-            "the fitted rotor speeds act earlier than they are logged, by as much as is allowed: "
-            "an effect outside the library may be the cause"
+            f"the fitted rotor speeds act at least {-1000.0 * offset:.1f} ms earlier than they are "
+            "logged: an effect outside the library may be the cause"
         )
     if (
         max(fit.setting.get("rotor_efficiency", {"": 0.0}).values())

@@ -14,6 +14,8 @@ from ...dynamics.effects import get
 from .regression import (
     CENTRAL,
     MOMENT_PREFIX,
+    REGRESSION,
+    ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
     Flights,
@@ -169,14 +171,21 @@ def priors_and_ranges(
     """Return for each column (columns,) its prior's precision, its value, and by how much it may
     fall and rise.
     """
-    size = np.array([typical_size(c, flights.vehicle) for c in columns])
+    size = np.array(
+        [
+            REGRESSION.filtered_rotor_time_offset_size
+            if flights.filtered and c == ROTOR_TIME_OFFSET
+            else typical_size(c, flights.vehicle)
+            for c in columns
+        ]
+    )
     value = np.array(
         [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
     )
     low, high = np.empty(len(columns)), np.empty(len(columns))
     for i, c in enumerate(columns):
         if not c[0]:
-            low[i], high[i] = range_of(c)
+            low[i], high[i] = range_of(c, flights.filtered)
         elif c[1].startswith(MOMENT_PREFIX):
             low[i], high[i] = -np.inf, np.inf
         elif c[1].startswith(START_PREFIX):

@@ -95,8 +95,11 @@ class Innovations:
     ) -> bool:
         """Return whether innovations confirm the change to the effects ``after``, with a
         log-likelihood ratio of at least ``least``.
+
+        They object to nothing where the pose was filtered: its noise then lasts, and past poses
+        predict it.
         """
-        return _confirmed(*self.confirmed_share(after), least)
+        return self._flights.filtered or _confirmed(*self.confirmed_share(after), least)
 
     def confirmed_share(self, after: Setting) -> tuple[float, float]:
         """Return the share of that change that minimises the innovations, and its log-likelihood
@@ -117,6 +120,8 @@ class Innovations:
         """Return whether they confirm a change of the model's force (N, world) and torque (Nm,
         body) at the rows (rows, 6).
         """
+        if self._flights.filtered:
+            return True
         changes = []
         parts = np.split(column, np.flatnonzero(self._flights.start)[1:])
         for motion, piece, part in zip(

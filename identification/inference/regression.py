@@ -19,6 +19,7 @@ from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
+from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.sensor_noise import noisy_logs
@@ -64,6 +65,12 @@ class RegressionSettings:
     kept_residuals: int = 16  # a fit asks several times for the residual at its setting
     bytes_per_sample: int = 400  # of a piece
     rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
+    # s, the same where the pose was filtered before the log was written: a causal low-pass of 5 Hz
+    # is 45 ms late, an estimator some more
+    filtered_rotor_time_offset_range: tuple[float, float] = (-0.1, 0.1)
+    # s, typical size of a time offset, and of the rotors' where the pose was filtered
+    time_offset_size: float = 0.0025
+    filtered_rotor_time_offset_size: float = 0.02
 
 
 REGRESSION = RegressionSettings()
@@ -71,6 +78,10 @@ REGRESSION = RegressionSettings()
 # the rounding
 FAST_MOTION_EFFECTS = frozenset(
     {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
+)
+# effects that a low-pass of the pose makes or hides: it delays, and weakens fast turns
+FILTER_LIKE_EFFECTS = frozenset(
+    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset"}
 )
 DELAY_EFFECTS = frozenset({"latency", "clock_offset"})  # each contains the rotors' time offset
 LATE_ROTOR_EFFECTS = DELAY_EFFECTS | {"motor_lag"}
@@ -108,7 +119,7 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     library's two.
     """
     if column in TIME_OFFSETS:
-        return 0.0025
+        return REGRESSION.time_offset_size
     if not column[0] and (size := deviation_size(column[1])) is not None:
         return size[0]
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
@@ -126,8 +137,12 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     return float(small * (large / small) ** share)
 
 
-def range_of(column: Column) -> tuple[float, float]:
-    """Return the range of a time offset, or of a flight's deviation."""
+def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
+    """Return the range of a time offset, or of a flight's deviation; ``filtered``: of flights whose
+    pose was filtered.
+    """
+    if filtered and column == ROTOR_TIME_OFFSET:
+        return REGRESSION.filtered_rotor_time_offset_range
     size = deviation_size(column[1])
     return REGRESSION.rotor_time_offset_range if size is None else (-size[1], size[1])
 
@@ -162,6 +177,9 @@ class Flights:
         )  # torque is left out, and only the time in the air counts
         if self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
+        # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
+        # and bandwidth took away
+        self.filtered = not self.commanded and any(pose_was_filtered(log) for log in self.logs)
         self.logs = tuple(excerpt(self.logs))
         self.deviating_flights = (
             len(logs) if self.commanded else 0
@@ -203,6 +221,7 @@ class Flights:
         self.t: Array = np.concatenate(t)
         self.period = float(np.median(np.diff(self.t)))
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
+        self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
         self.not_identifiable: frozenset[
             str
         ]  # effects whose columns are sensor noise to a large part
@@ -232,6 +251,12 @@ class Flights:
         )
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
+        self.visible_noise = floor
+        if self.filtered:
+            # what is identifiable depends on the noise that there is, not on what shows of it
+            noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
+            noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
+            floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
         not_identifiable = set()
         own: list[Column] = [
@@ -260,6 +285,8 @@ class Flights:
                 not_identifiable.add(effect)
         if self.commanded:
             not_identifiable |= EXCLUDED_EFFECTS
+        if self.filtered:
+            not_identifiable |= FILTER_LIKE_EFFECTS
         not_identifiable |= self.explained_by_rounding
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)

@@ -182,7 +182,8 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
         *loose_mounts(search, shares, regression, base),
     ]
     if not found:
-        signs = block_signs or list(innovation_hints(search, fit))
+        # a filtered pose has no innovations
+        signs = block_signs or ([] if flights.filtered else list(innovation_hints(search, fit)))
         return signs, bool(signs)
     innovations = Innovations(flights, fit.setting)
     confirmed = (

@@ -222,7 +222,7 @@ class Search:
             flights.start,
             flights.fit_rows,
             flights.period,
-            band if flights.commanded else None,
+            band if flights.commanded or flights.filtered else None,
         )
 
     def set_noise(self, fit: FittedEffects, regression: "Regression") -> None:
@@ -517,7 +517,7 @@ def _changed_setting(
         own = out.setdefault(effect, dict(flights.coefficients(setting, effect)))
         value = own.get(name, 0.0) + float(delta)
         if not effect:
-            value = float(np.clip(value, *range_of((effect, name))))
+            value = float(np.clip(value, *range_of((effect, name), flights.filtered)))
         else:
             c = coefficient((effect, name))
             value = float(np.clip(value, c.minimum, c.maximum))

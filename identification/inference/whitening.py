@@ -44,7 +44,8 @@ class Whitener:
         start: (rows,) first rows of unbroken pieces.
         fit: (rows,) the rows of the residual that may be looked at.
         period: s, from row to row.
-        free: of flights whose rotors are known from commands alone: take all of the residual for
+        free: of flights whose rotors are known from commands alone, or whose pose was filtered
+            so that its own noise is not in ``sensors``: take all of the residual for
             noise, nowhere less than its mean in this band (Hz).
     """
 

@@ -69,9 +69,24 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
     )
 
 
-def noisy_logs(logs: Sequence[FlightLog], vehicle: Vehicle, seed: int = 0) -> list[FlightLog]:
+def noisy_logs(
+    logs: Sequence[FlightLog], vehicle: Vehicle, seed: int = 0, hidden: bool = False
+) -> list[FlightLog]:
     """Return logs with their own noise added once more, so that the change of whatever is made of
     them is what noise makes.
+
+    ``hidden``: a filter took the noise out of the logs' upper band, and only a part of it shows.
+    What the vehicle's file says of its motion capture is added then, if it is more.
     """
     rng = np.random.default_rng(seed)
-    return [with_noise(log, sensor_noise(log, vehicle), rng) for log in logs]
+    out = []
+    for log in logs:
+        noise = sensor_noise(log, vehicle)
+        if hidden:
+            noise = replace(
+                noise,
+                position=max(noise.position, vehicle.mocap.sigma_pos_m),
+                attitude=max(noise.attitude, vehicle.mocap.sigma_att_rad),
+            )
+        out.append(with_noise(log, noise, rng))
+    return out

@@ -17,6 +17,7 @@ from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.whole_files import replaced
 from ..findings import Diagnosis, Errors
 from .page import report_page
+from .words import headline
 
 
 def write_report(
@@ -75,6 +76,8 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "error": error,
         "advice": diagnosis.advice,
         "notes": diagnosis.notes,
+        "headline": headline(diagnosis),
+        "floor_is_lower_bound": diagnosis.floor_is_bound,
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],

@@ -23,7 +23,9 @@ from .words import (
     effect_summary,
     error_sentences,
     headline,
+    in_words,
     percent,
+    ranking_sentences,
     remainder_sentence,
     rounded,
     scale_of,
@@ -70,6 +72,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         ],
         signatures=draw_signatures(diagnosis),
         candidates=draw_candidates(diagnosis),
+        ranking=ranking_sentences(diagnosis),
+        floor_is_bound=diagnosis.floor_is_bound,
         more_candidates=[
             f"{c.name} {percent(c.gain)}" for c in diagnosis.candidates if c not in shown
         ],
@@ -165,6 +169,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
     )
     return {
         "name": effect.name,
+        "others": in_words(effect.indistinguishable_from, "or"),
         "tentative": effect.tentative,
         "summary": effect_summary(effect.name),
         "evidence": evidence,

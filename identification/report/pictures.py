@@ -239,8 +239,12 @@ def draw_candidates(diagnosis: Diagnosis) -> Picture | None:
     finite = np.where(np.isfinite(gains), gains, 0.0)
     high, low = max(float(finite.max()), 0.05), max(float(min(finite.min(), 0.0)), -0.25)
     rows = np.arange(len(shown))[::-1]
+    rivals = {x for effect in diagnosis.effects for x in effect.indistinguishable_from}
     colours = [_COLOURS["after" if candidate.named else "bar"] for candidate in shown]
-    panel.barh(rows, 100.0 * np.maximum(finite, low), height=0.68, color=colours, lw=0)
+    bars = panel.barh(rows, 100.0 * np.maximum(finite, low), height=0.68, color=colours, lw=0)
+    for bar, candidate in zip(bars, shown, strict=True):
+        if candidate.name in rivals and not candidate.named:
+            bar.set(edgecolor=_COLOURS["after"], facecolor="none", lw=1.0)
     for row, gain in zip(rows, gains, strict=True):
         panel.text(
             100.0 * max(float(np.nan_to_num(gain)), 0.0) + 1.5 * high,
@@ -259,10 +263,12 @@ def draw_candidates(diagnosis: Diagnosis) -> Picture | None:
     panel.set_xlabel("share of the residual that it alone explains (%)", x=0.32)
     best = ", ".join(f"{candidate.name} {percent(candidate.gain)}" for candidate in shown[:3])
     named = ", ".join(candidate.name for candidate in shown if candidate.named) or "none"
+    alike = [c.name for c in shown if c.name in rivals and not c.named]
     return _picture(
         figure,
         "candidates",
-        f"Share of the residual that each effect explains alone; best: {best}. Named: {named}.",
+        f"Share of the residual that each effect explains alone; best: {best}. Named: {named}."
+        + (f" Not told from a named one: {', '.join(alike)}." if alike else ""),
     )
 
 
@@ -271,7 +277,9 @@ def shown_candidates(diagnosis: Diagnosis) -> list[Candidate]:
     return [
         candidate
         for i, candidate in enumerate(diagnosis.candidates)
-        if i < _BARS or candidate.named
+        if i < _BARS
+        or candidate.named
+        or any(candidate.name in e.indistinguishable_from for e in diagnosis.effects)
     ]
 
 

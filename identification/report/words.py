@@ -97,26 +97,42 @@ def coefficient_meaning(effect: str, coefficient: str) -> str:
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict in one plain sentence."""
-    sure = [e for e in diagnosis.effects if not e.tentative]
-    unsure = [e for e in diagnosis.effects if e.tentative]
+    """Return the verdict in plain words, as sure as its least sure part."""
+    undecided = [e for e in diagnosis.effects if e.indistinguishable_from]
+    sure = [e for e in diagnosis.effects if e not in undecided and not e.tentative]
+    unsure = [e for e in diagnosis.effects if e not in undecided and e.tentative]
     if diagnosis.verdict == "nothing to explain":
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
         if diagnosis.remainder == "random":
             return "The model's error looks random: no effect in the library explains it."
         return "The model's error has structure that no effect in the library explains."
-    lacked = (
-        f"The model {_lacked(diagnosis, sure)}"
-        + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
-        if sure
-        else f"The model perhaps {_lacked(diagnosis, unsure)}"
-    )
-    return (
-        f"{lacked}, and an unexplained error is left."
-        if diagnosis.verdict == "partly explained"
-        else f"{lacked}."
-    )
+    told = [_undecided(diagnosis, undecided)] if undecided else []
+    if sure:
+        told.append(
+            f"The model {_lacked(diagnosis, sure)}"
+            + (f", and perhaps {_lacked(diagnosis, unsure, sure)}" if unsure else "")
+        )
+    elif unsure:
+        told.append(f"The model perhaps {_lacked(diagnosis, unsure)}")
+    if diagnosis.verdict == "partly explained" and diagnosis.remainder != "none":
+        told[-1] += (
+            ", and an error is left that may or may not be the sensors' noise"
+            if diagnosis.floor_is_bound and diagnosis.remainder == "random"
+            else ", and an unexplained error is left"
+        )
+    return " ".join(f"{sentence}." for sentence in told)
+
+
+def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
+    """Return which effects these logs cannot tell from which others, in one sentence."""
+    pairs = [f"{e.name} from {in_words(e.indistinguishable_from, 'or')}" for e in effects]
+    declared = {e.name for e in diagnosis.declared.effects}
+    known = declared & {x for e in effects for x in (e.name, *e.indistinguishable_from)}
+    perhaps = "perhaps " if any(e.tentative for e in effects) else ""
+    what = "one of them" if len(effects) == 1 else "one of each"
+    model = f"is {perhaps}wrong in" if known else f"{perhaps}lacked"
+    return f"These logs cannot tell {', or '.join(pairs)}: the model {model} {what}"
 
 
 def _lacked(
@@ -167,7 +183,9 @@ def error_sentences(diagnosis: Diagnosis) -> list[str]:
         if new > 1.02 * old:
             change = f"rises from {start} to {end}"
         told.append(
-            f"{where} {change}; the noise floor is {least}."
+            f"{where} {change}; the noise floor is not known (at least {least})."
+            if diagnosis.floor_is_bound and math.isfinite(floor)
+            else f"{where} {change}; the noise floor is {least}."
             if math.isfinite(floor)
             else f"{where} {change}."
         )
@@ -233,6 +251,46 @@ def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
             "may be an effect that the library lacks."
         )
     return told
+
+
+def ranking_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return why an effect that alone explains more than a named one was not named: where chart and
+    names differ.
+    """
+    named = [c for c in diagnosis.candidates if c.named]
+    lowest = min((c.gain for c in named), default=math.inf)
+    above = [c for c in diagnosis.candidates if not c.named and c.gain > lowest]
+    told, rest = [], []
+    for candidate in above:
+        mates = [e.name for e in diagnosis.effects if candidate.name in e.indistinguishable_from]
+        if not mates:
+            rest.append(candidate)
+            continue
+        below = [c.name for c in named if c.gain < candidate.gain]
+        told.append(
+            f"{candidate.name} alone explains more than {in_words(below)} alone. It may be the "
+            f"cause: these logs cannot tell {in_words(mates, 'or')} from it."
+        )
+    if rest:
+        last = min(named, key=lambda c: c.gain).name
+        one = len(rest) == 1
+        told.append(
+            f"{in_words([c.name for c in rest])} {'explains' if one else 'each explain'} more "
+            f"alone than {last} does, but {'was' if one else 'were'} not named: beside "
+            f"{in_words([c.name for c in named])} {'it adds' if one else 'they add'} too little to "
+            "be worth a name."
+        )
+    return told
+
+
+def name_in_words(effect: NamedEffect) -> str:
+    """Return an effect's name with what it may be instead, and whether it is tentative."""
+    others = f" (or {in_words(effect.indistinguishable_from, 'or')})"
+    return (
+        effect.name
+        + (others if effect.indistinguishable_from else "")
+        + (" (tentative)" if effect.tentative else "")
+    )
 
 
 def confusion(effect: NamedEffect) -> str:

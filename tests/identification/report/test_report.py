@@ -30,9 +30,21 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.identification.report.files import write_report
-from windwrench.identification.report.pictures import draw_over_frequency, draw_over_time
-from windwrench.identification.report.words import headline, percent, rounded, with_std
+from windwrench.identification.report.files import report_data, write_report
+from windwrench.identification.report.page import report_page
+from windwrench.identification.report.pictures import (
+    draw_candidates,
+    draw_over_frequency,
+    draw_over_time,
+)
+from windwrench.identification.report.words import (
+    error_sentences,
+    headline,
+    percent,
+    ranking_sentences,
+    rounded,
+    with_std,
+)
 
 VEHICLE = load_vehicle("ardrone2")
 DRAG = {"kdx": 2.4e-4, "kdy": 1.8e-4}
@@ -380,6 +392,69 @@ def test_verdicts_in_one_sentence(diagnosis):
     ]
 
 
+def test_the_headline_is_as_sure_as_its_least_sure_part(diagnosis):
+    (drag,) = diagnosis.effects
+    centre = replace(drag, name="com_offset", indistinguishable_from=("rotor_efficiency",))
+    sag = replace(drag, name="battery_sag", indistinguishable_from=("rotor_efficiency", "mass"))
+    other = replace(centre, tentative=True)
+    changed = diagnosis.declared.with_effects(EffectSetting("com_offset", {"cx": 0.01}))
+    told = [
+        headline(replace(diagnosis, verdict="partly explained", remainder=r, effects=e, **more))
+        for r, e, more in [
+            ("none", (centre,), {}),
+            ("none", (centre, sag), {}),
+            ("random", (drag, centre), {}),
+            ("none", (other,), {}),
+            ("none", (centre,), {"declared": changed}),
+            ("random", (drag,), {"floor_is_bound": True}),
+            ("none", (replace(drag, tentative=True),), {}),
+        ]
+    ]
+    assert told == [
+        "These logs cannot tell com_offset from rotor_efficiency: the model lacked one of them.",
+        "These logs cannot tell com_offset from rotor_efficiency, or battery_sag from "
+        "rotor_efficiency or mass: the model lacked one of each.",
+        "These logs cannot tell com_offset from rotor_efficiency: the model lacked one of them. "
+        "The model lacked rotor_drag, and an unexplained error is left.",
+        "These logs cannot tell com_offset from rotor_efficiency: the model perhaps lacked one of "
+        "them.",
+        "These logs cannot tell com_offset from rotor_efficiency: the model is wrong in one of "
+        "them.",
+        "The model lacked rotor_drag, and an error is left that may or may not be the sensors' "
+        "noise.",
+        "The model perhaps lacked rotor_drag.",
+    ]
+
+
+def test_chart_and_names_agree_or_it_is_said_why_not(diagnosis):
+    (drag,) = diagnosis.effects
+    ranked = (
+        Candidate("rotor_efficiency", 0.9, False),
+        Candidate("mass", 0.8, False),
+        Candidate("rotor_drag", 0.5, True),
+        Candidate("wind", 0.4, False),
+    )
+    undecided = replace(drag, indistinguishable_from=("rotor_efficiency",))
+    made = replace(diagnosis, effects=(undecided,), candidates=ranked)
+    assert ranking_sentences(made) == [
+        "rotor_efficiency alone explains more than rotor_drag alone. It may be the cause: these "
+        "logs cannot tell rotor_drag from it.",
+        "mass explains more alone than rotor_drag does, but was not named: beside rotor_drag it "
+        "adds too little to be worth a name.",
+    ]
+    assert ranking_sentences(replace(made, candidates=ranked[2:])) == []
+    assert "Not told from a named one: rotor_efficiency." in draw_candidates(made).alt
+
+
+def test_a_floor_that_is_a_bound_is_called_one(diagnosis):
+    made = replace(diagnosis, floor_is_bound=True)
+    assert all("the noise floor is not known (at least" in s for s in error_sentences(made))
+    assert "noise floor, at least" in Page(report_page(made, "command")).text
+    assert "noise floor, at least" not in Page(report_page(diagnosis, "command")).text
+    assert report_data(made)["floor_is_lower_bound"] is True
+    assert report_data(made)["headline"] == headline(made)
+
+
 def test_what_is_declared_is_not_said_to_be_lacking(diagnosis):
     (drag,) = diagnosis.effects
     mass, wind = replace(drag, name="mass"), replace(drag, name="wind", tentative=True)
@@ -467,8 +542,8 @@ def test_the_page_says_what_is_in_doubt(reports):
     made, (_, path, _) = reports["hard"]
     page = Page(path.read_text("utf-8"))
     for words in (
-        "The model lacked rotor_drag and com_offset, and perhaps wind, and an "
-        "unexplained error is left.",
+        "These logs cannot tell rotor_drag from body_drag or attitude_gain: the model lacked one "
+        "of them. The model lacked com_offset, and perhaps wind, and an unexplained error is left.",
         "cannot distinguish rotor_drag from body_drag or attitude_gain",
         "wind is tentative",
         "could not be computed",

@@ -1,0 +1,202 @@
+"""Was the noise of a log filtered before it was written? Read from the spectrum of its channels.
+
+A sensor's own noise is white: its spectrum is level up to half the sampling rate. The motion of a
+rigid body is not up there, since rotors and inertia are low-passes of their own. So where the upper
+half of the band still falls, as behind a low-pass, an estimator or a resampling, nothing in the log
+shows how much noise there is at the frequencies of the motion: what is left at the top is a lower
+bound of it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..logs.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NoiseSpectrumSettings:
+    """When the spectrum of a channel is that of filtered noise."""
+
+    # shares of half the sampling rate between which the slope is read: above a vehicle's motion,
+    # below the last bins, which rounding and jitter of the clock fill
+    band: tuple[float, float] = (0.5, 0.95)
+    gap: float = 2.5  # median time steps, from which a piece ends; a single lost sample is none
+    segment: int = 128  # samples of a spectrum's segment
+    least_segments: int = 8  # half overlapping; of fewer the slope's own error is above 0.2
+    # power of 1/f by which the amplitude falls over the band. White noise has 0, cameras' poses and
+    # onboard attitudes that were not filtered up to 1.0 (vibration), a first-order low-pass 1
+    most_slope: float = 1.2
+    # where the log is fast enough: level between these shares of half the sampling rate, over that
+    # at the top of the band. White noise has 1; a first-order filter, as an estimator's own is, has
+    # 2 there though its slope is no larger than a vibrating camera's
+    lower_band: tuple[float, float] = (0.2, 0.35)
+    least_lower_hz: float = 20.0  # of that lower band: a vehicle's motion ends below
+    top_from: float = 0.8  # share of half the sampling rate, of the top of the band
+    most_fall: float = 1.5
+    differences: int = 2  # taken before the spectrum, so that slow motion leaks nowhere
+
+
+NOISE_SPECTRUM = NoiseSpectrumSettings()
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """How the noise of one channel falls towards half the sampling rate."""
+
+    channel: str  # position, attitude, gyro, accelerometer, rotor speeds
+    slope: float  # power of 1/f of the amplitude; 0 of white noise
+    # amplitude in a lower band over that at the top, 1 of white noise; NaN where the log is too
+    # slow for a band above the motion
+    fall: float
+    band_hz: tuple[float, float]  # in which the slope was read
+
+    @property
+    def filtered(self) -> bool:
+        """Whether it falls faster than an unfiltered sensor's noise does."""
+        return self.slope > NOISE_SPECTRUM.most_slope or (
+            self.fall > NOISE_SPECTRUM.most_fall and self.channel in POSE_CHANNELS
+        )
+
+
+POSE_CHANNELS = ("position", "attitude")
+
+
+def noise_spectra(log: FlightLog) -> list[ChannelNoise]:
+    """Return how the noise of each of a log's channels falls; channels too short to tell, or that
+    never change, are left out.
+    """
+    out = []
+    for channel, pieces, period in _channels(log):
+        found = _amplitudes(pieces)
+        if found is not None:
+            nyquist = 0.5 / period
+            low, high = NOISE_SPECTRUM.band
+            out.append(
+                ChannelNoise(
+                    channel, _slope(*found), _fall(*found, nyquist), (low * nyquist, high * nyquist)
+                )
+            )
+    return out
+
+
+def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
+    """Yield each channel's name, its unbroken pieces (n, k) and its period (s)."""
+    quaternion = np.where(log.valid[:, None], log.quaternion, [1.0, 0.0, 0.0, 0.0])
+    position = np.where(log.valid[:, None], log.position, np.nan)
+    for name, x in (
+        ("position", position),
+        ("attitude", position),
+        ("gyro", log.gyro),
+        ("accelerometer", log.accelerometer),
+        ("rotor speeds", None if log.commanded else log.rotor_speeds),
+    ):
+        rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
+        if x is None or len(rows) <= NOISE_SPECTRUM.segment:
+            continue
+        steps = np.diff(log.t[rows])
+        period = float(np.median(steps))
+        breaks = np.flatnonzero(steps > NOISE_SPECTRUM.gap * period) + 1
+        pieces = [piece for piece in np.split(rows, breaks) if len(piece) > NOISE_SPECTRUM.segment]
+        turning = name == "attitude"
+        yield name, [_angle(quaternion[r]) if turning else x[r] for r in pieces], period
+
+
+def _angle(quaternion: Array) -> Array:
+    """Return the sum (n - 1, 3) of the rotations (rad) between quaternions (n, 4): white noise
+    stays white in it, but for a small share that the motion turns.
+    """
+    turned = Rotation.from_quat(quaternion, scalar_first=True)
+    return np.asarray(np.cumsum((turned[:-1].inv() * turned[1:]).as_rotvec(), axis=0))
+
+
+def _amplitudes(pieces: Sequence[Array]) -> tuple[Array, Array] | None:
+    """Return shares of half the sampling rate (f,) and logarithms of the amplitude (f, k) of
+    pieces (n, k) there; None where there is too little to tell.
+
+    The power is the median of half overlapping segments: a leap of the pose, or a touch of the
+    ground, spoils some of them.
+    """
+    n, order = NOISE_SPECTRUM.segment, NOISE_SPECTRUM.differences
+    rough = [np.diff(piece, order, axis=0) for piece in pieces]
+    segments = [x[a : a + n] for x in rough for a in range(0, len(x) - n + 1, n // 2)]
+    if len(segments) < NOISE_SPECTRUM.least_segments:
+        return None
+    power = np.square(
+        np.abs(np.fft.rfft(np.hanning(n)[None, :, None] * np.array(segments), axis=1))
+    )
+    power = np.median(power[:, 1:], axis=0)
+    moving = power.max(axis=0) > 0.0
+    if not moving.any():
+        return None
+    share = np.arange(1, n // 2 + 1) / (n // 2)
+    undone = (2.0 * np.sin(0.5 * np.pi * share)) ** (2 * order)
+    return share, 0.5 * np.log(np.maximum(power[:, moving] / undone[:, None], 1e-300))
+
+
+def _slope(share: Array, amplitude: Array) -> float:
+    """Return the power of 1/f by which the amplitude falls over the band: the median channel's."""
+    inside = (share >= NOISE_SPECTRUM.band[0]) & (share <= NOISE_SPECTRUM.band[1])
+    at = np.log(share[inside])
+    at -= at.mean()
+    return float(np.median(-(at @ amplitude[inside] / (at @ at))))
+
+
+def _fall(share: Array, amplitude: Array, nyquist: float) -> float:
+    """Return the amplitude in the lower band over that at the top; NaN where motion may be in
+    that band.
+    """
+    low, high = NOISE_SPECTRUM.lower_band
+    if low * nyquist < NOISE_SPECTRUM.least_lower_hz:
+        return float("nan")
+    lower = (share >= low) & (share <= high)
+    top = (share >= NOISE_SPECTRUM.top_from) & (share <= NOISE_SPECTRUM.band[1])
+    return float(np.exp(np.median(amplitude[lower].mean(axis=0) - amplitude[top].mean(axis=0))))
+
+
+def filtering_notes(log: FlightLog) -> tuple[str, ...]:
+    """Return, as sentences, which of a log's channels were filtered before it was written, how that
+    is known, and what it means.
+    """
+    found = [noise for noise in noise_spectra(log) if noise.filtered]
+    pose = [noise for noise in found if noise.channel in POSE_CHANNELS]
+    others = [[noise] for noise in found if noise not in pose]
+    return tuple(_sentence(group) for group in ([pose] if pose else []) + others)
+
+
+def _sentence(group: Sequence[ChannelNoise]) -> str:
+    """Return what is said of channels of one kind; the clearest of them is the evidence."""
+    clearest = max(group, key=lambda noise: (noise.slope, noise.fall))
+    low, high = clearest.band_hz
+    if clearest.slope > NOISE_SPECTRUM.most_slope:
+        known = (
+            f"between {low:.3g} and {high:.3g} Hz, above a vehicle's motion, the amplitude of the "
+            f"{clearest.channel} falls with the power {clearest.slope:.1f} of the frequency"
+        )
+    else:
+        first, last = (share * high / NOISE_SPECTRUM.band[1] for share in NOISE_SPECTRUM.lower_band)
+        known = (
+            f"between {first:.3g} and {last:.3g} Hz, above a vehicle's motion, the amplitude of "
+            f"the {clearest.channel} is {clearest.fall:.1f} times that near {high:.3g} Hz"
+        )
+    means = (
+        "The log does not show how large the sensors' noise is, so the noise floor is a lower bound"
+        if clearest.channel in POSE_CHANNELS
+        else "Its noise cannot be read from this log"
+    )
+    what = " and ".join(noise.channel for noise in group)
+    were = "were" if len(group) > 1 or what.endswith("s") else "was"
+    return (
+        f"the {what} {were} filtered before the log was written, by a low-pass, an estimator or a "
+        f"resampling: {known}, where a sensor's own noise is level. {means}"
+    )
+
+
+def pose_was_filtered(log: FlightLog) -> bool:
+    """Return whether a log's pose was filtered, so that its noise cannot be read from it."""
+    return any(n.filtered for n in noise_spectra(log) if n.channel in POSE_CHANNELS)

@@ -1,0 +1,1 @@
+"""What a diagnosis makes of logs whose pose was filtered before it was written."""

@@ -1,0 +1,151 @@
+"""Whether the noise of a pose was filtered is told from its spectrum, never where it was not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, lfilter, sosfilt
+
+from tests.support.data_paths import DATA
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.readers.nanobench import read as read_nanobench
+from windwrench.identification.motion.noise_spectrum import (
+    NOISE_SPECTRUM,
+    filtering_notes,
+    noise_spectra,
+    pose_was_filtered,
+)
+from windwrench.studies.filtered_logs.filters import FILTERS
+
+VEHICLE = load_vehicle("ardrone2")
+
+
+@pytest.fixture(scope="module", params=["excite", "hover"])
+def log(request):
+    c = record_flight(VEHICLE, (), request.param, 15.0, 5)
+    return FlightLog(
+        c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"), name="flight"
+    )
+
+
+@pytest.mark.parametrize("name", list(FILTERS))
+def test_what_was_filtered_is_recognised_and_what_was_not_is_not(log, name):
+    filtered = FILTERS[name](log, VEHICLE)
+    assert pose_was_filtered(filtered) == (name != "as measured")
+    notes = filtering_notes(filtered)
+    assert [note.partition(" filtered before the log was written")[0] for note in notes] == (
+        [] if name == "as measured" else ["the position and attitude were"]
+    )
+    assert all("so the noise floor is a lower bound" in note for note in notes)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_white_noise_is_level(seed):
+    rng = np.random.default_rng(seed)
+    n = 2000
+    spin = 0.005 * rng.standard_normal((n, 3))
+    quaternion = np.column_stack([np.sqrt(1.0 - np.sum(spin**2, axis=1)), spin])
+    position = 0.001 * rng.standard_normal((n, 3)) + np.sin(np.arange(n) / 100.0)[:, None]
+    speeds = 400.0 + rng.standard_normal((n, 4))
+    noise = noise_spectra(FlightLog(np.arange(n) / 200.0, position, quaternion, speeds))
+    assert [x.channel for x in noise] == ["position", "attitude", "rotor speeds"]
+    for x in noise:
+        assert abs(x.slope) < 0.5
+        assert abs(x.fall - 1.0) < 0.25
+        assert not x.filtered
+
+
+@pytest.mark.parametrize("rate", [80.0, 200.0, 500.0])
+def test_the_slope_is_that_of_the_filter(rate):
+    """A first-order low-pass far below the band has a slope of one there, and the digital one that
+    has no zero at half the sampling rate flattens to sin, of which the slope is known.
+    """
+    rng = np.random.default_rng(0)
+    n = 40_000
+    x = lfilter([0.01], [1.0, -0.99], rng.standard_normal((n, 3)), axis=0)
+    (noise,) = (
+        found
+        for found in noise_spectra(
+            FlightLog(np.arange(n) / rate, x, np.tile([1.0, 0, 0, 0], (n, 1)), np.zeros((n, 4)))
+        )
+        if found.channel == "position"
+    )
+    share = np.linspace(*NOISE_SPECTRUM.band, 200)
+    slope = -np.polyfit(np.log(share), -np.log(np.sin(0.5 * np.pi * share)), 1)[0]
+    assert noise.slope == pytest.approx(slope, abs=0.06)
+    assert noise.band_hz == pytest.approx([0.25 * rate, 0.475 * rate])
+    # of a log at 80 Hz the lower band holds motion
+    assert np.isnan(noise.fall) == (rate < 200.0)
+    assert noise.filtered == (rate >= 200.0)
+
+
+def test_channels_are_asked_one_by_one(log):
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((len(log.t), 3))
+    gyro = np.full_like(white, np.nan)  # not read in every row
+    gyro[::2] = sosfilt(butter(2, 0.1, output="sos"), white[::2], axis=0)
+    made = replace(log, accelerometer=white, gyro=gyro)
+    (note,) = filtering_notes(made)
+    assert note.startswith("the gyro was filtered before the log was written")
+    assert "Its noise cannot be read from this log" in note
+    assert not pose_was_filtered(made)
+
+
+@pytest.mark.parametrize("name", ["as measured", "causal 20 Hz"])
+def test_a_pose_that_is_lost_now_and_then_says_the_same(log, name):
+    whole = FILTERS[name](log, VEHICLE)
+    position, quaternion = whole.position.copy(), whole.quaternion.copy()
+    for k in range(200, len(log.t), 400):
+        position[k : k + 30], quaternion[k : k + 30] = np.nan, np.nan
+    torn = replace(whole, position=position, quaternion=quaternion, valid=np.zeros(0, bool))
+    assert not torn.valid.all()
+    assert pose_was_filtered(torn) == pose_was_filtered(whole) == (name != "as measured")
+    for one, other in zip(noise_spectra(whole)[:2], noise_spectra(torn)[:2], strict=True):
+        assert other.slope == pytest.approx(one.slope, rel=0.1, abs=0.3)
+
+
+def test_a_log_that_is_short_or_still_says_nothing():
+    n = 300
+    still = FlightLog(
+        np.arange(n) / 100.0,
+        np.zeros((n, 3)),
+        np.tile([1.0, 0, 0, 0], (n, 1)),
+        np.full((n, 4), 400.0),
+    )
+    assert noise_spectra(still) == []
+    assert filtering_notes(still) == ()
+
+
+def test_cameras_that_were_not_filtered_are_not_called_so():
+    paths = sorted((DATA / "nanobench").glob("*.csv"))[:2]
+    if not paths:
+        pytest.skip("the NanoBench flights are not here: shared/data/nanobench")
+    for path in paths:
+        assert not pose_was_filtered(read_nanobench(path))
+        # of the accelerometer the firmware's low-pass at 30 Hz may show, of the pose none
+        assert not any(
+            " pose" in n or "position" in n for n in filtering_notes(read_nanobench(path))
+        )
+
+
+@pytest.mark.parametrize("flight", "ceg")
+def test_the_pose_of_an_estimator_is_recognised(flight):
+    path = DATA / "racer" / f"flight_{flight}.csv.gz"
+    if not path.exists():
+        pytest.skip("the racer's flights are not here: shared/data/racer")
+    d = np.genfromtxt(path, delimiter=",", names=True)
+
+    def columns(*names):
+        return np.column_stack([d[name] for name in names])
+
+    log = FlightLog(
+        d["timestamp_s"],
+        columns("pos_x", "pos_y", "pos_z"),
+        columns("quat_w", "quat_x", "quat_y", "quat_z"),
+        columns("rpm_front_left", "rpm_rear_left", "rpm_rear_right", "rpm_front_right")
+        * np.pi
+        / 30.0,
+    )
+    assert {x.channel for x in noise_spectra(log) if x.filtered} == {"position", "attitude"}
