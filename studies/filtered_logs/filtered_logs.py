@@ -78,7 +78,7 @@ def _outcome(log: Any, vehicle: Any, truth: Mapping[str, Mapping[str, float]]) -
         found = diagnose([log], vehicle)
     except InputError as error:
         return {**out, "refused": str(error), "effects": [], "errors": {}}
-    effects = [
+    effects: list[dict[str, Any]] = [
         {
             "name": e.name,
             "tentative": e.tentative,
