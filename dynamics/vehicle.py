@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..runtime.errors import InputError
+
 Array = NDArray[np.float64]
 
 # Rotors as in the paper: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right, with x forward and
@@ -30,6 +32,18 @@ class Mocap:
     rate_hz: float = 200.0
     sigma_pos_m: float = 0.001
     sigma_att_rad: float = 0.005
+
+
+@dataclass(frozen=True)
+class MotorCurve:
+    """Static thrust of one rotor against its command ``u``, 0 to 1:
+    ``f(u, V) = sum_i thrust[i] u^i (V / voltage_ref)^voltage_exponent``.
+    """
+
+    thrust: tuple[float, ...]  # N: coefficients of u^0, u^1, ... at the vehicle's voltage_ref
+    voltage_exponent: float = 0.0  # 0: thrust does not depend on the battery's voltage
+    # raw command (PWM counts, us, ...) at u = 0 and at u = 1
+    command: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -65,6 +79,7 @@ class Vehicle:
     )  # (3,) m, centre of mass from the geometric centre
     mocap: Mocap = Mocap()
     effects: tuple[EffectSetting, ...] = ()
+    motor_curve: MotorCurve | None = None  # None: thrust is not known from commands
     floor_z: float = -math.inf  # m
     ceiling_z: float = math.inf  # m
 
@@ -105,6 +120,28 @@ class Vehicle:
         """
         square = np.linalg.solve(self.mixing, np.concatenate([[thrust], torque]))
         return np.minimum(np.sqrt(np.maximum(square, 0.0)), self.omega_max)
+
+    def commanded_thrust(self, command: Array, voltage: Array | None = None) -> Array:
+        """Return the static thrust (N, 4) in N of motor commands (N, 4), 0 to 1, by the vehicle's
+        motor curve; ``voltage`` (N,) in V, None: that at which the curve holds.
+
+        Raises:
+            InputError: the vehicle states no motor curve.
+        """
+        if self.motor_curve is None:
+            raise InputError(
+                f"vehicle {self.name}: states no motor_curve; expected one, to turn motor "
+                "commands into thrust"
+            )
+        thrust = np.polynomial.polynomial.polyval(command, self.motor_curve.thrust)
+        if voltage is not None and self.voltage_ref > 0.0:
+            exponent = self.motor_curve.voltage_exponent
+            thrust = thrust * np.power(voltage / self.voltage_ref, exponent)[:, None]
+        return np.maximum(np.asarray(thrust, dtype=np.float64), 0.0)
+
+    def commanded_speeds(self, command: Array, voltage: Array | None = None) -> Array:
+        """Return the rotor speeds (N, 4) in rad/s whose thrust is ``commanded_thrust``."""
+        return np.sqrt(self.commanded_thrust(command, voltage) / self.k)
 
     def with_effects(self, *effects: EffectSetting) -> "Vehicle":
         """Return this vehicle with exactly these effects in its model."""

@@ -13,9 +13,10 @@ from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import parse_yaml, read_yaml
 from .effects import check_setting
-from .vehicle import Array, EffectSetting, Mocap, Vehicle
+from .vehicle import Array, EffectSetting, Mocap, MotorCurve, Vehicle
 
 _ROTOR_STEPS = 255  # an 8-bit rotor speed
+_MOST_POWERS = 6  # coefficients of a motor curve
 _LARGEST = 1e12  # in SI units; products of a few numbers beyond it overflow
 
 
@@ -105,6 +106,8 @@ def _vehicle(data: object, where: str) -> Vehicle:
         given["omega_source"] = data["omega_source"]
     if "mocap" in data:
         given["mocap"] = _mocap(data["mocap"], where)
+    if data.get("motor_curve") is not None:
+        given["motor_curve"] = _motor_curve(data["motor_curve"], where)
     given["effects"] = _effects(data.get("effects") or [], where)
     vehicle = Vehicle(**given)
     length = np.linalg.norm(
@@ -128,6 +131,12 @@ def dump_vehicle(vehicle: Vehicle) -> str:
             continue
         if f.name == "mocap":
             value = {m.name: getattr(value, m.name) for m in fields(Mocap)}
+        elif isinstance(value, MotorCurve):
+            value = {
+                "thrust": [float(x) for x in value.thrust],
+                "voltage_exponent": float(value.voltage_exponent),
+                "command": [float(x) for x in value.command],
+            }
         elif f.name == "effects":
             value = [
                 {"name": e.name, "coefficients": {c: float(v) for c, v in e.coefficients.items()}}
@@ -201,6 +210,43 @@ def _mocap(value: object, where: str) -> Mocap:
     return Mocap(
         **{key: _number(v, where, f"mocap.{key}", positive=True) for key, v in value.items()}
     )
+
+
+def _motor_curve(value: object, where: str) -> MotorCurve:
+    known = {f.name for f in fields(MotorCurve)}
+    where = f"{where}: motor_curve"
+    if not isinstance(value, dict) or "thrust" not in value:
+        raise InputError(
+            f"{where} must be a mapping of thrust (N, coefficients of u^0, u^1, ...), "
+            f"voltage_exponent and command (raw command at u = 0 and 1), got {value!r}"
+        )
+    for key in value:
+        if key not in known:
+            raise unknown_name("key", str(key), known, where)
+    thrust = value["thrust"]
+    if not isinstance(thrust, list) or not 2 <= len(thrust) <= _MOST_POWERS:
+        raise InputError(
+            f"{where}: thrust must be 2 to {_MOST_POWERS} numbers, the coefficients in N of "
+            f"u^0, u^1, ... with the command u from 0 to 1, got {thrust!r}"
+        )
+    coefficients = _numbers(thrust, where, "thrust", (len(thrust),))
+    if not np.sum(coefficients) > 0.0:
+        raise InputError(
+            f"{where}: thrust at the full command, the sum of its coefficients, is "
+            f"{np.sum(coefficients):g} N; expected a positive one"
+        )
+    given: dict[str, Any] = {"thrust": tuple(float(x) for x in coefficients)}
+    if "voltage_exponent" in value:
+        given["voltage_exponent"] = _number(value["voltage_exponent"], where, "voltage_exponent")
+    if "command" in value:
+        low, high = _numbers(value["command"], where, "command", (2,))
+        if not low < high:
+            raise InputError(
+                f"{where}: command must be the raw command at u = 0 and a larger one at u = 1, "
+                f"got {value['command']!r}"
+            )
+        given["command"] = (float(low), float(high))
+    return MotorCurve(**given)
 
 
 def _effects(value: object, where: str) -> tuple[EffectSetting, ...]:

@@ -12,10 +12,13 @@ One row a sample, time strictly increasing. Columns of the file:
 ``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
 ``ax, ay, az`` (optional)      m/s2     accelerometer at the centre: specific force, body; +g along z in a hover
 ``gx, gy, gz`` (optional)      rad/s    gyro: angular velocity, body
+``cmd1 ... cmd4`` (optional)   1        motor commands, 0 to 1, in the rotors' order
 ``vehicle=NAME`` (optional)    1        1 in every row: the vehicle that flew, named by the column's own name
 =============================  =======  ==========================================================================
 
 A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
+The pose's columns may be left out altogether where accelerometer and gyro are there, and the rotor speeds' where motor
+commands are.
 A row whose three fields of an inertial sensor are all empty is one in which it was not read, so a sensor faster than the
 pose has rows of its own. Other columns are ignored. The name of the vehicle stands in a header, so that whatever reads a table of
 numbers still reads one.
@@ -40,6 +43,7 @@ ROTORS = ("omega1", "omega2", "omega3", "omega4")
 TRUTH = ("fx", "fy", "fz", "tx", "ty", "tz")
 ACCELEROMETER = ("ax", "ay", "az")
 GYRO = ("gx", "gy", "gz")
+COMMANDS = ("cmd1", "cmd2", "cmd3", "cmd4")
 REQUIRED = ("t", *POSE, *ROTORS)
 
 VEHICLE = re.compile(r"vehicle=([A-Za-z0-9][A-Za-z0-9_.+ -]{0,63})")  # a column's name
@@ -55,7 +59,8 @@ class FlightLog:
     t: Array  # (N,) s
     position: Array  # (N, 3) m, world; NaN where the pose is missing
     quaternion: Array  # (N, 4) body to world, scalar first; NaN where the pose is missing
-    rotor_speeds: Array  # (N, 4) rad/s
+    # (N, 4) rad/s; NaN in every row where the log has commands that nothing turned into speeds
+    rotor_speeds: Array
     voltage: Array | None = None  # (N,) V
     force: Array | None = None  # (N, 3) N, world, truth
     torque: Array | None = None  # (N, 3) Nm, world, truth
@@ -75,11 +80,22 @@ class FlightLog:
     )  # (N,) or (N, ...) SI; what a reader found besides
     # rotor speeds are computed from commands: scale of thrust unknown, moments not to be trusted
     commanded: bool = False
+    command: Array | None = None  # (N, 4) motor commands, 0 to 1, in the rotors' order
     vehicle: str = ""  # name of the vehicle that flew, where the log or its reader knows it
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
             object.__setattr__(self, "valid", np.isfinite(self.position).all(axis=1))
+
+    @property
+    def has_pose(self) -> bool:
+        """Is there any pose in it?"""
+        return bool(self.valid.any())
+
+    @property
+    def has_rotor_speeds(self) -> bool:
+        """Are rotor speeds known, measured or computed from commands?"""
+        return bool(np.isfinite(self.rotor_speeds).all())
 
     @property
     def period(self) -> float:
@@ -200,6 +216,7 @@ def with_rows(log: FlightLog, keep: Mask) -> FlightLog:
         torque=cut(log.torque),
         accelerometer=cut(log.accelerometer),
         gyro=cut(log.gyro),
+        command=cut(log.command),
         valid=log.valid[keep],
         extra={name: x[keep] for name, x in log.extra.items()},
     )
@@ -214,8 +231,12 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     """
     columns = {"t": log.t}
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
-    columns |= {name: pose[:, i] for i, name in enumerate(POSE)}
-    columns |= {name: log.rotor_speeds[:, i] for i, name in enumerate(ROTORS)}
+    if log.has_pose or log.accelerometer is None or log.gyro is None:
+        columns |= {name: pose[:, i] for i, name in enumerate(POSE)}
+    if log.has_rotor_speeds or log.command is None:
+        columns |= {name: log.rotor_speeds[:, i] for i, name in enumerate(ROTORS)}
+    if log.command is not None:
+        columns |= {name: log.command[:, i] for i, name in enumerate(COMMANDS)}
     if log.voltage is not None:
         columns["vbat"] = log.voltage
     if log.force is not None and log.torque is not None:

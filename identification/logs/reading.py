@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
 from .flight_log import (
     ACCELEROMETER,
+    COMMANDS,
     GYRO,
     POSE,
     REQUIRED,
@@ -74,7 +76,7 @@ def read_log(
                 f"ROS 2 bag"
             )
         table = open_table(path)
-        missing = [name for name in REQUIRED if name not in table.header]
+        missing = [name for name in _needed(table) if name not in table.header]
         if missing:
             for other in READERS.values():
                 if other.signature and set(other.signature) <= set(table.header):
@@ -87,28 +89,44 @@ def read_log(
                 f"found {', '.join(table.header[:20])}"
             )
         with np.errstate(over="ignore", invalid="ignore"):
-            log = _canonical(table)
+            log = _canonical(table, vehicle)
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
     return _with_doubts(log, vehicle)
 
 
-def _canonical(table: Table) -> FlightLog:
+def _needed(table: Table) -> tuple[str, ...]:
+    """Return the columns that a table of the kit's format must have: pose and rotor speeds, unless
+    it has none of the one but an inertial sensor, or none of the other but motor commands.
+    """
+    there = set(table.header)
+    no_pose = not there & set(POSE) and {*ACCELEROMETER, *GYRO} <= there
+    no_rotors = not there & set(ROTORS) and set(COMMANDS) <= there
+    return ("t", *(() if no_pose else POSE), *(() if no_rotors else ROTORS))
+
+
+def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
     path = table.path
-    truth, *sensors = (_all_or_none(table, group) for group in (TRUTH, ACCELEROMETER, GYRO))
-    names = [*REQUIRED, *(["vbat"] if "vbat" in table.header else []), *truth]
+    truth, commands, *sensors = (
+        _all_or_none(table, group) for group in (TRUTH, COMMANDS, ACCELEROMETER, GYRO)
+    )
+    needed = _needed(table)
+    names = [*needed, *(["vbat"] if "vbat" in table.header else []), *truth, *commands]
     columns = table.read([*names, *(name for sensor in sensors for name in sensor)])
 
-    pose = np.column_stack([columns[name] for name in POSE])
+    nothing = np.full(table.rows, np.nan)
+    pose = np.column_stack([columns.get(name, nothing) for name in POSE])
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
     accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
     check_times(table, columns["t"])
     quaternion = unit_quaternions(table, pose[:, 3:], ~lost, "qw, qx, qy, qz")
-    rotor_speeds = np.column_stack([columns[name] for name in ROTORS])
-    for name in (*ROTORS, *(["vbat"] if "vbat" in names else [])):
+    rotor_speeds = np.column_stack([columns.get(name, nothing) for name in ROTORS])
+    command = np.column_stack([columns[name] for name in COMMANDS]) if commands else None
+    _check_commands(table, columns, commands)
+    for name in (name for name in (*ROTORS, "vbat") if name in names):
         low = np.flatnonzero(columns[name] < 0)
         if low.size:
             expected = (
@@ -121,11 +139,17 @@ def _canonical(table: Table) -> FlightLog:
                 f"negative; "
                 f"expected {expected} at least 0"
             )
+    computed = command is not None and vehicle is not None and vehicle.motor_curve is not None
+    commanded = computed and ROTORS[0] not in columns
+    if commanded and command is not None and vehicle is not None:
+        rotor_speeds = vehicle.commanded_speeds(command, columns.get("vbat"))
     return FlightLog(
         t=columns["t"],
         position=pose[:, :3].copy(),
         quaternion=quaternion,
         rotor_speeds=rotor_speeds,
+        command=command,
+        commanded=commanded,
         voltage=columns.get("vbat"),
         force=np.column_stack([columns[name] for name in TRUTH[:3]]) if truth else None,
         torque=np.column_stack([columns[name] for name in TRUTH[3:]]) if truth else None,
@@ -140,6 +164,17 @@ def _canonical(table: Table) -> FlightLog:
         valid=~lost,
         vehicle=_vehicle_name(table),
     )
+
+
+def _check_commands(table: Table, columns: Mapping[str, Array], names: Sequence[str]) -> None:
+    """Raise InputError at the first motor command outside 0 to 1."""
+    for name in names:
+        outside = np.flatnonzero((columns[name] < 0.0) | (columns[name] > 1.0))
+        if outside.size:
+            raise InputError(
+                f"{table.path}: column {name}, {table.row(outside[0])}: "
+                f"{columns[name][outside[0]]:g}; expected a motor command from 0 to 1"
+            )
 
 
 def _vehicle_name(table: Table) -> str:
@@ -173,7 +208,7 @@ def _all_or_none(table: Table, group: tuple[str, ...]) -> tuple[str, ...]:
 
 def _pose_notes(t: Array, lost: Mask, fast_sensor: bool) -> tuple[str, ...]:
     """Return a note on rows without a pose; beside a faster inertial sensor, on its gaps alone."""
-    if not lost.any():
+    if not lost.any() or lost.all():
         return ()
     if fast_sensor:
         return tuple(f"of the pose: {text}" for text in time_notes(t[~lost]))
@@ -198,7 +233,7 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
                 f"positions spread over {spread:.0f} m: are px, py, pz in millimetres? Expected "
                 f"metres"
             )
-    if vehicle is not None:
+    if vehicle is not None and log.has_rotor_speeds:
         with np.errstate(over="ignore"):
             thrust = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
         turning = thrust[log.rotor_speeds.max(axis=1) > 0.0]

@@ -152,6 +152,11 @@ class _Screening:
         log, vehicle, where = self.log, self.vehicle, self.where
         if not log.valid.any():
             raise InputError(f"{where}: no row has a pose; expected at least one to start from")
+        if not log.has_rotor_speeds:
+            raise InputError(
+                f"{where}: has motor commands and no rotor speeds, and the vehicle "
+                f"{vehicle.name} states no motor_curve; expected one, to turn commands into thrust"
+            )
         if log.vehicle and log.vehicle != vehicle.name:
             self.notes.append(
                 f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
