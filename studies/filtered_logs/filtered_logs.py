@@ -14,7 +14,7 @@ from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.motion.noise_spectrum import noise_spectra, pose_was_filtered
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json
 from windwrench.runtime.workers import workers
 from windwrench.studies.filtered_logs.filters import FILTERS
 from windwrench.studies.trials.practice_flights import practise, shown_in
@@ -148,8 +148,6 @@ def run(
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the outcomes as JSON, one a line."""
+    """Write the outcomes as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = ",\n".join(json.dumps(outcome) for outcome in outcomes)
-    with replaced(path) as partial:
-        partial.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    write_json(list(outcomes), path)
