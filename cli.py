@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from . import __version__
+from .commands.checking import convert
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
@@ -73,6 +74,7 @@ def windwrench(
 _COMMANDS: tuple[Callable[..., Any], ...] = (
     fly,
     benchmark,
+    convert,
     estimate,
     diagnose,
     record,

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from .terminal import (
+    MapOption,
     Out,
     ReaderOption,
     console,
@@ -55,7 +56,7 @@ _STAGES = {
 
 
 def _read(
-    paths: Sequence[Path], reader: str | None, vehicle: str | None
+    paths: Sequence[Path], reader: str | None, vehicle: str | None, log_map: str | None = None
 ) -> "tuple[list[FlightLog], Vehicle]":
     """Read flights of one vehicle, the one given or the one that the logs name.
 
@@ -69,7 +70,7 @@ def _read(
     model = None if vehicle is None else load_vehicle(vehicle)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flights = [read_log(path, reader, model) for path in paths]
+        flights = [read_log(path, reader, model, log_map) for path in paths]
     if model is not None:
         return flights, model
     expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
@@ -98,6 +99,7 @@ def _notes(texts: Iterable[str]) -> None:
 def estimate(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
+    map: MapOption = None,
     vehicle: LogVehicleOption = None,
     smooth: Annotated[
         bool | None,
@@ -140,7 +142,7 @@ def estimate(
         gate = GATE
     elif gate != 0.0 and not 0.5 <= gate < 1.0:
         raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
-    (flight,), model = _read([log], reader, vehicle)
+    (flight,), model = _read([log], reader, vehicle, map)
     folder = results_folder(out)
     if smooth is None:
         smooth = flight.gyro is None and flight.accelerometer is None
@@ -204,6 +206,7 @@ def diagnose(
         ),
     ] = None,
     reader: ReaderOption = None,
+    map: MapOption = None,
     against: Annotated[
         list[Path] | None,
         typer.Option(
@@ -227,7 +230,7 @@ def diagnose(
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
     if against:
-        return _compare(logs, against, reader, vehicle, out)
+        return _compare(logs, against, reader, vehicle, out, map)
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.words import (
@@ -237,7 +240,7 @@ def diagnose(
         remainder_sentence,
     )
 
-    every, model = _read([*logs, *(test or [])], reader, vehicle)
+    every, model = _read([*logs, *(test or [])], reader, vehicle, map)
     flights, unseen = every[: len(logs)], every[len(logs) :]
     folder = results_folder(out)
     with working("looking at the logs") as progress:
@@ -292,13 +295,14 @@ def _compare(
     reader: str | None,
     vehicle: str | None,
     out: Path,
+    log_map: str | None = None,
 ) -> dict[str, Any]:
     """Find what changed between two sets of flights; write change.json and change.png."""
     from ..identification.comparison.change import compare
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, headline, write_change
 
-    every, model = _read([*logs, *against], reader, vehicle)
+    every, model = _read([*logs, *against], reader, vehicle, log_map)
     folder = results_folder(out)
     trims = [trim_of_log(log, model) for log in every]
     change = compare(trims[: len(logs)], trims[len(logs) :])
@@ -317,6 +321,7 @@ def _compare(
 def replay(
     log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
     reader: ReaderOption = None,
+    map: MapOption = None,
     vehicle: LogVehicleOption = None,
     video: Annotated[
         bool, typer.Option("--video", help="Also write a video, replay.mp4 (video extra).")
@@ -354,7 +359,7 @@ def replay(
     from ..envs.video import FPS, Film, save_picture
     from ..identification.wrench_series import estimate_log
 
-    (flight,), model = _read([log], reader, vehicle)
+    (flight,), model = _read([log], reader, vehicle, map)
     length = float(flight.t[-1] - flight.t[0])
     if begin >= length:
         raise InputError(

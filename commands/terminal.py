@@ -121,6 +121,13 @@ def reader_names() -> Iterable[str]:
     return READERS
 
 
+def map_names() -> Iterable[str]:
+    """Return the maps of tables that come with the kit."""
+    from ..identification.logs import log_map
+
+    return log_map.map_names()
+
+
 Out = Annotated[
     Path, typer.Option("--out", help="Folder for the results; created if it does not exist.")
 ]
@@ -139,6 +146,16 @@ ReaderOption = Annotated[
         help="Reader for another log format: nanobench, crazyswarm2, px4_ulog, rosbag or "
         "rosbag:TOPICS.yaml.",
         autocompletion=offering(reader_names),
+    ),
+]
+MapOption = Annotated[
+    str | None,
+    typer.Option(
+        "--map",
+        help="What the columns of another table mean: a YAML file, or a map that comes with the "
+        "kit (betaflight, cflib, crazypad, euler-pwm, neurobem, rpm). windwrench check proposes "
+        "one.",
+        autocompletion=offering(map_names),
     ),
 ]
 

@@ -31,13 +31,21 @@ from .flight_log import (
     unit_quaternions,
 )
 from .inertial import check_inertial
+from .known_tables import read_known_table
+from .layout_guess import is_text_table
+from .log_map import load_map
 from .magnitudes import check_magnitudes
+from .mapped_log import read_mapped
 from .readers import READERS, find_reader
-from .tables import Table, open_table
+from .sample_gaps import bridged
+from .tables import SUFFIXES, Table, open_table
 
 
 def read_log(
-    path: str | Path, reader: str | None = None, vehicle: Vehicle | None = None
+    path: str | Path,
+    reader: str | None = None,
+    vehicle: Vehicle | None = None,
+    map: str | Path | None = None,
 ) -> FlightLog:
     """Read a flight log.
 
@@ -48,6 +56,8 @@ def read_log(
             for the kit's own.
         vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
             into rotor speeds; None: the one that the log or its reader names, where it is a preset.
+        map: for a table of other columns or another layout: the name of a map that ships with the
+            kit, or the path of a map file (``log_map``).
 
     Raises:
         InputError: the file cannot be read or breaks a rule of the form; the message says where and
@@ -58,7 +68,12 @@ def read_log(
             notes.
     """
     path = Path(path)
-    if reader is not None:
+    if map is not None:
+        if reader is not None:
+            raise InputError(f"{path}: both a reader and a map; expected one of them")
+        with np.errstate(over="ignore", invalid="ignore"):
+            log = read_mapped(path, load_map(map), vehicle)
+    elif reader is not None:
         with np.errstate(
             over="ignore", invalid="ignore"
         ):  # absurd numbers are refused for what they are
@@ -75,25 +90,33 @@ def read_log(
                 f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a "
                 f"ROS 2 bag"
             )
-        table = open_table(path)
-        missing = [name for name in _needed(table) if name not in table.header]
-        if missing:
+        foreign = is_text_table(path) and not path.name.lower().endswith(SUFFIXES)
+        table = None if foreign else open_table(path)
+        missing = [] if table is None else _missing(table)
+        if table is None:
+            log = read_known_table(path, vehicle, f"expected columns {', '.join(REQUIRED)}")
+        elif missing:
             for other in READERS.values():
                 if other.signature and set(other.signature) <= set(table.header):
                     raise InputError(
                         f"{path}: this is a {other.name} log; expected --reader {other.name} "
                         f"(reader={other.name!r}) with it"
                     )
-            raise InputError(
-                f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "
-                f"found {', '.join(table.header[:20])}"
-            )
-        with np.errstate(over="ignore", invalid="ignore"):
-            log = _canonical(table, vehicle)
+            words = f"missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}"
+            with np.errstate(over="ignore", invalid="ignore"):
+                log = read_known_table(path, vehicle, words)
+        else:
+            with np.errstate(over="ignore", invalid="ignore"):
+                log = _canonical(table, vehicle)
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
     return _with_doubts(log, vehicle)
+
+
+def _missing(table: Table) -> list[str]:
+    """Return the columns that a table of the kit's format lacks."""
+    return [name for name in _needed(table) if name not in table.header]
 
 
 def _needed(table: Table) -> tuple[str, ...]:
@@ -114,6 +137,11 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
     needed = _needed(table)
     names = [*needed, *(["vbat"] if "vbat" in table.header else []), *truth, *commands]
     columns = table.read([*names, *(name for sensor in sensors for name in sensor)])
+    check_finite(table, "t", columns["t"])
+    check_times(table, columns["t"])
+    motors = {name: columns[name] for name in (*ROTORS, *COMMANDS, "vbat") if name in names}
+    filled, gap_notes = bridged(table, columns["t"], motors)
+    columns |= filled
 
     nothing = np.full(table.rows, np.nan)
     pose = np.column_stack([columns.get(name, nothing) for name in POSE])
@@ -121,7 +149,6 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
     accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
-    check_times(table, columns["t"])
     quaternion = unit_quaternions(table, pose[:, 3:], ~lost, "qw, qx, qy, qz")
     rotor_speeds = np.column_stack([columns.get(name, nothing) for name in ROTORS])
     command = np.column_stack([columns[name] for name in COMMANDS]) if commands else None
@@ -158,6 +185,7 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
         name=log_name(path),
         source=str(path),
         notes=(
+            *gap_notes,
             *time_notes(columns["t"]),
             *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
         ),

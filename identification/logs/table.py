@@ -26,17 +26,21 @@ class Table:
     read: Callable[
         [Sequence[str]], dict[str, Array]
     ]  # names to columns (rows,); empty fields are NaN
+    first_line: int = 2  # line of a text in which the first row stands
+    notes: tuple[str, ...] = ()  # what was left out
 
     def row(self, index: int) -> str:
         """Return how to find a row (counted from 0) in the file: rows count from 1, lines include
         the header.
         """
-        return f"row {index + 1}" if file_kind(self.path) == ".parquet" else text_row(index)
+        if self.path.name.lower().endswith(".parquet"):
+            return f"row {index + 1}"
+        return text_row(index, self.first_line)
 
 
-def text_row(index: int) -> str:
-    """Return how to find a row (counted from 0) in a text."""
-    return f"row {index + 1} (line {index + 2})"
+def text_row(index: int, first_line: int = 2) -> str:
+    """Return how to find a row (counted from 0) in a text whose first row is in ``first_line``."""
+    return f"row {index + 1} (line {index + first_line})"
 
 
 def file_kind(path: Path) -> str:

@@ -1,0 +1,85 @@
+"""Rotor speeds of a log that has motor commands alone: by the vehicle's motor curve, or by an
+assumption that the log then states.
+
+Without a curve only the ratio of thrusts is assumed, ``f u^2 + (1 - f) u`` of a command u from 0 to
+1. The scale follows from flying: over a flight that begins and ends at rest the mean vertical
+thrust is the weight, so the thrust along each time's own rotor axis is counted by its vertical
+part; a tilted flight needs more than its weight.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import Vehicle
+from .flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+_FLYING = 0.5  # of the 90 % quantile of the thrust: less is ground, take-off or landing
+
+
+def with_commanded_speeds(log: FlightLog, vehicle: Vehicle | None, factor: float) -> FlightLog:
+    """Return a log whose rotor speeds are worked out from its commands, where it has no others.
+
+    Args:
+        log: the flight.
+        vehicle: that flew; None: nothing is worked out.
+        factor: f of the assumed relative thrust, 0 (thrust is linear in the command) to 1 (rotor
+            speed is).
+    """
+    if log.command is None or log.has_rotor_speeds:
+        return log
+    if vehicle is None:
+        text = "no rotor speeds: the log has motor commands, and no vehicle says what they give"
+        return replace(log, notes=(*log.notes, text))
+    if vehicle.motor_curve is not None:
+        terms = " + ".join(
+            f"{c:.4g} u^{i}" if i else f"{c:.4g}"
+            for i, c in enumerate(vehicle.motor_curve.thrust)
+            if c
+        )
+        note = (
+            f"rotor speeds: worked out from the motor commands by the motor curve of "
+            f"{vehicle.name}, thrust {terms} N a rotor, without the motors' lag"
+        )
+        speeds = vehicle.commanded_speeds(log.command, log.voltage)
+        return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
+    if not log.has_pose:
+        text = (
+            f"no rotor speeds: the log has motor commands and no pose, and the vehicle "
+            f"{vehicle.name} states no motor_curve; state it to turn commands into thrust"
+        )
+        return replace(log, notes=(*log.notes, text))
+    relative = factor * np.square(log.command) + (1.0 - factor) * log.command
+    scale = _scale(log, relative, vehicle)
+    if scale is None:
+        text = "no rotor speeds: the motor commands are 0 wherever there is a pose"
+        return replace(log, notes=(*log.notes, text))
+    note = (
+        "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
+        f"assumed to be {_words(factor)}, and its unknown scale is set so that the mean vertical "
+        f"thrust in flight is the weight of {vehicle.name} ({vehicle.weight:.4g} N): {scale:.4g} N "
+        "a motor at full command. Mass or a factor on thrust cannot be found from this log, nor a "
+        "thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of commands, without "
+        "the motors' lag. State motor_curve in the vehicle file to mend that"
+    )
+    speeds = np.sqrt(scale * relative / vehicle.k)
+    return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
+
+
+def _words(factor: float) -> str:
+    if factor == 0.0:
+        return "u"
+    return "u^2" if factor == 1.0 else f"{factor:g} u^2 + {1.0 - factor:.4g} u"
+
+
+def _scale(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
+    """Return N of a motor at full command, or None where no motor runs."""
+    _, x, y, _ = log.quaternion[log.valid].T
+    vertical = relative[log.valid].sum(axis=1) * (1.0 - 2.0 * (x * x + y * y))
+    total = relative[log.valid].sum(axis=1)
+    flying = total > _FLYING * float(np.quantile(total, 0.9))
+    mean = float(np.mean(vertical[flying])) if flying.any() else 0.0
+    return vehicle.weight / mean if mean > 0.0 else None
