@@ -42,7 +42,7 @@ from .ulog_counting import counting
 Array = NDArray[np.float64]
 Fields = Mapping[str, NDArray[Any]]
 
-SUFFIXES = (".ulg",)
+BEGINS = (b"ULog\x01\x12\x35",)
 
 _ODOMETRY = ("vehicle_mocap_odometry", "vehicle_visual_odometry")
 _ONBOARD = ("vehicle_local_position", "vehicle_attitude")

@@ -362,12 +362,10 @@ def test_a_cut_or_spoiled_log_reads_or_is_refused(write, t, vehicle, capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_a_ulog_asks_for_its_reader(tmp_path, monkeypatch):
-    (tmp_path / "flight.ulg").write_bytes(b"")
-    with pytest.raises(InputError, match=r"flight.ulg: expected --reader px4_ulog"):
-        read_log(tmp_path / "flight.ulg")
+def test_without_pyulog_a_ulog_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01")
     monkeypatch.setitem(sys.modules, "pyulog", None)
     with pytest.raises(
         InputError, match=r"pip install 'windwrench\[logs\]', or pip install pyulog"
     ):
-        read_log(tmp_path / "flight.ulg", "px4_ulog")
+        read_log(tmp_path / "flight.ulg")
