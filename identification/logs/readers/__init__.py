@@ -13,7 +13,7 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyswarm2, nanobench, px4_ulog, rosbag
+from . import crazyflie_csv, crazyflie_sd, crazyswarm2, nanobench, px4_ulog, rosbag
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,18 @@ READERS = {
     for reader in (
         Reader("nanobench", "a NanoBench table", nanobench.read, nanobench.SIGNATURE),
         Reader("crazyswarm2", "a crazyswarm2 table", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        Reader(
+            "crazyflie_sd",
+            "a Crazyflie's SD-card log",
+            crazyflie_sd.read,
+            begins=crazyflie_sd.BEGINS,
+        ),
+        Reader(
+            "crazyflie_csv",
+            "a table of a Crazyflie's log variables",
+            crazyflie_csv.read,
+            crazyflie_csv.SIGNATURE,
+        ),
         Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
         Reader(
             "rosbag",

@@ -249,7 +249,8 @@ def _rows(
         )
     t = stream.t[inside]
     if pose is None:
-        return t, np.full((len(t), 7), np.nan), (f"no pose: rows are those of {stream.name}",)
+        note = f"rows are those of {stream.name}, {1.0 / _step(t):.4g} Hz"
+        return t, np.full((len(t), 7), np.nan), (note,)
     if not own:
         values = pose.values[inside]
         whole = np.isfinite(values).all(axis=1)
@@ -263,7 +264,8 @@ def _rows(
     if len(times) >= 2:
         near = np.clip(np.searchsorted(t, times), 1, len(t) - 1)
         near -= times - t[near - 1] < t[near] - times
-        near = np.unique(near[np.abs(t[near] - times) <= 0.6 * _step(t)])
+        reach = max(0.6 * _step(t), 0.5 * _step(times) / _OWN_ROWS)
+        near = np.unique(near[np.abs(t[near] - times) <= reach])
         near = near[(t[near] >= times[0]) & (t[near] <= times[-1])]
         attitude = slerp(t[near], Stream(pose.name, times, here[:, 3:]))
         values[near] = np.column_stack(
