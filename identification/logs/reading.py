@@ -1,6 +1,5 @@
 """Reading a flight log from a file: this kit's own format here, any other through its reader."""
 
-import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -32,11 +31,11 @@ from .flight_log import (
 )
 from .inertial import check_inertial
 from .known_tables import read_known_table
-from .layout_guess import is_text_table
 from .log_map import load_map
 from .magnitudes import check_magnitudes
 from .mapped_log import read_mapped
-from .readers import READERS, find_reader
+from .readers import find_reader
+from .readers.recognise import looked_for_columns, reader_by_columns, reader_by_content
 from .sample_gaps import bridged
 from .tables import SUFFIXES, Table, open_table
 
@@ -50,10 +49,10 @@ def read_log(
     """Read a flight log.
 
     Args:
-        path: ``.csv``, ``.csv.gz`` or ``.parquet``.
-        reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with
-            that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
-            for the kit's own.
+        path: the log, of the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or of any that
+            a reader in ``identification/logs/readers/`` knows.
+        reader: name of a reader, with that reader's option behind a colon where it takes one
+            (``rosbag:topics.yaml``); None: chosen by what is in the file.
         vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
             into rotor speeds; None: the one that the log or its reader names, where it is a preset.
         map: for a table of other columns or another layout: the name of a map that ships with the
@@ -68,46 +67,8 @@ def read_log(
             notes.
     """
     path = Path(path)
-    if map is not None:
-        if reader is not None:
-            raise InputError(f"{path}: both a reader and a map; expected one of them")
-        with np.errstate(over="ignore", invalid="ignore"):
-            log = read_mapped(path, load_map(map), vehicle)
-    elif reader is not None:
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # absurd numbers are refused for what they are
-            log = find_reader(reader).read(path, vehicle)
-    else:
-        for other in READERS.values():
-            if path.name.lower().endswith(other.suffixes):
-                raise InputError(
-                    f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file "
-                    f"of this kind"
-                )
-        if os.path.isdir(path):  # False for a name that is too long
-            raise InputError(
-                f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a "
-                f"ROS 2 bag"
-            )
-        foreign = is_text_table(path) and not path.name.lower().endswith(SUFFIXES)
-        table = None if foreign else open_table(path)
-        missing = [] if table is None else _missing(table)
-        if table is None:
-            log = read_known_table(path, vehicle, f"expected columns {', '.join(REQUIRED)}")
-        elif missing:
-            for other in READERS.values():
-                if other.signature and set(other.signature) <= set(table.header):
-                    raise InputError(
-                        f"{path}: this is a {other.name} log; expected --reader {other.name} "
-                        f"(reader={other.name!r}) with it"
-                    )
-            words = f"missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}"
-            with np.errstate(over="ignore", invalid="ignore"):
-                log = read_known_table(path, vehicle, words)
-        else:
-            with np.errstate(over="ignore", invalid="ignore"):
-                log = _canonical(table, vehicle)
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
+        log = _read(path, reader, vehicle, map)
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
@@ -117,6 +78,33 @@ def read_log(
 def _missing(table: Table) -> list[str]:
     """Return the columns that a table of the kit's format lacks."""
     return [name for name in _needed(table) if name not in table.header]
+
+
+def _read(
+    path: Path, reader: str | None, vehicle: Vehicle | None, map: str | Path | None
+) -> FlightLog:
+    """Read a log by the map or the reader that is given, else as what is in it says."""
+    if map is not None:
+        if reader is not None:
+            raise InputError(f"{path}: both a reader and a map; expected one of them")
+        return read_mapped(path, load_map(map), vehicle)
+    if reader is not None:
+        return find_reader(reader).read(path, vehicle)
+    chosen = reader_by_content(path)
+    if chosen is not None:
+        return chosen.read(path, vehicle)
+    expected = f"{', '.join(REQUIRED)}, or the columns of {looked_for_columns()}"
+    if not path.name.lower().endswith(SUFFIXES):
+        return read_known_table(path, vehicle, f"expected columns {expected}")
+    table = open_table(path)
+    missing = _missing(table)
+    if not missing:
+        return _canonical(table, vehicle)
+    chosen = reader_by_columns(path, table.header)
+    if chosen is not None:
+        return chosen.read(path, vehicle)
+    words = f"missing column(s) {', '.join(missing)}; expected {expected}"
+    return read_known_table(path, vehicle, words)
 
 
 def _needed(table: Table) -> tuple[str, ...]:

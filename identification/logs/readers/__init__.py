@@ -13,19 +13,20 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyswarm2, nanobench, px4_ulog, rosbag
+from . import crazyflie_csv, crazyflie_sd, crazyswarm2, nanobench, px4_ulog, rosbag
 
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader: its name, its function, and the columns or the endings by which a log of its form
-    is known.
+    """A reader: its name, its function, and the columns or the first bytes by which a log of its
+    form is known.
     """
 
     name: str
+    what: str  # a log of its form, in words
     read: Callable[[Path, Vehicle | None], FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
-    suffixes: tuple[str, ...] = ()  # of a file's name
+    begins: tuple[bytes, ...] = ()  # first bytes of a file
     read_with: Callable[..., FlightLog] | None = (
         None  # takes a third argument, the option behind the name's colon
     )
@@ -34,10 +35,28 @@ class Reader:
 READERS = {
     reader.name: reader
     for reader in (
-        Reader("nanobench", nanobench.read, nanobench.SIGNATURE),
-        Reader("crazyswarm2", crazyswarm2.read, crazyswarm2.SIGNATURE),
-        Reader("px4_ulog", px4_ulog.read, suffixes=px4_ulog.SUFFIXES),
-        Reader("rosbag", rosbag.read, suffixes=rosbag.SUFFIXES, read_with=rosbag.read),
+        Reader("nanobench", "a NanoBench table", nanobench.read, nanobench.SIGNATURE),
+        Reader("crazyswarm2", "a crazyswarm2 table", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        Reader(
+            "crazyflie_sd",
+            "a Crazyflie's SD-card log",
+            crazyflie_sd.read,
+            begins=crazyflie_sd.BEGINS,
+        ),
+        Reader(
+            "crazyflie_csv",
+            "a table of a Crazyflie's log variables",
+            crazyflie_csv.read,
+            crazyflie_csv.SIGNATURE,
+        ),
+        Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
+        Reader(
+            "rosbag",
+            "a ROS bag (ROS 1, SQLite or MCAP)",
+            rosbag.read,
+            begins=rosbag.BEGINS,
+            read_with=rosbag.read,
+        ),
     )
 }
 
