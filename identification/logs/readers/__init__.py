@@ -13,7 +13,7 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyswarm2, nanobench, px4_ulog, rosbag
+from . import crazypad, crazyswarm2, nanobench, px4_ulog, rosbag
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ READERS = {
     for reader in (
         Reader("nanobench", nanobench.read, nanobench.SIGNATURE),
         Reader("crazyswarm2", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        Reader("crazypad", crazypad.read, crazypad.SIGNATURE),
         Reader("px4_ulog", px4_ulog.read, suffixes=px4_ulog.SUFFIXES),
         Reader("rosbag", rosbag.read, suffixes=rosbag.SUFFIXES, read_with=rosbag.read),
     )

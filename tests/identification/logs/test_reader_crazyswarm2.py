@@ -157,7 +157,7 @@ def test_bad_logs_are_named(write, tmp_path, vehicle):
 def test_an_unknown_reader_is_told_all():
     with pytest.raises(
         InputError,
-        match="unknown reader 'ros'; expected one of crazyswarm2, nanobench, px4_ulog, rosbag",
+        match="unknown reader 'ros'; expected one of crazypad, crazyswarm2",
     ):
         read_log("flight.bag", "ros")
 
