@@ -9,6 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +34,7 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
+    from ..identification.findings import Diagnosis
     from ..identification.logs.flight_log import FlightLog
 
 LogVehicleOption = Annotated[
@@ -214,6 +216,14 @@ def diagnose(
             "is looked for (which rotor, which side), and no model has to be true.",
         ),
     ] = None,
+    rotor_faults: Annotated[
+        bool,
+        typer.Option(
+            "--rotor-faults",
+            help="Look only for a rotor that lost thrust during a flight: which, when and how "
+            "much. Needs gyro, accelerometer and motor commands; no pose and no vehicle.",
+        ),
+    ] = False,
     without: Annotated[
         list[str] | None,
         typer.Option(
@@ -229,6 +239,10 @@ def diagnose(
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
+    if rotor_faults:
+        if against or test:
+            raise InputError("--rotor-faults: expected neither --against nor --test with it")
+        return _rotor_faults(logs, reader, vehicle, out)
     if against:
         return _compare(logs, against, reader, vehicle, out, map)
     from ..identification.diagnosis import diagnose as run
@@ -247,11 +261,14 @@ def diagnose(
         found = run(
             flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
         )
+    found = _with_rotor_faults(found, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
     _notes(found.notes)
     console.print(f"vehicle: {model.name}", highlight=False, markup=False)
-    for sentence in (headline(found), *error_sentences(found), remainder_sentence(found)):
+    faults = [data["headline"] for data in found.rotor_faults if data["rotor"] is not None]
+    sentences = (headline(found), *error_sentences(found), remainder_sentence(found), *faults)
+    for sentence in sentences:
         console.print(sentence, highlight=False, markup=False)
     if found.effects:
         table = Table("effect", "coefficient", "value", "+-", "unit", box=box.SIMPLE_HEAD)
@@ -316,6 +333,53 @@ def _compare(
     console.print(table)
     say(*written)
     return change_data(change)
+
+
+def _with_rotor_faults(found: "Diagnosis", flights: "Sequence[FlightLog]") -> "Diagnosis":
+    """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
+    from ..identification.rotor_faults.channels import channels_of_log
+    from ..identification.rotor_faults.detection import find_fault
+    from ..identification.rotor_faults.words import fault_data
+
+    faults = []
+    with working("looking for a rotor that lost thrust"):
+        for log in flights:
+            try:
+                faults.append(fault_data(find_fault(channels_of_log(log))))
+            except InputError:
+                continue  # no gyro, no accelerometer, or too little flight
+    notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
+    return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
+
+
+def _rotor_faults(
+    logs: Sequence[Path], reader: str | None, vehicle: str | None, out: Path
+) -> dict[str, Any]:
+    """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
+    from ..dynamics.vehicle_file import load_vehicle
+    from ..identification.rotor_faults.channels import sample
+    from ..identification.rotor_faults.detection import find_fault
+    from ..identification.rotor_faults.reading import read_channels
+    from ..identification.rotor_faults.words import fault_data, headline, write_faults
+
+    model = None if vehicle is None else load_vehicle(vehicle)
+    read = [read_channels(path, reader, model) for path in logs]
+    folder = results_folder(out)
+    found = []
+    with working("looking for a rotor that lost thrust") as progress:
+        for i, (channels, _) in enumerate(read):
+            progress(i / len(read))
+            found.append((find_fault(channels), sample(channels)))
+    written = write_faults(found, folder)
+    _notes(text for _, notes in read for text in notes)
+    for fault, samples in found:
+        ended = f"; nothing later: {samples.ended}" if samples.ended else ""
+        console.print(
+            f"{fault.name}: {fault.seconds:.1f} s in flight{ended}", highlight=False, markup=False
+        )
+        console.print(headline(fault), highlight=False, markup=False)
+    say(*written)
+    return {"rotor_faults": [fault_data(fault) for fault, _ in found]}
 
 
 def replay(

@@ -7,6 +7,7 @@ the world frame, torque about the centre of mass in the body frame.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,3 +159,6 @@ class Diagnosis:
     # whether the logs' noise was filtered before they were written (or is not white for another
     # reason): then the floor is a lower bound
     floor_is_bound: bool = False
+    # one a log that can show it: whether a rotor lost thrust during the flight, as plain data
+    # (``rotor_faults/words.py``); empty where that was not looked for
+    rotor_faults: tuple[Mapping[str, Any], ...] = ()

@@ -5,7 +5,11 @@ diagonals, each in parts of the total, and the total itself, as a logarithm. Bet
 unchanged vehicle they scatter, for a battery is never put in twice at the same place. Of that
 scatter little is known from two or three flights, so its covariance has an inverse-Wishart prior,
 and the difference of two sets is a multivariate Student's t (Gelman and others, *Bayesian Data
-Analysis*, third edition, section 3.6).
+Analysis*, third edition, section 3.6). To it comes what one flight's means are off by themselves,
+from the batches of each flight, and what the battery does to the total: a rotor's thrust for a
+request follows the voltage by a power that depends on the vehicle's motor controllers and on
+whether its firmware makes up for the battery, so that a difference of voltage makes the total less
+certain.
 
 What may have changed, each by an amount that is integrated over:
 
@@ -13,7 +17,8 @@ What may have changed, each by an amount that is integrated over:
 * a rotor delivers less than before for the same command (a cut propeller, a weak motor): its own
   thrust is asked to rise, alone;
 * the vehicle weighs more near a rotor or at a side: the centre of mass moves there;
-* all rotors are asked for more (the vehicle is heavier, the air thinner, the battery weaker).
+* all rotors are asked for more (the vehicle is heavier, the air thinner, the battery weaker);
+* something else: the four numbers moved in a way of their own (two rotors at once, a bent arm).
 
 A weaker rotor and a weight under it move the centre of thrust alike. They differ in the diagonals,
 where a real rotor near its limit does what neither says; so the place has a probability of its own,
@@ -34,6 +39,7 @@ from .trim import Trim
 Array = NDArray[np.float64]
 
 NOWHERE = "nowhere"
+SOMETHING_ELSE = "something else"
 # unit vectors to the left and the front
 _ROTORS = {
     "rotor 1 (front-left)": (1.0, 1.0),
@@ -58,6 +64,9 @@ class ChangeSettings:
     # share of the weight, or of one rotor's thrust, by which something that changed has changed:
     # the scale of a half-normal prior
     amount: float = 0.15
+    # standard deviation of the power by which the request for one thrust falls with the battery's
+    # voltage: 0 where the firmware makes up for the battery, up to 2 where rotor speed follows it
+    voltage_power: float = 0.5
     # how far a real rotor's request leaves what a linear one would need, as a share of the change:
     # thrust that bends near full power shows in diagonals and total, little in the sides
     bend: tuple[float, float, float, float] = (0.25, 0.25, 1.0, 0.5)
@@ -73,7 +82,7 @@ class Change:
     after: tuple[Trim, ...]
     difference: Array  # (4,) left - right, front - rear, diagonals, logarithm of the total
     std: Array  # (4,) of it, if nothing changed
-    # of "nowhere", each rotor, each side and "all rotors"; they sum to one
+    # of "nowhere", each rotor, each side, "all rotors" and "something else"; they sum to one
     places: dict[str, float]
     # of the likeliest place, if it is a rotor: that the rotor is weaker, that it carries more
     weaker: float
@@ -93,11 +102,6 @@ class Change:
         return self.places[self.place] >= self.sure_from
 
 
-def features(trim: Trim) -> Array:
-    """Return the four numbers (4,) of a flight."""
-    return np.append(trim.shares, math.log(trim.total))
-
-
 def compare(
     after: Sequence[Trim], before: Sequence[Trim], settings: ChangeSettings | None = None
 ) -> Change:
@@ -114,27 +118,55 @@ def compare(
     use = ChangeSettings() if settings is None else settings
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
-    a, b = (np.array([features(trim) for trim in group]) for group in (after, before))
+    a, b = (np.array([trim.features for trim in group]) for group in (after, before))
     scatter, freedom = _scatter(a, b, use)
-    share = 1.0 / len(a) + 1.0 / len(b)
     difference = a.mean(axis=0) - b.mean(axis=0)
+    unchanged = (1.0 / len(a) + 1.0 / len(b)) * scatter
+    for group in (after, before):
+        unchanged = unchanged + sum(trim.noise for trim in group) / len(group) ** 2
+    unchanged[3, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
-    nothing = float(_log_t(difference, np.zeros((1, 4)), share * scatter[None], freedom)[0])
+    nothing = float(_log_t(difference, np.zeros((1, 4)), unchanged[None], freedom)[0])
     found: list[tuple[str, str, float, float, float]] = []  # place, kind, evidence, amount, spread
     for place, kind in _hypotheses():
-        amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
-        prior = np.exp(-0.5 * np.square(amounts / use.amount))
-        prior /= prior.sum()
+        amounts, prior = _amounts(use)
         means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
         size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
-        scales = share * scatter + size[:, :, None] ** 2 * np.eye(4)
+        scales = unchanged + size[:, :, None] ** 2 * np.eye(4)
         logs = _log_t(difference, means, scales, freedom)
         weights = prior * np.exp(logs - logs.max())
         total = weights.sum()
         middle = float(amounts @ weights / total)
         spread = math.sqrt(float(np.square(amounts - middle) @ weights / total))
         found.append((place, kind, float(logs.max() + math.log(total)), middle, spread))
-    return _weigh(after, before, difference, share * scatter, nothing, found, use)
+    amounts, prior = _amounts(use)
+    wide = unchanged + (amounts**2)[:, None, None] * np.eye(4)
+    logs = _log_t(difference, np.zeros((_AMOUNTS, 4)), wide, freedom)
+    anything = float(np.logaddexp.reduce(logs + np.log(prior)))
+    found.append((SOMETHING_ELSE, "", anything, 0.0, 0.0))
+    return _weigh(after, before, difference, unchanged, nothing, found, use)
+
+
+def _amounts(use: ChangeSettings) -> tuple[Array, Array]:
+    """Return amounts of a change (n,) and how likely each is (n,)."""
+    amounts = np.linspace(0.02, 4.0, _AMOUNTS) * use.amount
+    prior = np.exp(-0.5 * np.square(amounts / use.amount))
+    return amounts, prior / prior.sum()
+
+
+def _voltage_ratio(after: Sequence[Trim], before: Sequence[Trim]) -> float:
+    """Return the logarithm of the mean voltages' ratio; zero where a flight has none.
+
+    It says how much less the total may be trusted, and is not taken off the total: a heavier
+    vehicle draws more and pulls its battery down, so that would hide what is looked for.
+    """
+    means = []
+    for group in (after, before):
+        levels = [math.log(trim.voltage) for trim in group if trim.voltage is not None]
+        if len(levels) < len(group):
+            return 0.0
+        means.append(float(np.mean(levels)))
+    return means[0] - means[1]
 
 
 def _hypotheses() -> list[tuple[str, str]]:
@@ -150,7 +182,7 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
         rotor = list(_ROTORS).index(place)
         thrust = shares.copy()
         thrust[rotor] /= 1.0 - min(amount, 0.9)
-        return features(Trim("", thrust, 0.0)) - features(Trim("", shares, 0.0))
+        return Trim("", thrust, 0.0).features - Trim("", shares, 0.0).features
     if place == "all rotors":
         return np.array([0.0, 0.0, 0.0, math.log1p(amount)])
     left, front = {**_ROTORS, **_SIDES}[place]
@@ -197,7 +229,7 @@ def _weigh(
     use: ChangeSettings,
 ) -> Change:
     """Return the probabilities of places, each place as likely as the other beforehand."""
-    names = [*_ROTORS, *_SIDES, "all rotors"]
+    names = [*_ROTORS, *_SIDES, "all rotors", SOMETHING_ELSE]
     kinds = {name: [f for f in found if f[0] == name] for name in names}
     logs = {NOWHERE: nothing + math.log(use.unchanged)}
     for name, group in kinds.items():
@@ -208,7 +240,7 @@ def _weigh(
     likeliest = max(places, key=places.__getitem__)
     chances = {"weaker": 0.0, "carries more": 0.0}
     amount, spread = 0.0, 0.0
-    if likeliest != NOWHERE:
+    if likeliest not in (NOWHERE, SOMETHING_ELSE):
         group = kinds[likeliest]
         best = max(group, key=lambda f: f[2])
         amount, spread = best[3], best[4]

@@ -3,13 +3,20 @@
 On the mean of a flight the rotors' moments balance what acts on the vehicle all the time, so the
 mean thrusts tell where it weighs and which rotor delivers less than it is asked for. That needs no
 true model: only that a thrust is proportional to the square of a rotor's speed, or to a command
-that is linear in thrust.
+that is linear in thrust. A log without a pose will do: where all rotors together push steadily with
+about the weight, the vehicle neither climbs nor lands.
+
+How far the mean of one flight is off, its noise, comes from the means of batches, each longer than
+what correlates within a flight (Schmeiser, *Batch size effects in the analysis of simulation
+output*, Operations Research 30, 1982).
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
@@ -20,6 +27,11 @@ Array = NDArray[np.float64]
 
 LEAST_SECONDS = 3.0  # of steady flight: a mean over less follows single manoeuvres
 CALM = 1.5  # m/s: faster, the airflow decides how the rotors share the work
+# of a log without a pose:
+HIGH = 0.5  # of the level that a tenth of the samples exceed: the rotors carry the vehicle
+EDGE = 1.5  # s after the rotors start and before they stop: taking off and landing
+NEAR = 0.1  # of the median thrust: further off, the vehicle climbs, sinks or pulls
+BATCH = 1.5  # s: the loop's answer to a gust is over
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +44,9 @@ class Trim:
     name: str
     thrust: Array  # (4,)
     seconds: float  # that it is a mean of
+    # (4, 4) covariance of ``features`` (``change.py``) as means of one flight; zero: not known
+    noise: Array = field(default_factory=lambda: np.zeros((4, 4)))
+    voltage: float | None = None  # V, mean over the same time
 
     @property
     def total(self) -> float:
@@ -46,8 +61,15 @@ class Trim:
         a, b, c, d = self.thrust / self.total
         return np.array([a + b - c - d, a + d - b - c, a + c - b - d])
 
+    @property
+    def features(self) -> Array:
+        """The shares and the logarithm of the total, (4,)."""
+        return np.append(self.shares, math.log(self.total))
 
-def trim_of(name: str, t: Array, thrust: Array, steady: NDArray[np.bool_]) -> Trim:
+
+def trim_of(
+    name: str, t: Array, thrust: Array, steady: NDArray[np.bool_], voltage: Array | None = None
+) -> Trim:
     """Return the trim of a flight.
 
     Args:
@@ -55,6 +77,7 @@ def trim_of(name: str, t: Array, thrust: Array, steady: NDArray[np.bool_]) -> Tr
         t: (N,) s, increasing.
         thrust: (N, 4), linear in thrust.
         steady: (N,) rows that count.
+        voltage: (N,) V, of the battery.
 
     Raises:
         InputError: fewer than 3 s count, or the rotors do not turn.
@@ -73,31 +96,100 @@ def trim_of(name: str, t: Array, thrust: Array, steady: NDArray[np.bool_]) -> Tr
             f"{name}: mean thrusts of the rotors are {np.round(mean, 4).tolist()}; expected four "
             "positive numbers"
         )
-    return Trim(name, mean, seconds)
+    level = None
+    if voltage is not None:
+        known = steady & np.isfinite(voltage) & (voltage > 0.0)
+        level = float(np.mean(voltage[known])) if known.any() else None
+    return Trim(name, mean, seconds, _noise(t, thrust, steady, step), level)
+
+
+def _noise(t: Array, thrust: Array, steady: NDArray[np.bool_], step: Array) -> Array:
+    """Return the covariance (4, 4) of the four numbers of a flight, from the means of batches."""
+    batch = np.floor(np.cumsum(np.where(steady, step, 0.0)) / BATCH).astype(np.int64)
+    rows = []
+    for number in range(int(batch[-1]) + 1):
+        inside = steady & (batch == number)
+        mean = thrust[inside].mean(axis=0) if inside.any() else np.zeros(4)
+        # the last batch may be a short one
+        if step[inside].sum() > 0.5 * BATCH and mean.min() > 0.0:
+            rows.append(Trim("", mean, 0.0).features)
+    if len(rows) < 2:
+        return np.zeros((4, 4))
+    covariance: Array = np.cov(np.array(rows), rowvar=False) / len(rows)
+    return covariance
 
 
 def trim_of_log(log: FlightLog, vehicle: Vehicle) -> Trim:
-    """Return the trim of a log in the kit's format, N.
+    """Return the trim of a log: thrust in N where rotor speeds are known, or a motor curve; else
+    the motor commands, taken as linear in thrust.
 
     Raises:
-        InputError: too little calm flight.
+        InputError: too little calm flight, or neither rotor speeds nor commands.
     """
-    thrust = np.square(log.rotor_speeds) * vehicle.k
+    name = log.source or log.name
+    if log.has_rotor_speeds:
+        thrust = np.square(log.rotor_speeds) * vehicle.k
+    elif log.command is None:
+        raise InputError(f"{name}: no rotor speeds and no motor commands; expected one of them")
+    elif vehicle.motor_curve is not None:
+        thrust = vehicle.commanded_thrust(log.command, log.voltage)
+    else:
+        thrust = log.command
+    if not log.has_pose:
+        return trim_of(name, log.t, thrust, carrying(log.t, thrust.sum(axis=1)), log.voltage)
     seen = np.flatnonzero(log.valid)
     if len(seen) < 3:
         raise InputError(f"{log.source or log.name}: fewer than three poses; expected a flight")
     height = np.interp(log.t, log.t[seen], log.position[seen, 2])
     steady = np.zeros(len(log.t), dtype=np.bool_)
-    for phase in flight_phases(log.t, height, log.rotor_speeds, vehicle):
+    speeds = log.rotor_speeds if log.has_rotor_speeds else _scaled_speeds(thrust, vehicle)
+    for phase in flight_phases(log.t, height, speeds, vehicle):
         if phase.name == FLIGHT:
             steady |= (log.t >= phase.start) & (log.t <= phase.end)
     velocity = np.gradient(log.position[seen], log.t[seen], axis=0)
     speed = _smooth(np.linalg.norm(velocity, axis=1), log.t[seen])
     steady &= np.interp(log.t, log.t[seen], speed) < CALM
-    return trim_of(log.source or log.name, log.t, thrust, steady)
+    return trim_of(name, log.t, thrust, steady, log.voltage)
+
+
+def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
+    """Return in which rows (N,) the rotors carry the vehicle steadily, from their thrust alone.
+
+    Args:
+        t: (N,) s.
+        total: (N,) thrust of all rotors, in any unit.
+    """
+    high = float(np.quantile(total, 0.9))
+    flying = total > HIGH * high
+    if high <= 0.0 or not flying.any():
+        return np.zeros(len(t), dtype=np.bool_)
+    smooth = _smooth(total, t)
+    flying = smooth > HIGH * high  # a single low sample is no landing
+    edges = np.flatnonzero(np.diff(flying.astype(np.int8), prepend=0, append=0))
+    steady = np.zeros(len(t), dtype=np.bool_)
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        # a log may begin and end in flight
+        start = t[first] + (EDGE if first > 0 else 0.0)
+        stop = t[end - 1] - (EDGE if end < len(t) else 0.0)
+        steady |= (t >= start) & (t <= stop)
+    if not steady.any():
+        return steady
+    middle = float(np.median(total[steady]))
+    close: NDArray[np.bool_] = steady & (np.abs(smooth / middle - 1.0) < NEAR)
+    return close
+
+
+def _scaled_speeds(thrust: Array, vehicle: Vehicle) -> Array:
+    """Return speeds (N, 4) in rad/s whose median thrust while the rotors are high is the weight."""
+    total = thrust.sum(axis=1)
+    flying = total > HIGH * float(np.quantile(total, 0.9))
+    scale = vehicle.weight / float(np.median(total[flying])) if flying.any() else 0.0
+    speeds: Array = np.sqrt(np.maximum(scale * thrust, 0.0) / vehicle.k)
+    return speeds
 
 
 def _smooth(values: Array, t: Array, seconds: float = 0.25) -> Array:
     """Return a running mean, so that the noise of a pose is not taken for motion."""
     width = max(1, round(seconds / float(np.median(np.diff(t)))))
-    return np.convolve(values, np.full(width, 1.0 / width), mode="same")
+    smooth: Array = uniform_filter1d(values, width, mode="nearest")
+    return smooth

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...runtime.page_files import write_json, write_png
-from .change import NOWHERE, Change
+from .change import NOWHERE, SOMETHING_ELSE, Change
 from .trim import Trim
 
 _NAMED = 0.05  # probability from which another place is mentioned
@@ -36,6 +38,8 @@ def headline(change: Change) -> str:
 
 def _kind(change: Change) -> str:
     size = f"{100 * change.amount:.0f} % (+- {100 * change.amount_std:.0f})"
+    if change.place == SOMETHING_ELSE:
+        return "The rotors share the work otherwise than one weaker rotor or one weight would ask."
     if change.place == "all rotors":
         return (
             f"All rotors are asked for {size} more: a heavier vehicle, a weaker battery, thin air."
@@ -62,6 +66,8 @@ def change_data(change: Change) -> dict[str, Any]:
                 "seconds": trim.seconds,
                 "thrust_share": (trim.thrust / trim.total).tolist(),
                 "total": trim.total,
+                "std": np.sqrt(np.diagonal(trim.noise)).tolist(),
+                "voltage": trim.voltage,
             }
             for trim in trims
         ]

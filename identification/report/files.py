@@ -85,6 +85,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
             {"channel": p.channel, "log": p.log, "t_s": p.t, "peak": p.peak}
             for p in diagnosis.pushes
         ],
+        "rotor_faults": diagnosis.rotor_faults,
         "logs": diagnosis.logs,
         "test_logs": diagnosis.test_logs,
         "seconds": diagnosis.seconds,

@@ -34,6 +34,10 @@ SOURCES = {
     "crazypad": (
         "the flights of github.com/AerialRoboticsUUST/CrazyPAD (Data 2024, 9, 79), converted to CSV"
     ),
+    "motor_faults": (
+        "the two ULogs with a motor fault of github.com/lerlis/RLS-fault-diagnosis-for-RflyMAD, "
+        "which state no licence"
+    ),
     "px4": "the logs of the test folder in github.com/PX4/pyulog",
     "flights": (
         "simulated flights of another simulator, which are not published; those of RotorPy "

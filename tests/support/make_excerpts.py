@@ -23,6 +23,12 @@ NANOBENCH_COLUMNS = (
 )
 CRAZYSWARM2 = {"log165": (0.0, 60.0), "log202": (0.0, 60.0)}  # all of it
 CRAZYSWARM2_LEFT_OUT = ("acc_x_mps2", "acc_y_mps2", "acc_z_mps2")
+CRAZYPAD = {
+    "normal_flight__E9_log00": (2.0, 12.0),
+    "normal_flight__E9_log01": (2.0, 12.0),
+    "add_weight_W3_near_M3__E9_log00": (2.0, 12.0),
+}
+CRAZYPAD_COLUMNS = ("t_s", *(f"motor_m{i}_0to65535" for i in (1, 2, 3, 4)), "vbat_V")
 PX4 = {"sample": (5.0, 15.0)}
 PX4_TOPICS = ["vehicle_local_position", "vehicle_attitude", "actuator_outputs"]
 MOST_BYTES = 150_000  # of one excerpt
@@ -39,7 +45,9 @@ def cut_table(
     """Write the rows of a CSV between two times, with those of its columns (all) that are asked
     for.
     """
-    lines = source.read_text(encoding="utf-8").splitlines()
+    whole = source.read_bytes()
+    packed = source.suffix == ".gz"
+    lines = (gzip.decompress(whole) if packed else whole).decode().splitlines()
     header = lines[0].split(",")
     kept = [header.index(name) for name in columns or header if name not in left_out]
     rows = [line.split(",") for line in lines[1:]]
@@ -73,11 +81,15 @@ def main() -> None:
         target = EXCERPTS / "crazyswarm2" / f"{name}.csv.gz"
         source = DATA / "crazyswarm2_payload" / "csv" / f"{name}.csv"
         cut_table(source, target, "t_s", span, left_out=CRAZYSWARM2_LEFT_OUT)
+    for name, span in CRAZYPAD.items():
+        target = EXCERPTS / "crazypad" / f"{name}.csv.gz"
+        cut_table(DATA / "crazypad" / f"{name}.csv.gz", target, "t_s", span, CRAZYPAD_COLUMNS)
     for name, span in PX4.items():
         cut_ulog(DATA / "px4" / f"{name}.ulg", EXCERPTS / "px4" / f"{name}.ulg", span)
     for notice, folder in (
         ("nanobench/LICENSE.upstream.txt", "nanobench"),
         ("crazyswarm2_payload/LICENSE.upstream.txt", "crazyswarm2"),
+        ("crazypad/LICENSE.upstream.txt", "crazypad"),
         ("px4/LICENSE.upstream.md", "px4"),
     ):
         shutil.copyfile(DATA / notice, EXCERPTS / folder / "LICENSE")

@@ -13,7 +13,7 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyflie_csv, crazyflie_sd, crazyswarm2, nanobench, px4_ulog, rosbag
+from . import crazyflie_csv, crazyflie_sd, crazypad, crazyswarm2, nanobench, px4_ulog, rosbag
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ READERS = {
             crazyflie_csv.read,
             crazyflie_csv.SIGNATURE,
         ),
+        Reader("crazypad", "a CrazyPAD table", crazypad.read, crazypad.SIGNATURE),
         Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
         Reader(
             "rosbag",

@@ -1,19 +1,27 @@
 """What changed between two sets of flights: drawn trims, simulated flights and measured ones."""
 
-import csv
-import gzip
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from typer.testing import CliRunner
 
-from tests.support.data_paths import DATA, SOURCES
+from tests.support.data_paths import DATA, SOURCES, excerpt
+from windwrench.cli import app
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.comparison.change import NOWHERE, ChangeSettings, compare, features
-from windwrench.identification.comparison.trim import Trim, trim_of, trim_of_log
+from windwrench.identification.comparison.change import (
+    NOWHERE,
+    SOMETHING_ELSE,
+    ChangeSettings,
+    compare,
+)
+from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
 from windwrench.identification.comparison.words import headline, write_change
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.reading import read_log
 
 ROTORS = (
     "rotor 1 (front-left)",
@@ -38,7 +46,7 @@ def drawn(rng, count, moved=(0.0, 0.0, 0.0, 0.0), vehicle=(0.02, -0.03, 0.05, 0.
 
 def test_the_four_numbers_of_drawn_flights_are_those_drawn():
     rng = np.random.default_rng(0)
-    found = np.array([features(trim) for trim in drawn(rng, 2000)])
+    found = np.array([trim.features for trim in drawn(rng, 2000)])
     np.testing.assert_allclose(found.mean(axis=0), [0.02, -0.03, 0.05, 0.0], atol=0.002)
     np.testing.assert_allclose(found.std(axis=0), ChangeSettings().scatter, rtol=0.06)
 
@@ -115,15 +123,66 @@ def test_flights_that_say_nothing_are_refused():
         trim_of_log(still, vehicle)
 
 
-def crazypad(path):
-    """The trim of a CrazyPAD flight; requests are linear in thrust, M4, M3, M2, M1 in our order."""
-    with gzip.open(path, "rt", encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    t, height, climb = (
-        np.array([float(row[name]) for row in rows]) for name in ("t_s", "est_z_m", "est_vz_mps")
+def test_flight_is_told_from_ground_by_the_thrust_alone():
+    """Two hops with a rest between: only what lies well inside a hop counts."""
+    t = 0.01 * np.arange(3000)
+    flying = ((t > 5.0) & (t < 12.0)) | ((t > 16.0) & (t < 25.0))
+    total = np.where(flying, 2.0 + 0.05 * np.sin(7.0 * t), 0.3)
+    steady = carrying(t, total)
+    inside = ((t > 7.0) & (t < 10.0)) | ((t > 18.0) & (t < 23.0))
+    assert steady[inside].all()
+    assert not steady[(t < 6.3) | (t > 23.7) | ((t > 10.7) & (t < 17.3))].any()
+    assert carrying(t, np.full(3000, 2.0)).all()  # a log of a piece of a flight
+    assert not carrying(t, np.zeros(3000)).any()
+
+
+def test_the_noise_of_a_flights_means_is_that_of_repeated_flights():
+    """With a disturbance that correlates over 0.3 s, as a loop's answer to gusts does."""
+    rng = np.random.default_rng(5)
+    t = 0.01 * np.arange(3000)
+    found, said = [], []
+    for _ in range(60):
+        gust = lfilter([1.0], [1.0, -np.exp(-0.01 / 0.3)], rng.standard_normal((3000, 4)), axis=0)
+        trim = trim_of("", t, 1.0 + 0.01 * gust, np.ones(3000, dtype=bool))
+        found.append(trim.features)
+        said.append(np.diag(trim.noise))
+    np.testing.assert_allclose(np.mean(said, axis=0), np.var(found, axis=0), rtol=0.6)
+
+
+def test_a_change_of_its_own_kind_is_something_else():
+    """Two rotors that are weaker, of which neither shares a side with the other."""
+    rng = np.random.default_rng(6)
+    found = [compare(drawn(rng, 3, (0.0, 0.0, 0.25, -0.25)), drawn(rng, 3)) for _ in range(10)]
+    assert np.mean([c.place == SOMETHING_ELSE for c in found]) > 0.9
+    assert "otherwise than" in headline(found[0])
+
+
+def test_another_battery_voltage_makes_the_total_less_certain():
+    rng = np.random.default_rng(7)
+    after, before = drawn(rng, 3, (0.0, 0.0, 0.0, 0.13)), drawn(rng, 3)
+    low, high = (
+        [replace(trim, voltage=volts) for trim in group]
+        for group, volts in ((after, 10.5), (before, 12.0))
     )
-    thrust = np.array([[float(row[f"motor_m{i}_0to65535"]) for i in (4, 3, 2, 1)] for row in rows])
-    return trim_of(path.name, t, thrust, (height > 0.3) & (np.abs(climb) < 0.15))
+    assert compare(after, before).places["all rotors"] > 0.8
+    assert compare(low, high).places["all rotors"] < 0.7
+
+
+@pytest.mark.measured
+def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
+    """The shipped pieces of three flights, by the command."""
+    folder = excerpt("crazypad")
+    normal = [str(path) for path in sorted(folder.glob("normal*.csv.gz"))]
+    weight = str(folder / "add_weight_W3_near_M3__E9_log00.csv.gz")
+    options = ["--reader", "crazypad", "--out", str(tmp_path)]
+    against = [word for path in normal for word in ("--against", path)]
+    result = CliRunner().invoke(app, ["diagnose", weight, *against, *options])
+    assert result.exit_code == 0, result.output
+    found = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
+    assert found["place"] == ROTORS[1]
+    result = CliRunner().invoke(app, ["diagnose", normal[0], "--against", normal[1], *options])
+    assert result.exit_code == 0, result.output
+    assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE
 
 
 @pytest.mark.measured
@@ -132,7 +191,11 @@ def test_measured_weights_and_cut_propellers():
     folder = DATA / "crazypad"
     if not folder.is_dir():
         pytest.skip(f"needs {folder}: {SOURCES['crazypad']}")
-    trims = {path.name: crazypad(path) for path in sorted(folder.glob("*.csv.gz"))}
+    vehicle = load_vehicle("crazyflie")
+    trims = {
+        path.name: trim_of_log(read_log(path, "crazypad"), vehicle)
+        for path in sorted(folder.glob("*.csv.gz"))
+    }
     near = {"M1": ROTORS[3], "M2": ROTORS[2], "M3": ROTORS[1], "M4": ROTORS[0], "M3_M4": "left"}
     right, count = 0, 0
     for name, trim in trims.items():

@@ -1,0 +1,232 @@
+"""What a search for rotor faults looks at: gyro, accelerometer and motor commands, each at its own
+rate, on one uniform grid of short intervals.
+
+Over an interval the mean angular acceleration is the difference of the gyro at its ends, exactly;
+specific force and thrust are means over the same interval. So nothing is differentiated or filtered
+by a window that would smear the time of a fault.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.signal import lfilter
+
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
+FINE = 0.004  # s, on which commands are filtered by the rotors' lag
+FLYING = 0.5  # of the level that a tenth of the samples exceed: the rotors carry the vehicle
+SETTLED = 1.5  # s after the rotors first carry the vehicle: it has left the ground
+LEAST_SECONDS = 3.0  # in flight: less says nothing of what is usual
+LONGEST_GAP = 0.1  # s without a sample, across which nothing is interpolated
+# an axis is clipped where it stays this long within this share of its magnitude, near the end of
+# a range that gyros have (a calibration moves that a little) or at the largest value of the log
+CLIPPED_SECONDS, CLIPPED_SHARE = 0.04, 0.01
+RANGES = np.array([250.0, 500.0, 1000.0, 2000.0]) * np.pi / 180.0  # rad/s
+RANGE_SHARE = 0.08
+IMPACT = 40.0  # m/s2 of specific force: the vehicle hit something
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """The three streams, in this kit's axes and order of rotors."""
+
+    name: str
+    gyro_times: Array  # (N,) s
+    gyro: Array  # (N, 3) rad/s, body
+    accelerometer_times: Array  # (M,) s
+    accelerometer: Array  # (M, 3) m/s2, body: +g along z in a hover
+    command_times: Array  # (K,) s
+    command: Array  # (K, 4) motor commands, in any unit that grows with thrust, 0: none
+    # the command is thrust itself but for a factor (rotor speeds squared): no curve is looked for
+    thrust_known: bool = False
+    motor_names: tuple[str, str, str, str] | None = None  # the log's own, of rotors 1 to 4
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The streams on the grid, while the vehicle flies and before it tumbles (N intervals)."""
+
+    t: Array  # (N,) s, middles
+    angular_acceleration: Array  # (N, 3) rad/s2, means
+    angular_velocity: Array  # (N, 3) rad/s, means
+    specific_force: Array  # (N,) m/s2 along body z, means
+    follows: Mask  # (N,) the interval before it is there too
+    # (N,) how far the command may be off between its own samples, in parts of the median: half of
+    # the change from one to the next in the middle, nothing at either
+    between: Array
+    channels: Channels
+    ended: str  # why nothing later was looked at; empty: the log's end
+
+    def thrust(self, lag: float, bend: float, dead: float) -> Array:
+        """Return the rotors' relative thrusts (N, 4): 1 at the median command while flying.
+
+        With ``x`` the command above ``dead``, 1 at the median, thrust is ``bend x^2 + (1 - bend)
+        x``, as in PX4's THR_MDL_FAC.
+
+        Args:
+            lag: s, time constant by which they follow the command.
+            bend: 0, thrust is linear in the command, to 1, it goes with the square.
+            dead: command at which thrust vanishes, in parts of the median.
+        """
+        source = self.channels
+        first, last = source.command_times[0], source.command_times[-1]
+        fine = np.arange(first, last + FINE, FINE)
+        u = np.column_stack([np.interp(fine, source.command_times, c) for c in source.command.T])
+        u /= np.median(np.interp(self.t, fine, u.mean(axis=1)))
+        x = np.maximum(u - dead, 0.0) / (1.0 - dead)
+        thrust = bend * x * x + (1.0 - bend) * x
+        if lag > 0.0:
+            keep = float(np.exp(-FINE / lag))
+            thrust = lfilter([1.0 - keep], [1.0, -keep], thrust, axis=0, zi=keep * thrust[:1])[0]
+        return _means(fine, thrust, self.t)
+
+
+def channels_of_log(log: FlightLog) -> Channels:
+    """Return the streams of a log in the kit's format: commands where it has them, else rotor
+    speeds.
+
+    Raises:
+        InputError: gyro, accelerometer, or both commands and rotor speeds are missing.
+    """
+    name = log.source or log.name
+    if log.gyro is None or log.accelerometer is None:
+        raise InputError(
+            f"{name}: no gyro or no accelerometer; expected gx, gy, gz and ax, ay, az, to look for "
+            "a rotor that lost thrust"
+        )
+    if log.command is not None:
+        command, known = log.command, False
+    elif log.has_rotor_speeds:
+        command, known = np.square(log.rotor_speeds), True
+    else:
+        raise InputError(f"{name}: no motor commands and no rotor speeds; expected one of them")
+    read = [np.isfinite(sensor).all(axis=1) for sensor in (log.gyro, log.accelerometer)]
+    # a command that is held between two of its own samples says so by its changes
+    new = np.any(np.diff(command, axis=0, prepend=np.nan) != 0.0, axis=1)
+    new[-1] = True
+    return Channels(
+        name,
+        log.t[read[0]],
+        log.gyro[read[0]],
+        log.t[read[1]],
+        log.accelerometer[read[1]],
+        log.t[new],
+        command[new],
+        known,
+    )
+
+
+def sample(channels: Channels) -> Samples:
+    """Put the streams on the grid.
+
+    Raises:
+        InputError: fewer than 3 s of flight.
+    """
+    c = channels
+    streams = (c.gyro_times, c.accelerometer_times, c.command_times)
+    if min(map(len, streams)) < 10:
+        raise InputError(f"{c.name}: fewer than ten samples of gyro, accelerometer or commands")
+    begin, end = max(s[0] for s in streams), min(s[-1] for s in streams)
+    edges = np.arange(begin, end, STEP)
+    if len(edges) < 3:
+        raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
+    t = 0.5 * (edges[1:] + edges[:-1])
+    gyro = np.column_stack([np.interp(edges, c.gyro_times, axis) for axis in c.gyro.T])
+    force = _means(c.accelerometer_times, c.accelerometer, t)
+    total = np.interp(t, c.command_times, c.command.sum(axis=1))
+    high = float(np.quantile(total, 0.9))
+    flying = total > FLYING * high
+    there = np.ones(len(t), dtype=np.bool_)
+    for stream in (c.gyro_times, c.accelerometer_times):
+        after = np.clip(np.searchsorted(stream, t), 1, len(stream) - 1)
+        there &= stream[after] - stream[after - 1] < LONGEST_GAP
+    stop, why = _end(c, t)
+    keep = flying & there & (t < stop)
+    if keep.any():
+        keep &= t > t[np.argmax(keep)] + SETTLED
+    if keep.sum() * STEP < LEAST_SECONDS:
+        raise InputError(
+            f"{c.name}: {keep.sum() * STEP:.3g} s in flight; expected at least {LEAST_SECONDS:g} s "
+            "to see what is usual"
+        )
+    follows = np.concatenate([[False], keep[1:] & keep[:-1]])
+    return Samples(
+        t[keep],
+        (np.diff(gyro, axis=0) / STEP)[keep],
+        (0.5 * (gyro[1:] + gyro[:-1]))[keep],
+        force[keep, 2],
+        follows[keep],
+        _between(c, t[keep]),
+        c,
+        why,
+    )
+
+
+def _between(c: Channels, t: Array) -> Array:
+    """Return how far a command may be off between its samples (N,); see ``Samples``."""
+    after = np.clip(np.searchsorted(c.command_times, t), 1, len(c.command_times) - 1)
+    start, end = c.command_times[after - 1], c.command_times[after]
+    part = np.clip((t - start) / (end - start), 0.0, 1.0)
+    change = np.abs(c.command[after] - c.command[after - 1]).mean(axis=1)
+    usual = np.median(np.interp(t, c.command_times, c.command.mean(axis=1)))
+    coarse = end - start > 1.5 * STEP
+    found: Array = np.where(coarse, change / usual * np.sqrt(part * (1.0 - part)), 0.0)
+    return found
+
+
+def _means(times: Array, values: Array, middles: Array) -> Array:
+    """Return the means (N, d) over the grid's intervals of what is linear between ``times``."""
+    steps = np.diff(times)[:, None]
+    area = np.concatenate([[np.zeros(values.shape[1])], 0.5 * (values[1:] + values[:-1]) * steps])
+    area = np.cumsum(area, axis=0)
+    ends = [middles - 0.5 * STEP, middles + 0.5 * STEP]
+    low, high = (
+        np.column_stack(
+            [_integral(end, times, v, a) for v, a in zip(values.T, area.T, strict=True)]
+        )
+        for end in ends
+    )
+    means: Array = (high - low) / STEP
+    return means
+
+
+def _integral(at: Array, times: Array, values: Array, area: Array) -> Array:
+    """Return the integral from the first time to ``at`` of what is linear between ``times``."""
+    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    d = np.clip(at, times[0], times[-1]) - times[i]
+    slope = (values[i + 1] - values[i]) / (times[i + 1] - times[i])
+    found: Array = area[i] + values[i] * d + 0.5 * slope * d * d
+    return found
+
+
+def _end(c: Channels, t: Array) -> tuple[float, str]:
+    """Return when the model ends to hold, and why: a gyro that clips, or an impact."""
+    found = [(np.inf, "")]
+    count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro_times)))))
+    for axis in c.gyro.T:
+        size = np.abs(axis)
+        near = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE
+        near |= (size > (1.0 - CLIPPED_SHARE) * size.max()) & (size > RANGES[0])
+        spread = maximum_filter1d(axis, count) - minimum_filter1d(axis, count)
+        clipped = near & (spread < CLIPPED_SHARE * size)
+        if clipped.any():
+            # the filters look half their width to either side
+            first = max(0, int(np.argmax(clipped)) - count // 2)
+            found.append((float(c.gyro_times[first]), "the gyro was at its limit"))
+    hit = np.linalg.norm(c.accelerometer, axis=1) > IMPACT
+    # take-off may be hard: an impact counts once the rotors carry the vehicle
+    total = c.command.sum(axis=1)
+    flying = c.command_times[total > FLYING * np.quantile(total, 0.9)]
+    hit &= c.accelerometer_times > flying[0] + SETTLED if len(flying) else False
+    if hit.any():
+        found.append(
+            (float(c.accelerometer_times[np.argmax(hit)]) - STEP, "the vehicle hit something")
+        )
+    return min(found)
