@@ -67,7 +67,7 @@ def write_fleet(
         for i, row in enumerate(rows()):
             file.write(("," if i else "") + "\n  " + json.dumps(row, allow_nan=False))
         file.write("\n ]\n}\n")
-    write_page(fleet, rows(), page, command)
+    write_page(fleet, rows, page, command)
     return [page, numbers, table, draw_fleet(fleet, folder)]
 
 

@@ -3,7 +3,7 @@ without it all of the page is there.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -32,7 +32,9 @@ _WIDTH, _HEIGHT, _EDGE = 132.0, 34.0, 4.0  # of a small picture, pixels
 _MOST_POINTS = 200  # in it
 
 
-def write_page(fleet: Fleet, rows: Iterable[Mapping[str, Any]], path: Path, command: str) -> None:
+def write_page(
+    fleet: Fleet, rows: Callable[[], Iterable[Mapping[str, Any]]], path: Path, command: str
+) -> None:
     """Write the page, whole or not at all, a flight at a time. Every text is escaped: names come
     from users.
 
@@ -53,7 +55,8 @@ def write_page(fleet: Fleet, rows: Iterable[Mapping[str, Any]], path: Path, comm
         kinds=[(count, _KINDS.get(kind, kind)) for kind, count in fleet.refused.items()],
         trends=(_trend(one) for one in fleet.trends),
         any_trend=bool(fleet.trends),
-        flights=(_flight(row) for row in rows),
+        flights=(_flight(row) for row in rows() if row["status"] == "diagnosed"),
+        refusals=(_refusal(row) for row in rows() if row["status"] == "refused"),
         rate=f"{100 * DRIFT.false_discoveries:g}",
         least=DRIFT.least_flights,
         command=command.encode("utf-8", "replace").decode(),
@@ -202,12 +205,9 @@ def small_picture(one: Trend) -> dict[str, Any] | None:
 
 
 def _flight(row: Mapping[str, Any]) -> dict[str, Any]:
-    shown: dict[str, Any] = {key: row[key] for key in ("id", "flight", "log", "status")}
-    if row["status"] == "refused":
-        return {**shown, "kind": _KINDS.get(row["kind"], row["kind"]), "reason": row["reason"]}
     before, after = (row["error"][side]["force_rms_N"] for side in ("before", "after"))
     return {
-        **shown,
+        **{key: row[key] for key in ("id", "flight", "log")},
         "verdict": row["verdict"],
         "tone": _TONES.get(row["verdict"], "warn"),
         "headline": row["headline"],
@@ -216,6 +216,13 @@ def _flight(row: Mapping[str, Any]) -> dict[str, Any]:
         "before_key": before or 0.0,
         "after": short(after),
         "after_key": after or 0.0,
+    }
+
+
+def _refusal(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        **{key: row[key] for key in ("id", "flight", "log", "reason")},
+        "kind": _KINDS.get(row["kind"], row["kind"]),
     }
 
 
