@@ -18,6 +18,7 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError
+from .fleets import diagnose_fleet
 from .terminal import (
     MapOption,
     Out,
@@ -198,7 +199,11 @@ def estimate(
 
 def diagnose(
     logs: Annotated[
-        list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")
+        list[Path],
+        typer.Argument(
+            help="Flight logs of one vehicle: .csv, .csv.gz or .parquet; with --fleet, logs of any "
+            "vehicles and folders of them."
+        ),
     ],
     test: Annotated[
         list[Path] | None,
@@ -232,6 +237,36 @@ def diagnose(
         ),
     ] = None,
     vehicle: LogVehicleOption = None,
+    fleet: Annotated[
+        bool,
+        typer.Option(
+            "--fleet",
+            help="Diagnose each log by itself, many at a time; write one page and table of all: "
+            "fleet.html, fleet.json, fleet.csv, fleet.png. A run that was ended goes on.",
+        ),
+    ] = False,
+    manifest: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --fleet: which log is of which vehicle (.yaml or .csv); default: fleet.yaml "
+            "in the folder of logs."
+        ),
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(help="With --fleet: address of a Ray cluster to work on, or local."),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help="With --fleet: number of processes; default: one per core."),
+    ] = None,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0,
+            help="With --fleet: longest time for one log, s; default: 600. Then it is refused.",
+        ),
+    ] = None,
     out: Out = Path("results/diagnose"),
 ) -> dict[str, Any]:
     """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
@@ -243,6 +278,18 @@ def diagnose(
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
         return _rotor_faults(logs, reader, vehicle, out)
+    if fleet:
+        if test or against:
+            raise InputError(
+                "--fleet: each log is diagnosed by itself; expected no --test, --against"
+            )
+        return diagnose_fleet(
+            logs, vehicle, reader, without or (), manifest, cluster, jobs, limit, out
+        )
+    alone = {"--manifest": manifest, "--cluster": cluster, "--jobs": jobs, "--limit": limit}
+    for option, value in alone.items():
+        if value is not None:
+            raise InputError(f"{option}: expected --fleet with it")
     if against:
         return _compare(logs, against, reader, vehicle, out, map)
     from ..identification.diagnosis import diagnose as run

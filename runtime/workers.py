@@ -15,6 +15,8 @@ T = TypeVar("T")
 
 # forked workers would share the locks of compiled code and of linear algebra
 _CONTEXT = multiprocessing.get_context("spawn")
+# one process a core: further threads of linear algebra would only wait for each other
+SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def end_with_parent() -> None:
@@ -69,6 +71,23 @@ def workers(count: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown()
         raise
     pool.shutdown()
+
+
+def one_process(prepare: Callable[[], None] = end_with_parent) -> ProcessPoolExecutor:
+    """Return a pool of one process, whose linear algebra has one thread; it has started.
+
+    Args:
+        prepare: called in the process first; it calls ``end_with_parent``.
+    """
+    pool = _Pool(1, mp_context=_CONTEXT, initializer=prepare)
+    given = {name: value for name, value in SINGLE_THREADED.items() if name not in os.environ}
+    os.environ.update(given)  # read by the libraries as they are imported
+    try:
+        pool.submit(os.getpid)
+    finally:
+        for name in given:
+            del os.environ[name]
+    return pool
 
 
 @contextmanager

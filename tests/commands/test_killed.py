@@ -39,6 +39,7 @@ BENCHMARK = (
     "out",
 )
 DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
+FLEET = ("diagnose", ".", "--fleet", "--jobs", "1", "--out", "out")
 REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
 CLOSE_LOOP = ("close-loop", "--effect", "constant_force", "--episodes", "1", "--out", "out")
 
@@ -108,7 +109,8 @@ def results(folder):
         if path.suffix == ".jsonl":
             lines = [json.loads(line) for line in path.read_text().splitlines()]
             for line in lines:
-                for part in (line, *line["diagnoses"]):
+                line.pop("cost", None)
+                for part in (line, *line.get("diagnoses", [])):
                     part.pop("seconds", None)
             kept[path.name] = sorted(map(json.dumps, lines))
         elif path.name != "run.json":
@@ -130,7 +132,9 @@ def flight(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "arguments", [BENCHMARK, DIAGNOSE, REPRODUCE, CLOSE_LOOP, ("trials",)], ids=lambda a: a[0]
+    "arguments",
+    [BENCHMARK, DIAGNOSE, FLEET, REPRODUCE, CLOSE_LOOP, ("trials",)],
+    ids=lambda a: a[2].strip("-") if a == FLEET else a[0],
 )
 @pytest.mark.slow
 def test_a_killed_run_leaves_nothing_half_and_can_be_run_again(tmp_path, flight, arguments):

@@ -32,6 +32,7 @@ STOREYS = (
     {"prediction", "inference", "comparison"},
     {"diagnosis"},
     {"report"},
+    {"fleet"},
 )
 STOREY = {room: height for height, rooms in enumerate(STOREYS) for room in rooms}
 TORCH = {"torch", "stable_baselines3", "sb3_contrib"}

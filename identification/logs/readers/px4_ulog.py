@@ -15,8 +15,8 @@ within the range that PWM_MAIN_MIN and MAX (or their kin) state.
 
 Where there are commands alone, a vehicle with a ``motor_curve`` turns them into thrust. One
 without gets relative thrusts: ``actuator_motors`` itself (PX4 inverts its curve after it),
-or ``f x^2 + (1 - f) x`` of an output x, with f the parameter THR_MDL_FAC. Their unknown scale is set
-so that thrust balances the declared vehicle's weight in flight: at each sample thrust is mass times
+or ``f x^2 + (1 - f) x`` of an output x, with f the parameter THR_MDL_FAC. Their unknown scale is
+set so that thrust balances the declared vehicle's weight in flight: at each sample thrust is mass times
 the accelerometer's reading along the thrust axis, without one weight over the cosine of the tilt,
 and the scale is the median. Mass and a factor on thrust cannot be found from such a log.
 

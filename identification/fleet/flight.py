@@ -1,0 +1,156 @@
+"""The diagnosis of one log of a fleet, in a worker: what comes back is plain data, whatever
+happens.
+"""
+
+import hashlib
+import os
+import time
+import traceback
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import dump_vehicle, load_vehicle, preset_names
+from ...runtime.code_digest import code_digest
+from ...runtime.errors import InputError
+from ..diagnosis import diagnose
+from ..logs.flight_log import FlightLog
+from ..logs.reading import read_log
+from ..report.files import report_data
+from .manifest import FleetLog
+
+_CODE = ("runtime", "dynamics", "estimator", "identification")
+_NOT_CODE = ("identification/fleet", "identification/report")  # tell what was found, find nothing
+_BLOCK = 2**20  # bytes read at a time
+# of report.json, what a fleet keeps of a flight
+_KEPT = (
+    "verdict",
+    "remainder",
+    "headline",
+    "effects",
+    "error",
+    "notes",
+    "seconds",
+    "vehicle",
+    "floor_is_lower_bound",
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A log that is to be diagnosed."""
+
+    log: FleetLog
+    key: str  # of its outcome
+    without: tuple[str, ...] = ()  # effects taken out of the library
+
+
+def key_of(log: FleetLog, without: tuple[str, ...], known: dict[str, str]) -> str:
+    """Return what an outcome depends on, as a digest (32 hexadecimal digits): the log's bytes, the
+    vehicle, the reader, the effects that are left out, and the code.
+
+    Args:
+        log: the log.
+        without: effects taken out of the library.
+        known: texts of vehicles, filled here.
+
+    Raises:
+        InputError: the log cannot be read.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    vehicle = log.vehicle or ""
+    if vehicle and vehicle not in known:
+        known[vehicle] = dump_vehicle(load_vehicle(vehicle))
+    reader = log.reader or ""
+    option = Path(reader.partition(":")[2])
+    for text in (
+        known.get(vehicle, ""),
+        reader,
+        option.read_text(encoding="utf-8", errors="replace") if option.is_file() else "",
+        *sorted(without),
+        code_digest(_CODE, (), _NOT_CODE),
+    ):
+        digest.update(len(text.encode()).to_bytes(8, "big") + text.encode())
+    path = Path(log.path)
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    try:
+        for file in files:
+            if not file.is_file():  # a pipe would never end
+                raise InputError(f"{file}: is no regular file")
+            with open(file, "rb") as data:
+                while block := data.read(_BLOCK):
+                    digest.update(block)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return digest.hexdigest()
+
+
+def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
+    """Return the outcome of a log that was refused.
+
+    Args:
+        key: of the outcome.
+        kind: input (the log or its vehicle), memory, time, died, or error (a fault of the kit).
+        reason: one line.
+    """
+    text = " ".join(reason.encode("utf-8", "replace").decode().split())
+    return {"key": key, "status": "refused", "kind": kind, "reason": text}
+
+
+def diagnose_one(job: Job) -> dict[str, Any]:
+    """Return the outcome of a log: what was found, or why it was refused. Raises nothing."""
+    begun, busy = time.perf_counter(), time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a log's notes say what matters
+            flight, vehicle = _read(job.log)
+            data = report_data(diagnose([flight], vehicle, without=job.without))
+    except InputError as error:
+        return refusal(job.key, "input", str(error))
+    except MemoryError:
+        return refusal(job.key, "memory", f"{job.log.path}: needs more memory than there is")
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{os.path.basename(place.filename)}, line {place.lineno}"
+        return refusal(
+            job.key, "error", f"{job.log.path}: {type(error).__name__} ({where}): {error}"
+        )
+    kept: Mapping[str, Any] = {name: data[name] for name in _KEPT}
+    cost = {
+        "took_s": round(time.perf_counter() - begun, 2),
+        "cpu_s": round(time.process_time() - busy, 2),
+        "peak_mb": _peak_mb(),
+        "process": os.getpid(),
+    }
+    return {"key": job.key, "status": "diagnosed", **kept, "cost": cost}
+
+
+def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
+    """Return the flight of a log and its vehicle.
+
+    Raises:
+        InputError: it cannot be read, or its vehicle is not known.
+    """
+    model = None if log.vehicle is None else load_vehicle(log.vehicle)
+    flight = read_log(log.path, log.reader, model)
+    if model is not None:
+        return flight, model
+    if flight.vehicle not in preset_names():
+        named = f"names the vehicle {flight.vehicle}" if flight.vehicle else "names no vehicle"
+        raise InputError(
+            f"{log.path}: {named}; expected {', '.join(preset_names())}, or a vehicle from "
+            f"--vehicle, a manifest or a vehicle.yaml beside the log"
+        )
+    return flight, load_vehicle(flight.vehicle)
+
+
+def _peak_mb() -> int | None:
+    """Return the most memory that this process has had, where the system says."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

@@ -1,0 +1,282 @@
+"""Which logs a fleet has, and of each: which vehicle flew, which reader reads it, when it flew.
+
+What a log is not told by the manifest comes, in this order, from the command line, from a
+``vehicle.yaml`` beside it or in a folder above it (within the folder that was given), and from the
+log itself. The manifest is YAML::
+
+    order: name               # or modified: the file's time; default: name
+    logs:
+      - log: "alpha/*.csv"    # pattern of paths below the manifest's folder; * takes / too
+        vehicle: racer.yaml   # a preset, or a file beside the manifest
+        id: alpha             # the individual; default: the log's folder, else the vehicle's name
+        reader: nanobench
+        time: 2026-03-01T10:00
+
+or CSV with these columns, ``log,vehicle,id,reader,time``. The first entry that fits a log counts.
+"""
+
+import csv
+import io
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, date, datetime
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from ...dynamics.vehicle_file import load_vehicle
+from ...runtime.errors import InputError, unknown_name
+from ...runtime.file_limits import LIMITS
+from ...runtime.regular_files import read_bytes
+from ...runtime.yaml_file import read_yaml
+from ..logs.readers import READERS, find_reader
+
+MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
+VEHICLE_FILE = "vehicle.yaml"
+_TABLES = (".csv", ".csv.gz", ".parquet")
+_BAG_FOLDER = "metadata.yaml"  # marks a ROS 2 bag, a folder that is one log
+_KEYS = ("log", "vehicle", "id", "reader", "time")
+_ORDERS = ("name", "modified")
+_MOST_BYTES = LIMITS.table_line * 64  # of a manifest in CSV
+
+
+@dataclass(frozen=True)
+class FleetLog:
+    """One log of a fleet."""
+
+    path: str
+    name: str  # below the folder that was given
+    vehicle: str | None = None  # a preset or a vehicle file; None: the log names it
+    id: str = ""  # the individual that flew; empty: the vehicle's name
+    reader: str | None = None
+    time: float | None = None  # s; orders the flights of an individual; None: their names do
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a manifest says of the logs that fit a pattern."""
+
+    log: str
+    vehicle: str | None = None
+    id: str = ""
+    reader: str | None = None
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What is said of logs below a folder."""
+
+    folder: Path
+    entries: tuple[Entry, ...] = ()
+    by_modified: bool = False
+
+
+def read_manifest(path: Path) -> Manifest:
+    """Read a manifest (.yaml, .yml or .csv).
+
+    Raises:
+        InputError: it cannot be read, or a field is unknown, missing or malformed.
+    """
+    by_modified = False
+    if path.suffix.lower() in (".yaml", ".yml"):
+        given = read_yaml(path, "a fleet's manifest")
+        if not isinstance(given, dict) or not isinstance(given.get("logs"), list):
+            raise InputError(f"{path}: expected a mapping with a list named logs")
+        for key in given:
+            if key not in ("logs", "order"):
+                raise unknown_name("key", str(key), ("logs", "order"), str(path))
+        order = given.get("order", "name")
+        if order not in _ORDERS:
+            raise unknown_name("order", str(order), _ORDERS, str(path))
+        by_modified = order == "modified"
+        found = [(f"logs, entry {i}", entry) for i, entry in enumerate(given["logs"], 1)]
+    else:
+        found = list(_csv_entries(path))
+    entries = tuple(_entry(entry, f"{path}: {where}", path.parent) for where, entry in found)
+    return Manifest(path.parent, entries, by_modified)
+
+
+def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
+    data = read_bytes(path, "a fleet's manifest", _MOST_BYTES)
+    try:
+        rows = csv.DictReader(io.StringIO(data.decode("utf-8-sig")), strict=True)
+        if "log" not in (rows.fieldnames or ()):
+            raise InputError(f"{path}: missing column log; expected {', '.join(_KEYS)}")
+        for row in rows:
+            if None in row or None in row.values():
+                raise InputError(
+                    f"{path}: line {rows.line_num}: expected {len(rows.fieldnames or ())} fields"
+                )
+            yield f"line {rows.line_num}", {k: v.strip() for k, v in row.items() if v.strip()}
+    except (ValueError, csv.Error) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: cannot be read as a fleet's manifest: {error}") from error
+
+
+def _entry(given: Any, where: str, folder: Path) -> Entry:
+    if not isinstance(given, Mapping) or "log" not in given:
+        raise InputError(f"{where}: expected a mapping with a pattern named log")
+    for key in given:
+        if key not in _KEYS:
+            raise unknown_name("key", str(key), _KEYS, where)
+    vehicle = None if given.get("vehicle") is None else str(given["vehicle"])
+    if vehicle is not None and vehicle.endswith((".yaml", ".yml")):
+        vehicle = str(folder / vehicle)
+    reader = None if given.get("reader") is None else str(given["reader"])
+    if reader is not None:
+        find_reader(reader)
+    return Entry(
+        str(given["log"]),
+        vehicle,
+        str(given.get("id") or ""),
+        reader,
+        _seconds(given.get("time"), where),
+    )
+
+
+def _seconds(value: Any, where: str) -> float | None:
+    """Return a time (a number, a date, or a text that is one) in seconds."""
+    if value is None:
+        return None
+    try:
+        if isinstance(value, str):
+            try:
+                value = float(value)
+            except ValueError:
+                value = datetime.fromisoformat(value)
+        if isinstance(value, date) and not isinstance(value, datetime):
+            value = datetime(value.year, value.month, value.day)
+        if isinstance(value, datetime):
+            value = (value if value.tzinfo else value.replace(tzinfo=UTC)).timestamp()
+        seconds = float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"{where}: time {value!r}: expected a number or a date such as 2026-03-01T10:00"
+        ) from error
+    if not abs(seconds) < float("inf"):
+        raise InputError(f"{where}: time {value!r}: expected a finite number")
+    return seconds
+
+
+def find_logs(
+    given: Sequence[Path],
+    manifest: Manifest | None = None,
+    vehicle: str | None = None,
+    reader: str | None = None,
+    without: Path | None = None,
+) -> tuple[list[FleetLog], list[str]]:
+    """Return the logs among files and in folders, in the order of their names, and doubts: entries
+    of the manifest that fit none.
+
+    Args:
+        given: files, and folders that are searched through.
+        manifest: default: ``fleet.yaml`` in the first folder that has one.
+        vehicle: of the logs of which the manifest names none.
+        reader: likewise.
+        without: a folder that is left out, the results'.
+
+    Raises:
+        InputError: there is no such file, there is no log, or a vehicle cannot be used.
+    """
+    if manifest is None:
+        manifest = next(
+            (read_manifest(p / MANIFEST) for p in given if (p / MANIFEST).is_file()), None
+        )
+    used: set[int] = set()
+    logs: dict[str, FleetLog] = {}
+    for root in given:
+        for path in _logs_in(root, without):
+            below = path.relative_to(root) if root.is_dir() and path != root else None
+            one = FleetLog(
+                str(path),
+                below.as_posix() if below is not None and len(given) == 1 else str(path),
+                vehicle or _vehicle_beside(path, root),
+                below.parts[0] if below is not None and len(below.parts) > 1 else "",
+                reader,
+            )
+            logs.setdefault(os.path.realpath(path), _with_manifest(one, manifest, used))
+    if not logs:
+        raise InputError(
+            f"{', '.join(map(str, given))}: no flight log found; expected files that end in "
+            f"{', '.join(_suffixes())}"
+        )
+    for name in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
+        load_vehicle(name)  # a mistake in the vehicle is no log's
+    entries = manifest.entries if manifest else ()
+    doubts = [
+        f"warning: the manifest's entry {entry.log!r} fits no log"
+        for i, entry in enumerate(entries)
+        if i not in used
+    ]
+    return sorted(logs.values(), key=lambda log: natural(log.name)), doubts
+
+
+def natural(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Return what orders names as people do: ``flight9`` before ``flight10``."""
+    return tuple(
+        (0, int(part), "") if part.isdecimal() else (1, 0, part)
+        for part in re.split(r"([0-9]+)", name)
+        if part
+    )
+
+
+def _suffixes() -> tuple[str, ...]:
+    return (*_TABLES, *(suffix for reader in READERS.values() for suffix in reader.suffixes))
+
+
+def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
+    """Yield the logs that a path stands for."""
+    if not root.exists():
+        raise InputError(f"{root}: no such file or folder")
+    if not root.is_dir() or (root / _BAG_FOLDER).is_file():
+        yield root
+        return
+    avoided = None if without is None else os.path.realpath(without)
+    for folder, folders, files in os.walk(root):
+        folders[:] = sorted(
+            name
+            for name in folders
+            if not name.startswith(".") and os.path.realpath(Path(folder, name)) != avoided
+        )
+        bags = [name for name in folders if Path(folder, name, _BAG_FOLDER).is_file()]
+        folders[:] = [name for name in folders if name not in bags]
+        yield from (Path(folder, name) for name in bags)
+        for name in sorted(files):
+            if name.lower().endswith(_suffixes()) and not name.startswith("."):
+                yield Path(folder, name)
+
+
+def _vehicle_beside(path: Path, root: Path) -> str | None:
+    """Return the nearest ``vehicle.yaml`` beside a log or above it, no higher than the root."""
+    if not root.is_dir():
+        return None
+    for folder in path.parents:
+        if (folder / VEHICLE_FILE).is_file():
+            return str(folder / VEHICLE_FILE)
+        if folder == root:
+            return None
+    return None
+
+
+def _with_manifest(log: FleetLog, manifest: Manifest | None, used: set[int]) -> FleetLog:
+    """Return a log with what the manifest says of it; note which entry was used."""
+    if manifest is None:
+        return log
+    if manifest.by_modified:
+        log = replace(log, time=os.path.getmtime(log.path))
+    path = os.path.relpath(log.path, manifest.folder).replace(os.sep, "/")
+    for i, entry in enumerate(manifest.entries):
+        if fnmatchcase(path, entry.log):
+            used.add(i)
+            return replace(
+                log,
+                vehicle=entry.vehicle or log.vehicle,
+                id=entry.id or log.id,
+                reader=entry.reader or log.reader,
+                time=log.time if entry.time is None else entry.time,
+            )
+    return log

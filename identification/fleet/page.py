@@ -1,0 +1,242 @@
+"""The page of a fleet: one HTML file that needs nothing else. Its script only sorts and searches;
+without it all of the page is there.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...runtime.whole_files import replaced
+from ..report.words import MISSING, coefficient_meaning, in_words, rounded, with_std
+from .drift import DRIFT, Appearance, Fleet, Trend
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+_KINDS = {
+    "input": "the log or its vehicle cannot be used",
+    "time": "it took too long",
+    "memory": "it needs too much memory",
+    "died": "its process died",
+    "error": "an error of this program",
+}
+_TONES = {"explained": "good", "nothing to explain": "good", "unexplained": "bad"}
+_MINUS = "−"
+_WIDTH, _HEIGHT, _EDGE = 132.0, 34.0, 4.0  # of a small picture, pixels
+_MOST_POINTS = 200  # in it
+
+
+def write_page(
+    fleet: Fleet, rows: Callable[[], Iterable[Mapping[str, Any]]], path: Path, command: str
+) -> None:
+    """Write the page, whole or not at all, a flight at a time. Every text is escaped: names come
+    from users.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    counts = fleet.individuals.values()
+    diagnosed = sum(c["diagnosed"] for c in counts)
+    refused = sum(c["refused"] for c in counts)
+    parts = _template().generate(
+        headline=headline(fleet),
+        logs=diagnosed + refused,
+        diagnosed=diagnosed,
+        refused=refused,
+        individuals=len(fleet.individuals),
+        verdicts=fleet.verdicts,
+        changes=[change_in_words(one) for one in changes(fleet)],
+        kinds=[(count, _KINDS.get(kind, kind)) for kind, count in fleet.refused.items()],
+        trends=(_trend(one) for one in fleet.trends),
+        any_trend=bool(fleet.trends),
+        flights=(_flight(row) for row in rows() if row["status"] == "diagnosed"),
+        refusals=(_refusal(row) for row in rows() if row["status"] == "refused"),
+        rate=f"{100 * DRIFT.false_discoveries:g}",
+        least=DRIFT.least_flights,
+        command=command.encode("utf-8", "replace").decode(),
+        version=__version__,
+    )
+    with replaced(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.writelines(parts)
+
+
+@cache
+def _template() -> "Template":
+    from jinja2 import Environment, StrictUndefined
+
+    source = resources.files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
+    return Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    ).from_string(source)
+
+
+def changes(fleet: Fleet) -> list[Trend | Appearance]:
+    """Return the drifts and appearances that are told."""
+    return [
+        *(one for one in fleet.trends if one.drifts),
+        *(one for one in fleet.appearances if one.changed),
+    ]
+
+
+def headline(fleet: Fleet) -> str:
+    """Return the first sentence."""
+    logs = sum(sum(c.values()) for c in fleet.individuals.values())
+    refused = sum(c["refused"] for c in fleet.individuals.values())
+    found = changes(fleet)
+    who = list(dict.fromkeys(_id(one) for one in found))
+    vehicles = len(fleet.individuals)
+    text = f"{_count(logs, 'log')} of {_count(vehicles, 'vehicle')}"
+    text += f", {refused} refused" if refused else ""
+    if logs == refused:
+        return f"{text}: none could be diagnosed."
+    if not found:
+        return f"{text}: no effect changed from flight to flight as far as these flights can tell."
+    shown = in_words(who[:3] if len(who) <= 3 else [*who[:3], f"{len(who) - 3} more"])
+    return f"{text}: effects changed from flight to flight on {shown}."
+
+
+def _id(one: Trend | Appearance) -> str:
+    return one.series.id if isinstance(one, Trend) else one.id
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def change_in_words(one: Trend | Appearance) -> str:
+    """Return a sentence on what changed."""
+    p = f"adjusted p = {rounded(one.adjusted_p or 0.0, 2)}" if one.adjusted_p else "adjusted p = 0"
+    if isinstance(one, Appearance):
+        when = "later" if one.later else "earlier"
+        return (
+            f"{one.id}: {one.effect} is named in {len(one.named)} of {one.among} flights, the "
+            f"{when} ones ({p})."
+        )
+    series, ends = one.series, one.ends or (math.nan, math.nan)
+    unit = "" if series.unit == "1" else f" {series.unit}"
+    sure = " Few of these flights are sure of the effect's name." if one.tentative else ""
+    return (
+        f"{series.id}: {series.coefficient} of {series.effect} went from {short(ends[0])} to "
+        f"{short(ends[1])}{unit} over {len(series.flights)} flights, {_slope(one)} a flight "
+        f"({p}).{sure}"
+    )
+
+
+def short(value: float | None) -> str:
+    """Return a number with three digits, with an exponent where it needs one."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:.3g}".replace("-", _MINUS)
+
+
+def _slope(one: Trend) -> str:
+    low, high = one.per_flight_ci95 or (None, None)
+    return f"{short(one.per_flight)} [{short(low)}, {short(high)}]"
+
+
+def _trend(one: Trend) -> dict[str, Any]:
+    series = one.series
+    low, high = one.mean_ci95
+    return {
+        "id": series.id,
+        "effect": series.effect,
+        "coefficient": series.coefficient,
+        "meaning": coefficient_meaning(series.effect, series.coefficient),
+        "unit": "" if series.unit == "1" else series.unit,
+        "named": len(series.flights),
+        "among": one.among,
+        "sure": sum(series.sure),
+        "mean": short(one.mean),
+        "mean_key": one.mean,
+        "interval": f"[{short(low)}, {short(high)}]",
+        "slope": MISSING if one.per_flight is None else _slope(one),
+        "slope_key": 0.0 if one.per_flight is None else one.per_flight,
+        "p": MISSING if one.adjusted_p is None else short(one.adjusted_p),
+        "p_key": 2.0 if one.adjusted_p is None else one.adjusted_p,
+        "drifts": one.drifts,
+        "tentative": one.tentative,
+        "picture": small_picture(one),
+    }
+
+
+def small_picture(one: Trend) -> dict[str, Any] | None:
+    """Return the points, bars and line (pixels) of a coefficient over flights; None without a
+    number.
+    """
+    x, y, s = (
+        np.asarray(v, dtype=float) for v in (one.series.flights, one.series.values, one.series.stds)
+    )
+    sure = np.asarray(one.series.sure, dtype=bool)
+    good = np.isfinite(y)
+    x, y, s, sure = x[good], y[good], np.nan_to_num(s[good]), sure[good]
+    if not len(y):
+        return None
+    if len(y) > _MOST_POINTS:
+        keep = np.unique(np.linspace(0, len(y) - 1, _MOST_POINTS).astype(int))
+        x, y, s, sure = x[keep], y[keep], s[keep], sure[keep]
+    # a flight with a huge deviation must not flatten the others
+    reach = np.minimum(1.96 * s, 3.0 * (np.ptp(y) + np.median(s)))
+    low, high = float(np.min(y - reach)), float(np.max(y + reach))
+    first = float(x[0])
+    span, width = (high - low) or abs(high) or 1.0, float(np.ptp(x)) or 1.0
+
+    def across(v: float) -> float:
+        return round(_EDGE + (v - first) / width * (_WIDTH - 2 * _EDGE), 1)
+
+    def up(v: float) -> float:
+        return round(_HEIGHT - _EDGE - (v - low) / span * (_HEIGHT - 2 * _EDGE), 1)
+
+    points = [
+        {"x": across(a), "y": up(b), "top": up(b + r), "foot": up(b - r), "sure": bool(c)}
+        for a, b, r, c in zip(x, y, reach, sure, strict=True)
+    ]
+    line = None
+    if one.ends is not None:
+        line = {"x1": points[0]["x"], "y1": up(one.ends[0]), "x2": points[-1]["x"]}
+        line["y2"] = up(one.ends[1])
+    alt = f"{len(y)} values over flights {x[0]:.0f} to {x[-1]:.0f}"
+    return {"points": points, "line": line, "alt": alt, "width": _WIDTH, "height": _HEIGHT}
+
+
+def _flight(row: Mapping[str, Any]) -> dict[str, Any]:
+    before, after = (row["error"][side]["force_rms_N"] for side in ("before", "after"))
+    return {
+        **{key: row[key] for key in ("id", "flight", "log")},
+        "verdict": row["verdict"],
+        "tone": _TONES.get(row["verdict"], "warn"),
+        "headline": row["headline"],
+        "effects": list(_effects(row["effects"])),
+        "before": short(before),
+        "before_key": before or 0.0,
+        "after": short(after),
+        "after_key": after or 0.0,
+    }
+
+
+def _refusal(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        **{key: row[key] for key in ("id", "flight", "log", "reason")},
+        "kind": _KINDS.get(row["kind"], row["kind"]),
+    }
+
+
+def _effects(effects: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    for effect in effects:
+        numbers = []
+        for name, value in effect["coefficients"].items():
+            unit = effect["units"].get(name, "")
+            std = effect["std"].get(name)
+            text = with_std(*(math.nan if v is None else v for v in (value, std)))
+            numbers.append(f"{name} {text}{'' if unit == '1' else f' {unit}'}")
+        yield {
+            "name": effect["name"],
+            "others": in_words(effect["indistinguishable_from"], "or"),
+            "tentative": effect["tentative"],
+            "numbers": ", ".join(numbers),
+        }

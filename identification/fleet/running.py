@@ -1,0 +1,157 @@
+"""A fleet's logs, one diagnosis each, spread over workers; what is done is not done again."""
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ...dynamics.vehicle_file import load_vehicle
+from ...runtime.errors import InputError
+from ...runtime.lasting_workers import Lost, crew_of, each
+from .flight import Job, diagnose_one, key_of, refusal
+from .manifest import FleetLog, natural
+from .outcomes import Outcome, Outcomes
+
+OUTCOMES = "outcomes.jsonl"
+LIMIT_S = 600.0  # for one log; a minute of flight takes some seconds
+
+
+@dataclass(frozen=True)
+class Done:
+    """A log and where its outcome lies."""
+
+    log: FleetLog
+    key: str
+
+
+def run_fleet(
+    logs: Sequence[FleetLog],
+    outcomes: Outcomes,
+    without: tuple[str, ...] = (),
+    limit_s: float = LIMIT_S,
+    jobs: int | None = None,
+    cluster: str | None = None,
+    report: Callable[[Mapping[str, int]], None] = lambda counts: None,
+) -> list[Done]:
+    """Diagnose every log that has no outcome yet; return all logs with the keys of their outcomes.
+
+    A refusal for want of time, or of a process that died, is tried again where the limit is higher
+    than it was.
+
+    Args:
+        logs: of the fleet.
+        outcomes: what is done; it grows.
+        without: effects taken out of the library.
+        limit_s: what one log may take, s.
+        jobs: processes; default: one a core.
+        cluster: a Ray cluster's address, or ``local``; None: processes of this machine. Every
+            machine of a cluster must find the logs under the same paths.
+        report: called after each log with what was counted so far: ``kept``, ``diagnosed``,
+            ``refused``.
+
+    Raises:
+        InputError: an outcome cannot be written, or there is no such cluster.
+    """
+    counts = {"kept": 0, "diagnosed": 0, "refused": 0}
+    done: list[Done] = []
+    first: dict[str, str] = {}  # the first log of each key: another one is its copy
+    texts: dict[str, str] = {}
+
+    def keep(outcome: Outcome) -> None:
+        if outcome["key"] not in outcomes or outcomes[outcome["key"]] != outcome:
+            outcomes.add(outcome)
+        counts[outcome["status"]] += 1
+        report(counts)
+
+    def pending() -> Iterator[Job]:
+        for log in logs:
+            try:
+                key = key_of(log, without, texts)
+                unread = None
+            except InputError as error:
+                key, unread = _key_of_name(log), str(error)
+            if key in first:
+                unread = f"{log.path}: the same flight as {first[key]}, byte for byte"
+                key = _key_of_name(log)
+            first.setdefault(key, log.name)
+            done.append(Done(log, key))
+            if unread is not None:
+                keep(refusal(key, "input", unread))
+            elif key in outcomes and not _again(outcomes[key], limit_s):
+                counts["kept"] += 1
+                report(counts)
+            else:
+                yield Job(log if cluster is None else _absolute(log), key, without)
+
+    with crew_of(diagnose_one, jobs, cluster) as (crew, count):
+        for job, result in each(pending(), crew, count, limit_s):
+            if isinstance(result, Lost):
+                why = f"{job.log.path}: {result.words}"
+                keep(refusal(job.key, result.kind, why) | {"limit_s": limit_s})
+            else:
+                keep(result)
+    return done
+
+
+def _again(outcome: Outcome, limit_s: float) -> bool:
+    return outcome.get("kind") in ("time", "died") and limit_s > outcome.get("limit_s", limit_s)
+
+
+def _key_of_name(log: FleetLog) -> str:
+    """Return the key of a log's outcome where its bytes have none of their own."""
+    return hashlib.blake2b(b"name:" + os.fsencode(log.path), digest_size=16).hexdigest()
+
+
+def _absolute(log: FleetLog) -> FleetLog:
+    """Return a log whose paths mean the same in every working folder."""
+    vehicle, reader = log.vehicle, log.reader
+    if vehicle is not None and vehicle.endswith((".yaml", ".yml")):
+        vehicle = os.path.abspath(vehicle)
+    if reader is not None and ":" in reader:
+        name, _, option = reader.partition(":")
+        reader = f"{name}:{os.path.abspath(option)}"
+    return replace(log, path=os.path.abspath(log.path), vehicle=vehicle, reader=reader)
+
+
+def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
+    """Yield each flight: its log, the individual, its place among that one's flights, its outcome;
+    one at a time, in the order of individuals and flights.
+    """
+    models: dict[str, str] = {}
+    named = [(one.log.id or _vehicle_name(one, outcomes, models), one) for one in done]
+    timed: dict[str, bool] = {}
+    for name, one in named:
+        timed[name] = timed.get(name, True) and one.log.time is not None
+    named.sort(
+        key=lambda pair: (
+            natural(pair[0]),
+            (pair[1].log.time or 0.0) if timed[pair[0]] else 0.0,
+            natural(pair[1].log.name),
+        )
+    )
+    number, last = 0, ""
+    for name, one in named:
+        number = number + 1 if name == last else 1
+        last = name
+        outcome = outcomes[one.key]
+        yield {
+            "id": _text(name),
+            "flight": number,
+            "log": _text(one.log.name),
+            "time": one.log.time,
+            **{k: v for k, v in outcome.items() if k not in ("key", "cost", "limit_s")},
+        }
+
+
+def _vehicle_name(one: Done, outcomes: Outcomes, models: dict[str, str]) -> str:
+    """Return the name of the vehicle that a log is diagnosed with."""
+    if one.log.vehicle is None:
+        return str(outcomes[one.key].get("vehicle", "unknown"))
+    if one.log.vehicle not in models:
+        models[one.log.vehicle] = load_vehicle(one.log.vehicle).name
+    return models[one.log.vehicle]
+
+
+def _text(name: str) -> str:
+    return name.encode("utf-8", "replace").decode()

@@ -1,0 +1,184 @@
+"""``windwrench diagnose --fleet``: every log gets its outcome, and none stops the others."""
+
+import csv
+import json
+import sys
+
+import pytest
+
+from windwrench.cli import main
+from windwrench.commands.running import plain
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification.fleet.flight import Job, diagnose_one, key_of
+from windwrench.identification.fleet.manifest import find_logs
+from windwrench.identification.fleet.outcomes import Outcomes
+from windwrench.identification.fleet.running import OUTCOMES, run_fleet
+from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.runtime import lasting_workers
+
+FOUND = {
+    "status": "diagnosed",
+    "verdict": "explained",
+    "remainder": "none",
+    "headline": "The model lacked mass.",
+    "effects": [
+        {
+            "name": "mass",
+            "coefficients": {"dm": 0.04},
+            "std": {"dm": 0.001},
+            "units": {"dm": "kg"},
+            "tentative": False,
+            "indistinguishable_from": [],
+        }
+    ],
+    "error": {
+        side: {"force_rms_N": 0.5, "torque_rms_Nm": 0.01} for side in ("before", "after", "floor")
+    },
+    "notes": [],
+    "seconds": 12.0,
+    "vehicle": "ardrone2",
+    "floor_is_lower_bound": False,
+}
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch, capfd):
+    """Run the command in ``tmp_path``; return exit code, standard output and error."""
+
+    def run_here(*arguments):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["windwrench", "diagnose", *map(str, arguments)])
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capfd.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return run_here
+
+
+class Here:
+    """A worker in this process, so that nothing has to start: it does, or loses, a task."""
+
+    def __init__(self, work):
+        self.work, self.warm = work, False
+
+    def start(self, task):
+        future = lasting_workers.Future()
+        if "killer" in task.log.name:
+            future.set_exception(lasting_workers.BrokenProcessPool("gone"))
+        elif "endless" not in task.log.name:
+            future.set_result(self.work(task))
+        return future
+
+    def end(self):
+        pass
+
+    def last_words(self):
+        return "its process was ended by SIGKILL"
+
+
+@pytest.fixture
+def here(monkeypatch):
+    monkeypatch.setattr(lasting_workers, "_Process", Here)
+
+
+@pytest.fixture
+def logs(tmp_path):
+    """A folder of logs of which one is diagnosed already, and none other can be read."""
+    folder = tmp_path / "logs"
+    (folder / "alpha").mkdir(parents=True)
+    for name in ("alpha/flight2.csv", "alpha/killer.csv", "alpha/endless.csv", "done.csv"):
+        (folder / name).write_text(f"t,px\n0,{name}\n")
+    (folder / "alpha" / "copy.csv").write_bytes((folder / "alpha" / "flight2.csv").read_bytes())
+    found, _ = find_logs([folder], vehicle="ardrone2")
+    out = tmp_path / "out"
+    out.mkdir()
+    outcomes = Outcomes(out / OUTCOMES)
+    outcomes.add({"key": key_of(next(x for x in found if x.name == "done.csv"), (), {}), **FOUND})
+    outcomes.close()
+    return folder
+
+
+def outcomes_in(folder):
+    lines = map(json.loads, (folder / OUTCOMES).read_text().splitlines())
+    return [(line["status"], line.get("kind")) for line in lines]
+
+
+def test_no_log_stops_the_others(call, here, logs, tmp_path):
+    arguments = ("logs", "--fleet", "--vehicle", "ardrone2", "--out", "out", "--limit", "1")
+    code, said, _ = call(*arguments, "--json")
+    assert code == 0
+    result = json.loads(said)["result"]
+    assert result["logs"] == 5
+    assert result["refused"] == {"input": 2, "died": 1, "time": 1}
+    assert result["individuals"]["ardrone2"] == {"diagnosed": 1, "refused": 0}
+    table = list(csv.DictReader(open(tmp_path / "out" / "fleet.csv", newline="")))  # noqa: SIM115
+    reasons = {line["log"]: line["reason"] for line in table}
+    assert reasons["alpha/killer.csv"].endswith("its process was ended by SIGKILL")
+    assert reasons["alpha/endless.csv"].endswith("it took more than 1 s")
+    assert "missing column(s)" in reasons["alpha/copy.csv"]
+    assert "the same flight as alpha/copy.csv" in reasons["alpha/flight2.csv"]
+    assert reasons["done.csv"] == ""
+    for name in ("fleet.html", "fleet.json", "fleet.png", "run.json"):
+        assert (tmp_path / "out" / name).exists()
+    once = outcomes_in(tmp_path / "out")
+    assert len(once) == 5
+    assert call(*arguments)[0] == 0  # nothing is done again
+    assert outcomes_in(tmp_path / "out") == once
+    again = call(*arguments[:-1], "2")  # but what a limit had ended
+    assert again[0] == 0
+    assert sorted(outcomes_in(tmp_path / "out")[5:]) == [("refused", "died"), ("refused", "time")]
+
+
+def test_a_fleet_of_which_nothing_is_left_says_so(call, here, logs):
+    code, _, error = call("logs/alpha/flight2.csv", "--fleet", "--out", "other")
+    assert code == 2
+    assert "none of 1 logs could be diagnosed" in error
+    assert "fleet.html" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("logs", "--limit", "5"), "--limit: expected --fleet"),
+        (("logs", "--manifest", "x.csv"), "--manifest: expected --fleet"),
+        (("logs", "--fleet", "--test", "x.csv"), "expected no --test"),
+        (("logs", "--fleet", "--manifest", "x.csv"), "x.csv: cannot be read"),
+        (("logs", "--fleet", "--without", "drag"), "--without: unknown effect 'drag'"),
+        (("logs", "--fleet", "--reader", "px5"), "unknown reader 'px5'"),
+        (("logs", "--fleet", "--vehicle", "x"), "unknown vehicle 'x'"),
+        (("nothing", "--fleet"), "nothing: no such file"),
+    ],
+)
+def test_a_request_that_cannot_be_is_named(call, logs, arguments, words):
+    code, _, error = call(*arguments, "--out", "new")
+    assert code == 2
+    assert words in error
+    assert len(error.strip().splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cluster", [None, "local"])
+def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):
+    if cluster:
+        pytest.importorskip("ray", reason="Ray is not installed: pip install 'windwrench[cluster]'")
+    effect = EffectSetting("rotor_drag", {"kdx": 2.4e-4, "kdy": 1.8e-4})
+    for i in range(2):
+        c = record_flight(load_vehicle("ardrone2"), (effect,), "excite", 15.0, i)
+        flown = (c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"))
+        write_log(FlightLog(*flown, name=str(i), vehicle="ardrone2"), tmp_path / f"{i}.csv")
+    (tmp_path / "bad.csv").write_text("t\n")
+    logs, _ = find_logs([tmp_path])
+    outcomes = Outcomes(tmp_path / OUTCOMES)
+    done = run_fleet(logs, outcomes, jobs=1, cluster=cluster)
+    for one in done:
+        alone = diagnose_one(Job(one.log, one.key))
+        there = outcomes[one.key]
+        assert there.pop("cost", {}).keys() == alone.pop("cost", {}).keys()
+        there["reason"] = there.get("reason", "").rpartition("/")[2]
+        alone["reason"] = alone.get("reason", "").rpartition("/")[2]
+        assert there == plain(alone)
+    assert [outcomes[one.key]["status"] for one in done] == ["diagnosed", "diagnosed", "refused"]
+    outcomes.close()

@@ -1,0 +1,149 @@
+"""Drifts from flight to flight: intervals that hold the truth, and few that are told by chance."""
+
+import numpy as np
+import pytest
+from scipy.stats import linregress, t
+
+from windwrench.identification.fleet.drift import (
+    DRIFT,
+    Series,
+    appearance_of,
+    fleet_of,
+    meta_regression,
+    trend_of,
+)
+
+
+def series(values, stds, sure=None, flights=None):
+    n = len(values)
+    return Series(
+        "a",
+        "mass",
+        "dm",
+        "kg",
+        list(flights or range(1, n + 1)),
+        list(values),
+        list(stds),
+        list(sure if sure is not None else [True] * n),
+    )
+
+
+def row(who, flight, effects=(), status="diagnosed"):
+    data = {"id": who, "flight": flight, "status": status, "kind": "input", "verdict": "explained"}
+    return data | {
+        "effects": [
+            {
+                "name": name,
+                "coefficients": {"c": value},
+                "std": {"c": std},
+                "units": {"c": "kg"},
+                "tentative": tentative,
+                "indistinguishable_from": others,
+            }
+            for name, value, std, tentative, others in effects
+        ]
+    }
+
+
+def test_with_equal_deviations_it_is_ordinary_regression():
+    rng = np.random.default_rng(0)
+    y = 1.0 + 0.2 * np.arange(8) + rng.standard_normal(8)
+    for std in (0.01, 1.0, 100.0):  # wrong deviations cancel
+        found = trend_of(series(y, [std] * 8), 8)
+        line = linregress(np.arange(8), y)
+        half = t.ppf(0.975, 6) * line.stderr
+        assert found.per_flight == pytest.approx(line.slope)
+        assert found.per_flight_ci95 == pytest.approx((line.slope - half, line.slope + half))
+        assert found.p == pytest.approx(line.pvalue)
+
+
+def test_the_variance_between_values_is_that_of_paule_and_mandel():
+    """Its equation, put in: the deviance equals the degrees of freedom."""
+    rng = np.random.default_rng(1)
+    s = 10 ** rng.uniform(-4.5, -3.5, 15)
+    y = 3e-4 + s * rng.standard_normal(15) + 4e-4 * rng.standard_normal(15)
+    (mean,), covariance, between = meta_regression(np.ones((15, 1)), y, s, True)
+    weight = 1.0 / (s**2 + between**2)
+    assert weight @ (y - mean) ** 2 == pytest.approx(14.0, rel=1e-6)
+    assert mean == pytest.approx(weight @ y / weight.sum())
+    assert covariance[0, 0] == pytest.approx(1.0 / weight.sum())
+
+
+@pytest.mark.parametrize("between", [0.0, 2.0])
+def test_intervals_hold_the_truth(between):
+    rng = np.random.default_rng(2)
+    held = {"slope": 0, "mean": 0}
+    for _ in range(300):
+        s = 10 ** rng.uniform(-0.5, 0.5, 9)
+        y = 2.0 + 0.1 * np.arange(9) + s * rng.standard_normal(9)
+        y += between * rng.standard_normal(9)
+        found = trend_of(series(y, s), 9)
+        held["slope"] += found.per_flight_ci95[0] <= 0.1 <= found.per_flight_ci95[1]
+        y -= 0.1 * np.arange(9)
+        low, high = trend_of(series(y, s), 9).mean_ci95
+        held["mean"] += low <= 2.0 <= high
+    assert 0.91 <= held["slope"] / 300 <= 0.99
+    assert held["mean"] / 300 >= 0.91
+
+
+def test_few_flights_have_no_trend_and_bad_numbers_do_not_count():
+    few = trend_of(series([1.0] * (DRIFT.least_flights - 1), [0.1] * (DRIFT.least_flights - 1)), 9)
+    assert (few.per_flight, few.p, few.mean) == (None, None, pytest.approx(1.0))
+    one = trend_of(series([1.0], [0.1]), 9)
+    assert one.mean_ci95 == pytest.approx((0.804, 1.196))
+    spoiled = trend_of(series([1.0, np.nan, 2.0], [np.nan, 1.0, 0.0]), 9)
+    assert spoiled.per_flight is None
+    same = trend_of(series([1.0] * 9, [0.1] * 9), 9)  # at a bound
+    assert (same.p, same.per_flight) == (1.0, pytest.approx(0.0))
+
+
+def test_flights_that_are_sure_count_alone_where_they_are_enough():
+    y, s = [1.0, 1.01, 0.99, 1.0, 1.02, 50.0], [0.01] * 6
+    sure = trend_of(series(y, s, [True] * 5 + [False]), 6)
+    assert sure.mean == pytest.approx(1.0, abs=0.02)
+    assert not sure.tentative
+    assert trend_of(series(y, s, [True] * 4 + [False] * 2), 6).tentative
+
+
+def test_an_effect_that_comes_is_told_though_its_coefficient_is_constant():
+    rows = [row("a", i, [("mass", 1.0, 0.1, False, [])] if i > 8 else []) for i in range(1, 17)]
+    rows += [row("b", i, [("mass", 1.0, 0.1, False, [])] if i % 2 else []) for i in range(1, 17)]
+    rows.append(row("b", 17, status="refused"))
+    fleet = fleet_of(rows)
+    told = {one.id: one.changed for one in fleet.appearances}
+    assert told == {"a": True, "b": False}
+    assert next(one for one in fleet.appearances if one.id == "a").later
+    assert fleet.individuals["b"] == {"diagnosed": 16, "refused": 1}
+    assert (fleet.refused, fleet.verdicts) == ({"input": 1}, {"explained": 32})
+    assert appearance_of("a", "mass", [1, 2], [1, 2, 3, 4]) is None
+
+
+def test_an_effect_is_there_where_another_name_stands_for_it():
+    """The name that a diagnosis picks among equals may change; that is no change of the vehicle."""
+    rows = [row("a", i, [("mass", 1.0, 0.1, False, ["thrust_scale"])]) for i in range(1, 9)]
+    rows += [row("a", i, [("thrust_scale", 1.0, 0.1, False, ["mass"])]) for i in range(9, 17)]
+    assert fleet_of(rows).appearances == ()
+    assert all(not any(one.series.sure) for one in fleet_of(rows).trends)
+
+
+def test_drifts_are_told_and_chance_is_not():
+    rng = np.random.default_rng(3)
+    rows, individuals = [], 60
+    for who in range(individuals):
+        slope = 0.2 if who < 6 else 0.0
+        for flight in range(1, 13):
+            s = float(rng.uniform(0.1, 0.3))
+            value = 1.0 + slope * flight + s * float(rng.standard_normal())
+            rows.append(row(f"v{who}", flight, [("mass", value, s, False, [])]))
+    fleet = fleet_of(rows)
+    told = [int(one.series.id[1:]) for one in fleet.trends if one.drifts]
+    assert set(told) >= set(range(6))
+    assert len(told) <= 8
+    assert [one.drifts for one in fleet.trends] == sorted(
+        (one.drifts for one in fleet.trends), reverse=True
+    )
+
+
+def test_a_fleet_of_refused_logs_is_one():
+    fleet = fleet_of([row("a", 1, status="refused")])
+    assert (fleet.trends, fleet.appearances, dict(fleet.refused)) == ((), (), {"input": 1})

@@ -1,0 +1,200 @@
+"""A fleet's files: strict numbers, a table, and a page that a real browser shows, sorts and
+searches.
+"""
+
+import csv
+import json
+import re
+
+import pytest
+
+from tests.support.browser import look, needs_browser
+from windwrench.identification.fleet.drift import fleet_of
+from windwrench.identification.fleet.files import fleet_data, write_fleet
+from windwrench.identification.fleet.manifest import FleetLog
+from windwrench.identification.fleet.outcomes import Outcomes
+from windwrench.identification.fleet.page import change_in_words, changes, headline
+from windwrench.identification.fleet.running import Done, rows
+
+HOSTILE = "<script>alert('x')</script>&\"=1+1"
+ERROR = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
+
+
+def effect(name, value, std, tentative=False, others=()):
+    return {
+        "name": name,
+        "coefficients": {"dm": value},
+        "std": {"dm": std},
+        "units": {"dm": "kg"},
+        "tentative": tentative,
+        "indistinguishable_from": list(others),
+    }
+
+
+def diagnosed(who, flight, *effects):
+    return {
+        "id": who,
+        "flight": flight,
+        "log": f"{who}/flight{flight}.csv",
+        "time": None,
+        "status": "diagnosed",
+        "verdict": "explained" if effects else "nothing to explain",
+        "remainder": "none",
+        "headline": "The model explains these logs.",
+        "effects": list(effects),
+        "error": {"before": ERROR, "after": {**ERROR, "torque_rms_Nm": None}, "floor": ERROR},
+        "notes": [],
+        "seconds": 15.0,
+        "vehicle": "ardrone2",
+    }
+
+
+FLIGHTS = [
+    *(
+        diagnosed("alpha", i, effect("mass", 0.01 * i + 0.001 * (i % 3), 0.002))
+        for i in range(1, 11)
+    ),
+    *(diagnosed("beta", i) for i in range(1, 4)),
+    diagnosed("beta", 4, effect("mass", 0.02, None, True, ["thrust_scale"])),
+    {
+        "id": HOSTILE,
+        "flight": 1,
+        "log": HOSTILE,
+        "time": 3.0,
+        "status": "refused",
+        "kind": "died",
+        "reason": f"{HOSTILE}: its process died",
+    },
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fleet")
+    written = write_fleet(fleet_of(FLIGHTS), lambda: iter(FLIGHTS), folder, "windwrench diagnose")
+    assert [path.name for path in written] == [
+        "fleet.html",
+        "fleet.json",
+        "fleet.csv",
+        "fleet.png",
+    ]
+    return folder
+
+
+def test_the_first_sentence_says_what_changed():
+    fleet = fleet_of(FLIGHTS)
+    assert headline(fleet) == (
+        "15 logs of 3 vehicles, 1 refused: effects changed from flight to flight on alpha."
+    )
+    (change,) = changes(fleet)
+    assert re.fullmatch(
+        r"alpha: dm of mass went from 0\.01\d* to 0\.1\d* kg over 10 flights, 0\.0[\d.]+ "
+        r"\[0\.0[\d.]+, 0\.0[\d.]+\] a flight \(adjusted p = [\d.]+\)\.",
+        change_in_words(change),
+    )
+    calm = fleet_of(FLIGHTS[10:14])
+    assert headline(calm).startswith("4 logs of 1 vehicle: no effect changed")
+    assert headline(fleet_of(FLIGHTS[14:])).endswith("1 refused: none could be diagnosed.")
+
+
+def test_the_numbers_are_strict_json(folder):
+    def refuse(text):
+        raise AssertionError(text)
+
+    data = json.loads((folder / "fleet.json").read_text(), parse_constant=refuse)
+    assert data["flights"] == FLIGHTS
+    assert {key: data[key] for key in data if key != "flights"} == json.loads(
+        json.dumps(fleet_data(fleet_of(FLIGHTS)))
+    )
+    alpha = next(one for one in data["trends"] if one["id"] == "alpha")
+    assert (alpha["named_in"], alpha["sure_in"], alpha["among"]) == (10, 10, 10)
+    assert alpha["drifts"]
+    assert alpha["per_flight"] == pytest.approx(0.01, rel=0.1)
+
+
+def test_the_table_has_a_line_a_coefficient(folder):
+    with open(folder / "fleet.csv", newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == 15
+    assert lines[0]["value"] == "0.011"
+    assert lines[-1]["log"] == HOSTILE
+    assert (lines[-1]["status"], lines[-1]["effect"]) == ("refused", "")
+    assert lines[-2]["indistinguishable_from"] == "thrust_scale"
+
+
+def test_the_page_needs_nothing_else_and_believes_no_name(folder):
+    page = (folder / "fleet.html").read_text(encoding="utf-8")
+    assert HOSTILE not in page
+    assert page.count("<script") == 1
+    assert not re.search(r"https?://|@import|url\(", page)
+    assert page.rstrip().endswith("</html>")
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "dark"), [(1200, False), (390, True)])
+def test_a_browser_shows_the_page(folder, tmp_path, width, dark):
+    page = (folder / "fleet.html").read_text(encoding="utf-8")
+    found = look(page, width, tmp_path, dark)
+    assert found["complaints"] == []
+    assert found["scroll_width"] == found["width"]  # wide tables scroll by themselves
+    assert (found["background"] == "rgb(20, 24, 30)") == dark
+    assert "its process died" in found["text"]
+    assert found["text"].count("drifts") == 1
+
+
+_CLICKS = """<script>{
+const box = document.querySelector("input");
+const left = table => [...document.querySelectorAll(table + " tbody tr")].filter(r => !r.hidden);
+const shown = table => left(table).map(row => row.cells[1].textContent);
+const type = text => { box.value = text; box.dispatchEvent(new Event("input")); };
+const told = [];
+type("alpha flight1"); told.push(shown("#flights"));
+type("DIED"); told.push([shown("#flights").length, shown("#refused").length]);
+type("");
+const heads = [...document.querySelectorAll("#flights th button")];
+const head = heads.find(button => button.textContent === "Flight");
+head.click(); told.push(shown("#flights").slice(0, 3));
+head.click(); told.push(shown("#flights").slice(0, 3));
+document.title = "told " + JSON.stringify(told);
+document.body.prepend(document.title);
+}</script></body>"""
+
+
+@needs_browser
+def test_the_page_sorts_and_searches(folder, tmp_path):
+    page = (folder / "fleet.html").read_text(encoding="utf-8").replace("</body>", _CLICKS)
+    found = look(page, 1200, tmp_path)
+    told = re.search(r"told (\[.*\])", found["text"])[1]
+    assert json.loads(told) == [
+        ["1", "10"],
+        [0, 1],
+        ["1", "1", "2"],
+        ["10", "9", "8"],
+    ]
+
+
+def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
+    outcomes = Outcomes(tmp_path / "outcomes.jsonl")
+    done = []
+    for i, (name, who, time) in enumerate(
+        [
+            ("b10", "b", None),
+            ("b9", "b", None),
+            ("a1", "a", 5.0),
+            ("a2", "a", 4.0),
+            ("x", "", None),
+        ]
+    ):
+        key = f"{i:032x}"
+        outcomes.add({"key": key, "status": "refused", "kind": "input", "reason": "?", "cost": 1})
+        done.append(Done(FleetLog(name, name, "ardrone2", who, time=time), key))
+    found = [(row["id"], row["flight"], row["log"]) for row in rows(done, outcomes)]
+    assert found == [
+        ("a", 1, "a2"),
+        ("a", 2, "a1"),
+        ("ardrone2", 1, "x"),
+        ("b", 1, "b9"),
+        ("b", 2, "b10"),
+    ]
+    assert "cost" not in next(rows(done, outcomes))
+    outcomes.close()

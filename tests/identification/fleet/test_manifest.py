@@ -1,0 +1,137 @@
+"""Which logs a fleet has, and which vehicle flew each."""
+
+import pytest
+
+from windwrench.dynamics import InputError, dump_vehicle, load_vehicle
+from windwrench.identification.fleet.manifest import find_logs, natural, read_manifest
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Logs of two individuals and one loose log, beside things that are none."""
+    for name in (
+        "alpha/flight10.csv",
+        "alpha/flight9.csv",
+        "beta/day1/a.csv.gz",
+        "beta/b.ulg",
+        "loose.parquet",
+        "notes.txt",
+        ".hidden/x.csv",
+        "out/fleet.csv",
+        "bag/metadata.yaml",
+        "bag/bag_0.mcap",
+    ):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    (tmp_path / "beta" / "vehicle.yaml").write_text(dump_vehicle(load_vehicle("crazyflie")))
+    return tmp_path
+
+
+def test_logs_are_found_in_folders_with_their_individuals(folder):
+    logs, doubts = find_logs([folder], without=folder / "out")
+    assert [(log.name, log.id) for log in logs] == [
+        ("alpha/flight9.csv", "alpha"),
+        ("alpha/flight10.csv", "alpha"),
+        ("bag", ""),
+        ("beta/b.ulg", "beta"),
+        ("beta/day1/a.csv.gz", "beta"),
+        ("loose.parquet", ""),
+    ]
+    assert doubts == []
+    beside = str(folder / "beta" / "vehicle.yaml")
+    assert [log.vehicle for log in logs] == [None, None, None, beside, beside, None]
+    logs, _ = find_logs([folder], vehicle="ardrone2", without=folder / "out")
+    assert {log.vehicle for log in logs} == {"ardrone2"}
+    logs, _ = find_logs([folder / "alpha", folder / "alpha" / "flight9.csv"])
+    assert len(logs) == 2  # none twice
+
+
+@pytest.mark.parametrize("form", ["yaml", "csv"])
+def test_a_manifest_says_what_logs_do_not(folder, form):
+    if form == "yaml":
+        path = folder / "fleet.yaml"  # found by itself
+        path.write_text(
+            "logs:\n"
+            "  - {log: 'alpha/*9.csv', vehicle: beta/vehicle.yaml, id: A, time: 2026-03-01T10:00}\n"
+            "  - {log: 'alpha/*', vehicle: hummingbird, time: 7}\n"
+            "  - {log: 'gamma/*', vehicle: hummingbird}\n"
+            "  - {log: '*.ulg', reader: px4_ulog}\n"
+        )
+    else:
+        path = folder / "list.csv"
+        path.write_text(
+            "log,vehicle,id,reader,time\n"
+            "alpha/*9.csv,beta/vehicle.yaml,A,,2026-03-01T10:00\n"
+            "alpha/*,hummingbird,,,7\n"
+            "gamma/*,hummingbird,,,\n"
+            "*.ulg,,,px4_ulog,\n"
+        )
+    given = None if form == "yaml" else read_manifest(path)
+    logs, doubts = find_logs([folder], given, without=folder / "out")
+    found = {log.name: log for log in logs}
+    nine, ten = found["alpha/flight9.csv"], found["alpha/flight10.csv"]
+    assert (nine.id, nine.vehicle, nine.time) == (
+        "A",
+        str(folder / "beta/vehicle.yaml"),
+        1772359200.0,
+    )
+    assert (ten.id, ten.vehicle, ten.time) == ("alpha", "hummingbird", 7.0)
+    assert found["beta/b.ulg"].reader == "px4_ulog"
+    assert found["beta/b.ulg"].vehicle == str(folder / "beta" / "vehicle.yaml")
+    assert len(doubts) == 1
+    assert "gamma/*" in doubts[0]
+
+
+def test_the_files_own_times_order_them_on_request(folder):
+    (folder / "fleet.yaml").write_text("order: modified\nlogs: []\n")
+    logs, _ = find_logs([folder / "alpha"], read_manifest(folder / "fleet.yaml"))
+    assert all(log.time is not None for log in logs)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("- a", "expected a mapping with a list named logs"),
+        ("logs: []\nordre: name", "did you mean 'order'"),
+        ("logs: []\norder: size", "unknown order 'size'"),
+        ("logs: [{vehicle: ardrone2}]", "entry 1: expected a mapping with a pattern named log"),
+        ("logs: [{log: '*', vehicel: ardrone2}]", "entry 1: unknown key 'vehicel'"),
+        ("logs: [{log: '*', time: soon}]", "entry 1: time 'soon': expected a number or a date"),
+        ("logs: [{log: '*', reader: px5}]", "unknown reader 'px5'"),
+        ("logs: [{log: '*', vehicle: ardrone3}]", "unknown vehicle 'ardrone3'"),
+        ("logs: [{log: '*', vehicle: none.yaml}]", "none.yaml: cannot be read as a vehicle file"),
+    ],
+)
+def test_a_wrong_manifest_is_named(tmp_path, text, words):
+    (tmp_path / "a.csv").write_text("")
+    (tmp_path / "fleet.yaml").write_text(text)
+    with pytest.raises(InputError) as error:
+        find_logs([tmp_path])
+    assert words.lower() in str(error.value).lower()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("vehicle\nardrone2\n", "missing column log"),
+        ("log,vehicle\na,b,c\n", "line 2: expected 2 fields"),
+        ("log,colour\na,b\n", "line 2: unknown key 'colour'"),
+    ],
+)
+def test_a_wrong_table_is_named(tmp_path, text, words):
+    (tmp_path / "fleet.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_manifest(tmp_path / "fleet.csv")
+
+
+def test_no_log_is_named(tmp_path):
+    with pytest.raises(InputError, match="no flight log found"):
+        find_logs([tmp_path])
+    with pytest.raises(InputError, match="no such file"):
+        find_logs([tmp_path / "a.csv"])
+
+
+def test_names_are_ordered_as_people_do():
+    names = ["b", "flight10", "flight9", "2", "10", "", "flight9b"]
+    assert sorted(names, key=natural) == ["", "2", "10", "b", "flight9", "flight9b", "flight10"]

@@ -1,0 +1,92 @@
+"""Workers that stay warm: one that dies or takes too long costs its own task alone."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from windwrench.runtime.lasting_workers import Lost, crew_of, each
+
+
+def work(task):
+    """Answer with the process, or end as the task says."""
+    if task == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if task == "exits":
+        os._exit(3)
+    if task == "sleeps":
+        time.sleep(600.0)
+    if task == "raises":
+        raise ValueError(task)
+    if isinstance(task, Path) and not task.exists():  # dies the first time
+        task.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.getpid(), os.environ.get("OPENBLAS_NUM_THREADS")
+
+
+def lives(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def outcomes(tasks, count=1, limit=60.0):
+    with crew_of(work, count) as (crew, several):
+        assert several == count
+        return list(each(tasks, crew, several, limit))
+
+
+def test_a_worker_stays_warm_and_alone(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    done = outcomes(range(4))
+    assert [task for task, _ in done] == [0, 1, 2, 3]
+    assert {threads for _, (_, threads) in done} == {"1"}
+    (process,) = {process for _, (process, _) in done}
+    assert process != os.getpid()
+    deadline = time.monotonic() + 20.0
+    while lives(process) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not lives(process)  # it ends with the work
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_death_costs_its_own_task_alone(tmp_path, count):
+    tasks = [0, "dies", 1, tmp_path / "mark", "exits", 2]
+    done = dict(outcomes(tasks, count))
+    assert set(done) == set(tasks)
+    assert done["dies"].kind == "died"
+    assert "SIGKILL" in done["dies"].words
+    assert "code 3" in done["exits"].words
+    assert not any(isinstance(done[task], Lost) for task in (0, 1, 2))
+    assert done[tmp_path / "mark"][0] != os.getpid()  # its second attempt
+
+
+def test_a_task_that_takes_too_long_is_ended():
+    done = dict(outcomes([0, "sleeps", 1], limit=4.0))
+    assert done["sleeps"] == Lost("time", "it took more than 4 s")
+    assert done[1][0] != done[0][0]  # another process took over
+
+
+def test_tasks_are_taken_when_a_worker_is_free():
+    taken = []
+
+    def tasks():
+        for i in range(6):
+            taken.append(i)
+            yield i
+
+    with crew_of(work, 1) as (crew, count):
+        running = each(tasks(), crew, count, 60.0)
+        next(running)
+        assert taken == [0]
+        running.close()
+
+
+def test_what_the_work_raises_is_raised():
+    with pytest.raises(ValueError, match="raises"):
+        outcomes([0, "raises", 1])
