@@ -13,7 +13,17 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyflie_csv, crazyflie_sd, crazyswarm2, nanobench, px4_ulog, rosbag
+from . import (
+    ardupilot_bin,
+    betaflight_csv,
+    crazyflie_csv,
+    crazyflie_sd,
+    crazyswarm2,
+    nanobench,
+    px4_ulog,
+    racer,
+    rosbag,
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +58,20 @@ READERS = {
             "a table of a Crazyflie's log variables",
             crazyflie_csv.read,
             crazyflie_csv.SIGNATURE,
+        ),
+        Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
+        Reader(
+            "betaflight_csv",
+            "a blackbox_decode table",
+            betaflight_csv.read,
+            betaflight_csv.SIGNATURE,
+            read_with=betaflight_csv.read,
+        ),
+        Reader(
+            "ardupilot_bin",
+            "an ArduPilot log (DataFlash .BIN)",
+            ardupilot_bin.read,
+            begins=ardupilot_bin.BEGINS,
         ),
         Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
         Reader(
