@@ -15,6 +15,7 @@ from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
 from . import (
     ardupilot_bin,
+    betaflight_bbl,
     betaflight_csv,
     crazyflie_csv,
     crazyflie_sd,
@@ -60,6 +61,13 @@ READERS = {
             crazyflie_csv.SIGNATURE,
         ),
         Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
+        Reader(
+            "betaflight",
+            "a blackbox of Betaflight or INAV",
+            betaflight_bbl.read,
+            begins=betaflight_bbl.BEGINS,
+            read_with=betaflight_bbl.read,
+        ),
         Reader(
             "betaflight_csv",
             "a blackbox_decode table",

@@ -4,13 +4,14 @@
   to the left are positive, and an accelerometer at rest reads +1 g along z. As here.
 * **Gyro.** Degrees per second. ``gyroUnfilt`` where it was logged, else ``gyroADC``, which the
   firmware filtered for its flight loop.
-* **Accelerometer.** ``accSmooth``, low-passed by the firmware (``acc_lpf_hz``), in counts: ``acc_1G``
-  of the header is one g; without a header, the power of two that is nearest to its length in the
-  first half second, when a quadrotor stands (recording begins when it is armed).
+* **Accelerometer.** ``accSmooth``, low-passed by the firmware (``acc_lpf_hz``), in counts:
+  ``acc_1G`` of the header is one g; without a header, the power of two that is nearest to its
+  length in the first half second, when a quadrotor stands (recording begins when it is armed).
 * **Commands.** ``motor[0..3]``, between the two numbers of the header's ``motorOutput``; without
   one, 48 to 2047 (DShot) where a motor leaves 1000 to 2000, else those.
-* **Rotor speeds.** ``eRPM[0..3]`` of bidirectional DShot, in hundreds: rpm is eRPM times 200 over the
-  number of magnet poles, which the header (``motor_poles``) or the reader's option says, else 14.
+* **Rotor speeds.** ``eRPM[0..3]`` of bidirectional DShot, in hundreds: rpm is eRPM times 200 over
+  the number of magnet poles, which the header (``motor_poles``) or the reader's option says, else
+  14.
 * **Voltage.** ``vbatLatest``, V, or hundredths of it in a log as it is.
 
 Motors count 1 rear-right, 2 front-right, 3 rear-left, 4 front-left (quad x). There is no pose.
