@@ -32,8 +32,13 @@ from .flight_log import (
 from .inertial import check_inertial
 from .magnitudes import check_magnitudes
 from .readers import find_reader
-from .readers.recognise import looked_for_columns, reader_by_columns, reader_by_content
-from .tables import Table, open_table
+from .readers.recognise import (
+    looked_for_columns,
+    reader_by_columns,
+    reader_by_content,
+    unknown_content,
+)
+from .tables import SUFFIXES, Table, open_table
 
 
 def read_log(
@@ -59,6 +64,8 @@ def read_log(
     """
     path = Path(path)
     chosen = reader_by_content(path) if reader is None else find_reader(reader)
+    if chosen is None and not path.name.lower().endswith(SUFFIXES):
+        raise unknown_content(path)
     table = open_table(path) if chosen is None else None
     missing = [name for name in _needed(table) if name not in table.header] if table else []
     if table is not None and missing:

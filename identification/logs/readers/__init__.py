@@ -19,6 +19,7 @@ from . import (
     betaflight_csv,
     crazyflie_csv,
     crazyflie_sd,
+    crazypad,
     crazyswarm2,
     nanobench,
     px4_ulog,
@@ -60,6 +61,7 @@ READERS = {
             crazyflie_csv.read,
             crazyflie_csv.SIGNATURE,
         ),
+        Reader("crazypad", "a CrazyPAD table", crazypad.read, crazypad.SIGNATURE),
         Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
         Reader(
             "betaflight",

@@ -46,7 +46,7 @@ def _byte(data: Bytes, at: Ints) -> int:
     """Return the next byte; behind the end 0, and the place goes on, so that it shows."""
     place = at[0]
     at[0] = place + 1
-    return np.int64(data[place]) if place < len(data) else 0
+    return int(data[place]) if place < len(data) else 0
 
 
 @compiled

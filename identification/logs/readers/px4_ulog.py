@@ -58,18 +58,25 @@ _ODOMETRY = ("vehicle_mocap_odometry", "vehicle_visual_odometry")
 _ONBOARD = ("vehicle_local_position", "vehicle_attitude")
 _ROTORS = ("esc_status", "actuator_motors", "actuator_outputs")
 _TRUTH = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
-# topics of gyro and accelerometer, the first that are logged are taken; of each its fields
-_INERTIAL = (
-    ("sensor_combined", "gyro_rad", "sensor_combined", "accelerometer_m_s2"),
-    ("vehicle_imu", "delta_angle", "vehicle_imu", "delta_velocity"),
-    ("vehicle_angular_velocity", "xyz", "vehicle_acceleration", "xyz"),
-)
+# topics and fields of gyro and accelerometer, of which the first that was logged is taken
+_INERTIAL = {
+    "gyro_rad": (
+        ("sensor_combined", "gyro_rad"),
+        ("vehicle_imu", "delta_angle"),
+        ("vehicle_angular_velocity", "xyz"),
+    ),
+    "accelerometer_m_s2": (
+        ("sensor_combined", "accelerometer_m_s2"),
+        ("vehicle_imu", "delta_velocity"),
+        ("vehicle_acceleration", "xyz"),
+    ),
+}
 _TOPICS = (
     *_ODOMETRY,
     *_TRUTH,
     *_ONBOARD,
     *_ROTORS,
-    *dict.fromkeys(topic for way in _INERTIAL for topic in way[::2]),
+    *dict.fromkeys(topic for ways in _INERTIAL.values() for topic, _ in ways),
     "battery_status",
     "vehicle_land_detected",
 )
@@ -124,7 +131,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """
     log = _open(path)
     pose, pose_notes = _pose(log)
-    gyro, accelerometer, inertial_notes = _inertial(log)
+    gyro, accelerometer = (_inertial(log, field) for field in _INERTIAL)
     if pose is None and (gyro is None or accelerometer is None):
         raise InputError(
             f"{path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
@@ -141,7 +148,12 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         in_flight = _flying(log, relative.t, total)
         rotors, note = balanced_speeds(path, relative, vehicle, in_flight, accelerometer, pose)
         scale_notes = [note]
-    notes = [*pose_notes, order_note, *rotor_notes, *scale_notes, *inertial_notes]
+    notes = [*pose_notes, order_note, *rotor_notes, *scale_notes]
+    if sensors := dict.fromkeys(s.name for s in (gyro, accelerometer) if s is not None):
+        notes.append(
+            f"gyro and accelerometer: {' and '.join(sensors)}, with what PX4 calibrated, body "
+            "turned from forward, right, down to forward, left, up"
+        )
     if log.damaged:
         notes.append("the file is damaged; what could be read of it was used")
     return flight_log(
@@ -480,24 +492,12 @@ def _voltage(log: _Log) -> Stream | None:
     return None
 
 
-def _inertial(log: _Log) -> tuple[Stream | None, Stream | None, list[str]]:
-    """Return gyro and accelerometer in the kit's body axes, None where they were not logged, and
-    a note on which topics they are.
+def _inertial(log: _Log, field: str) -> Stream | None:
+    """Return the gyro (``gyro_rad``) or the accelerometer (``accelerometer_m_s2``) in the kit's
+    body axes, or None where none was logged.
     """
-    for gyro_topic, gyro, force_topic, force in _INERTIAL:
-        turn = _sensor(log, gyro_topic, gyro)
-        pull = _sensor(log, force_topic, force)
-        if turn is not None or pull is not None:
-            topics = " and ".join(dict.fromkeys(s.name for s in (turn, pull) if s is not None))
-            return (
-                turn,
-                pull,
-                [
-                    f"gyro and accelerometer: {topics}, with what PX4 calibrated, body turned from "
-                    "forward, right, down to forward, left, up"
-                ],
-            )
-    return None, None, []
+    found = (_sensor(log, *way) for way in _INERTIAL[field])
+    return next((sensor for sensor in found if sensor is not None), None)
 
 
 def _sensor(log: _Log, topic: str, field: str) -> Stream | None:
