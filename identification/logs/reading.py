@@ -31,11 +31,17 @@ from .flight_log import (
 )
 from .inertial import check_inertial
 from .known_tables import read_known_table
+from .layout_guess import is_text_table
 from .log_map import load_map
 from .magnitudes import check_magnitudes
 from .mapped_log import read_mapped
 from .readers import find_reader
-from .readers.recognise import looked_for_columns, reader_by_columns, reader_by_content
+from .readers.recognise import (
+    looked_for_columns,
+    reader_by_columns,
+    reader_by_content,
+    unknown_content,
+)
 from .sample_gaps import bridged
 from .tables import SUFFIXES, Table, open_table
 
@@ -95,6 +101,8 @@ def _read(
         return chosen.read(path, vehicle)
     expected = f"{', '.join(REQUIRED)}, or the columns of {looked_for_columns()}"
     if not path.name.lower().endswith(SUFFIXES):
+        if not is_text_table(path):
+            raise unknown_content(path)
         return read_known_table(path, vehicle, f"expected columns {expected}")
     table = open_table(path)
     missing = _missing(table)

@@ -13,7 +13,19 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyflie_csv, crazyflie_sd, crazypad, crazyswarm2, nanobench, px4_ulog, rosbag
+from . import (
+    ardupilot_bin,
+    betaflight_bbl,
+    betaflight_csv,
+    crazyflie_csv,
+    crazyflie_sd,
+    crazypad,
+    crazyswarm2,
+    nanobench,
+    px4_ulog,
+    racer,
+    rosbag,
+)
 
 
 @dataclass(frozen=True)
@@ -50,6 +62,27 @@ READERS = {
             crazyflie_csv.SIGNATURE,
         ),
         Reader("crazypad", "a CrazyPAD table", crazypad.read, crazypad.SIGNATURE),
+        Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
+        Reader(
+            "betaflight",
+            "a blackbox of Betaflight or INAV",
+            betaflight_bbl.read,
+            begins=betaflight_bbl.BEGINS,
+            read_with=betaflight_bbl.read,
+        ),
+        Reader(
+            "betaflight_csv",
+            "a blackbox_decode table",
+            betaflight_csv.read,
+            betaflight_csv.SIGNATURE,
+            read_with=betaflight_csv.read,
+        ),
+        Reader(
+            "ardupilot_bin",
+            "an ArduPilot log (DataFlash .BIN)",
+            ardupilot_bin.read,
+            begins=ardupilot_bin.BEGINS,
+        ),
         Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
         Reader(
             "rosbag",

@@ -16,9 +16,9 @@ within the range that PWM_MAIN_MIN and MAX (or their kin) state.
 Where there are commands alone, a vehicle with a ``motor_curve`` turns them into thrust. One
 without gets relative thrusts: ``actuator_motors`` itself (PX4 inverts its curve after it),
 or ``f x^2 + (1 - f) x`` of an output x, with f the parameter THR_MDL_FAC. Their unknown scale is
-set so that thrust balances the declared vehicle's weight in flight: at each sample thrust is mass times
-the accelerometer's reading along the thrust axis, without one weight over the cosine of the tilt,
-and the scale is the median. Mass and a factor on thrust cannot be found from such a log.
+set so that thrust balances the declared vehicle's weight in flight: at each sample thrust is mass
+times the accelerometer's reading along the thrust axis, without one weight over the cosine of the
+tilt, and the scale is the median. Mass and a factor on thrust cannot be found from such a log.
 
 **Gyro and accelerometer.** ``sensor_combined``, else ``vehicle_imu`` (angles and velocities over
 their integration time, put in its middle), else ``vehicle_angular_velocity`` and
@@ -44,6 +44,8 @@ from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
+from .balanced_thrust import balanced_speeds
+from .balanced_thrust import flying as by_thrust
 from .streams import Stream, flight_log, from_ned, slerp
 from .ulog_counting import counting
 
@@ -56,18 +58,25 @@ _ODOMETRY = ("vehicle_mocap_odometry", "vehicle_visual_odometry")
 _ONBOARD = ("vehicle_local_position", "vehicle_attitude")
 _ROTORS = ("esc_status", "actuator_motors", "actuator_outputs")
 _TRUTH = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
-# topics of gyro and accelerometer, the first that are logged are taken; of each its fields
-_INERTIAL = (
-    ("sensor_combined", "gyro_rad", "sensor_combined", "accelerometer_m_s2"),
-    ("vehicle_imu", "delta_angle", "vehicle_imu", "delta_velocity"),
-    ("vehicle_angular_velocity", "xyz", "vehicle_acceleration", "xyz"),
-)
+# topics and fields of gyro and accelerometer, of which the first that was logged is taken
+_INERTIAL = {
+    "gyro_rad": (
+        ("sensor_combined", "gyro_rad"),
+        ("vehicle_imu", "delta_angle"),
+        ("vehicle_angular_velocity", "xyz"),
+    ),
+    "accelerometer_m_s2": (
+        ("sensor_combined", "accelerometer_m_s2"),
+        ("vehicle_imu", "delta_velocity"),
+        ("vehicle_acceleration", "xyz"),
+    ),
+}
 _TOPICS = (
     *_ODOMETRY,
     *_TRUTH,
     *_ONBOARD,
     *_ROTORS,
-    *dict.fromkeys(topic for way in _INERTIAL for topic in way[::2]),
+    *dict.fromkeys(topic for ways in _INERTIAL.values() for topic, _ in ways),
     "battery_status",
     "vehicle_land_detected",
 )
@@ -122,7 +131,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """
     log = _open(path)
     pose, pose_notes = _pose(log)
-    gyro, accelerometer, inertial_notes = _inertial(log)
+    gyro, accelerometer = (_inertial(log, field) for field in _INERTIAL)
     if pose is None and (gyro is None or accelerometer is None):
         raise InputError(
             f"{path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
@@ -132,11 +141,19 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         )
     order, order_note = _motor_order(log)
     measured, command, relative, rotor_notes = _rotors(log, order)
-    rotors, scale_notes = measured, ()
+    rotors, scale_notes = measured, []
     curve = vehicle is not None and vehicle.motor_curve is not None
     if measured is None and relative is not None and vehicle is not None and not curve:
-        rotors, scale_notes = _balanced(log, relative, vehicle, accelerometer, pose)
-    notes = [*pose_notes, order_note, *rotor_notes, *scale_notes, *inertial_notes]
+        total = relative.values.sum(axis=1)
+        in_flight = _flying(log, relative.t, total)
+        rotors, note = balanced_speeds(path, relative, vehicle, in_flight, accelerometer, pose)
+        scale_notes = [note]
+    notes = [*pose_notes, order_note, *rotor_notes, *scale_notes]
+    if sensors := dict.fromkeys(s.name for s in (gyro, accelerometer) if s is not None):
+        notes.append(
+            f"gyro and accelerometer: {' and '.join(sensors)}, with what PX4 calibrated, body "
+            "turned from forward, right, down to forward, left, up"
+        )
     if log.damaged:
         notes.append("the file is damaged; what could be read of it was used")
     return flight_log(
@@ -361,41 +378,6 @@ def _rotors(
     )
 
 
-def _balanced(
-    log: _Log, relative: Stream, vehicle: Vehicle, accelerometer: Stream | None, pose: Stream | None
-) -> tuple[Stream, tuple[str, ...]]:
-    """Return rotor speeds (N, 4) in rad/s whose thrust, in flight and on the median, balances the
-    weight, and the note that says so.
-    """
-    t, total = relative.t, relative.values.sum(axis=1)
-    flying = _flying(log, t, total) & (total > 0.0)
-    needed, by, span = np.full(len(t), vehicle.weight), "its weight", t
-    if accelerometer is not None and len(accelerometer.t) >= 2:
-        sensed = accelerometer.forward()[0]
-        needed, span = vehicle.mass * sensed.at(t)[:, 2], sensed.t
-        by = "its mass times the accelerometer along the thrust axis"
-    elif pose is not None:
-        whole = np.isfinite(pose.values).all(axis=1)
-        seen = Stream(pose.name, pose.t[whole], pose.values[whole]).forward()[0]
-        q = seen.at(t)[:, 3:]
-        upright = 1.0 - 2.0 * (q[:, 1] ** 2 + q[:, 2] ** 2)  # cosine of the tilt
-        needed, span = vehicle.weight / np.where(upright > 0.2, upright, np.nan), seen.t
-        by = "its weight over the cosine of the tilt"
-    flying &= (t >= span[0]) & (t <= span[-1])
-    usable = flying & np.isfinite(needed) & (needed > 0.0)
-    if not usable.any():
-        raise InputError(
-            f"{log.path}: {relative.name}: no sample in flight; expected motors that run"
-        )
-    scale = float(np.median(needed[usable] / total[usable]))
-    return Stream(relative.name, t, np.sqrt(scale * relative.values / vehicle.k)), (
-        f"thrust model: the unknown scale is set so that thrust in flight balances {vehicle.name} "
-        f"({vehicle.weight:.4g} N) on the median, by {by}: {scale:.4g} N a motor at full command. "
-        f"Mass or a factor on thrust cannot be found from this log; rotor speeds are "
-        "sqrt(thrust / k) of commands, without the motors' lag",
-    )
-
-
 def _esc_rpm(log: _Log, fields: Fields) -> Array:
     """Return the reported rpm (N, 4) of PX4's motors 1 to 4."""
     slots = list(range(4))
@@ -497,7 +479,7 @@ def _flying(log: _Log, t: Array, total: Array) -> NDArray[np.bool_]:
             ) & (total > 0.0)
             if flying.any():
                 return flying
-    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
+    return by_thrust(total)
 
 
 def _voltage(log: _Log) -> Stream | None:
@@ -510,24 +492,12 @@ def _voltage(log: _Log) -> Stream | None:
     return None
 
 
-def _inertial(log: _Log) -> tuple[Stream | None, Stream | None, list[str]]:
-    """Return gyro and accelerometer in the kit's body axes, None where they were not logged, and
-    a note on which topics they are.
+def _inertial(log: _Log, field: str) -> Stream | None:
+    """Return the gyro (``gyro_rad``) or the accelerometer (``accelerometer_m_s2``) in the kit's
+    body axes, or None where none was logged.
     """
-    for gyro_topic, gyro, force_topic, force in _INERTIAL:
-        turn = _sensor(log, gyro_topic, gyro)
-        pull = _sensor(log, force_topic, force)
-        if turn is not None or pull is not None:
-            topics = " and ".join(dict.fromkeys(s.name for s in (turn, pull) if s is not None))
-            return (
-                turn,
-                pull,
-                [
-                    f"gyro and accelerometer: {topics}, with what PX4 calibrated, body turned from "
-                    "forward, right, down to forward, left, up"
-                ],
-            )
-    return None, None, []
+    found = (_sensor(log, *way) for way in _INERTIAL[field])
+    return next((sensor for sensor in found if sensor is not None), None)
 
 
 def _sensor(log: _Log, topic: str, field: str) -> Stream | None:

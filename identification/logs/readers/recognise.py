@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ....runtime.errors import InputError
 from ....runtime.regular_files import open_regular
-from ..layout_guess import is_text_table
 from ..table import SUFFIXES
 from . import READERS, Reader
 
@@ -19,35 +18,44 @@ _BAG_FOLDER = ("metadata.yaml", ".db3", ".mcap")  # one of these is in a ROS 2 b
 
 
 def reader_by_content(path: Path) -> Reader | None:
-    """Return the reader of a file or folder by its first bytes; None where it may be a table.
+    """Return the reader of a file or folder by its first bytes; None where no reader knows them.
 
     Raises:
-        InputError: it cannot be read, or is neither a table nor of any reader's form.
+        InputError: it is a folder, but no ROS 2 bag's.
     """
     if os.path.isdir(path):  # False for a name that is too long
         return _folder(path)
-    table = path.name.lower().endswith(SUFFIXES) or is_text_table(path)
     try:
-        with open_regular(path, "a flight log") as file:
-            head = file.read(_HEAD)
+        head = _head(path)
     except InputError:
-        if table:
-            return None  # whoever reads the table says what is wrong
-        raise
+        return None  # whoever reads it says what is wrong
     for reader in READERS.values():
         if reader.begins and head.startswith(reader.begins):
             return reader
-    if table:
-        return None
-    looked_for = ", ".join(reader.what for reader in READERS.values() if reader.begins)
+    return None
+
+
+def unknown_content(path: Path) -> InputError:
+    """Return the error for a file that no reader knows and that is no table by its name.
+
+    Raises:
+        InputError: it cannot be read at all.
+    """
+    head = _head(path)
     if head.startswith(_GZIP):
-        raise InputError(
+        return InputError(
             f"{path}: is packed (gzip); expected a table, .csv.gz by name, or the log unpacked"
         )
-    raise InputError(
+    looked_for = ", ".join(reader.what for reader in READERS.values() if reader.begins)
+    return InputError(
         f"{path}: unknown kind of file: it begins with {_shown(head)}; expected {looked_for}, "
         f"or a table, with a name that ends in {', '.join(SUFFIXES)}"
     )
+
+
+def _head(path: Path) -> bytes:
+    with open_regular(path, "a flight log") as file:
+        return file.read(_HEAD)
 
 
 def reader_by_columns(path: Path, header: Sequence[str]) -> Reader | None:

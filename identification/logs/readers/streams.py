@@ -64,6 +64,7 @@ class Stream:
         step = np.diff(self.t)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
         there = step[after - 1] <= _SENSOR_GAP * float(np.median(step))
+        there |= (self.t[after] == t) | (self.t[after - 1] == t)
         out[~there | (t < self.t[0]) | (t > self.t[-1])] = np.nan
         return out
 
