@@ -539,7 +539,11 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
                 fitting.append(unit)
         if len(fitting) == 1:
             why = f"in it the rotors carry the weight of {vehicle.name}"
-            return "rotors", fitting[0], True, why
+            # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
+            named = any(w in names for w in ("omega", "speed", "rotor"))
+            if pulses and not named:
+                why += ", though they may be pulses in us"
+            return "rotors", fitting[0], named or not pulses, why
     if middle > GUESS.rpm and not is_command:
         whole = bool(np.all(turning == np.round(turning)))
         sure = not (whole and high <= 65535.0 and middle > 20_000.0)
