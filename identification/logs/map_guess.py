@@ -113,7 +113,11 @@ _QUATERNION = (
     r".*(_|^)(q|quat|quaternion|orientation|rotation|att|attitude)",
     r".*quat.*|.*orient.*|(stateestimate|est)_q",
 )
-_ANGLES = (r"", r"stateestimate|est|att|attitude|euler|angle|angles|orientation|rpy|.*")
+_ANGLES = (
+    r"",
+    r"mocap|vicon|stateestimate|est|att|attitude|euler|angle|angles|orientation|rpy|pose",
+    r"(?!.*(rate|vel|gyro|omega|speed)).*",
+)
 _ACCELEROMETER = (
     r"a|acc|accel|accelerometer|imu_a|imu_acc|imu_accel|linear_acceleration|imu_linear_acceleration",
     r"spec_force|specific_force|accsmooth|imu_accelerometer|.*accelerometer.*|a_imu|acc_.*|.*_acc",
@@ -136,6 +140,16 @@ _VOLTAGE = ("vbat", "battery", "voltage", "vbatlatest", "bat", "batt", "pm_vbat"
 _TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "clock", "times", "timeus", "elapsed")
 
 
+# a part of the table, and the field of the map that names its columns
+_COLUMN_FIELDS = {
+    "position": ("position", "columns"),
+    "quaternion": ("attitude", "order"),
+    "angles": ("attitude", "columns"),
+    "accelerometer": ("accelerometer", "columns"),
+    "gyro": ("gyro", "columns"),
+}
+
+
 def guess_map(
     table: Table, layout: FoundLayout, vehicle: Vehicle | None = None, name: str = "guess"
 ) -> Guess:
@@ -154,7 +168,7 @@ def guess_map(
     names = take_apart(table.header, layout.units)
     clock = _time_column(table, names)
     rest = [n for n in names if n.column != clock.column]
-    parts = _groups(rest)
+    parts, rivals = _groups(rest)
     if parts["position"] is None or not (parts["quaternion"] or parts["angles"]):
         parts["position"] = parts["quaternion"] = parts["angles"] = None
     _check_enough(table, parts)
@@ -162,6 +176,11 @@ def guess_map(
     data = table.read(list(dict.fromkeys(wanted)))
     found = _Found(table, names, data)
     t, time = _time(found, clock)
+    for part, (section, name_of_field) in _COLUMN_FIELDS.items():
+        group = parts[part]
+        if group is not None and rivals[part] > 1:
+            why = f"{rivals[part]} groups of columns look like it; taken: {group.columns[0]} ..."
+            found.say(section, name_of_field, False, why)
     physics = FlightPhysics(t, GUESS.samples)
     given: dict[str, Any] = {"time": time, "name": name}
     motors = _motor_values(found, parts)
@@ -201,21 +220,22 @@ def _time_column(table: Table, names: list[Name]) -> Name:
     )
 
 
-def _groups(names: list[Name]) -> dict[str, Group | None]:
-    """Return the columns of each kind, by their names."""
+def _groups(names: list[Name]) -> tuple[dict[str, Group | None], dict[str, int]]:
+    """Return the columns of each kind, by their names, and how many groups look like each."""
+    rivals = dict.fromkeys(_COLUMN_FIELDS, 1)
     triples = [*groups_of(names, "xyz"), *groups_of(names, ("north", "east", "down"))]
     threes = groups_of(names, "012", numbered=True)
     fours = [g for start in (1, 0) for g in _numbered(names, start)]
-    quaternion, _ = best_group(groups_of(names, "wxyz"), _QUATERNION)
+    quaternion, rivals["quaternion"] = best_group(groups_of(names, "wxyz"), _QUATERNION)
     if quaternion is None:
         quaternion, _ = best_group(fours, _QUATERNION[:2])
     taken = set(quaternion.columns) if quaternion else set()
     triples = [g for g in triples if not taken & set(g.columns)]
-    angles, _ = best_group(groups_of(names, ("roll", "pitch", "yaw")), _ANGLES)
+    angles, rivals["angles"] = best_group(groups_of(names, ("roll", "pitch", "yaw")), _ANGLES)
     if angles is None:
         angles, _ = best_group(groups_of(names, ("phi", "theta", "psi")), _ANGLES)
-    accelerometer, _ = best_group([*triples, *threes], _ACCELEROMETER)
-    gyro, _ = best_group([*triples, *threes], _GYRO)
+    accelerometer, rivals["accelerometer"] = best_group([*triples, *threes], _ACCELEROMETER)
+    gyro, rivals["gyro"] = best_group([*triples, *threes], _GYRO)
     if gyro is None:
         gyro = next((g for g in groups_of(names, "pqr") if g.key in ("", "rate", "body")), None)
     placed = _by_places(names)
@@ -226,7 +246,7 @@ def _groups(names: list[Name]) -> dict[str, Group | None]:
         motors = placed
     for sensor in (accelerometer, gyro):
         triples = [g for g in triples if sensor is None or g.columns != sensor.columns]
-    position, _ = best_group(triples, _POSITION)
+    position, rivals["position"] = best_group(triples, _POSITION)
     battery = next(
         (
             Group((n.column,), n.base, n.unit)
@@ -236,7 +256,7 @@ def _groups(names: list[Name]) -> dict[str, Group | None]:
         ),
         None,
     )
-    return {
+    parts: dict[str, Group | None] = {
         "position": position,
         "quaternion": quaternion,
         "angles": None if quaternion else angles,
@@ -246,6 +266,7 @@ def _groups(names: list[Name]) -> dict[str, Group | None]:
         "commands": commands,
         "battery": battery,
     }
+    return parts, rivals
 
 
 def _numbered(names: list[Name], start: int) -> list[Group]:

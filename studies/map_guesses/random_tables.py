@@ -135,12 +135,32 @@ def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.1
         name = pick(_VOLTS).format(u=unit)
         columns[name] = log.voltage / (1.0 if unit == "V" else 1e-3)
         parts["battery"] = Battery((name,), unit)
+    _distract(log, columns, rng, pick)
     separator = pick((",", ";", "\t", " "))
     if separator == " " and any(" " in name for name in columns):
         separator = ";"
     decimal = pick((".", ",")) if separator != "," else "."
     text = _text(columns, separator, decimal, int(rng.integers(0, 4)))
     return Written(log, LogMap(name="truth", **parts), separator, decimal, text)
+
+
+def _distract(
+    log: FlightLog, columns: dict[str, Array], rng: np.random.Generator, pick: Any
+) -> None:
+    """Add columns that a flight log needs not: velocities, set points, a magnetometer, a mode."""
+    noise = rng.standard_normal((len(log.t), 3))
+    for templates, values in (
+        (("v{a}", "vel_{a}", "velocity.{a}", "est_v{a}"), np.gradient(log.position, axis=0)),
+        (("{a}_setpoint", "target_{a}", "pos_sp_{a}", "ref.{a}"), np.round(log.position, 1)),
+        (("mag_{a}", "mag.{a}"), 0.3 + 0.01 * noise),
+    ):
+        if rng.random() < 0.3:
+            template = pick(templates)
+            for a, column in zip("xyz", values.T, strict=True):
+                columns.setdefault(template.format(a=a), column)
+    if rng.random() < 0.3:
+        columns["mode"] = np.floor(log.t / 7.0)
+        columns["temperature"] = 30.0 + 0.01 * log.t
 
 
 def _pose(
