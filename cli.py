@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 from . import __version__
-from .commands.checking import convert
+from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
@@ -74,6 +74,7 @@ def windwrench(
 _COMMANDS: tuple[Callable[..., Any], ...] = (
     fly,
     benchmark,
+    check,
     convert,
     estimate,
     diagnose,

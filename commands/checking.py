@@ -6,14 +6,20 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich import box
+from rich.table import Table
+from rich.text import Text
 
 from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
 from .terminal import (
     MapOption,
+    Out,
     ReaderOption,
     console,
     note,
     offering,
+    results_folder,
     say,
     vehicle_names,
     working,
@@ -28,6 +34,80 @@ CheckVehicleOption = Annotated[
         autocompletion=offering(vehicle_names),
     ),
 ]
+
+
+def check(
+    log: Annotated[Path, typer.Argument(help="Flight log of any kind.")],
+    map: MapOption = None,
+    reader: ReaderOption = None,
+    vehicle: CheckVehicleOption = None,
+    write_map: Annotated[
+        Path | None,
+        typer.Option("--write-map", help="Write the map by which the log was read: a YAML file."),
+    ] = None,
+    out: Out = Path("results/check"),
+) -> dict[str, Any]:
+    """Say what a flight log holds: how it was read and why so, channels, rates, gaps and doubts.
+    For a table of unknown columns a map is guessed; write a picture of the channels.
+
+    Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
+    """
+    from ..dynamics.vehicle_file import load_vehicle
+    from ..identification.report.log_check import check_log
+    from ..identification.report.log_picture import plot_log
+
+    model = None if vehicle is None else load_vehicle(vehicle)
+    with working("reading"):
+        found = check_log(log, reader, model, map)
+    if write_map is not None and not found.map_text:
+        raise InputError(
+            f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
+        )
+    folder = results_folder(out)
+    written = [plot_log(found.log, folder / "check.png")]
+    if write_map is not None:
+        with replaced(write_map) as temporary:
+            temporary.write_text(found.map_text, encoding="utf-8")
+        written.append(write_map)
+    flight = found.log
+    seconds = float(flight.t[-1] - flight.t[0])
+    _print(f"{flight.name}: {len(flight.t)} rows, {seconds:.1f} s, read by {found.read_by}")
+    table = Table(
+        "channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit", box=box.SIMPLE_HEAD
+    )
+    for c in found.channels:
+        table.add_row(
+            c.name,
+            f"{c.rate_hz:.4g}",
+            str(c.gaps),
+            f"{c.longest_gap_s:.3g}",
+            f"{c.low:.4g}",
+            f"{c.high:.4g}",
+            c.unit,
+        )
+    console.print(table)
+    if found.guess is not None:
+        reasons = Table("field", "", "why", box=box.SIMPLE_HEAD)
+        for r in found.guess.reasons:
+            reasons.add_row(
+                Text(f"{r.section} {r.field}".strip()),
+                "certain" if r.certain else "GUESS",
+                Text(r.why),
+            )
+        console.print(reasons)
+        if write_map is None:
+            console.print(found.map_text, highlight=False, markup=False, soft_wrap=True)
+    for text in flight.notes:
+        if not text.startswith("warning"):
+            _print(text)
+    for text in found.doubts:
+        note(f"warning: {text.removeprefix('warning: ')}")
+    say(*written)
+    return found.as_dict()
+
+
+def _print(text: str) -> None:
+    console.print(text, highlight=False, markup=False)
 
 
 def convert(

@@ -154,15 +154,15 @@ def _score(lines: list[str], layout: TextLayout) -> tuple[float, int]:
             rows.append((i, len(fields), numbers))
     if not rows:
         return 0.0, 0
-    # the last lines decide: before them may stand a program's settings, numbers too
-    tail = rows[len(rows) // 2 :]
+    # the later lines decide: before them may stand a program's settings, numbers too
+    tail = rows[len(rows) // 4 :]
     width = Counter(n for _, n, _ in tail).most_common(1)[0][0]
     if width < _FEWEST:
         return 0.0, 0
-    most = max(n for _, _, n in tail)
-    fitting = sum(1 for _, n, _ in tail if n == width)
-    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * min(most, width))
-    return most * fitting / len(tail), start
+    whole = sum(1 for line in lines[tail[0][0] :] if line.strip())
+    most = max(k for _, n, k in tail if n == width)
+    start = next(i for i, n, k in rows if n >= 0.8 * width and k >= 0.5 * most)
+    return sum(k for _, n, k in tail if n == width) / whole, start
 
 
 def _with_header(path: Path, lines: list[str], layout: TextLayout, start: int) -> FoundLayout:

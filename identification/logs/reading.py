@@ -75,6 +75,16 @@ def read_log(
     path = Path(path)
     with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
         log = _read(path, reader, vehicle, map)
+    return finished(log, vehicle)
+
+
+def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
+    """Return a log as ``read_log`` gives it, of what a reader made of its file: with doubts about
+    its units, and without inertial sensors that contradict its pose.
+
+    Raises:
+        InputError: a number is none that a flight has.
+    """
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():
         vehicle = load_vehicle(log.vehicle)
@@ -279,5 +289,5 @@ def _with_doubts(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     if not doubts:
         return log
     for doubt in doubts:
-        warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=3)
+        warnings.warn(f"{log.source}: {doubt}", UserWarning, stacklevel=4)
     return replace(log, notes=(*log.notes, *(f"warning: {doubt}" for doubt in doubts)))

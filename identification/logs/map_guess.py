@@ -1,0 +1,709 @@
+"""A map for a table that brings none: guessed from the columns' names, the size of their numbers,
+and the physics that every flight obeys. Each field says whether it is certain, and why.
+
+A unit in a name is taken at its word. What names do not say, the flight does: the specific force
+points along the thrust axis, so a horizontal acceleration is gravity times the tilt, which tells
+the quaternion's order and sense, frames, degrees and millimetres; rotors turn the body towards the
+side that they push up, which tells their order. A flight that hardly moves tells neither, and then
+the field is a guess.
+"""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from .column_names import PLACES, Group, Name, best_group, groups_of, take_apart
+from .flight_physics import FlightPhysics, Pose
+from .layout_guess import FoundLayout
+from .log_map import (
+    COMMAND_UNITS,
+    ROTOR_UNITS,
+    TIME_UNITS,
+    Attitude,
+    Battery,
+    Columns,
+    Commands,
+    LogMap,
+    Rotors,
+    Sensor,
+    TimeColumn,
+)
+from .rotor_orders import ORDERS, Order, order_names, order_words
+from .table import Table
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GuessSettings:
+    """When a field is certain."""
+
+    rates: tuple[float, float] = (5.0, 5000.0)  # Hz of rows, in which one unit of time alone falls
+    # the same where it is beyond doubt
+    sure_rates: tuple[float, float] = (15.0, 2500.0)
+    rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
+    # rate in rad/s
+    gravity: float = 0.15  # relative difference of the median specific force from 1 g
+    fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
+    carries: tuple[float, float] = (0.6, 1.7)  # thrust by weight of rotors in their right unit
+    samples: int = 20_000  # rows that are looked at
+
+
+GUESS = GuessSettings()
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a field is what it is."""
+
+    section: str
+    field: str
+    certain: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A map that was guessed."""
+
+    log_map: LogMap
+    reasons: tuple[Reason, ...]
+    unused: tuple[str, ...] = ()  # columns
+
+    @property
+    def doubts(self) -> tuple[Reason, ...]:
+        """The fields that are not certain."""
+        return tuple(reason for reason in self.reasons if not reason.certain)
+
+
+@dataclass
+class _Found:
+    """What was found so far."""
+
+    table: Table
+    names: list[Name]
+    data: dict[str, Array]
+    reasons: list[Reason] = field(default_factory=list)
+
+    def say(self, section: str, name: str, certain: bool, why: str) -> None:
+        self.reasons.append(Reason(section, name, certain, why))
+
+    def values(self, columns: Sequence[str]) -> Array:
+        return np.column_stack([self.data[name] for name in columns])
+
+
+_POSITION = (
+    r"p|pos|position|pose_position|local_position|location|loc",
+    r"(mocap|vicon|optitrack|opti|qualisys|gt|ground_truth|body|rigid_body|drone|quad|uav)"
+    r"(_(p|pos|position))?",
+    r"(stateestimate|state_estimate|state|est|estimate|odom|odometry|ekf|local|world|pose)"
+    r"(_(p|pos|position))?",
+    r"p_.*|pos_.*|position_.*|.*_pos|.*_position|.*_p|translation.*",
+    r"",
+)
+_QUATERNION = (
+    r"q|quat|quaternion|attitude_q|orientation|pose_orientation|rot|rotation|att|attitude",
+    r".*(_|^)(q|quat|quaternion|orientation|rotation|att|attitude)",
+    r".*quat.*|.*orient.*|(stateestimate|est)_q",
+)
+_ANGLES = (
+    r"",
+    r"mocap|vicon|stateestimate|est|att|attitude|euler|angle|angles|orientation|rpy|pose",
+    r"(?!.*(rate|vel|gyro|omega|speed)).*",
+)
+_ACCELEROMETER = (
+    r"a|acc|accel|accelerometer|imu_a|imu_acc|imu_accel|linear_acceleration|imu_linear_acceleration",
+    r"spec_force|specific_force|accsmooth|imu_accelerometer|.*accelerometer.*|a_imu|acc_.*|.*_acc",
+)
+_GYRO = (
+    r"g|gyr|gyro|gyroscope|imu_g|imu_gyr|imu_gyro|angular_velocity|imu_angular_velocity|gyroadc",
+    r"w|omega|rate|rates|ang_vel|angvel|body_rate|body_rates|.*gyro.*|w_imu|.*angular_velocity.*",
+)
+_ROTORS = (
+    r"e?rpm|rotor_rpm|motor_rpm|esc_rpm|m_rpm|motor_e?rpm",
+    r"omega|w|rotor|rotor_speed|rotor_speeds|motor_speed|motor_speeds|rotor_velocity|n|speed|prop",
+    r".*(rpm|omega|rotor|speed).*",
+)
+_COMMANDS = (
+    r"cmd|command|pwm|motor_pwm|pwm_m|motor_cmd|throttle|duty|u|act|actuator|output|out|thr",
+    r"rcou_c|servo|servo_output|control|motor_m|motors?|m|motor_output|c",
+    r".*(pwm|cmd|command|duty|throttle|output|motor|actuator).*",
+)
+_VOLTAGE = ("vbat", "battery", "voltage", "vbatlatest", "bat", "batt", "pm_vbat", "battery_voltage")
+_TIMES = ("t", "time", "timestamp", "stamp", "timestamps", "clock", "times", "timeus", "elapsed")
+
+
+# a part of the table, and the field of the map that names its columns
+_COLUMN_FIELDS = {
+    "position": ("position", "columns"),
+    "quaternion": ("attitude", "order"),
+    "angles": ("attitude", "columns"),
+    "accelerometer": ("accelerometer", "columns"),
+    "gyro": ("gyro", "columns"),
+}
+
+
+def guess_map(
+    table: Table, layout: FoundLayout, vehicle: Vehicle | None = None, name: str = "guess"
+) -> Guess:
+    """Return a guessed map of a table.
+
+    Args:
+        table: of any columns.
+        layout: how it was laid out, with a line of units where it has one.
+        vehicle: that flew, whose weight and rotors tell the rotors' unit; None: not known.
+        name: of the map.
+
+    Raises:
+        InputError: no columns look like a time, a pose or an IMU, and motors; the message says
+            which are missing.
+    """
+    names = take_apart(table.header, layout.units)
+    clock = _time_column(table, names)
+    rest = [n for n in names if n.column != clock.column]
+    parts, rivals = _groups(rest)
+    if parts["position"] is None or not (parts["quaternion"] or parts["angles"]):
+        parts["position"] = parts["quaternion"] = parts["angles"] = None
+    _check_enough(table, parts)
+    wanted = [clock.column, *(c for group in parts.values() if group for c in group.columns)]
+    data = table.read(list(dict.fromkeys(wanted)))
+    found = _Found(table, names, data)
+    t, time = _time(found, clock)
+    for part, (section, name_of_field) in _COLUMN_FIELDS.items():
+        group = parts[part]
+        if group is not None and rivals[part] > 1:
+            why = f"{rivals[part]} groups of columns look like it; taken: {group.columns[0]} ..."
+            found.say(section, name_of_field, False, why)
+    physics = FlightPhysics(t, GUESS.samples)
+    given: dict[str, Any] = {"time": time, "name": name}
+    motors = _motor_values(found, parts)
+    best = None
+    if parts["position"] is not None:
+        pose_map, best = _pose(found, parts, physics, motors)
+        given |= pose_map
+    given |= _imu(found, parts, physics, best, given.get("body", ""))
+    given |= _motors(found, parts, physics, best, given, vehicle)
+    given |= _battery(found, parts["battery"])
+    used = set(wanted)
+    return Guess(
+        LogMap(**given),
+        tuple(found.reasons),
+        tuple(c for c in table.header if c not in used),
+    )
+
+
+def _time_column(table: Table, names: list[Name]) -> Name:
+    for word in _TIMES:
+        for name in names:
+            if name.base == word:
+                return name
+    for name in names:
+        if name.base.startswith(("time", "timestamp")) or name.base.endswith(("time", "timestamp")):
+            return name
+    first = names[0]
+    try:
+        values = table.read([first.column])[first.column]
+    except InputError:
+        values = np.zeros(2)
+    if len(values) > 2 and np.all(np.diff(values) > 0.0):
+        return first
+    raise InputError(
+        f"{table.path}: no column looks like a time; expected one such as t, time or timestamp, "
+        f"found {', '.join(table.header[:20])}"
+    )
+
+
+def _groups(names: list[Name]) -> tuple[dict[str, Group | None], dict[str, int]]:
+    """Return the columns of each kind, by their names, and how many groups look like each."""
+    rivals = dict.fromkeys(_COLUMN_FIELDS, 1)
+    triples = [*groups_of(names, "xyz"), *groups_of(names, ("north", "east", "down"))]
+    threes = groups_of(names, "012", numbered=True)
+    fours = [g for start in (1, 0) for g in _numbered(names, start)]
+    quaternion, rivals["quaternion"] = best_group(groups_of(names, "wxyz"), _QUATERNION)
+    if quaternion is None:
+        quaternion, _ = best_group(fours, _QUATERNION[:2])
+    taken = set(quaternion.columns) if quaternion else set()
+    triples = [g for g in triples if not taken & set(g.columns)]
+    angles, rivals["angles"] = best_group(groups_of(names, ("roll", "pitch", "yaw")), _ANGLES)
+    if angles is None:
+        angles, _ = best_group(groups_of(names, ("phi", "theta", "psi")), _ANGLES)
+    accelerometer, rivals["accelerometer"] = best_group([*triples, *threes], _ACCELEROMETER)
+    gyro, rivals["gyro"] = best_group([*triples, *threes], _GYRO)
+    if gyro is None:
+        gyro = next((g for g in groups_of(names, "pqr") if g.key in ("", "rate", "body")), None)
+    placed = _by_places(names)
+    free = [g for g in fours if not taken & set(g.columns)]
+    motors, _ = best_group(free, _ROTORS)
+    commands, _ = best_group([g for g in free if g != motors], _COMMANDS)
+    if placed is not None:
+        motors = placed
+    for sensor in (accelerometer, gyro):
+        triples = [g for g in triples if sensor is None or g.columns != sensor.columns]
+    position, rivals["position"] = best_group(triples, _POSITION)
+    battery = next(
+        (
+            Group((n.column,), n.base, n.unit)
+            for word in _VOLTAGE
+            for n in names
+            if n.base == word or n.base.endswith(f"_{word}")
+        ),
+        None,
+    )
+    parts: dict[str, Group | None] = {
+        "position": position,
+        "quaternion": quaternion,
+        "angles": None if quaternion else angles,
+        "accelerometer": accelerometer,
+        "gyro": gyro,
+        "motors": motors,
+        "commands": commands,
+        "battery": battery,
+    }
+    return parts, rivals
+
+
+def _numbered(names: list[Name], start: int) -> list[Group]:
+    endings = [str(start + i) for i in range(4)]
+    return groups_of(names, endings, numbered=True)
+
+
+def _by_places(names: list[Name]) -> Group | None:
+    """Return the columns of motors that are named by their places, front-left first."""
+    found: dict[str, dict[int, Name]] = {}
+    for name in names:
+        for word, place in PLACES.items():
+            if name.base.endswith(word):
+                key = name.base.removesuffix(word).strip("_")
+                found.setdefault(key, {}).setdefault(place, name)
+                break
+    for key, members in found.items():
+        if len(members) == 4:
+            units = {members[i].unit for i in range(4)}
+            unit = units.pop() if len(units) == 1 else ""
+            if not unit and "rpm" in key:
+                unit = "rpm"
+            return Group(tuple(members[i].column for i in range(4)), f"place:{key}", unit)
+    return None
+
+
+def _check_enough(table: Table, parts: Mapping[str, Group | None]) -> None:
+    missing = []
+    if parts["position"] is None and not (parts["accelerometer"] and parts["gyro"]):
+        missing.append(
+            "a pose (such as x, y, z, qw, qx, qy, qz or roll, pitch, yaw) or an IMU (such as ax, "
+            "ay, az, gx, gy, gz)"
+        )
+    if parts["motors"] is None and parts["commands"] is None:
+        missing.append("four motors (such as rpm1 to rpm4, motor[0] to motor[3])")
+    if missing:
+        raise InputError(
+            f"{table.path}: no columns look like {' or like '.join(missing)}; found "
+            f"{', '.join(table.header[:40])}. Write a map by hand"
+        )
+
+
+def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
+    raw = found.data[name.column]
+    steps = np.diff(raw[np.isfinite(raw)])
+    steps = steps[steps > 0.0]
+    if not steps.size:
+        raise InputError(
+            f"{found.table.path}: column {name.column}: no increasing times; expected a time"
+        )
+    step = float(np.median(steps))
+    unit = name.unit if name.unit in TIME_UNITS else ""
+    rates = {u: 1.0 / (step * TIME_UNITS[u]) for u in ("s", "ms", "us", "ns")}
+    if unit:
+        found.say("time", "unit", True, f"{unit} by the name of the column")
+    else:
+        low, high = GUESS.rates
+        unit = next((u for u, rate in rates.items() if low <= rate <= high), "s")
+        sure = GUESS.sure_rates[0] <= rates[unit] <= GUESS.sure_rates[1]
+        found.say("time", "unit", sure, f"in {unit} there are {rates[unit]:.4g} rows a second")
+    begin = raw[np.isfinite(raw)][0]
+    return (raw - begin) * TIME_UNITS[unit], TimeColumn(name.column, unit)
+
+
+def _motor_values(found: _Found, parts: Mapping[str, Group | None]) -> Array | None:
+    group = parts["motors"] or parts["commands"]
+    return None if group is None else found.values(group.columns)
+
+
+def _pose(
+    found: _Found,
+    parts: Mapping[str, Group | None],
+    physics: FlightPhysics,
+    motors: Array | None,
+) -> tuple[dict[str, Any], "Pose"]:
+    """Return the map's sections of the pose and what they make of the table."""
+    place, quaternion, angles = parts["position"], parts["quaternion"], parts["angles"]
+    assert place is not None
+    group = quaternion or angles
+    assert group is not None
+    attitude = found.values(group.columns)
+    orders: tuple[str, ...] = ("wxyz",)
+    if quaternion is not None and quaternion.numbered:
+        orders = ("wxyz", "xyzw")
+    units: tuple[str, ...] = ("",)
+    if quaternion is None:
+        units = (group.unit,) if group.unit in ("deg", "rad") else ("deg", "rad")
+        if len(units) == 2 and np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
+            units = ("deg",)
+    hint = "ned" if any(w in "".join(place.columns).lower() for w in ("ned", "down")) else ""
+    best = physics.best_pose(
+        found.values(place.columns),
+        attitude,
+        motors,
+        orders=orders,
+        units=units,
+        length=place.unit if place.unit in ("m", "cm", "mm") else "",
+        euler=quaternion is None,
+        hint=hint,
+    )
+    fit = f"{best.left:.0%} of the horizontal acceleration is left unexplained by the tilt"
+    sections = {"world": best.world, "body": best.body}
+    found.say("world", "", best.sure("world"), f"{best.world}: {fit}{best.margin('world')}")
+    found.say(
+        "body", "", best.sure("body"), f"{best.body}: the thrust points up{best.margin('body')}"
+    )
+    if place.unit in ("m", "cm", "mm"):
+        found.say("position", "unit", True, f"{best.length} by the columns' names")
+    else:
+        found.say(
+            "position",
+            "unit",
+            best.sure_length,
+            f"{best.length}: accelerations are {best.gain:.3g} times gravity's tilt in m",
+        )
+    made: Attitude
+    if quaternion is not None:
+        made = Attitude(group.columns, order=best.order, sense=best.sense)
+        if quaternion.numbered:
+            found.say("attitude", "order", best.sure("order"), f"{best.order}: {fit}")
+        else:
+            found.say("attitude", "order", True, "by the columns' names")
+    else:
+        signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
+        made = Attitude(
+            group.columns, unit=best.unit, euler=best.euler, sense=best.sense, signs=signs
+        )
+        if len(units) == 1:
+            why = "by the columns' names" if group.unit else "angles beyond pi"
+            found.say("attitude", "unit", True, f"{best.unit}: {why}")
+        else:
+            found.say("attitude", "unit", best.sure("unit"), f"{best.unit}: {fit}")
+        found.say(
+            "attitude",
+            "euler",
+            best.sure("euler"),
+            f"{best.euler}: the usual order, and {fit}{best.margin('euler')}",
+        )
+        found.say(
+            "attitude",
+            "signs",
+            best.sure("pitch_sign"),
+            f"pitch {'turned over' if best.pitch_sign < 0 else 'as it stands'}: {fit}",
+        )
+    found.say("attitude", "sense", best.sure("sense"), f"{best.sense}: {fit}{best.margin('sense')}")
+    sections |= {
+        "position": Columns(place.columns, best.length),
+        "attitude": made,
+    }
+    return sections, best
+
+
+def _imu(
+    found: _Found,
+    parts: Mapping[str, Group | None],
+    physics: FlightPhysics,
+    pose: "Pose | None",
+    body: str,
+) -> dict[str, Any]:
+    """Return the sections of the inertial sensors."""
+    out: dict[str, Any] = {}
+    acc, gyro = parts["accelerometer"], parts["gyro"]
+    axes, sure_axes = "", False
+    if acc is not None:
+        values = found.values(acc.columns)
+        size = float(np.nanmedian(np.linalg.norm(values, axis=1)))
+        z = float(np.nanmean(values[:, 2])) / max(size, 1e-12)
+        axes, sure_axes = ("flu" if z > 0.0 else "frd"), abs(z) > 0.8
+        if z < 0.0 and pose is None:  # turned over, or gravity in place of the specific force
+            sure_axes = False
+        unit, scale = _acceleration_unit(found, acc.unit, size)
+        found.say(
+            "accelerometer",
+            "body",
+            sure_axes,
+            f"{axes}: along z it reads {'+' if z > 0 else '-'}{abs(z):.2f} of its size",
+        )
+        out["accelerometer"] = Sensor(acc.columns, unit, scale=scale, body=axes)
+    if gyro is not None:
+        values = found.values(gyro.columns)
+        unit = gyro.unit if gyro.unit in ("rad/s", "deg/s") else ""
+        if pose is not None:
+            unit2, axes2, sure, why = physics.gyro(values, pose, unit)
+            found.say("gyro", "unit", bool(unit) or sure, unit or f"{unit2}: {why}")
+            found.say("gyro", "body", sure, f"{axes2}: {why}")
+            out["gyro"] = Sensor(gyro.columns, unit2, body=axes2)
+        else:
+            high = float(np.nanquantile(np.abs(values), 0.995))
+            guessed = "deg/s" if high > 6.0 else "rad/s"
+            found.say(
+                "gyro",
+                "unit",
+                bool(unit) or high > GUESS.fast_gyro,
+                f"{unit or guessed}: "
+                + ("by the columns' names" if unit else f"its fast values are {high:.3g}"),
+            )
+            found.say("gyro", "body", sure_axes, "as the accelerometer's")
+            out["gyro"] = Sensor(gyro.columns, unit or guessed, body=axes or "flu")
+    if body == "" and axes:
+        out["body"] = axes
+    return out
+
+
+def _acceleration_unit(found: _Found, named: str, size: float) -> tuple[str, float]:
+    for unit, one in (("m/s2", 9.80665), ("g", 1.0)):
+        if named == unit or (not named and abs(size / one - 1.0) < GUESS.gravity):
+            why = "by the columns' names" if named else f"its median size is {size:.3g}"
+            found.say("accelerometer", "unit", True, f"{unit}: {why}")
+            return unit, 1.0
+    scale = 9.80665 / max(size, 1e-12)
+    found.say(
+        "accelerometer",
+        "scale",
+        False,
+        f"raw: its median size is {size:.4g}, which is taken for the 9.81 m/s2 of a hover",
+    )
+    return "raw", float(f"{scale:.6g}")
+
+
+def _motors(
+    found: _Found,
+    parts: Mapping[str, Group | None],
+    physics: FlightPhysics,
+    pose: "Pose | None",
+    given: Mapping[str, Any],
+    vehicle: Vehicle | None,
+) -> dict[str, Any]:
+    """Return the sections of rotor speeds and commands."""
+    out: dict[str, Any] = {}
+    for group in (parts["motors"], parts["commands"]):
+        if group is None:
+            continue
+        values = found.values(group.columns)
+        kind, unit, sure, why = motor_unit(group, values, vehicle)
+        if kind in out:
+            continue
+        found.say(kind, "unit", sure, f"{unit}: {why}")
+        made: Rotors | Commands
+        pairs = 7 if unit == "eRPM" else 1
+        limits: tuple[float, float] | None = None
+        if unit == "eRPM":
+            found.say(kind, "pole_pairs", False, "7, of most motors of small racers")
+        if kind == "commands":
+            limits = COMMAND_UNITS[unit] or (0.0, 65535.0)
+            if unit in ("us", "counts", "dshot"):
+                found.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
+        order, sure, why = _order(found, group, values, kind, physics, pose, given)
+        found.say(kind, "order", sure, why)
+        if kind == "rotors":
+            made = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
+        else:
+            made = Commands(group.columns, unit, order=order, range=limits)
+        out[kind] = made
+    return out
+
+
+def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[str, str, bool, str]:
+    """Return whether columns are rotors or commands, their unit, if that is certain, and why."""
+    names = " ".join(group.columns).lower()
+    turning = values[np.isfinite(values)]
+    turning = np.abs(turning[turning != 0.0])
+    if not turning.size:
+        return "commands", "normalised", False, "all are zero"
+    low, middle, high = (float(x) for x in np.quantile(turning, [0.01, 0.5, 1.0]))
+    if group.unit in ROTOR_UNITS:
+        return "rotors", group.unit, True, "by the columns' names"
+    if "erpm" in names:
+        return "rotors", "eRPM", True, "by the columns' names"
+    if "rpm" in names:
+        return "rotors", "rpm", True, "by the columns' names"
+    if high <= 1.0:
+        sure = "omega" not in names and "rpm" not in names
+        return "commands", "normalised", sure, f"values up to {high:.3g}"
+    if group.unit == "us":
+        return "commands", "us", True, "by the columns' names"
+    if group.unit == "percent":
+        return "commands", "percent", True, "by the columns' names"
+    is_command = any(w in names for w in ("pwm", "cmd", "command", "servo", "out", "throttle"))
+    pulses = low >= 850.0 and high <= 2250.0
+    if is_command and pulses:
+        return "commands", "us", True, f"values from {low:.4g} to {high:.4g}"
+    if is_command and high <= 100.0:
+        return "commands", "percent", False, f"values up to {high:.3g}"
+    if is_command and high <= 65535.0 and middle > 4000.0:
+        return "commands", "counts", False, f"values up to {high:.6g}"
+    if vehicle is not None and not is_command:
+        fitting = []
+        for unit in ("rad/s", "rpm", "Hz"):
+            thrust = np.nanmedian(np.square(values * ROTOR_UNITS[unit]) @ vehicle.k)
+            if GUESS.carries[0] <= thrust / vehicle.weight <= GUESS.carries[1]:
+                fitting.append(unit)
+        if len(fitting) == 1:
+            why = f"in it the rotors carry the weight of {vehicle.name}"
+            # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
+            named = any(w in names for w in ("omega", "speed", "rotor"))
+            if pulses and not named:
+                why += ", though they may be pulses in us"
+            return "rotors", fitting[0], named or not pulses, why
+    if middle > GUESS.rpm and not is_command:
+        whole = bool(np.all(turning == np.round(turning)))
+        sure = not (whole and high <= 65535.0 and middle > 20_000.0)
+        return "rotors", "rpm", sure, f"the median is {middle:.5g}, too fast for rad/s"
+    if pulses and "omega" not in names:
+        return "commands", "us", False, f"values from {low:.4g} to {high:.4g}"
+    return "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"
+
+
+_HINTS = {  # words in names, and whose order they speak for
+    "motor[0]": "betaflight",
+    "motor.m1": "crazyflie",
+    "motor_m1": "crazyflie",
+    "output[0]": "px4-x",
+    "rcou": "ardupilot-x",
+}
+
+
+def _order(
+    found: _Found,
+    group: Group,
+    values: Array,
+    kind: str,
+    physics: FlightPhysics,
+    pose: "Pose | None",
+    given: Mapping[str, Any],
+) -> tuple[Order, bool, str]:
+    """Return the order of the rotors, whether it is certain, and why."""
+    if group.key.startswith("place:"):
+        return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
+    thrusts = np.square(values) if kind == "rotors" else values
+    rates = None
+    gyro = given.get("gyro")
+    if isinstance(gyro, Sensor):
+        rates = physics.rates_of(found.values(gyro.columns), gyro.unit, gyro.body)
+    known = physics.orders(thrusts, pose, rates)
+    text = " ".join(group.columns).lower()
+    hint = next((name for word, name in _HINTS.items() if word in text), "windwrench")
+    if not known:
+        return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
+    ranked = sorted(known.items(), key=lambda item: item[1])
+    (best, left), (_, second) = ranked[0], ranked[1]
+    sure = physics.sure_order(left, second)
+    if not sure:
+        return (
+            ORDERS[hint],
+            False,
+            f"{hint}: no order explains the body's turning much better than all others",
+        )
+    names = order_names(best)
+    what = names[0] if names else order_words(best)
+    return (
+        best,
+        True,
+        f"{what}: it leaves {left / 2:.0%} of the angular acceleration unexplained, the next best "
+        f"{second / 2:.0%}",
+    )
+
+
+def _battery(found: _Found, group: Group | None) -> dict[str, Any]:
+    if group is None:
+        return {}
+    values = found.values(group.columns)
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not values.size:
+        return {}
+    middle = float(np.median(values))
+    unit = group.unit if group.unit in ("V", "mV", "cV") else ""
+    if unit:
+        found.say("battery", "unit", True, f"{unit}: by the column's name")
+    else:
+        unit = "V" if middle < 100.0 else "cV" if middle < 2700.0 else "mV"
+        sure = middle < 60.0 or 2700.0 < middle < 60_000.0
+        found.say("battery", "unit", sure, f"{unit}: its median is {middle:.4g}")
+    return {"battery": Battery(group.columns, unit)}
+
+
+def map_yaml(guess: Guess) -> str:
+    """Return a guessed map as a YAML file; comments say what is certain and what is a guess."""
+    m = guess.log_map
+    said: dict[str, list[Reason]] = {}
+    for reason in guess.reasons:
+        said.setdefault(reason.section, []).append(reason)
+    out = io.StringIO()
+    out.write("# A map of this table's columns. What is marked GUESS: check it.\n")
+
+    def section(name: str, value: object) -> None:
+        for reason in said.get(name, []):
+            mark = "certain" if reason.certain else "GUESS"
+            out.write(f"# {mark}: {f'{reason.field}: ' if reason.field else ''}{reason.why}\n")
+        if isinstance(value, str):
+            out.write(f"{name}: {value}\n")
+            return
+        text = yaml.safe_dump(
+            {name: value}, default_flow_style=None, sort_keys=False, width=1000, allow_unicode=True
+        )
+        out.write(text)
+
+    if m.vehicle:
+        section("vehicle", m.vehicle)
+    section("time", {"column": m.time.column, "unit": m.time.unit})
+    section("world", m.world)
+    section("body", m.body)
+    for name, part in m.sections.items():
+        section(name, _fields(part))
+    if guess.unused:
+        out.write(f"# columns that are not used: {', '.join(guess.unused)}\n")
+    return out.getvalue()
+
+
+def _fields(part: Columns) -> dict[str, Any]:
+    """Return a section as its fields stand in the file."""
+    if isinstance(part, Battery):
+        return {"column": part.columns[0], "unit": part.unit}
+    fields: dict[str, Any] = {"columns": list(part.columns)}
+    if isinstance(part, Attitude):
+        if part.euler:
+            fields |= {"euler": part.euler, "unit": part.unit}
+        else:
+            fields |= {"order": part.order}
+        fields["sense"] = part.sense
+    else:
+        fields["unit"] = part.unit
+    if isinstance(part, Rotors | Commands):
+        names = order_names(part.order)
+        fields["order"] = names[0] if names else list(part.order)
+    if isinstance(part, Rotors) and part.pole_pairs != 1:
+        fields["pole_pairs"] = part.pole_pairs
+    if isinstance(part, Commands) and part.range is not None:
+        fields["range"] = list(part.range)
+    if isinstance(part, Sensor) and part.body:
+        fields["body"] = part.body
+    if part.scale != 1.0:
+        fields["scale"] = part.scale
+    if part.signs:
+        fields["signs"] = list(part.signs)
+    return fields
+
+
+def with_name(guess: Guess, name: str) -> Guess:
+    """Return a guess whose map has another name."""
+    return replace(guess, log_map=replace(guess.log_map, name=name))

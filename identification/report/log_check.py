@@ -1,0 +1,231 @@
+"""What a flight log is: how it was read and why so, its channels with their rates and gaps, and
+what is doubtful about it.
+"""
+
+import re
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle_file import load_vehicle, preset_names
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+from ..logs.known_tables import known_map
+from ..logs.layout_guess import is_parquet, is_text_table, open_any_table
+from ..logs.log_map import MAPS, map_names
+from ..logs.map_guess import Guess, guess_map, map_yaml
+from ..logs.mapped_log import map_table
+from ..logs.reading import finished, read_log
+from ..logs.screening import screen_log
+from ..motion.noise_spectrum import noise_spectra
+
+Array = NDArray[np.float64]
+
+_GAP = 3.0  # of a channel's own median steps
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a log."""
+
+    name: str
+    unit: str
+    samples: int
+    rate_hz: float
+    gaps: int  # longer than 3 of its own steps
+    longest_gap_s: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LogCheck:
+    """What was found of a log."""
+
+    log: FlightLog
+    read_by: str
+    channels: tuple[Channel, ...]
+    doubts: tuple[str, ...]
+    guess: Guess | None = None
+    map_text: str = ""  # the map by which it was read, as a YAML file; empty where it needed none
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        log = self.log
+        reasons = self.guess.reasons if self.guess else ()
+        return {
+            "log": log.name,
+            "read_by": self.read_by,
+            "samples": len(log.t),
+            "seconds": float(log.t[-1] - log.t[0]),
+            "channels": {
+                c.name: {
+                    "unit": c.unit,
+                    "samples": c.samples,
+                    "rate_hz": c.rate_hz,
+                    "gaps": c.gaps,
+                    "longest_gap_s": c.longest_gap_s,
+                    "range": [c.low, c.high],
+                }
+                for c in self.channels
+            },
+            "vehicle": log.vehicle or None,
+            "notes": list(log.notes),
+            "doubts": list(self.doubts),
+            "map": self.map_text or None,
+            "fields": [
+                {
+                    "field": f"{r.section}.{r.field}" if r.field else r.section,
+                    "certain": r.certain,
+                    "why": r.why,
+                }
+                for r in reasons
+            ],
+        }
+
+
+def check_log(
+    path: Path,
+    reader: str | None = None,
+    vehicle: Vehicle | None = None,
+    log_map: str | None = None,
+) -> LogCheck:
+    """Return what a log is; a table of unknown columns is read by a map that is guessed.
+
+    Args:
+        path: of any log that can be read.
+        reader: its reader, or None.
+        vehicle: that flew, or None: the one that the log names, where it comes with the kit.
+        log_map: its map, or None.
+
+    Raises:
+        InputError: it cannot be read, and no map can be guessed.
+    """
+    guess, text = None, ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        if log_map is not None:
+            log = read_log(path, reader, vehicle, log_map)
+            read_by, text = f"the map {log_map}", _map_text(log_map)
+        else:
+            try:
+                log = read_log(path, reader, vehicle)
+                read_by, text = _read_by(path, log)
+            except InputError as error:
+                if reader is not None or not (is_text_table(path) or is_parquet(path)):
+                    raise
+                log, guess = _guessed(path, vehicle, error)
+                read_by, text = "a map that was guessed", map_yaml(guess)
+    if vehicle is None and log.vehicle in preset_names():
+        vehicle = load_vehicle(log.vehicle)
+    doubts = [
+        f"guessed: {r.section}{f' {r.field}' if r.field else ''}: {r.why}"
+        for r in (guess.doubts if guess else ())
+    ]
+    doubts += [note for note in log.notes if note.startswith("warning")]
+    doubts += _doubts(log, vehicle)
+    return LogCheck(log, read_by, tuple(_channels(log)), tuple(doubts), guess, text)
+
+
+def _map_text(name: str) -> str:
+    path = MAPS / f"{name}.yaml" if name in map_names() else Path(name)
+    return path.read_text(encoding="utf-8-sig")
+
+
+def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
+    """Return in words what read a log, and the text of the map where that was one."""
+    if named := re.search(r"\(reader ([^()]+)\)$", log.source):
+        return f"the reader {named[1]}", ""
+    if is_text_table(path):
+        known = known_map(open_any_table(path)[0].header)
+        if known is not None and known.name != "windwrench":
+            return f"the map {known.name}, known by its columns", _map_text(known.name)
+    return "this kit's own format", ""
+
+
+def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[FlightLog, Guess]:
+    table, layout = open_any_table(path)
+    if known_map(table.header) is not None:
+        raise error
+    guess = guess_map(table, layout, vehicle)
+    if vehicle is not None:
+        guess = replace(guess, log_map=replace(guess.log_map, vehicle=vehicle.name))
+    with np.errstate(over="ignore", invalid="ignore"):
+        log = map_table(table, layout, guess.log_map, vehicle)
+    return finished(log, vehicle), guess
+
+
+def _channels(log: FlightLog) -> list[Channel]:
+    """Return the channels that a log has."""
+    speeds = log.rotor_speeds if log.has_rotor_speeds else None
+    rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
+    given: list[tuple[str, str, Array | None]] = [
+        ("position", "m", np.where(log.valid[:, None], log.position, np.nan)),
+        ("attitude (tilt)", "deg", _tilt(log)),
+        (rotors, "rad/s", speeds),
+        ("motor commands", "0 to 1", log.command),
+        ("battery", "V", None if log.voltage is None else log.voltage[:, None]),
+        ("accelerometer", "m/s2", log.accelerometer),
+        ("gyro", "rad/s", log.gyro),
+        ("true force", "N", log.force),
+        ("true torque", "Nm", log.torque),
+    ]
+    out = []
+    for name, unit, values in given:
+        if values is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+        if len(rows) < 2:
+            continue
+        steps = np.diff(log.t[rows])
+        step = float(np.median(steps))
+        out.append(
+            Channel(
+                name,
+                unit,
+                len(rows),
+                1.0 / step,
+                int(np.sum(steps > _GAP * step)),
+                float(steps.max()),
+                float(values[rows].min()),
+                float(values[rows].max()),
+            )
+        )
+    return out
+
+
+def _tilt(log: FlightLog) -> Array:
+    """Return the angle (N, 1) between thrust axis and vertical, degrees; NaN without a pose."""
+    x, y = log.quaternion[:, 1], log.quaternion[:, 2]
+    up = np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)
+    angle = np.degrees(np.arccos(up))
+    return np.asarray(np.where(log.valid, angle, np.nan)[:, None])
+
+
+def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
+    """Return what the motion and the noise of a log make doubtful."""
+    doubts = [
+        f"the noise of the {c.channel} falls by f^-{c.slope:.1f} between {c.band_hz[0]:.3g} and "
+        f"{c.band_hz[1]:.3g} Hz: it was filtered before it was written, and the log does not show "
+        "how large it was"
+        for c in noise_spectra(log)
+        if c.filtered
+    ]
+    if vehicle is None:
+        return [
+            *doubts,
+            "no vehicle is given: units and frames were not checked against its rotors",
+        ]
+    if not log.has_pose:
+        return doubts
+    try:
+        doubts += screen_log(log, vehicle)
+    except InputError as error:
+        where = f"{log.source}: "
+        doubts.append(f"a diagnosis refuses it: {str(error).removeprefix(where)}")
+    return doubts

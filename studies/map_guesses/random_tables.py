@@ -1,0 +1,275 @@
+"""Known flights written as tables in random conventions: names, separators, units, frames, orders.
+
+The writing shares no code with the reading: what it writes comes from the map's words alone.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation
+
+from windwrench.dynamics import load_vehicle
+from windwrench.envs.recording import record_flight
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.log_map import (
+    Attitude,
+    Battery,
+    Columns,
+    Commands,
+    LogMap,
+    Rotors,
+    Sensor,
+    TimeColumn,
+)
+from windwrench.identification.logs.rotor_orders import ORDERS
+
+Array = NDArray[np.float64]
+
+TRAJECTORIES = ("excite", "gentle", "circle", "fast", "hover", "yaw")
+VEHICLES = ("ardrone2", "crazyflie", "hummingbird")
+
+_TIMES = ("t", "time", "timestamp", "Time", "timestamp_{u}", "time ({u})", "Time [{u}]")
+_PLACES = ("{a}", "p{a}", "pos_{a}", "position.{a}", "mocap_{a}", "Position {A} [{u}]", "{a}_{u}")
+_QUATERNIONS = ("q{a}", "quat_{a}", "orientation.{a}", "q.{a}", "pose.orientation.{a}")
+_NUMBERED = ("q[{n}]", "q{n}", "quat_{n}")
+_ANGLES = ("{a}", "{A}", "{a}_{u}", "att.{a}", "{a} [{u}]")
+_GYROS = ("g{a}", "gyro_{a}", "gyro.{a}", "angular_velocity.{a}", "w{a}", "gyro_{a} [{u}]")
+_ACCELEROMETERS = ("a{a}", "acc_{a}", "acc.{a}", "linear_acceleration.{a}", "accel_{a} [{u}]")
+_SPEEDS = ("m{i}", "omega{i}", "rotor_speed_{i}", "w{i}", "motor[{n}]", "motor_{i}", "prop{i}")
+_COMMANDS = ("cmd{i}", "motor[{n}]", "m{i}", "output[{n}]", "throttle_{i}", "u{i}")
+_PULSES = ("pwm{i}", "motor_pwm_{i}", "servo{i}", "motor[{n}]", "pwm[{n}]")
+_VOLTS = ("vbat", "battery", "voltage", "battery_voltage", "vbat [{u}]")
+
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_LENGTH = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
+_SPEED = {"rad/s": 1.0, "rpm": np.pi / 30.0, "Hz": 2.0 * np.pi}
+_SPEED_NAMES = {"rpm": "rpm{i}", "eRPM": "eRPM[{n}]"}
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A table that was written: the flight, what its columns mean, and how it was laid out."""
+
+    log: FlightLog
+    log_map: LogMap
+    separator: str
+    decimal: str
+    text: str
+
+
+def flight(vehicle: str, trajectory: str, seed: int, seconds: float = 20.0) -> FlightLog:
+    """Return a simulated flight with an IMU and motor commands (rotor speed by 1.25 times the
+    fastest).
+    """
+    model = load_vehicle(vehicle)
+    c = record_flight(model, (), trajectory, seconds, seed)
+    rng = np.random.default_rng(seed)
+    rotation = Rotation.from_quat(c["quaternion"], scalar_first=True)
+    thrust = np.zeros((len(c["t"]), 3))
+    thrust[:, 2] = np.square(c["rotor_speeds"]) @ model.k
+    force = rotation.inv().apply(c["force"]) + thrust
+    matrices = rotation.as_matrix().reshape(-1, 9)
+    period = float(np.median(np.diff(c["t"])))
+    smooth = savgol_filter(matrices, 15, 3, axis=0).reshape(-1, 3, 3)
+    change = savgol_filter(matrices, 15, 3, deriv=1, delta=period, axis=0).reshape(-1, 3, 3)
+    skew = np.einsum("nji,njk->nik", smooth, change)
+    rates = 0.5 * np.column_stack(
+        [
+            skew[:, 2, 1] - skew[:, 1, 2],
+            skew[:, 0, 2] - skew[:, 2, 0],
+            skew[:, 1, 0] - skew[:, 0, 1],
+        ]
+    )
+    return FlightLog(
+        t=c["t"],
+        position=c["position"],
+        quaternion=c["quaternion"],
+        rotor_speeds=c["rotor_speeds"],
+        voltage=c.get("voltage", np.full(len(c["t"]), 11.1)),
+        accelerometer=force / model.mass + 0.1 * rng.standard_normal(force.shape),
+        gyro=rates + 0.01 * rng.standard_normal(rates.shape),
+        command=np.clip(c["rotor_speeds"] / (1.25 * c["rotor_speeds"].max()), 0.0, 1.0),
+        name=f"{vehicle}_{trajectory}_{seed}",
+        vehicle=vehicle,
+    )
+
+
+def random_table(log: FlightLog, rng: np.random.Generator, imu_only: float = 0.15) -> Written:
+    """Return a flight as a table in a random convention.
+
+    Args:
+        log: the flight.
+        rng: draws the convention.
+        imu_only: share of tables without a pose.
+    """
+
+    def pick(items: Any) -> Any:
+        return items[int(rng.integers(len(items)))]
+
+    has_pose = bool(rng.random() >= imu_only)
+    has_imu = not has_pose or bool(rng.random() < 0.4)
+    world, body = pick((("enu", "flu"), ("ned", "frd"), ("enu", "flu"), ("enu", "frd")))
+    columns: dict[str, Array] = {}
+
+    unit = pick(tuple(_TIME))
+    begin = pick((0.0, 12.5, 1.7e9 if unit == "s" else 50.0))
+    template = pick(_TIMES)
+    name = template.format(u=unit)
+    columns[name] = (log.t + begin) / _TIME[unit]
+    parts: dict[str, Any] = {"time": TimeColumn(name, unit), "world": world, "body": body}
+
+    turn = np.array([1.0, -1.0, -1.0])
+    world_turn = turn if world == "ned" else np.ones(3)
+    body_turn = turn if body == "frd" else np.ones(3)
+    if has_pose:
+        parts |= _pose(log, columns, world_turn, body_turn, pick)
+    if has_imu:
+        parts |= _imu(log, columns, body_turn, body, pick)
+    parts |= _motors(log, columns, pick)
+    if rng.random() < 0.5 and log.voltage is not None:
+        unit = pick(("V", "mV"))
+        name = pick(_VOLTS).format(u=unit)
+        columns[name] = log.voltage / (1.0 if unit == "V" else 1e-3)
+        parts["battery"] = Battery((name,), unit)
+    _distract(log, columns, rng, pick)
+    separator = pick((",", ";", "\t", " "))
+    if separator == " " and any(" " in name for name in columns):
+        separator = ";"
+    decimal = pick((".", ",")) if separator != "," else "."
+    text = _text(columns, separator, decimal, int(rng.integers(0, 4)))
+    return Written(log, LogMap(name="truth", **parts), separator, decimal, text)
+
+
+def _distract(
+    log: FlightLog, columns: dict[str, Array], rng: np.random.Generator, pick: Any
+) -> None:
+    """Add columns that a flight log needs not: velocities, set points, a magnetometer, a mode."""
+    noise = rng.standard_normal((len(log.t), 3))
+    for templates, values in (
+        (("v{a}", "vel_{a}", "velocity.{a}", "est_v{a}"), np.gradient(log.position, axis=0)),
+        (("{a}_setpoint", "target_{a}", "pos_sp_{a}", "ref.{a}"), np.round(log.position, 1)),
+        (("mag_{a}", "mag.{a}"), 0.3 + 0.01 * noise),
+    ):
+        if rng.random() < 0.3:
+            template = pick(templates)
+            for a, column in zip("xyz", values.T, strict=True):
+                columns.setdefault(template.format(a=a), column)
+    if rng.random() < 0.3:
+        columns["mode"] = np.floor(log.t / 7.0)
+        columns["temperature"] = 30.0 + 0.01 * log.t
+
+
+def _pose(
+    log: FlightLog, columns: dict[str, Array], world: Array, body: Array, pick: Any
+) -> dict[str, Any]:
+    unit = pick(tuple(_LENGTH))
+    template = pick(_PLACES)
+    names = tuple(template.format(a=a, A=a.upper(), u=unit) for a in "xyz")
+    position = log.position * world / _LENGTH[unit]
+    columns |= dict(zip(names, position.T, strict=True))
+    out: dict[str, Any] = {"position": Columns(names, unit)}
+    rotation = Rotation.from_matrix(
+        world[:, None]
+        * Rotation.from_quat(log.quaternion, scalar_first=True).as_matrix()
+        * body[None, :]
+    )
+    sense = pick(("body_to_world", "body_to_world", "world_to_body"))
+    if sense == "world_to_body":
+        rotation = rotation.inv()
+    if pick((True, True, False)):
+        q = rotation.as_quat(scalar_first=True)
+        order = pick(("wxyz", "xyzw"))
+        if order == "xyzw":
+            q = q[:, [1, 2, 3, 0]]
+        if pick((True, True, False)):
+            template = pick(_QUATERNIONS)
+            names = tuple(template.format(a=a) for a in order)
+        else:
+            template = pick(_NUMBERED)
+            names = tuple(template.format(n=n) for n in range(4))
+        out["attitude"] = Attitude(names, order=order, sense=sense)
+        columns |= dict(zip(names, q.T, strict=True))
+        return out
+    euler, unit = pick(("zyx", "zyx", "xyz")), pick(("deg", "rad"))
+    angles = rotation.as_euler(euler.upper())
+    by_axis = {axis: angles[:, i] for i, axis in enumerate(euler)}
+    template = pick(_ANGLES)
+    names = tuple(template.format(a=a, A=a.capitalize(), u=unit) for a in ("roll", "pitch", "yaw"))
+    out["attitude"] = Attitude(names, euler=euler, unit=unit, sense=sense)
+    scale = 1.0 if unit == "rad" else 180.0 / np.pi
+    columns |= {name: scale * by_axis[axis] for name, axis in zip(names, "xyz", strict=True)}
+    return out
+
+
+def _imu(
+    log: FlightLog, columns: dict[str, Array], body: Array, axes: str, pick: Any
+) -> dict[str, Any]:
+    assert log.accelerometer is not None
+    assert log.gyro is not None
+    out: dict[str, Any] = {}
+    for section, templates, values, units in (
+        ("accelerometer", _ACCELEROMETERS, log.accelerometer, {"m/s2": 1.0, "g": 9.80665}),
+        ("gyro", _GYROS, log.gyro, {"rad/s": 1.0, "deg/s": np.pi / 180.0}),
+    ):
+        unit = pick(tuple(units))
+        template = pick(templates)
+        names = tuple(template.format(a=a, u=unit) for a in "xyz")
+        columns |= dict(zip(names, (values * body / units[unit]).T, strict=True))
+        out[section] = Sensor(names, unit, body=axes)
+    return out
+
+
+def _motors(log: FlightLog, columns: dict[str, Array], pick: Any) -> dict[str, Any]:
+    order = pick((*ORDERS.values(), tuple(int(i) for i in pick(((1, 3, 2, 4), (2, 1, 4, 3))))))
+    # motor m stands at the kit's place order.index(m)
+    at = [order.index(m) for m in (1, 2, 3, 4)]
+    kind = pick(("speed", "speed", "us", "normalised"))
+    if kind == "speed":
+        unit = pick(("rad/s", "rpm", "rpm", "Hz", "eRPM"))
+        pairs = 7 if unit == "eRPM" else 1
+        scale = _SPEED["rpm"] / pairs if unit == "eRPM" else _SPEED[unit]
+        template = _SPEED_NAMES.get(unit, "") if pick((True, unit == "eRPM")) else ""
+        template = template or pick(_SPEEDS)
+        values = log.rotor_speeds[:, at] / scale
+        names = tuple(template.format(i=i + 1, n=i) for i in range(4))
+        made: Any = Rotors(names, unit, order=order, pole_pairs=pairs)
+        columns |= dict(zip(names, values.T, strict=True))
+        return {"rotors": made}
+    assert log.command is not None
+    low, high = (1000.0, 2000.0) if kind == "us" else (0.0, 1.0)
+    values = low + (high - low) * log.command[:, at]
+    template = pick(_PULSES if kind == "us" else _COMMANDS)
+    names = tuple(template.format(i=i + 1, n=i) for i in range(4))
+    columns |= dict(zip(names, values.T, strict=True))
+    return {"commands": Commands(names, kind, order=order, range=(low, high))}
+
+
+def _text(columns: dict[str, Array], separator: str, decimal: str, comments: int) -> str:
+    lines = [f"# exported by a program, line {i + 1}" for i in range(comments)]
+    lines.append(separator.join(columns))
+    texts = [[f"{x:.17g}" for x in column.tolist()] for column in columns.values()]
+    if decimal == ",":
+        texts = [[x.replace(".", ",") for x in column] for column in texts]
+    lines += [separator.join(row) for row in zip(*texts, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def save(written: Written, path: Path) -> Path:
+    """Write a table's text to a file."""
+    path.write_text(written.text, encoding="utf-8")
+    return path
+
+
+def with_rates(log: FlightLog, rng: np.random.Generator) -> FlightLog:
+    """Return the flight with a pose in every second row alone, as a table of several rates has
+    it.
+    """
+    lost = np.zeros(len(log.t), bool)
+    lost[int(rng.integers(2)) :: 2] = True
+    position, quaternion = log.position.copy(), log.quaternion.copy()
+    position[lost] = quaternion[lost] = np.nan
+    return replace(log, position=position, quaternion=quaternion, valid=~lost)

@@ -1,0 +1,73 @@
+"""``check`` and ``convert``: anyone's table in, by the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from windwrench.cli import app
+from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.errors import InputError
+from windwrench.studies.map_guesses.random_tables import Written, flight, random_table, save
+
+
+@pytest.fixture(scope="module")
+def written() -> Written:
+    return random_table(flight("ardrone2", "excite", 1, 12.0), np.random.default_rng(4), 0.0)
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, object]:
+    app([*map(str, arguments), "--json"], standalone_mode=False)
+    found: dict[str, object] = json.loads(capsys.readouterr().out)["result"]
+    return found
+
+
+def test_check_proposes_a_map_that_convert_takes(
+    tmp_path: Path, written: Written, capsys: pytest.CaptureFixture[str]
+) -> None:
+    theirs, map_file = save(written, tmp_path / "theirs.csv"), tmp_path / "map.yaml"
+    found = run(
+        capsys, "check", theirs, "--vehicle", "ardrone2", "--write-map", map_file, "--out", tmp_path
+    )
+    assert found["read_by"] == "a map that was guessed"
+    assert (tmp_path / "check.png").read_bytes().startswith(b"\x89PNG")
+    assert found["map"] == map_file.read_text()
+    assert all(field["why"] for field in found["fields"])  # type: ignore[attr-defined]
+    ours = tmp_path / "ours.csv.gz"
+    run(capsys, "convert", theirs, "--map", map_file, "--out", ours)
+    log = read_log(ours)
+    np.testing.assert_allclose(log.position, written.log.position, atol=1e-9)
+    again = run(capsys, "check", ours, "--out", tmp_path / "again")
+    assert again["read_by"] == "this kit's own format"
+    assert again["vehicle"] == "ardrone2"
+
+
+def test_a_log_of_the_kits_own_needs_no_map(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(capsys, "record", "--seconds", 2, "--out", tmp_path / "own.csv")
+    with pytest.raises(InputError, match="is read by this kit's own format and needs no map"):
+        app(
+            ["check", str(tmp_path / "own.csv"), "--write-map", str(tmp_path / "map.yaml")],
+            standalone_mode=False,
+        )
+    own = str(tmp_path / "own.csv")
+    with pytest.raises(InputError, match="is the log itself"):
+        app(["convert", own, "--out", own], standalone_mode=False)
+
+
+def test_commands_stay_commands_when_they_are_converted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What nobody measured must not come back as if it had been."""
+    lines = ["time,x,y,z,roll,pitch,yaw,pwm1,pwm2,pwm3,pwm4"]
+    lines += [f"{0.01 * k:.2f},0,0,1,0,0,0,1500,1500,1500,1500" for k in range(50)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    out = tmp_path / "b.csv"
+    run(
+        capsys, "convert", tmp_path / "a.csv", "--map", "euler-pwm", "--vehicle", "crazyflie",
+        "--out", out,
+    )  # fmt: skip
+    assert "cmd1" in out.read_text().split("\n")[0]
+    assert "omega1" not in out.read_text().split("\n")[0]

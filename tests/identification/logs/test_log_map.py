@@ -1,0 +1,312 @@
+"""Maps: what the columns of somebody's table mean, and the flight log that follows."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.identification.inference.commanded_rotors import thrust_is_assumed
+from windwrench.identification.logs.flight_log import FlightLog, with_rows, write_log
+from windwrench.identification.logs.log_map import load_map, map_names, parse_map
+from windwrench.identification.logs.mapped_log import read_mapped
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.rotor_orders import ORDERS, order_words, rotor_order
+from windwrench.runtime.errors import InputError
+from windwrench.studies.map_guesses.random_tables import flight, random_table, save
+
+GOOD = {
+    "time": {"column": "t"},
+    "position": {"columns": ["x", "y", "z"]},
+    "attitude": {"columns": ["qx", "qy", "qz", "qw"], "order": "xyzw"},
+    "rotors": {"columns": ["m1", "m2", "m3", "m4"], "unit": "rpm", "order": "betaflight"},
+}
+
+
+@pytest.fixture(scope="module")
+def flown() -> FlightLog:
+    """Six seconds of a simulated flight with an IMU, commands and a voltage."""
+    return flight("ardrone2", "excite", 3, 6.0)
+
+
+def assert_same(found: FlightLog, true: FlightLog) -> None:
+    np.testing.assert_allclose(found.t, true.t - true.t[0], atol=2e-6)
+    if found.has_pose:
+        np.testing.assert_allclose(found.position, true.position, atol=1e-9)
+        same = np.sum(found.quaternion * true.quaternion, axis=1)
+        np.testing.assert_allclose(np.abs(same), 1.0, atol=1e-9)
+    if found.command is not None:
+        np.testing.assert_allclose(found.command, true.command, atol=1e-9)
+    else:
+        np.testing.assert_allclose(found.rotor_speeds, true.rotor_speeds, rtol=1e-9)
+    for name in ("accelerometer", "gyro", "voltage"):
+        if getattr(found, name) is not None:
+            np.testing.assert_allclose(getattr(found, name), getattr(true, name), atol=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_any_convention_and_its_map_give_the_same_flight(
+    tmp_path: Path, flown: FlightLog, seed: int
+) -> None:
+    """Separators, decimal commas, units, frames, quaternion and Euler orders, rotor orders."""
+    rng = np.random.default_rng(seed)
+    first = int(rng.integers(0, len(flown.t) - 60))
+    rows = np.zeros(len(flown.t), bool)
+    rows[first : first + 50] = True
+    true = with_rows(flown, rows)
+    true = replace(true, t=true.t - true.t[0])
+    written = random_table(true, rng)
+    found = read_mapped(save(written, tmp_path / "table.csv"), written.log_map)
+    assert_same(found, true)
+    assert found.has_pose == (written.log_map.position is not None)
+    assert (found.gyro is None) == (written.log_map.gyro is None)
+
+
+@pytest.mark.parametrize("name", map_names())
+def test_each_map_that_ships_is_a_map(name: str) -> None:
+    found = load_map(name)
+    assert found.about
+    assert found.name == name
+    assert set(found.recognise) <= {
+        column for part in found.sections.values() for column in part.columns
+    } | {found.time.column, "loopIteration", "pwm_m1_0to65535"}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"tim": {}}, "unknown field 'tim'; expected one of .*Did you mean 'time'"),
+        ({"time": {"column": "t", "unit": "h"}}, "map: time: unknown unit 'h'; expected one of"),
+        ({"time": {"unit": "s"}}, "map: time: column: missing; expected one column"),
+        ({"position": {"columns": ["x", "y"]}}, r"position: columns: \['x', 'y'\]; expected a li"),
+        ({"position": None}, "no section position; expected position and attitude"),
+        ({"attitude": {"columns": ["a", "b", "c"]}}, "attitude: columns: .*a list of 4 columns"),
+        (
+            {"rotors": {**GOOD["rotors"], "order": "px4"}},
+            "rotors: order: unknown rotor order",
+        ),
+        ({"rotors": {**GOOD["rotors"], "order": [1, 2, 3, 3]}}, "rotors: order: .*numbers of the"),
+        ({"rotors": {**GOOD["rotors"], "unit": "eRPM"}}, "eRPM without pole_pairs"),
+        ({"rotors": {**GOOD["rotors"], "scale": 0}}, "rotors: scale: 0; expected a factor"),
+        ({"rotors": {**GOOD["rotors"], "signs": [1, 2, 1, 1]}}, "signs: .*4 times 1 or -1"),
+        ({"rotors": None}, "no motors; expected a section rotors or commands"),
+        ({"world": "esu"}, "unknown world 'esu'; expected one of enu"),
+        ({"gyro": {"columns": ["a", "b", "c"], "unit": "raw"}}, "gyro: unit raw without a scale"),
+        (
+            {"commands": {"columns": list("abcd"), "unit": "us", "range": [1, 1]}},
+            "range: .*two numbers",
+        ),
+    ],
+)
+def test_a_map_that_is_none_says_what_was_expected(
+    change: dict[str, object], expected: str
+) -> None:
+    with pytest.raises(InputError, match=expected):
+        parse_map({**GOOD, **change}, "map")
+
+
+def test_a_map_of_no_name_is_suggested() -> None:
+    with pytest.raises(InputError, match=r"unknown map 'betafligt'.*Did you mean 'betaflight'"):
+        load_map("betafligt")
+
+
+def table(path: Path, columns: dict[str, object], count: int = 40) -> Path:
+    """Write a hover; a column is a number, or a list of fields."""
+    good: dict[str, object] = {"t": [f"{0.01 * k:.2f}" for k in range(count)]}
+    good |= {"x": 0.1, "y": 0.2, "z": 1.0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}
+    good |= dict.fromkeys(("m1", "m2", "m3", "m4"), 3600.0) | columns
+    texts = [v if isinstance(v, list) else [str(v)] * count for v in good.values()]
+    rows = [",".join(row) for row in zip(*texts, strict=True)]
+    path.write_text("\n".join([",".join(good), *rows]) + "\n")
+    return path
+
+
+def test_a_map_that_does_not_fit_names_the_columns(tmp_path: Path) -> None:
+    given = {**GOOD, "position": {"columns": ["pos_x", "pos_y", "altitude"]}}
+    with pytest.raises(InputError) as caught:
+        read_mapped(table(tmp_path / "a.csv", {"Pos_X": 1}), parse_map(given, "mine.yaml"))
+    text = str(caught.value)
+    assert "map mine.yaml does not fit: no column 'pos_x' of position (like Pos_X)" in text
+    assert "'altitude' of position" in text
+    assert "found t, x, y, z" in text
+
+
+def test_a_map_file_is_taken_by_read_log(tmp_path: Path) -> None:
+    """Betaflight's motor 1 is the rear right one, the kit's rotor 3."""
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(GOOD))
+    path = table(tmp_path / "a.csv", {"m1": 3000.0})
+    log = read_log(path, map=tmp_path / "map.yaml")
+    np.testing.assert_allclose(log.rotor_speeds[0] * 30 / np.pi, [3600, 3600, 3000, 3600])
+    with pytest.raises(InputError, match="both a reader and a map"):
+        read_log(path, "nanobench", map=tmp_path / "map.yaml")
+
+
+def test_orders_are_what_their_names_say() -> None:
+    assert order_words(ORDERS["betaflight"]) == (
+        "motors 1 rear-right, 2 front-right, 3 rear-left, 4 front-left"
+    )
+    assert order_words(ORDERS["px4-x"]) == (
+        "motors 1 front-right, 2 rear-left, 3 front-left, 4 rear-right"
+    )
+    assert order_words(ORDERS["crazyflie"]) == (
+        "motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left"
+    )
+    assert rotor_order([4, 3, 2, 1], "") == ORDERS["crazyflie"]
+
+
+def test_a_table_of_several_rates_has_the_rows_of_its_pose(tmp_path: Path) -> None:
+    """Pose at 50 Hz, rotors at 100 Hz in other rows, a voltage now and then."""
+    count = 80
+    pose = {
+        name: [value if k % 2 == 0 else "" for k in range(count)]
+        for name, value in {
+            "x": "0",
+            "y": "0",
+            "z": "1",
+            "qx": "0",
+            "qy": "0",
+            "qz": "0",
+            "qw": "1",
+        }.items()
+    }
+    rotors = {
+        f"m{i}": [f"{3600 + k}" if k % 2 else "NaN" for k in range(count)] for i in (1, 2, 3, 4)
+    }
+    volts = {"v": [f"{11 + 0.01 * k:.2f}" if k % 20 == 0 else "" for k in range(count)]}
+    path = table(tmp_path / "a.csv", {**pose, **rotors, **volts}, count)
+    found = read_mapped(path, parse_map({**GOOD, "battery": {"column": "v"}}, "m"))
+    assert found.valid.all()
+    assert len(found.t) == 39  # from the rotors' first sample to their last
+    np.testing.assert_allclose(found.rotor_speeds[:, 0] * 30 / np.pi, 3600 + np.arange(2, 80, 2))
+    assert found.voltage is not None
+    assert found.voltage[9] == pytest.approx(11.2)
+    assert any(
+        "interpolated to the other rows" in note or "missing" in note for note in found.notes
+    )
+
+
+def test_rows_of_one_time_are_one_row(tmp_path: Path) -> None:
+    t = [f"{0.01 * (k // 2):.2f}" for k in range(80)]
+    pose = {
+        n: [v if k % 2 else "" for k in range(80)]
+        for n, v in zip(("x", "y", "z", "qx", "qy", "qz", "qw"), "0010001", strict=True)
+    }
+    rotors = {f"m{i}": ["" if k % 2 else "3600" for k in range(80)] for i in (1, 2, 3, 4)}
+    found = read_mapped(
+        table(tmp_path / "a.csv", {"t": t, **pose, **rotors}, 80), parse_map(GOOD, "m")
+    )
+    assert len(found.t) == 40
+    assert found.valid.all()
+    assert any("joined" in note for note in found.notes)
+
+
+def test_times_that_go_back_are_refused_with_their_row(tmp_path: Path) -> None:
+    t = [f"{0.01 * k:.2f}" for k in range(40)]
+    t[7] = "0.01"
+    words = r"column t, row 8 \(line 9\): 0.01 goes back from 0.06"
+    with pytest.raises(InputError, match=words):
+        read_mapped(table(tmp_path / "a.csv", {"t": t}), parse_map(GOOD, "m"))
+
+
+COMMANDED = {
+    **{k: v for k, v in GOOD.items() if k != "rotors"},
+    "commands": {"columns": ["m1", "m2", "m3", "m4"], "unit": "us", "order": "px4-x"},
+}
+
+
+def test_commands_without_a_curve_say_what_is_assumed(tmp_path: Path) -> None:
+    """Level at 1600 us: each rotor carries a quarter of the weight, and that is an assumption."""
+    vehicle = load_vehicle("crazyflie")
+    path = table(tmp_path / "a.csv", dict.fromkeys(("m1", "m2", "m3", "m4"), 1600))
+    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, COMMANDED))
+    assert log.commanded
+    assert thrust_is_assumed([log], vehicle)
+    np.testing.assert_allclose(log.rotor_speeds, vehicle.hover_rate)
+    assert any("cannot be found from this log" in note for note in log.notes)
+
+
+def test_a_tilted_flight_needs_more_than_its_weight(tmp_path: Path) -> None:
+    """At a tilt of 60 degrees twice the weight flies level."""
+    vehicle = load_vehicle("crazyflie")
+    tilted = {"qx": np.sin(np.pi / 6), "qw": np.cos(np.pi / 6)}
+    path = table(tmp_path / "a.csv", {**tilted, **dict.fromkeys(("m1", "m2", "m3", "m4"), 1600)})
+    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, COMMANDED))
+    np.testing.assert_allclose(log.rotor_speeds, np.sqrt(2.0) * vehicle.hover_rate)
+
+
+def test_a_stated_curve_turns_commands_into_speeds(tmp_path: Path) -> None:
+    curve = MotorCurve(thrust=(0.0, 0.02, 0.10), command=(1000.0, 2000.0))
+    vehicle = replace(load_vehicle("crazyflie"), motor_curve=curve)
+    given = {**COMMANDED, "commands": {**COMMANDED["commands"], "unit": "counts"}}
+    path = table(tmp_path / "a.csv", dict.fromkeys(("m1", "m2", "m3", "m4"), 1600))
+    log = read_log(path, vehicle=vehicle, map=_saved(tmp_path, given))
+    assert log.commanded
+    assert not thrust_is_assumed([log], vehicle)
+    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[0] ** 2, 0.012 + 0.036)
+    assert any("motor curve" in note for note in log.notes)
+    with pytest.raises(InputError, match="unit counts without a range"):
+        read_log(path, map=tmp_path / "map.yaml")
+
+
+def test_commands_of_another_range_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected motor commands from 1000 to 2000"):
+        read_mapped(table(tmp_path / "a.csv", {}), parse_map(COMMANDED, "m"))
+
+
+def _saved(folder: Path, given: dict[str, object]) -> Path:
+    path = folder / "map.yaml"
+    path.write_text(yaml.safe_dump(given))
+    return path
+
+
+def test_the_kits_own_columns_are_read_in_any_layout(tmp_path: Path, flown: FlightLog) -> None:
+    """Semicolons, decimal commas and a comment, without a map."""
+    write_log(flown, tmp_path / "own.csv")
+    text = (tmp_path / "own.csv").read_text()
+    other = "# from a spreadsheet\n" + text.replace(",", ";").replace(".", ",")
+    (tmp_path / "other.csv").write_text(other)
+    (tmp_path / "other.txt").write_text(other)
+    own = read_log(tmp_path / "own.csv")
+    for name in ("other.csv", "other.txt"):
+        log = read_log(tmp_path / name)
+        np.testing.assert_array_equal(log.t, own.t)
+        np.testing.assert_allclose(log.rotor_speeds, own.rotor_speeds, rtol=1e-12)
+        np.testing.assert_allclose(log.gyro, own.gyro, atol=1e-15)
+
+
+def test_a_betaflight_table_is_known_by_its_columns(tmp_path: Path) -> None:
+    """As blackbox_decode writes it: settings before the header, a text column, no pose."""
+    names = ["loopIteration", "time (us)", *(f"gyroADC[{i}]" for i in range(3))]
+    names += [f"accSmooth[{i}]" for i in range(3)] + [f"motor[{i}]" for i in range(4)]
+    names += [f"eRPM[{i}]" for i in range(4)] + ["vbatLatest (V)", "flightModeFlags (flags)"]
+    row = ["500", "600", "700", "800", "1000", "1100", "1200", "1300", "16.1", "ANGLE_MODE|ARM"]
+    lines = ['"Product","Blackbox flight data recorder"', '"acc_1G","2048"', ", ".join(names)]
+    for k in range(50):
+        imu = [str(10 + k), str(-20 - k), str(30 + k), str(k), str(k), str(2048 + k)]
+        lines.append(", ".join([str(k), str(1000 * k), *imu, *row]))
+    path = tmp_path / "bf.csv"
+    path.write_text("\n".join(lines) + "\n")
+    log = read_log(path)
+    assert not log.has_pose
+    assert log.notes[0] == "columns: by the map betaflight"
+    assert log.accelerometer is not None
+    assert log.gyro is not None
+    np.testing.assert_allclose(log.accelerometer[0], [0.0, 0.0, 9.80665])
+    np.testing.assert_allclose(log.gyro[0], np.radians([10, -20, 30]))
+    rpm = log.rotor_speeds[0] * 7 * 30 / np.pi
+    np.testing.assert_allclose(rpm, [130_000, 120_000, 100_000, 110_000])
+    assert log.command is not None
+    np.testing.assert_allclose(log.command[0, 0], (800 - 48) / (2047 - 48))
+
+
+def test_an_unknown_table_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"missing column\(s\) px.*windwrench check a.csv"):
+        read_log(table(tmp_path / "a.csv", {}))

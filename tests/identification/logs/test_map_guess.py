@@ -1,0 +1,86 @@
+"""Maps that are guessed: right, or marked as a guess, never silently wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from windwrench.dynamics import load_vehicle
+from windwrench.identification.logs.column_names import take_apart
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.layout_guess import open_any_table
+from windwrench.identification.logs.log_map import parse_map
+from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml
+from windwrench.runtime.errors import InputError
+from windwrench.studies.map_guesses.random_tables import flight, random_table, save
+from windwrench.studies.map_guesses.study import fields_of, judge
+
+
+@pytest.fixture(scope="module")
+def flown() -> list[FlightLog]:
+    """A lively flight and a hover."""
+    return [flight("ardrone2", "excite", 1, 15.0), flight("crazyflie", "hover", 2, 10.0)]
+
+
+def guessed(path: Path, name: str = "") -> Guess:
+    table, layout = open_any_table(path)
+    return guess_map(table, layout, load_vehicle(name) if name else None)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_no_guess_is_silently_wrong(tmp_path: Path, flown: list[FlightLog], seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    log = flown[seed % 4 == 3]
+    written = random_table(log, rng)
+    found = guessed(save(written, tmp_path / "table.csv"), log.vehicle if seed % 2 else "")
+    _, silent = judge(found, written.log_map)
+    assert not silent
+
+
+def test_a_lively_flight_is_read_right_with_its_vehicle(
+    tmp_path: Path, flown: list[FlightLog]
+) -> None:
+    """Most fields of most tables are right; here every field of 4 of 5 tables, guessed or not."""
+    right = 0
+    for seed in range(5):
+        written = random_table(flown[0], np.random.default_rng(seed), imu_only=0.0)
+        flagged, silent = judge(
+            guessed(save(written, tmp_path / "table.csv"), "ardrone2"), written.log_map
+        )
+        right += not flagged and not silent
+    assert right >= 4
+
+
+def test_the_map_that_is_written_is_the_map_that_was_guessed(
+    tmp_path: Path, flown: list[FlightLog]
+) -> None:
+    for seed in range(4):
+        written = random_table(flown[0], np.random.default_rng(seed))
+        found = guessed(save(written, tmp_path / "table.csv"))
+        text = map_yaml(found)
+        again = parse_map(yaml.safe_load(text), "map")
+        assert fields_of(again) == fields_of(found.log_map)
+        assert text.count("# GUESS") == len(found.doubts)
+
+
+def test_names_are_taken_apart() -> None:
+    names = take_apart(["Position X [mm]", "gyroADC[1]", "roll_deg", "q[0]", "t", "accel_x (g)"])
+    assert [(n.base, n.unit) for n in names] == [
+        ("position_x", "mm"),
+        ("gyroadc_1", ""),
+        ("roll", "deg"),
+        ("q_0", ""),
+        ("t", ""),
+        ("accel_x", "g"),
+    ]
+
+
+def test_a_table_without_motors_or_pose_is_refused_with_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,height\n0,1\n0.1,2\n0.2,2\n")
+    with pytest.raises(InputError, match=r"no columns look like a pose .* or like four motors"):
+        guessed(path)
+    path.write_text("a,b\n0,1\n0,2\n0,2\n")
+    with pytest.raises(InputError, match="no column looks like a time"):
+        guessed(path)
