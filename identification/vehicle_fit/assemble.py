@@ -21,6 +21,7 @@ _EFFECTS = {
     "body_drag": ("dx", "dy", "dz", "cx", "cy"),
     "inflow_thrust": ("kz",),
     "translational_lift": ("kh",),
+    "rate_damping": ("dx", "dy", "dz"),
 }
 _EITHER_SIGN = ("translational_lift",)
 
@@ -113,6 +114,8 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
             found = {letter: value for letter, value in found.items() if value > 0.0}
         if any(found.values()):
             out.append(EffectSetting(effect, found))
+    if any(e.name == "rotor_drag" for e in out):  # which damps by itself, rotor by rotor
+        out = [e for e in out if e.name != "rate_damping"]
     return out
 
 

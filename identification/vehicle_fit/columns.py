@@ -75,7 +75,7 @@ def balance(
     noise: list[Array] = []
     for piece in pieces:
         here = rotor_columns(piece, drive)
-        air = _air_columns(piece)
+        air = air_columns(piece)
         names = (*here, *air)
         base = np.column_stack([*_measured(piece), *here.values(), *air.values()])
         parts, count = [base], len(names)
@@ -113,7 +113,7 @@ def basis(piece: Piece, drive: Drive) -> Array:
 
 
 def turning(piece: Piece, drive: Drive) -> Array:
-    """Return each rotor's speed (n, 4), behind the lag: measured, or as its command says, 0 to 1."""
+    """Return each rotor's speed (n, 4), behind the lag: as measured, or its command."""
     source = piece.command if drive.commands else piece.rotor_speeds
     assert source is not None
     return lagged(source, drive.lag, piece.period)
@@ -141,7 +141,7 @@ def rotor_columns(piece: Piece, drive: Drive) -> dict[str, Array]:
     return out
 
 
-def _air_columns(piece: Piece) -> dict[str, Array]:
+def air_columns(piece: Piece) -> dict[str, Array]:
     """Return the columns (n,) that do not depend on the rotors."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)

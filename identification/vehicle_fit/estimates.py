@@ -98,7 +98,7 @@ def estimates_of(
     _yaw(out, read, sources, arm, arm_range, fixed)
     _lag(out, read, sources)
     _centre(out, read, sources, geometry, arm)
-    _drag(out, read, sources, kept)
+    _drag(out, read, sources, arm, kept)
     return out
 
 
@@ -331,7 +331,9 @@ def _centre(
         )
 
 
-def _drag(out: list[Estimate], read: Reading, sources: Sources, kept: Sequence[str]) -> None:
+def _drag(
+    out: list[Estimate], read: Reading, sources: Sources, arm: float, kept: Sequence[str]
+) -> None:
     if not sources.velocity:
         out.append(
             Estimate(
@@ -372,6 +374,18 @@ def _drag(out: list[Estimate], read: Reading, sources: Sources, kept: Sequence[s
         out.append(
             Estimate("translational_lift kh", *known, "N/(m/s)^2", IDENTIFIED, "force along body z")
         )
+    for axis in "xyz":
+        if f"damping {axis}" in kept:
+            known = read.interval(lambda v, axis=axis: arm * v[f"damping {axis}"])
+            out.append(
+                Estimate(
+                    f"rate_damping d{axis}",
+                    *known,
+                    "Nm/(rad/s)",
+                    IDENTIFIED,
+                    f"{sources.rate} against its own derivative",
+                )
+            )
     if not any_of:
         out.append(
             Estimate(

@@ -21,7 +21,7 @@ from .channels import Piece, Sources, pieces_of
 from .columns import Drive
 from .estimates import estimates_of
 from .geometry import SPIN, Geometry
-from .parameters import DELAY, OPTIONAL, first_model, with_fixed, with_more
+from .parameters import DELAY, OPTIONAL, POSITIVE, first_model, with_fixed, with_more
 from .result import Identified
 from .rounding import rounding_step
 from .solve import Fit, fall_with, solve, step_with
@@ -43,8 +43,7 @@ class IdentifySettings:
     penalty: float = 2.0
     least_voltage_range: float = 0.03  # share: below it the voltage's exponent is not asked for
     least_lag: float = 4.0  # standard deviations of a lag behind rotor speeds that were logged
-    lags: tuple[float, ...] = (0.02, 0.08)  # s, where the search for it starts
-    first_rounds: int = 4
+    lags: tuple[float, ...] = (0.03, 0.08)  # s, where the search for it starts
 
 
 IDENTIFY = IdentifySettings()
@@ -151,36 +150,26 @@ def _first_fit(
         return (other if sure and plain.loss - other.loss > enough else plain), turned
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
     best: tuple[float, Fit, bool] | None = None
-    for exponents in ((2,), (1, 2), (0, 1, 2)):
+    # from the richest curve down: a fit that starts poor takes its own misfit for noise
+    for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
         model, start, here, turned = first_model(pieces, sources, here, mass, gravity)
         lags = IDENTIFY.lags if best is None else (best[1].drive.lag,)
-        tried = [
-            solve(
-                pieces,
-                replace(here, lag=lag),
-                model,
-                start,
-                nonlinear,
-                0.0,
-                prior,
-                IDENTIFY.first_rounds,
-            )
-            for lag in lags
-        ]
-        fit = min(tried, key=lambda f: f.loss)
+        fit = min(
+            (
+                solve(pieces, replace(here, lag=lag), model, start, nonlinear, 0.0, prior)
+                for lag in lags
+            ),
+            key=lambda f: f.loss,
+        )
         cost = fit.loss + IDENTIFY.penalty * math.log(_frequencies(fit)) * len(exponents)
-        if not _rises(fit):
-            continue
-        if best is None or cost < best[0]:
+        if _rises(fit) and (best is None or cost < best[0]):
             best = cost, fit, turned
     if best is None:
         raise InputError(
             "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
         )
-    fit, turned = best[1], best[2]
-    theta = fit.theta[: len(fit.model.free)]
-    return solve(pieces, fit.drive, fit.model, theta, nonlinear, 0.0, prior), turned
+    return best[1], best[2]
 
 
 def _rises(fit: Fit) -> bool:
@@ -209,8 +198,10 @@ def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, li
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
         if fall_with(fit, model, start) > least:
             quiet = 0.0 if fit.drive.lag > 0.0 else noise
-            fit = solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY})
-            kept.append(name)
+            richer = solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY})
+            if all(richer.values[p] > 0.0 for p in parameters if p in POSITIVE):
+                fit = richer
+                kept.append(name)
     return fit, kept
 
 

@@ -7,8 +7,9 @@ little. Angular acceleration: ``w' = J^-1 (torque - w x J w) + bias``.
 Parameters (``theta``) are numbers near 1 or 0: what they multiply is in ``Scales``.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,68 +50,68 @@ def inertia_of(p: Mapping[str, float]) -> Array:
     return np.array([[p["Jx"], xy, xz], [xy, p["Jy"], yz], [xz, yz, p["Jz"]]])
 
 
-def coefficients(p: Mapping[str, float], names: Sequence[str], mass: float, powers: int) -> Array:
+def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, powers: int) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
-    place = {name: i for i, name in enumerate(names)}
-    out = np.zeros((6, len(names)))
+    place, lever, gyroscopic = _structure(names)
     get = p.get
-    thrust = [get(f"a{j}", 0.0) for j in range(powers)]
-    for j, a in enumerate(thrust):
-        out[0, place[f"T{j}"]] = get("tilt x", 0.0) * a / mass
-        out[1, place[f"T{j}"]] = get("tilt y", 0.0) * a / mass
-        out[2, place[f"T{j}"]] = a / mass
-    for i, axis in enumerate(_AXES):
-        out[i, place["1"]] = get(f"force bias {axis}", 0.0)
-        for kind in ("rotor drag", "linear drag", "quadratic drag"):
-            if f"{kind} {axis}" in place:
-                out[i, place[f"{kind} {axis}"]] = get(f"{kind} {axis}", 0.0) / mass
-    if "lift" in place:
-        out[2, place["lift"]] = get("lift", 0.0) / mass
-    _lever(out, place, np.array([get(n, 0.0) for n in LEVERS]))
-
-    moment = np.zeros((3, len(names)))  # torque about the centre of mass
-    for j, a in enumerate(thrust):
-        moment[0, place[f"X{j}"]] += a
-        moment[0, place[f"T{j}"]] -= a * get("cy", 0.0)
-        moment[1, place[f"Y{j}"]] += a
-        moment[1, place[f"T{j}"]] += a * get("cx", 0.0)
-        moment[2, place[f"Z{j}"]] += a * get("reach", 0.0)
-    moment[2, place["spin up"]] = get("Jr", 0.0)
-    moment[0, place["spin x"]], moment[1, place["spin y"]] = get("Jr", 0.0), get("Jr", 0.0)
     inertia = inertia_of(p)
-    _gyroscopic(moment, place, inertia)
+    out = np.empty((6, len(names)))
+    out[:3] = np.tensordot([get(n, 0.0) for n in LEVERS], lever, 1)
+    moment = np.tensordot(inertia.ravel(), gyroscopic, 1)  # torque about the centre of mass
+    for j in range(powers):
+        a = get(f"a{j}", 0.0)
+        thrust = place[f"T{j}"]
+        out[0, thrust] += get("tilt x", 0.0) * a / mass
+        out[1, thrust] += get("tilt y", 0.0) * a / mass
+        out[2, thrust] += a / mass
+        moment[0, place[f"X{j}"]] += a
+        moment[0, thrust] -= a * get("cy", 0.0)
+        moment[1, place[f"Y{j}"]] += a
+        moment[1, thrust] += a * get("cx", 0.0)
+        moment[2, place[f"Z{j}"]] += a * get("reach", 0.0)
     for i, axis in enumerate(_AXES):
+        out[i, place["1"]] += get(f"force bias {axis}", 0.0)
         moment[i, place[f"w{axis}"]] -= get(f"damping {axis}", 0.0)
+        for kind in ("rotor drag", "linear drag", "quadratic drag"):
+            if (value := get(f"{kind} {axis}")) is not None:
+                out[i, place[f"{kind} {axis}"]] += value / mass
+    if "lift" in p:
+        out[2, place["lift"]] += p["lift"] / mass
+    spin = get("Jr", 0.0)
+    moment[2, place["spin up"]] += spin
+    moment[0, place["spin x"]] += spin
+    moment[1, place["spin y"]] += spin
     out[3:] = np.linalg.solve(inertia, moment)
     for i, axis in enumerate(_AXES):
         out[3 + i, place["1"]] += get(f"turn bias {axis}", 0.0)
     return out
 
 
-def _lever(out: Array, place: Mapping[str, int], r: Array) -> None:
-    """Add ``w' x r + w x (w x r)`` to the force's coefficients."""
+@lru_cache(maxsize=16)
+def _structure(names: tuple[str, ...]) -> tuple[dict[str, int], Array, Array]:
+    """Return the columns' places; the force's coefficients (3, 3, c) for each part of the lever,
+    ``w' x r + w x (w x r)``; and the torque's (9, 3, c) for each part of the inertia, ``-w x J w``.
+    """
+    place = {name: i for i, name in enumerate(names)}
+
+    def product(a: int, b: int) -> int:
+        first, second = sorted((a, b))
+        return place[f"w{_AXES[first]}w{_AXES[second]}"]
+
+    lever, gyroscopic = np.zeros((3, 3, len(names))), np.zeros((9, 3, len(names)))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        out[i, place[f"dw{_AXES[j]}"]] += r[k]
-        out[i, place[f"dw{_AXES[k]}"]] -= r[j]
+        lever[k, i, place[f"dw{_AXES[j]}"]] += 1.0
+        lever[j, i, place[f"dw{_AXES[k]}"]] -= 1.0
         for n in range(3):
-            a, b = sorted((i, n))
-            out[i, place[f"w{_AXES[a]}w{_AXES[b]}"]] += r[n]
-        for n in range(3):
-            out[i, place[f"w{_AXES[n]}w{_AXES[n]}"]] -= r[i]
+            lever[n, i, product(i, n)] += 1.0
+            lever[i, i, product(n, n)] -= 1.0
+            gyroscopic[3 * k + n, i, product(j, n)] -= 1.0
+            gyroscopic[3 * j + n, i, product(k, n)] += 1.0
+    return place, lever, gyroscopic
 
 
-def _gyroscopic(moment: Array, place: Mapping[str, int], inertia: Array) -> None:
-    """Add ``-w x J w`` to the moment's coefficients."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        for n in range(3):
-            for sign, a, row in ((-1.0, j, k), (1.0, k, j)):
-                first, second = sorted((a, n))
-                moment[i, place[f"w{_AXES[first]}w{_AXES[second]}"]] += sign * inertia[row, n]
-
-
-def jacobian(model: Model, theta: Array, names: Sequence[str]) -> tuple[Array, Array]:
+def jacobian(model: Model, theta: Array, names: tuple[str, ...]) -> tuple[Array, Array]:
     """Return the coefficients (6, c) and their derivatives (p, 6, c) by the free parameters."""
 
     def at(x: Array) -> Array:

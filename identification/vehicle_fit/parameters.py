@@ -37,6 +37,8 @@ BASE = (
     "turn bias z",
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
+# of these a negative value is no physics, but another fault of the model
+POSITIVE = tuple(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz")
 # each is added where it makes the logs much likelier
 OPTIONAL: dict[str, tuple[str, ...]] = {
     "rotor_drag": ("rotor drag x", "rotor drag y"),
@@ -45,7 +47,9 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
     "vertical drag": ("linear drag z",),
     "inflow": ("rotor drag z",),
     "lift": ("lift",),
-    "rate_damping": ("damping x", "damping y", "damping z"),
+    "damping x": ("damping x",),
+    "damping y": ("damping y",),
+    "damping z": ("damping z",),
     "products of inertia": ("Jxy", "Jxz", "Jyz"),
 }
 

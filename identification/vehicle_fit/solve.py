@@ -98,7 +98,6 @@ def solve(
     nonlinear: tuple[str, ...],
     rotor_noise: float = 0.0,
     nonlinear_prior: dict[str, float] | None = None,
-    rounds: int | None = None,
 ) -> Fit:
     """Return the fit that Gauss-Newton reaches from ``start`` (p,) and the drive's own lag, delay
     and exponent.
@@ -109,7 +108,7 @@ def solve(
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
     zero = np.zeros(len(nonlinear))
-    for number in range(rounds or SOLVE.rounds):
+    for number in range(SOLVE.rounds):
         total = np.sum([_grams(made, spectra, i) for i in range(len(made.segments))], axis=0)
         shift, moved = zero.copy(), 0.0
         for _ in range(SOLVE.steps):
