@@ -136,8 +136,9 @@ ReaderOption = Annotated[
     str | None,
     typer.Option(
         "--reader",
-        help="Reader for another log format: nanobench, crazyswarm2, px4_ulog, rosbag or "
-        "rosbag:TOPICS.yaml.",
+        help="Reader of the log, where another is wanted than what is in the file says: "
+        "px4_ulog, ardupilot_bin, betaflight[:MAGNET_POLES], crazyflie_sd, rosbag[:TOPICS.yaml] "
+        "and so on (docs/readers.md).",
         autocompletion=offering(reader_names),
     ),
 ]

@@ -35,6 +35,8 @@ class FileLimits:
         bag_unpacked: of all chunks that are unpacked to read one bag.
         bag_index: entries in the index of a ROS 1 bag; there is one for each message.
         ulog_file: bytes of a PX4 log.
+        binary_log: bytes of a log that is read whole, of ArduPilot, Betaflight or a Crazyflie.
+        log_fields: variables in one kind of its records; ArduPilot's have at most 16.
         ulog_fields: fields of all topics that it subscribes to, those within fields written out;
             PX4's logs have some 10,000.
         ulog_texts: information and parameters in it; PX4's logs have some 2,000.
@@ -59,6 +61,8 @@ class FileLimits:
     bag_unpacked: int = 2**31
     bag_index: int = 4_000_000
     ulog_file: int = 2**29
+    binary_log: int = 2**28
+    log_fields: int = 500
     ulog_fields: int = 200_000
     ulog_texts: int = 200_000
 

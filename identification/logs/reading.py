@@ -1,6 +1,5 @@
 """Reading a flight log from a file: this kit's own format here, any other through its reader."""
 
-import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -32,8 +31,14 @@ from .flight_log import (
 )
 from .inertial import check_inertial
 from .magnitudes import check_magnitudes
-from .readers import READERS, find_reader
-from .tables import Table, open_table
+from .readers import find_reader
+from .readers.recognise import (
+    looked_for_columns,
+    reader_by_columns,
+    reader_by_content,
+    unknown_content,
+)
+from .tables import SUFFIXES, Table, open_table
 
 
 def read_log(
@@ -42,10 +47,10 @@ def read_log(
     """Read a flight log.
 
     Args:
-        path: ``.csv``, ``.csv.gz`` or ``.parquet``.
-        reader: name of a reader in ``identification/logs/readers/`` for a log of another form, with
-            that reader's option behind a colon where it takes one (``rosbag:topics.yaml``); None
-            for the kit's own.
+        path: the log, of the kit's own form (``.csv``, ``.csv.gz`` or ``.parquet``) or of any that
+            a reader in ``identification/logs/readers/`` knows.
+        reader: name of a reader, with that reader's option behind a colon where it takes one
+            (``rosbag:topics.yaml``); None: chosen by what is in the file.
         vehicle: the vehicle that flew, for checking units and, in a reader, for converting thrust
             into rotor speeds; None: the one that the log or its reader names, where it is a preset.
 
@@ -58,37 +63,24 @@ def read_log(
             notes.
     """
     path = Path(path)
-    if reader is not None:
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # absurd numbers are refused for what they are
-            log = find_reader(reader).read(path, vehicle)
-    else:
-        for other in READERS.values():
-            if path.name.lower().endswith(other.suffixes):
-                raise InputError(
-                    f"{path}: expected --reader {other.name} (reader={other.name!r}) with a file "
-                    f"of this kind"
-                )
-        if os.path.isdir(path):  # False for a name that is too long
-            raise InputError(
-                f"{path}: is a folder; expected a file, or --reader rosbag with the folder of a "
-                f"ROS 2 bag"
-            )
-        table = open_table(path)
-        missing = [name for name in _needed(table) if name not in table.header]
-        if missing:
-            for other in READERS.values():
-                if other.signature and set(other.signature) <= set(table.header):
-                    raise InputError(
-                        f"{path}: this is a {other.name} log; expected --reader {other.name} "
-                        f"(reader={other.name!r}) with it"
-                    )
+    chosen = reader_by_content(path) if reader is None else find_reader(reader)
+    if chosen is None and not path.name.lower().endswith(SUFFIXES):
+        raise unknown_content(path)
+    table = open_table(path) if chosen is None else None
+    missing = [name for name in _needed(table) if name not in table.header] if table else []
+    if table is not None and missing:
+        chosen = reader_by_columns(path, table.header)
+        if chosen is None:
             raise InputError(
                 f"{path}: missing column(s) {', '.join(missing)}; expected {', '.join(REQUIRED)}, "
+                f"or the columns of {looked_for_columns()}; "
                 f"found {', '.join(table.header[:20])}"
             )
-        with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers are refused for themselves
+        if chosen is not None:
+            log = chosen.read(path, vehicle)
+        else:
+            assert table is not None
             log = _canonical(table, vehicle)
     check_magnitudes(log)
     if vehicle is None and log.vehicle in preset_names():

@@ -34,6 +34,13 @@ SOURCES = {
     "crazypad": (
         "the flights of github.com/AerialRoboticsUUST/CrazyPAD (Data 2024, 9, 79), converted to CSV"
     ),
+    "crazyflie_imu": (
+        "the SD-card logs log10, log15 and log16 of "
+        "github.com/arplaboratory/data-driven-system-identification"
+    ),
+    "ardupilot": "backend_log_80k.BIN of the tests of github.com/ArduPilot/MethodicConfigurator",
+    "motor_faults": "the ULogs of github.com/lerlis/RLS-fault-diagnosis-for-RflyMAD",
+    "racer": "test flights of NeuroBEM as republished by github.com/RCL-NUS/NeuroMHE, as CSV",
     "px4": "the logs of the test folder in github.com/PX4/pyulog",
     "flights": (
         "simulated flights of another simulator, which are not published; those of RotorPy "

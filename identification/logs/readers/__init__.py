@@ -13,19 +13,32 @@ from pathlib import Path
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
-from . import crazyswarm2, nanobench, px4_ulog, rosbag
+from . import (
+    ardupilot_bin,
+    betaflight_bbl,
+    betaflight_csv,
+    crazyflie_csv,
+    crazyflie_sd,
+    crazypad,
+    crazyswarm2,
+    nanobench,
+    px4_ulog,
+    racer,
+    rosbag,
+)
 
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader: its name, its function, and the columns or the endings by which a log of its form
-    is known.
+    """A reader: its name, its function, and the columns or the first bytes by which a log of its
+    form is known.
     """
 
     name: str
+    what: str  # a log of its form, in words
     read: Callable[[Path, Vehicle | None], FlightLog]
     signature: tuple[str, ...] = ()  # columns of a table
-    suffixes: tuple[str, ...] = ()  # of a file's name
+    begins: tuple[bytes, ...] = ()  # first bytes of a file
     read_with: Callable[..., FlightLog] | None = (
         None  # takes a third argument, the option behind the name's colon
     )
@@ -34,10 +47,50 @@ class Reader:
 READERS = {
     reader.name: reader
     for reader in (
-        Reader("nanobench", nanobench.read, nanobench.SIGNATURE),
-        Reader("crazyswarm2", crazyswarm2.read, crazyswarm2.SIGNATURE),
-        Reader("px4_ulog", px4_ulog.read, suffixes=px4_ulog.SUFFIXES),
-        Reader("rosbag", rosbag.read, suffixes=rosbag.SUFFIXES, read_with=rosbag.read),
+        Reader("nanobench", "a NanoBench table", nanobench.read, nanobench.SIGNATURE),
+        Reader("crazyswarm2", "a crazyswarm2 table", crazyswarm2.read, crazyswarm2.SIGNATURE),
+        Reader(
+            "crazyflie_sd",
+            "a Crazyflie's SD-card log",
+            crazyflie_sd.read,
+            begins=crazyflie_sd.BEGINS,
+        ),
+        Reader(
+            "crazyflie_csv",
+            "a table of a Crazyflie's log variables",
+            crazyflie_csv.read,
+            crazyflie_csv.SIGNATURE,
+        ),
+        Reader("crazypad", "a CrazyPAD table", crazypad.read, crazypad.SIGNATURE),
+        Reader("racer", "a table of the racer", racer.read, racer.SIGNATURE),
+        Reader(
+            "betaflight",
+            "a blackbox of Betaflight or INAV",
+            betaflight_bbl.read,
+            begins=betaflight_bbl.BEGINS,
+            read_with=betaflight_bbl.read,
+        ),
+        Reader(
+            "betaflight_csv",
+            "a blackbox_decode table",
+            betaflight_csv.read,
+            betaflight_csv.SIGNATURE,
+            read_with=betaflight_csv.read,
+        ),
+        Reader(
+            "ardupilot_bin",
+            "an ArduPilot log (DataFlash .BIN)",
+            ardupilot_bin.read,
+            begins=ardupilot_bin.BEGINS,
+        ),
+        Reader("px4_ulog", "a PX4 log (ULog)", px4_ulog.read, begins=px4_ulog.BEGINS),
+        Reader(
+            "rosbag",
+            "a ROS bag (ROS 1, SQLite or MCAP)",
+            rosbag.read,
+            begins=rosbag.BEGINS,
+            read_with=rosbag.read,
+        ),
     )
 }
 

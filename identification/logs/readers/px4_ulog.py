@@ -1,20 +1,28 @@
 """PX4 logs (``.ulg``), read with pyulog.
 
-**Pose.** Motion capture where it was logged (``vehicle_mocap_odometry``, else
+**Pose.** A simulator's ground truth where it was logged (``vehicle_local_position_groundtruth`` and
+``vehicle_attitude_groundtruth``), else motion capture (``vehicle_mocap_odometry``, else
 ``vehicle_visual_odometry``), else the onboard filter (``vehicle_local_position`` and
-``vehicle_attitude``). PX4's world is north, east, down (or forward, right, down) and its body
-forward, right, down; here the world is north, west, up and the body forward, left, up: both turn by
-half a turn about their x axis. Rows are the position's samples, at ``timestamp_sample`` where the
-topic has it.
+``vehicle_attitude``), which was filtered before it was logged. PX4's world is north, east, down (or
+forward, right, down) and its body forward, right, down; here the world is north, west, up and the
+body forward, left, up: both turn by half a turn about their x axis. Positions are taken at
+``timestamp_sample`` where the topic has it. A log without any pose is read for its inertial
+sensors.
 
-**Rotors.** Measured rotor speeds of ``esc_status`` where ESCs report them. Otherwise commands, of
-which only the ratio of thrusts is known: ``actuator_motors`` holds relative thrust itself (PX4
-inverts its thrust curve after it), and ``actuator_outputs`` what was sent to the motors, x from 0
-to 1, with relative thrust ``f x^2 + (1 - f) x`` and f the parameter THR_MDL_FAC. The unknown scale
-is set so that the median thrust in flight is the declared vehicle's weight: mass and a factor on
-thrust cannot be found from such a log.
+**Rotors.** Measured rotor speeds of ``esc_status`` where ESCs report them. Commands are kept beside
+them, 0 to 1: ``actuator_motors`` as it is, else ``actuator_outputs``, what was sent to the motors,
+within the range that PWM_MAIN_MIN and MAX (or their kin) state.
 
-**Gyro and accelerometer.** ``sensor_combined``, rad/s and m/s2 in forward, right, down.
+Where there are commands alone, a vehicle with a ``motor_curve`` turns them into thrust. One
+without gets relative thrusts: ``actuator_motors`` itself (PX4 inverts its curve after it),
+or ``f x^2 + (1 - f) x`` of an output x, with f the parameter THR_MDL_FAC. Their unknown scale is
+set so that thrust balances the declared vehicle's weight in flight: at each sample thrust is mass
+times the accelerometer's reading along the thrust axis, without one weight over the cosine of the
+tilt, and the scale is the median. Mass and a factor on thrust cannot be found from such a log.
+
+**Gyro and accelerometer.** ``sensor_combined``, else ``vehicle_imu`` (angles and velocities over
+their integration time, put in its middle), else ``vehicle_angular_velocity`` and
+``vehicle_acceleration``: rad/s and m/s2 in forward, right, down.
 
 Motors are renumbered by the positions in the parameters CA_ROTORn_PX and PY where the log has them,
 else PX4's quad x is assumed: 1 front-right, 2 rear-left, 3 front-left, 4 rear-right.
@@ -36,19 +44,42 @@ from ....runtime.errors import InputError
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
+from .balanced_thrust import balanced_speeds
+from .balanced_thrust import flying as by_thrust
 from .streams import Stream, flight_log, from_ned, slerp
 from .ulog_counting import counting
 
 Array = NDArray[np.float64]
 Fields = Mapping[str, NDArray[Any]]
 
-SUFFIXES = (".ulg",)
+BEGINS = (b"ULog\x01\x12\x35",)
 
 _ODOMETRY = ("vehicle_mocap_odometry", "vehicle_visual_odometry")
 _ONBOARD = ("vehicle_local_position", "vehicle_attitude")
 _ROTORS = ("esc_status", "actuator_motors", "actuator_outputs")
-_INERTIAL = "sensor_combined"
-_TOPICS = (*_ODOMETRY, *_ONBOARD, *_ROTORS, _INERTIAL, "battery_status", "vehicle_land_detected")
+_TRUTH = ("vehicle_local_position_groundtruth", "vehicle_attitude_groundtruth")
+# topics and fields of gyro and accelerometer, of which the first that was logged is taken
+_INERTIAL = {
+    "gyro_rad": (
+        ("sensor_combined", "gyro_rad"),
+        ("vehicle_imu", "delta_angle"),
+        ("vehicle_angular_velocity", "xyz"),
+    ),
+    "accelerometer_m_s2": (
+        ("sensor_combined", "accelerometer_m_s2"),
+        ("vehicle_imu", "delta_velocity"),
+        ("vehicle_acceleration", "xyz"),
+    ),
+}
+_TOPICS = (
+    *_ODOMETRY,
+    *_TRUTH,
+    *_ONBOARD,
+    *_ROTORS,
+    *dict.fromkeys(topic for ways in _INERTIAL.values() for topic, _ in ways),
+    "battery_status",
+    "vehicle_land_detected",
+)
 _QUAD_X = (
     2,
     1,
@@ -95,22 +126,48 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     """Read a ULog; ``vehicle`` turns commands into rotor speeds where none were measured.
 
     Raises:
-        InputError: pyulog is missing, the file is no ULog, or lacks a pose or four motors.
+        InputError: pyulog is missing, the file is no ULog, or lacks four motors, or a pose and
+            inertial sensors.
     """
     log = _open(path)
     pose, pose_notes = _pose(log)
+    gyro, accelerometer = (_inertial(log, field) for field in _INERTIAL)
+    if pose is None and (gyro is None or accelerometer is None):
+        raise InputError(
+            f"{path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
+            f"{' and no '.join(t for t in _ONBOARD if t not in log.topics) or 'valid position'}; "
+            "expected one of the former or vehicle_local_position with vehicle_attitude, or gyro "
+            "and accelerometer"
+        )
     order, order_note = _motor_order(log)
-    rotors, rotor_notes = _rotors(log, order, vehicle)
-    notes = [*pose_notes, order_note, *rotor_notes]
+    measured, command, relative, rotor_notes = _rotors(log, order)
+    rotors, scale_notes = measured, []
+    curve = vehicle is not None and vehicle.motor_curve is not None
+    if measured is None and relative is not None and vehicle is not None and not curve:
+        total = relative.values.sum(axis=1)
+        in_flight = _flying(log, relative.t, total)
+        rotors, note = balanced_speeds(path, relative, vehicle, in_flight, accelerometer, pose)
+        scale_notes = [note]
+    notes = [*pose_notes, order_note, *rotor_notes, *scale_notes]
+    if sensors := dict.fromkeys(s.name for s in (gyro, accelerometer) if s is not None):
+        notes.append(
+            f"gyro and accelerometer: {' and '.join(sensors)}, with what PX4 calibrated, body "
+            "turned from forward, right, down to forward, left, up"
+        )
     if log.damaged:
         notes.append("the file is damaged; what could be read of it was used")
-    accelerometer, gyro = (_inertial(log, field) for field in ("accelerometer_m_s2", "gyro_rad"))
-    if accelerometer is not None or gyro is not None:
-        notes.append(
-            f"gyro and accelerometer: {_INERTIAL}, with what PX4 calibrated, at the pose's times"
-        )
     return flight_log(
-        path, "px4_ulog", pose, rotors, _voltage(log), tuple(notes), accelerometer, gyro
+        path,
+        "px4_ulog",
+        pose,
+        rotors,
+        _voltage(log),
+        tuple(notes),
+        accelerometer,
+        gyro,
+        command=command,
+        vehicle=vehicle,
+        commanded=measured is None,
     )
 
 
@@ -168,13 +225,20 @@ def _quaternion(log: _Log, topic: str, fields: Fields) -> Array:
     return log.columns(topic, fields, ("q[0]", "q[1]", "q[2]", "q[3]"))
 
 
-def _pose(log: _Log) -> tuple[Stream, list[str]]:
-    """Return the pose in the kit's frames, and notes that say whose it is."""
+def _pose(log: _Log) -> tuple[Stream | None, list[str]]:
+    """Return the pose in the kit's frames, and notes that say whose it is; None: the log has
+    none.
+    """
     frames = (
         "world and body turned half a turn about x: from north, east, down to x north, y west, z "
         "up, and from "
         "forward, right, down to forward, left, up"
     )
+    if all(topic in log.topics for topic in _TRUTH):
+        return _position_and_attitude(log, *_TRUTH), [
+            f"pose: the simulator's ground truth ({' and '.join(_TRUTH)}), which has no noise; "
+            f"{frames}"
+        ]
     for topic in _ODOMETRY:
         for fields in log.topics.get(topic, []):
             names = (
@@ -193,21 +257,15 @@ def _pose(log: _Log) -> tuple[Stream, list[str]]:
             return Stream(topic, t, np.column_stack(from_ned(position, quaternion))), notes
     missing = [topic for topic in _ONBOARD if topic not in log.topics]
     if missing:
-        raise InputError(
-            f"{log.path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
-            f"{' and no '.join(missing)}; "
-            "expected one of the former or vehicle_local_position with vehicle_attitude"
-        )
-    fields = log.topics["vehicle_local_position"][0]
-    position = log.columns("vehicle_local_position", fields, ("x", "y", "z"))
-    for flag, columns in (("xy_valid", slice(0, 2)), ("z_valid", slice(2, 3))):
-        if flag in fields:
-            position[np.asarray(fields[flag]) == 0, columns] = np.nan
-    t = _times(fields)
+        return None, [f"no pose in the log: no {' and no '.join(missing)}"]
+    pose = _position_and_attitude(log, *_ONBOARD)
+    if np.isfinite(pose.values).all(axis=1).sum() < 2:
+        return None, ["no pose in the log: the onboard filter never had a valid position"]
     notes = [
         f"pose: the onboard filter's (vehicle_local_position and vehicle_attitude), not motion "
-        f"capture's; {frames}"
+        f"capture's: it was filtered before it was logged; {frames}"
     ]
+    fields = log.topics["vehicle_local_position"][0]
     resets = [
         name
         for name in ("xy_reset_counter", "z_reset_counter")
@@ -217,8 +275,19 @@ def _pose(log: _Log) -> tuple[Stream, list[str]]:
         notes.append(
             f"the onboard position was reset in the log ({', '.join(resets)}): it jumps there"
         )
-    position, quaternion = from_ned(position, slerp(t, _attitude(log)))
-    return Stream("vehicle_local_position", t, np.column_stack([position, quaternion])), notes
+    return pose, notes
+
+
+def _position_and_attitude(log: _Log, position_topic: str, attitude_topic: str) -> Stream:
+    """Return the pose in the kit's frames at the position's times; NaN where it is not valid."""
+    fields = log.topics[position_topic][0]
+    position = log.columns(position_topic, fields, ("x", "y", "z"))
+    for flag, columns in (("xy_valid", slice(0, 2)), ("z_valid", slice(2, 3))):
+        if flag in fields and position_topic not in _TRUTH:
+            position[np.asarray(fields[flag]) == 0, columns] = np.nan
+    t = _times(fields)
+    position, quaternion = from_ned(position, slerp(t, _attitude(log, attitude_topic)))
+    return Stream(position_topic, t, np.column_stack([position, quaternion]))
 
 
 def _in_earth_frame(fields: Fields) -> bool:
@@ -230,16 +299,13 @@ def _in_earth_frame(fields: Fields) -> bool:
     return bool(np.all(np.isin(fields.get("local_frame", 0), (0, 1))))  # before: 0 NED, 1 FRD
 
 
-def _attitude(log: _Log) -> Stream:
-    if "vehicle_attitude" not in log.topics:
+def _attitude(log: _Log, topic: str = "vehicle_attitude") -> Stream:
+    if topic not in log.topics:
         raise InputError(
-            f"{log.path}: no attitude: no topic vehicle_attitude; expected it where the odometry "
-            f"has none"
+            f"{log.path}: no attitude: no topic {topic}; expected it where the odometry has none"
         )
-    fields = log.topics["vehicle_attitude"][0]
-    return Stream(
-        "vehicle_attitude", _times(fields), _quaternion(log, "vehicle_attitude", fields)
-    ).forward()[0]
+    fields = log.topics[topic][0]
+    return Stream(topic, _times(fields), _quaternion(log, topic, fields)).forward()[0]
 
 
 def _motor_order(log: _Log) -> tuple[list[int], str]:
@@ -274,42 +340,42 @@ def _motor_order(log: _Log) -> tuple[list[int], str]:
     )
 
 
-def _rotors(log: _Log, order: list[int], vehicle: Vehicle | None) -> tuple[Stream, list[str]]:
-    """Return rotor speeds (N, 4) in rad/s in the kit's order, and notes on where they came from."""
+def _rotors(
+    log: _Log, order: list[int]
+) -> tuple[Stream | None, Stream | None, Stream | None, list[str]]:
+    """Return measured rotor speeds (N, 4) in rad/s, commands (M, 4) and relative thrusts (M, 4),
+    all in the kit's order, and notes on where they came from.
+    """
+    measured, notes = None, []
     for fields in log.topics.get("esc_status", []):
         rpm = _esc_rpm(log, fields)
         if np.any(rpm != 0.0):
             speeds = np.abs(rpm[:, order]) * (2.0 * math.pi / 60.0)
-            return Stream(
+            measured = Stream(
                 "esc_status", 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64), speeds
-            ), ["rotor speeds: measured by the ESCs (esc_status)"]
+            )
+            notes.append("rotor speeds: measured by the ESCs (esc_status)")
+            break
     found = _commands(log)
     if found is None:
-        raise InputError(
-            f"{log.path}: no motors: expected esc_status with rotor speeds, actuator_motors or "
-            f"actuator_outputs of four motors, found "
-            f"{', '.join(sorted(log.topics)) or 'none of the topics'}"
-        )
-    if vehicle is None:
-        raise InputError(
-            f"{log.path}: the log has motor commands but no rotor speeds; expected a vehicle, "
-            "whose weight and k convert them into rotor speeds"
-        )
-    name, t, relative, note = found
-    total = relative.sum(axis=1)
-    flying = _flying(log, t, total)
-    middle = float(np.median(total[flying])) if flying.any() else 0.0
-    if middle <= 0.0:
-        raise InputError(f"{log.path}: {name}: no sample in flight; expected motors that run")
-    scale = vehicle.weight / middle
-    return Stream(name, t, np.sqrt(scale * relative[:, order] / vehicle.k)), [
-        f"thrust model: no rotor speeds in the log; {note}. The unknown scale is set so that the "
-        f"median thrust in flight is "
-        f"the weight of {vehicle.name} ({vehicle.weight:.4g} N): {scale:.4g} N a motor at full "
-        f"command. Mass or a factor "
-        "on thrust cannot be found from this log; rotor speeds are sqrt(thrust / k) of commands, "
-        "without the motors' lag"
-    ]
+        if measured is None:
+            raise InputError(
+                f"{log.path}: no motors: expected esc_status with rotor speeds, actuator_motors or "
+                f"actuator_outputs of four motors that turn, found "
+                f"{', '.join(sorted(log.topics)) or 'none of the topics'}"
+            )
+        return measured, None, None, notes
+    name, t, command, relative, note = found
+    if measured is None:
+        notes.append(f"no rotor speeds in the log; {note}")
+    elif len(t) < 2:
+        return measured, None, None, notes
+    return (
+        measured,
+        Stream(name, t, command[:, order]),
+        Stream(name, t, relative[:, order]),
+        notes,
+    )
 
 
 def _esc_rpm(log: _Log, fields: Fields) -> Array:
@@ -322,9 +388,9 @@ def _esc_rpm(log: _Log, fields: Fields) -> Array:
     return log.columns("esc_status", fields, tuple(f"esc[{i}].esc_rpm" for i in slots))
 
 
-def _commands(log: _Log) -> tuple[str, Array, Array, str] | None:
-    """Return a topic, its times (N,) in s, relative thrusts (N, 4) of PX4's motors 1 to 4, and what
-    was assumed.
+def _commands(log: _Log) -> tuple[str, Array, Array, Array, str] | None:
+    """Return a topic, its times (N,) in s, commands (N, 4), 0 to 1, and relative thrusts (N, 4) of
+    PX4's motors 1 to 4, and what was assumed.
     """
     for fields in log.topics.get("actuator_motors", []):
         control = log.columns("actuator_motors", fields, tuple(f"control[{i}]" for i in range(4)))
@@ -334,8 +400,10 @@ def _commands(log: _Log) -> tuple[str, Array, Array, str] | None:
                 "actuator_motors",
                 _times(fields),
                 relative,
+                relative,
                 (
-                    "actuator_motors is relative thrust, to which PX4 applies the inverse of its "
+                    "commands: actuator_motors is relative thrust, to which PX4 applies the "
+                    "inverse of its "
                     "thrust curve (THR_MDL_FAC) "
                     "afterwards"
                 ),
@@ -361,9 +429,11 @@ def _commands(log: _Log) -> tuple[str, Array, Array, str] | None:
         return (
             "actuator_outputs",
             1e-6 * np.asarray(fields["timestamp"], dtype=np.float64),
+            x,
             (factor * x * x + (1.0 - factor) * x),
             (
-                f"actuator_outputs, {span} taken as x = 0 to 1, gives relative thrust f x^2 + (1 - "
+                f"commands: actuator_outputs, {span} taken as x = 0 to 1, gives relative thrust "
+                f"f x^2 + (1 - "
                 f"f) x with THR_MDL_FAC "
                 f"f = {factor:g}; motors 1 to 4 at outputs "
                 f"{', '.join(str(slot + 1) for slot in slots)}"
@@ -409,7 +479,7 @@ def _flying(log: _Log, t: Array, total: Array) -> NDArray[np.bool_]:
             ) & (total > 0.0)
             if flying.any():
                 return flying
-    return np.asarray(total > 0.5 * np.quantile(total, 0.9))
+    return by_thrust(total)
 
 
 def _voltage(log: _Log) -> Stream | None:
@@ -423,12 +493,27 @@ def _voltage(log: _Log) -> Stream | None:
 
 
 def _inertial(log: _Log, field: str) -> Stream | None:
+    """Return the gyro (``gyro_rad``) or the accelerometer (``accelerometer_m_s2``) in the kit's
+    body axes, or None where none was logged.
+    """
+    found = (_sensor(log, *way) for way in _INERTIAL[field])
+    return next((sensor for sensor in found if sensor is not None), None)
+
+
+def _sensor(log: _Log, topic: str, field: str) -> Stream | None:
     """Return one inertial sensor in the kit's body axes, or None where it was not logged."""
     names = tuple(f"{field}[{i}]" for i in range(3))
-    for fields in log.topics.get(_INERTIAL, []):
-        if set(names) <= set(fields):
-            t = 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64)
-            return Stream(
-                _INERTIAL, t, log.columns(_INERTIAL, fields, names) * np.array([1.0, -1.0, -1.0])
-            )
+    for fields in log.topics.get(topic, []):
+        if not set(names) <= set(fields) or len(fields["timestamp"]) < 2:
+            continue
+        t = _times(fields)
+        values = log.columns(topic, fields, names) * np.array([1.0, -1.0, -1.0])
+        if f"{field}_dt" in fields:  # angle or velocity gained over a time in us
+            span = 1e-6 * np.asarray(fields[f"{field}_dt"], dtype=np.float64)
+            values = values / np.where(span > 0.0, span, np.nan)[:, None]
+            t = t - 0.5 * span
+        late = np.asarray(fields.get("accelerometer_timestamp_relative", 0), dtype=np.float64)
+        if field == "accelerometer_m_s2" and np.all(np.abs(late) < 1e6):
+            t = t + 1e-6 * late
+        return Stream(topic, t, values)
     return None

@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.fuzz.ulog_writer import ulog_bytes
 from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.reading import read_log
 
 pytest.importorskip("pyulog", reason="pyulog is not installed: pip install 'windwrench[logs]'")
@@ -221,10 +223,13 @@ def relative(vehicle):
 
 
 def assert_scaled(log, ours, vehicle):
+    """The vertical part of a thrust that stays the same carries the weight on the median."""
     thrust = vehicle.k * log.rotor_speeds**2
-    np.testing.assert_allclose(np.median(thrust.sum(axis=1)), vehicle.weight, rtol=1e-5)
+    up = motion(log.t)[1].as_matrix()[:, 2, 2]
+    np.testing.assert_allclose(np.median(thrust.sum(axis=1) * up), vehicle.weight, rtol=2e-3)
     np.testing.assert_allclose(thrust[100] / thrust[100].sum(), ours / ours.sum(), rtol=1e-5)
-    assert any("median thrust in flight is the weight of ardrone2" in note for note in log.notes)
+    assert any("thrust in flight balances ardrone2" in note for note in log.notes)
+    assert log.commanded
 
 
 def test_relative_thrust_is_scaled_to_the_weight(write, t, vehicle):
@@ -242,11 +247,97 @@ def test_relative_thrust_is_scaled_to_the_weight(write, t, vehicle):
         {"THR_MDL_FAC": 0.3},
     )
     assert_scaled(read_log(path, "px4_ulog", vehicle), ours, vehicle)
-    with pytest.raises(
-        InputError,
-        match=r"flight.ulg: the log has motor commands but no rotor speeds; expected a vehicle",
-    ):
-        read_log(path, "px4_ulog")
+    alone = read_log(path, "px4_ulog")  # without a vehicle commands stay what they are
+    assert not alone.has_rotor_speeds
+    np.testing.assert_allclose(alone.command[100], ours, rtol=1e-6)
+    curve = MotorCurve(thrust=(0.0, 1.0, 2.0), voltage_exponent=0.0, command=(0.0, 1.0))
+    stated = read_log(path, None, replace(vehicle, motor_curve=curve))
+    np.testing.assert_allclose(
+        vehicle.k * stated.rotor_speeds[100] ** 2, ours + 2.0 * ours**2, rtol=1e-5
+    )
+
+
+def test_a_tilted_flight_needs_more_thrust_than_its_weight(write, t, vehicle):
+    """The accelerometer says how much: here half as much again."""
+    at = wide(t)
+    force = np.tile([0.0, 0.0, -1.5 * vehicle.gravity], (len(at), 1))  # forward, right, down
+    path = write(
+        {
+            "vehicle_mocap_odometry": odometry(t),
+            "sensor_combined": {
+                "uint64_t timestamp": stamps(at),
+                "float gyro_rad": np.sin(np.multiply.outer(at, [1.0, 2.0, 3.0])),
+                "float accelerometer_m_s2": force + 1e-3 * np.sin(at)[:, None],
+            },
+            "actuator_motors": {
+                "uint64_t timestamp": stamps(at),
+                "float control": np.full((len(at), 12), 0.5),
+            },
+        }
+    )
+    with pytest.warns(UserWarning, match="gyro|gx"):
+        log = read_log(path, None, vehicle)
+    thrust = np.sum(vehicle.k * log.rotor_speeds**2, axis=1)
+    np.testing.assert_allclose(thrust, 1.5 * vehicle.weight, rtol=1e-3)
+
+
+def test_without_a_pose_the_inertial_sensors_are_read(write, t, vehicle):
+    times = wide(t)
+    gyro, force = inertial(times)
+    combined = {
+        "uint64_t timestamp": stamps(times),
+        "float gyro_rad": gyro @ FLIP,
+        "float accelerometer_m_s2": force @ FLIP,
+    }
+    step = np.full(len(times), 4000)  # us
+    integrated = {
+        "uint64_t timestamp": stamps(times + 0.002),  # the end of what they were gained over
+        "float delta_angle": gyro @ FLIP * 0.004,
+        "float delta_velocity": force @ FLIP * 0.004,
+        "int32_t delta_angle_dt": step,
+        "int32_t delta_velocity_dt": step,
+    }
+    for topic, fields in (("sensor_combined", combined), ("vehicle_imu", integrated)):
+        log = read_log(write({"esc_status": esc(times), topic: fields}), None, vehicle)
+        assert not log.has_pose
+        at = log.t + times[0]
+        assert 0.9 * len(times) < len(at)
+        np.testing.assert_allclose(log.gyro, inertial(at)[0], atol=2e-2)
+        np.testing.assert_allclose(log.accelerometer, inertial(at)[1], atol=2e-2)
+        np.testing.assert_allclose(log.rotor_speeds[5], growth(at[5]) * OURS, atol=0.3)
+
+
+def test_a_slow_pose_stands_in_rows_of_the_inertial_sensors(write, vehicle):
+    slow, times = 0.1 * np.arange(40), np.arange(-0.2, 4.2, 0.004)
+    gyro, force = inertial(times)
+    topics = {
+        "sensor_combined": {
+            "uint64_t timestamp": stamps(times),
+            "float gyro_rad": gyro @ FLIP,
+            "float accelerometer_m_s2": force @ FLIP,
+        },
+        "esc_status": esc(times),
+    }
+    for pose in ({"vehicle_mocap_odometry": odometry(slow)}, onboard(slow)):
+        log = read_log(write(topics | pose), None, vehicle)
+        assert log.valid.sum() == len(slow)
+        assert len(log.t) > 1000
+        at = log.t[log.valid] + times[0]
+        position, turn = motion(at)
+        np.testing.assert_allclose(log.position[log.valid], position, atol=1e-3)
+        seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
+        assert (turn.inv() * seen).magnitude().max() < 2e-3
+        np.testing.assert_allclose(log.gyro, inertial(log.t + times[0])[0], atol=2e-2)
+
+
+def test_a_simulators_ground_truth_comes_first(write, t, vehicle):
+    truth = {
+        f"{topic}_groundtruth": {k: v for k, v in fields.items() if "valid" not in k}
+        for topic, fields in onboard(t).items()
+    }
+    log = read_log(write({**onboard(t + 0.3), **truth, "esc_status": esc(wide(t))}), None, vehicle)
+    assert_motion(log, t, atol=1e-5)
+    assert any("ground truth" in note for note in log.notes)
 
 
 @pytest.mark.parametrize("pulses", [True, False])
@@ -362,12 +453,10 @@ def test_a_cut_or_spoiled_log_reads_or_is_refused(write, t, vehicle, capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_a_ulog_asks_for_its_reader(tmp_path, monkeypatch):
-    (tmp_path / "flight.ulg").write_bytes(b"")
-    with pytest.raises(InputError, match=r"flight.ulg: expected --reader px4_ulog"):
-        read_log(tmp_path / "flight.ulg")
+def test_without_pyulog_a_ulog_says_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01")
     monkeypatch.setitem(sys.modules, "pyulog", None)
     with pytest.raises(
         InputError, match=r"pip install 'windwrench\[logs\]', or pip install pyulog"
     ):
-        read_log(tmp_path / "flight.ulg", "px4_ulog")
+        read_log(tmp_path / "flight.ulg")

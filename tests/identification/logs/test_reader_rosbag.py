@@ -255,14 +255,16 @@ def test_a_map_states_topics_frames_units_and_order(write, kind, pose, vehicle):
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
-def test_an_imu_is_taken_where_the_map_names_it(write, kind, vehicle):
+def test_an_imu_is_taken_in_the_frame_that_the_map_states(write, kind, vehicle):
     topics = {
         "/a": pose_topic(),
         "/motors": actuator_topic(),
         "/imu": ("sensor_msgs/msg/Imu", WIDE, lambda messages, t: messages.imu(t)),
     }
     path = write(kind, topics)
-    assert read_log(path, "rosbag", vehicle).gyro is None
+    log = read_log(path, None, vehicle)  # REP 145 has an IMU forward, left, up
+    np.testing.assert_allclose(log.gyro, inertial(log.t)[0] @ FLIP, atol=2e-3)
+    assert "imu: body forward, left, up, as the bag has it" in log.notes
     path.with_name("flight.topics.yaml").write_text("imu: {topic: /imu, frame: ned}")
     log = read_log(path, "rosbag", vehicle)
     gyro, force = inertial(log.t)
@@ -330,7 +332,7 @@ def test_messages_out_of_order_are_left_out(write, vehicle):
             "pose: topic /motors is of type mav_msgs/msg/Actuators; expected "
             "geometry_msgs/msg/PoseStamped",
         ),
-        ("pos: /a", "unknown key 'pos'; expected one of imu, pose, rotors, voltage"),
+        ("pos: /a", "unknown key 'pos'; expected one of command, imu, pose, rotors, voltage"),
         (
             "pose: {topic: /a, frames: ned}",
             "pose: unknown key 'frames'; expected one of frame, topic",
@@ -343,7 +345,7 @@ def test_messages_out_of_order_are_left_out(write, vehicle):
         ("rotors: {order: [0, 1, 2, 3]}", "order: expected four different elements"),
         ("rotors: {order: 5}", "order: expected four different elements"),
         ("rotors: /n", "states no unit; expected unit: rad/s, rpm, rev/s"),
-        ("- pose", "expected a mapping of pose, rotors, voltage, imu to topics, got list"),
+        ("- pose", "expected a mapping of pose, rotors, command, voltage, imu to topics, got list"),
         ("pose: [", "not valid YAML"),
     ],
 )
@@ -413,15 +415,18 @@ def test_what_is_no_bag_is_refused(tmp_path, name, content, vehicle):
 
 
 def test_what_is_not_there_is_refused(tmp_path, vehicle):
-    with pytest.raises(InputError, match=r"absent.bag: cannot be read as a ROS 1 bag"):
+    with pytest.raises(InputError, match=r"absent.bag: cannot be read as a ROS bag"):
         read_log(tmp_path / "absent.bag", "rosbag", vehicle)
+    (tmp_path / "flight.csv").write_text("t")
     with pytest.raises(
         InputError, match=r"flight.csv: unknown kind of bag; expected .bag, .db3, .mcap"
     ):
         read_log(tmp_path / "flight.csv", "rosbag", vehicle)
     with pytest.raises(InputError, match=r"cannot be read as a ROS 2 bag: .*metadata"):
         read_log(tmp_path, "rosbag", vehicle)
-    with pytest.raises(InputError, match=r"is a folder; expected a file, or --reader rosbag"):
+    with pytest.raises(
+        InputError, match=r"is a folder; expected a file, or .* ROS 2 bag, .*; found flight.csv"
+    ):
         read_log(tmp_path, None, vehicle)
 
 
@@ -546,9 +551,8 @@ def test_files_and_messages_packed_one_by_one_are_refused(mode, write, vehicle):
         read_log(path, "rosbag", vehicle)
 
 
-def test_a_bag_asks_for_its_reader(tmp_path, monkeypatch, vehicle):
-    with pytest.raises(InputError, match=r"flight.bag: expected --reader rosbag"):
-        read_log(tmp_path / "flight.bag")
+def test_without_rosbags_a_bag_says_what_to_install(tmp_path, monkeypatch, vehicle):
+    (tmp_path / "flight.bag").write_bytes(b"#ROSBAG V2.0\n")
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(
         InputError, match=r"pip install 'windwrench\[logs\]', or pip install rosbags"

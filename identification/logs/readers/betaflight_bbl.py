@@ -1,0 +1,190 @@
+"""Blackboxes of Betaflight and INAV (``.bbl``, ``.bfl``, ``.txt``) as they are.
+
+A file may hold several logs, one for each time that the vehicle was armed: the longest is read, and
+a note says so. ``blackbox_frames`` decodes it, ``betaflight_units`` says what its fields become.
+orangebox, the library for these logs, is under the GPL, lacks an encoding that Betaflight's logs
+have (10) and decodes in Python; it serves the tests as a second opinion.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ....dynamics.vehicle import Vehicle
+from ....runtime.errors import InputError
+from ....runtime.file_limits import LIMITS
+from ....runtime.regular_files import read_bytes
+from ..flight_log import FlightLog
+from .betaflight_units import FIELDS, betaflight_log, magnet_poles
+from .blackbox_frames import ENCODINGS, PREDICTORS, Layout, decode
+
+_START = b"H Product:Blackbox"
+BEGINS = (_START,)
+
+_WHAT = "a blackbox of Betaflight or INAV"
+_HEADERS = 2_000  # lines
+_LINE = 20_000  # bytes
+_FRAMES = "IPSGH"
+_WANTED = ("time", *FIELDS)
+
+
+@dataclass(frozen=True)
+class _Section:
+    """One log of a file."""
+
+    headers: Mapping[str, str]
+    begin: int  # of its frames
+    end: int
+
+
+def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
+    """Read a blackbox; ``option``: number of the motors' magnet poles, for eRPM.
+
+    Raises:
+        InputError: the file cannot be read, is no blackbox, is damaged from its start, or has no
+            motors or inertial sensors.
+    """
+    poles = magnet_poles(option, path)
+    data = read_bytes(path, _WHAT, LIMITS.binary_log)
+    if not data.startswith(_START):
+        raise InputError(
+            f"{path}: cannot be read as {_WHAT}: it does not begin with {_START.decode()!r}"
+        )
+    starts = [match.start() for match in re.finditer(re.escape(_START), data)]
+    ends = [*starts[1:], len(data)]
+    longest = max(range(len(starts)), key=lambda i: ends[i] - starts[i])
+    section = _section(path, data, starts[longest], ends[longest])
+    version = section.headers.get("Data version", "2")
+    if version != "2":
+        raise InputError(f"{path}: header Data version: {version[:20]!r}; expected 2")
+    names = section.headers.get("Field I name", "").split(",")
+    layout = _layout(path, section.headers, names)
+    keep = [name for name in _WANTED if name in names]
+    if "time" not in keep:
+        raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
+    where = np.array([names.index(name) for name in keep], dtype=np.int64)
+    frames = np.frombuffer(data[: section.end], np.uint8)
+    most = LIMITS.table_rows + 1
+    count, _, _ = decode(
+        frames, section.begin, layout, where, np.zeros((0, len(keep)), np.int64), most
+    )
+    if count > LIMITS.table_rows:
+        raise InputError(f"{path}: more than {LIMITS.table_rows} frames; expected one flight")
+    if count < 2:
+        raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
+    rows = np.zeros((count, len(keep)), np.int64)
+    _, lost, _ = decode(frames, section.begin, layout, where, rows, most)
+    columns = {name: rows[:, i].astype(np.float64) for i, name in enumerate(keep)}
+    t = 1e-6 * columns.pop("time")
+    firmware = section.headers.get("Firmware revision", "an unknown firmware")[:60]
+    notes = [f"blackbox of {firmware}"]
+    if len(starts) > 1:
+        notes.append(
+            f"the file holds {len(starts)} logs; the longest, number {longest + 1}, was read"
+        )
+    if lost:
+        notes.append(f"{lost} frame(s) of {count + lost} could not be decoded and were left out")
+    return betaflight_log(
+        path,
+        "betaflight",
+        t,
+        columns,
+        {},
+        section.headers,
+        poles,
+        vehicle,
+        tuple(notes),
+    )
+
+
+def _section(path: Path, data: bytes, start: int, end: int) -> _Section:
+    """Return the headers of a log and where its frames begin.
+
+    Raises:
+        InputError: the headers do not end.
+    """
+    headers: dict[str, str] = {}
+    place = start
+    for _ in range(_HEADERS):
+        if data[place : place + 2] != b"H ":
+            return _Section(headers, place, end)
+        stop = data.find(b"\n", place, min(end, place + _LINE))
+        if stop < 0:
+            break
+        key, _, value = data[place + 2 : stop].decode("ascii", "replace").partition(":")
+        headers[key.strip()] = value.strip()
+        place = stop + 1
+    raise InputError(f"{path}: its headers do not end; expected frames behind them")
+
+
+def _layout(path: Path, headers: Mapping[str, str], names: list[str]) -> Layout:
+    """Return what the headers say of the frames.
+
+    Raises:
+        InputError: they contradict themselves, or name what is not known.
+    """
+    if len(names) > LIMITS.log_fields:
+        raise InputError(f"{path}: more than {LIMITS.log_fields} fields; expected a blackbox")
+    lists = {}
+    for letter in _FRAMES:
+        for what, known in (("predictor", PREDICTORS), ("encoding", ENCODINGS)):
+            key = f"Field {letter} {what}"
+            numbers = _numbers(path, key, headers.get(key, ""))
+            if bad := [n for n in numbers if n not in known]:
+                raise InputError(
+                    f"{path}: header {key}: {bad[0]}; expected one of {', '.join(map(str, known))}"
+                )
+            lists[letter, what] = numbers
+        sizes = {len(lists[letter, what]) for what in ("predictor", "encoding")}
+        if len(sizes) > 1 or (letter in "IP" and sizes != {len(names)}):
+            raise InputError(
+                f"{path}: headers Field {letter} predictor and encoding have "
+                f"{' and '.join(map(str, sorted(sizes)))} numbers; expected as many as the "
+                f"{len(names)} names of Field I"
+            )
+    counts = [len(lists[letter, "encoding"]) for letter in _FRAMES]
+    width = max(*counts, 1)
+    tables = {what: np.zeros((5, width), np.int64) for what in ("predictor", "encoding")}
+    for row, letter in enumerate(_FRAMES):
+        for what, table in tables.items():
+            table[row, : counts[row]] = lists[letter, what]
+    places = [
+        names.index(name) if name in names else -1 for name in ("loopIteration", "time", "motor[0]")
+    ]
+    if places[0] < 0 and 6 in tables["predictor"]:
+        raise InputError(f"{path}: no field loopIteration, which its predictors count on")
+    every, share = _interval(headers.get("I interval", "32")), headers.get("P interval", "1/1")
+    top, _, bottom = share.partition("/")
+    above, below = (_interval(top), _interval(bottom)) if bottom else (1, _interval(top))
+    least = headers.get("motorOutput", "").split(",")[0]
+    constants = [
+        int(text) if text.lstrip("-").isdecimal() and len(text) < 10 else default
+        for text, default in (
+            (headers.get("minthrottle", ""), 1150),
+            (headers.get("vbatref", ""), 4095),
+            (least, 0),
+        )
+    ]
+    return Layout(
+        tables["encoding"],
+        tables["predictor"],
+        np.array(counts, np.int64),
+        np.array([every, above, below], np.int64),
+        np.array(constants, np.int64),
+        np.array(places, np.int64),
+    )
+
+
+def _interval(text: str) -> int:
+    """Return an interval of frames, at least 1."""
+    return max(1, int(text)) if text.isdecimal() and len(text) < 8 else 1
+
+
+def _numbers(path: Path, key: str, text: str) -> list[int]:
+    parts = text.split(",") if text else []
+    if not all(part.strip().isdecimal() and len(part) < 6 for part in parts):
+        raise InputError(f"{path}: header {key}: {text[:60]!r}; expected numbers, comma, numbers")
+    return [int(part) for part in parts]

@@ -1,0 +1,308 @@
+"""The frames of a blackbox of Betaflight, INAV or Cleanflight, decoded by compiled code.
+
+A frame is a letter and the fields that the header lists for it, each coded as the header says (its
+*encoding*) and counted from what could be foreseen of it (its *predictor*), after the description
+of the format in Betaflight's and Cleanflight's documentation ("Blackbox logging internals"). ``I``
+frames stand alone, ``P`` frames build on the two main frames before them, ``S``, ``G``, ``H`` (slow
+fields, GPS) and ``E`` (events) stand between and are passed over. What cannot be decoded is passed
+byte by byte, and what follows counts from the next ``I`` frame.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....runtime.compiled import compiled
+
+Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+ENCODINGS = (0, 1, 3, 6, 7, 8, 9, 10)
+PREDICTORS = (*range(12), 256)
+LONGEST = 1024  # bytes of a frame
+_TOO_DAMAGED = 1_000_000  # frames that cannot be decoded, after which a log is given up
+
+
+class Layout(NamedTuple):
+    """What a header says of the frames; I and P frames have the same fields."""
+
+    encodings: Ints  # (5, F) of I, P, S, G and H frames
+    predictors: Ints  # (5, F)
+    counts: Ints  # (5,) fields of each
+    intervals: Ints  # (3,) of I frames, and numerator and denominator of P frames, in loops
+    constants: Ints  # (3,) minthrottle, vbatref, least motor output
+    places: Ints  # (3,) fields loopIteration, time and motor[0]; -1: none
+
+
+@compiled
+def _signed(value: int, bits: int) -> int:
+    """Return an integer of some bits with its sign."""
+    return value - (1 << bits) if value & (1 << (bits - 1)) else value
+
+
+@compiled
+def _byte(data: Bytes, at: Ints) -> int:
+    """Return the next byte; behind the end 0, and the place goes on, so that it shows."""
+    place = at[0]
+    at[0] = place + 1
+    return int(data[place]) if place < len(data) else 0
+
+
+@compiled
+def _unsigned_vb(data: Bytes, at: Ints) -> int:
+    out = 0
+    for shift in range(0, 35, 7):
+        byte = _byte(data, at)
+        out |= (byte & 0x7F) << shift
+        if byte < 128:
+            return out & 0xFFFFFFFF
+    at[0] = len(data) + 1  # more than 32 bits: no number
+    return 0
+
+
+@compiled
+def _signed_vb(data: Bytes, at: Ints) -> int:
+    value = _unsigned_vb(data, at)
+    return (value >> 1) ^ -(value & 1)
+
+
+@compiled
+def _three(data: Bytes, at: Ints, out: Ints, variable: bool) -> None:
+    """Read three fields: of equal widths, or, ``variable``, of 5, 5, 4 and 8, 7, 7 bits."""
+    lead = _byte(data, at)
+    kind = lead >> 6
+    if kind == 0:
+        for i in range(3):
+            out[i] = _signed((lead >> (4 - 2 * i)) & 3, 2)
+    elif kind == 1 and variable:
+        second = _byte(data, at)
+        out[0] = _signed((lead & 0x3E) >> 1, 5)
+        out[1] = _signed(((lead & 1) << 4) | (second >> 4), 5)
+        out[2] = _signed(second & 15, 4)
+    elif kind == 1:
+        second = _byte(data, at)
+        out[0] = _signed(lead & 15, 4)
+        out[1] = _signed(second >> 4, 4)
+        out[2] = _signed(second & 15, 4)
+    elif kind == 2 and variable:
+        second, third = _byte(data, at), _byte(data, at)
+        out[0] = _signed(((lead & 0x3F) << 2) | (second >> 6), 8)
+        out[1] = _signed(((second & 0x3F) << 1) | (third >> 7), 7)
+        out[2] = _signed(third & 0x7F, 7)
+    elif kind == 2:
+        out[0] = _signed(lead & 0x3F, 6)
+        out[1] = _signed(_byte(data, at) & 0x3F, 6)
+        out[2] = _signed(_byte(data, at) & 0x3F, 6)
+    else:
+        for i in range(3):
+            width = ((lead >> (2 * i)) & 3) + 1
+            value = 0
+            for k in range(width):
+                value |= _byte(data, at) << (8 * k)
+            out[i] = _signed(value, 8 * width)
+
+
+@compiled
+def _four(data: Bytes, at: Ints, out: Ints) -> None:
+    """Read four fields of 0, 4, 8 or 16 bits, packed by half bytes."""
+    selector = _byte(data, at)
+    half, held = False, 0  # is half a byte left over, and the byte that it is of
+    for i in range(4):
+        kind = (selector >> (2 * i)) & 3
+        if kind == 0:
+            out[i] = 0
+        elif kind == 1:
+            if not half:
+                held = _byte(data, at)
+                out[i] = _signed(held >> 4, 4)
+            else:
+                out[i] = _signed(held & 15, 4)
+            half = not half
+        elif kind == 2:
+            first = _byte(data, at)
+            if half:
+                out[i] = _signed(((held & 15) << 4) | (first >> 4), 8)
+                held = first
+            else:
+                out[i] = _signed(first, 8)
+        else:
+            first, second = _byte(data, at), _byte(data, at)
+            if half:
+                out[i] = _signed(((held & 15) << 12) | (first << 4) | (second >> 4), 16)
+                held = second
+            else:
+                out[i] = _signed((first << 8) | second, 16)
+
+
+@compiled
+def _fields(data: Bytes, at: Ints, encodings: Ints, count: int, out: Ints) -> None:
+    """Read the fields of a frame as they are coded."""
+    group = np.zeros(4, np.int64)
+    i = 0
+    while i < count and at[0] <= len(data):
+        encoding = encodings[i]
+        if encoding == 0:
+            out[i] = _signed_vb(data, at)
+            i += 1
+        elif encoding == 1:
+            out[i] = _unsigned_vb(data, at)
+            i += 1
+        elif encoding == 3:
+            out[i] = -_signed(_unsigned_vb(data, at) & 0x3FFF, 14)
+            i += 1
+        elif encoding == 6:
+            size = 1
+            while size < 8 and i + size < count and encodings[i + size] == 6:
+                size += 1
+            if size == 1:
+                out[i] = _signed_vb(data, at)
+            else:
+                there = _byte(data, at)
+                for k in range(size):
+                    out[i + k] = _signed_vb(data, at) if there & (1 << k) else 0
+            i += size
+        elif encoding == 7 or encoding == 10:
+            _three(data, at, group, encoding == 10)
+            for k in range(min(3, count - i)):
+                out[i + k] = group[k]
+            i += 3
+        elif encoding == 8:
+            _four(data, at, group)
+            for k in range(min(4, count - i)):
+                out[i + k] = group[k]
+            i += 4
+        else:  # nothing was written
+            out[i] = 0
+            i += 1
+
+
+@compiled
+def _passed_over(before: int, intervals: Ints) -> int:
+    """Return how many loops after one were not to be recorded."""
+    count = 0
+    while count < 1000:
+        k = before + 1 + count
+        if (k % intervals[0] + intervals[1] - 1) % intervals[2] < intervals[1]:
+            break
+        count += 1
+    return count
+
+
+@compiled
+def _predict(
+    out: Ints, before: Ints, older: Ints, count: int, predictors: Ints, layout: Layout
+) -> None:
+    """Add to the fields (F,) of a main frame what could be foreseen of them."""
+    for i in range(count):
+        kind = predictors[i]
+        if kind == 1:
+            out[i] += before[i]
+        elif kind == 2:
+            out[i] += 2 * before[i] - older[i]
+        elif kind == 3:
+            # a half is cut off towards zero, as in C
+            total = before[i] + older[i]
+            out[i] += total // 2 if total >= 0 else -(-total // 2)
+        elif kind == 4:
+            out[i] += layout.constants[0]
+        elif kind == 5 and layout.places[2] >= 0:
+            out[i] += out[layout.places[2]]
+        elif kind == 6:
+            out[i] = before[i] + 1 + _passed_over(before[layout.places[0]], layout.intervals)
+        elif kind == 8:
+            out[i] += 1500
+        elif kind == 9:
+            out[i] += layout.constants[1]
+        elif kind == 11:
+            out[i] += layout.constants[2]
+
+
+@compiled
+def _event(data: Bytes, at: Ints) -> int:
+    """Pass over an event; return 0, 1 at the log's end, 2 where it is of an unknown kind."""
+    kind = _byte(data, at)
+    if kind == 0 or kind == 15 or kind == 40:  # beep, disarmed, sensor failure
+        _unsigned_vb(data, at)
+    elif kind == 14 or kind == 30:  # recording goes on, flight mode
+        _unsigned_vb(data, at)
+        _unsigned_vb(data, at)
+    elif kind == 13:  # adjustment in flight
+        if _byte(data, at) < 128:
+            _signed_vb(data, at)
+        else:
+            at[0] += 4
+    elif kind == 255:
+        return 1
+    else:
+        return 2
+    return 0
+
+
+@compiled
+def decode(
+    data: Bytes, begin: int, layout: Layout, keep: Ints, rows: Ints, most: int
+) -> tuple[int, int, int]:
+    """Decode the main frames of a log.
+
+    Args:
+        data: the file, or what of it belongs to one log.
+        begin: where its frames begin.
+        layout: of the frames.
+        keep: (K,) fields that are wanted.
+        rows: (N, K) receives them; with N = 0 frames are counted alone.
+        most: frames after which to stop.
+
+    Returns:
+        How many frames were decoded, how many were not, and the place behind the last.
+    """
+    fields = layout.encodings.shape[1]
+    out, before, older = (
+        np.zeros(fields, np.int64),
+        np.zeros(fields, np.int64),
+        np.zeros(fields, np.int64),
+    )
+    at = np.zeros(1, np.int64)
+    place, found, lost, based = begin, 0, 0, False
+    while place < len(data) and found < most and lost < _TOO_DAMAGED:
+        letter = data[place]
+        kind = -1
+        for k, known in enumerate((73, 80, 83, 71, 72)):  # I P S G H
+            if letter == known:
+                kind = k
+        at[0] = place + 1
+        said = 0
+        if letter == 69:  # E
+            said = _event(data, at)
+        elif kind >= 0 and layout.counts[kind] > 0:
+            _fields(data, at, layout.encodings[kind], layout.counts[kind], out)
+        else:
+            said = 2
+        after = at[0]
+        good = said != 2 and after <= len(data) and after - place <= LONGEST
+        if good and said == 0 and after < len(data):  # another frame must follow
+            good = data[after] in (73, 80, 83, 71, 72, 69)
+        if not good:
+            lost += 1
+            based = False
+            place += 1
+            # the next letter that may begin a frame
+            while place < len(data) and data[place] not in (73, 80, 83, 71, 72, 69):
+                place += 1
+            continue
+        if said == 1:
+            place = after
+            break
+        if kind == 0 or (kind == 1 and based):
+            _predict(out, before, older, layout.counts[kind], layout.predictors[kind], layout)
+            older[:] = out if kind == 0 else before
+            before[:] = out
+            based = True
+            if len(rows) > found:
+                for k in range(len(keep)):
+                    rows[found, k] = out[keep[k]]
+            found += 1
+        elif kind == 1:
+            lost += 1
+        place = after
+    return found, lost, place

@@ -1,0 +1,180 @@
+"""Logs that a Crazyflie's micro-SD deck writes (``usdlog``): binary, of events.
+
+The format (Bitcraze's documentation of the deck, versions 1 and 2), little-endian: the byte 0xBC;
+the version and the number of event types, 16 bits each; of each type its number (16 bits), its
+name, its number of variables (16 bits) and their names, each with the letter of its type in
+brackets as in Python's ``struct`` (``acc.x(f)``), all texts ended by a zero byte. Then the events:
+number, time (version 1: 32 bits of milliseconds, version 2: 64 bits of microseconds), variables.
+The last four bytes are a CRC-32 of all before them.
+
+``crazyflie_variables`` says what the variables become.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....dynamics.vehicle import Vehicle
+from ....runtime.errors import InputError
+from ....runtime.file_limits import LIMITS
+from ....runtime.regular_files import read_bytes
+from ..flight_log import FlightLog
+from .crazyflie_variables import Event, crazyflie_log
+
+BEGINS = (b"\xbc\x01\x00", b"\xbc\x02\x00")
+
+_WHAT = "a Crazyflie's SD-card log"
+_TYPES = frozenset("bBhHiIqQefd")
+_TEXT = 200  # bytes of a name
+_RUN = 4096  # events looked at together
+_TIMES = {1: ("<u4", 1e-3), 2: ("<u8", 1e-6)}  # of a version: type, and s per unit
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A type of event: its name and the layout of one."""
+
+    name: str
+    layout: np.dtype[Any]
+    variables: tuple[str, ...]
+
+
+def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
+    """Read an SD-card log; ``vehicle`` turns motor set points into rotor speeds.
+
+    Raises:
+        InputError: the file cannot be read, is no such log, or lacks motors, or a pose and inertial
+            sensors.
+    """
+    data = read_bytes(path, _WHAT, LIMITS.binary_log)
+    version, kinds, begin = _header(path, data)
+    found, end = _events(path, data, kinds, begin)
+    notes = [f"{_WHAT}, version {version}"]
+    if not _whole(data, end):
+        notes.append(
+            f"the file is damaged or was cut {end} bytes from its start ({len(data) - end} bytes "
+            "are left); what stands before was used"
+        )
+    events: list[Event] = []
+    for number, kind in kinds.items():
+        rows = found.get(number)
+        if rows is None or len(rows) < 2:
+            continue
+        t = _TIMES[version][1] * rows["time"].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+            columns = {name: rows[name].astype(np.float64) for name in kind.variables}
+        events.append((kind.name, t, columns))
+    if not events:
+        raise InputError(f"{path}: no event twice; expected at least two samples")
+    first = min(float(t[0]) for _, t, _ in events)
+    notes.append(f"times: the vehicle's clock, which stood at {first:.6g} s at the first event")
+    return crazyflie_log(path, "crazyflie_sd", events, vehicle, tuple(notes))
+
+
+def _whole(data: bytes, end: int) -> bool:
+    """Return whether the file ends behind its last event, or with the checksum (CRC-32) of all that
+    stands before.
+    """
+    if end == len(data):
+        return True
+    return len(data) - end == 4 and zlib.crc32(data[:end]) == int.from_bytes(data[end:], "little")
+
+
+def _header(path: Path, data: bytes) -> tuple[int, dict[int, _Kind], int]:
+    """Return the version, the types of events by number, and where the events begin.
+
+    Raises:
+        InputError: the header is cut or says something else.
+    """
+    place = 5
+
+    def word() -> int:
+        nonlocal place
+        if place + 2 > len(data):
+            raise InputError(f"{path}: ends within its header; expected {_WHAT}")
+        (value,) = struct.unpack_from("<H", data, place)
+        place += 2
+        return int(value)
+
+    def text() -> str:
+        nonlocal place
+        end = data.find(b"\0", place, place + _TEXT)
+        if end < 0:
+            raise InputError(
+                f"{path}: a name in its header does not end within {_TEXT} bytes; expected {_WHAT}"
+            )
+        found = data[place:end].decode("ascii", "replace")
+        place = end + 1
+        return found
+
+    if len(data) < place or not data.startswith(BEGINS):
+        raise InputError(
+            f"{path}: cannot be read as {_WHAT}: begins with {data[:3].hex(' ') or 'nothing'}; "
+            f"expected bc and the version 1 or 2"
+        )
+    version, count = struct.unpack_from("<HH", data, 1)
+    kinds: dict[int, _Kind] = {}
+    for _ in range(count):
+        number, name = word(), text()
+        fields: list[tuple[str, str]] = []
+        for _ in range(word()):
+            variable, _, letter = text().removesuffix(")").rpartition("(")
+            if letter not in _TYPES or not variable:
+                raise InputError(
+                    f"{path}: event {name[:60]!r}: a variable of type {letter[:20]!r}; expected "
+                    f"one of {' '.join(sorted(_TYPES))}"
+                )
+            fields.append((variable, f"<{letter}"))
+            if len(fields) > LIMITS.log_fields:
+                raise InputError(
+                    f"{path}: event {name[:60]!r}: more than {LIMITS.log_fields} variables"
+                )
+        names = [variable for variable, _ in fields]
+        if len(set(names)) < len(names) or number in kinds or {"event", "time"} & set(names):
+            raise InputError(
+                f"{path}: event {name[:60]!r}: a number or a variable stands there twice; "
+                "expected each once"
+            )
+        layout = np.dtype([("event", "<u2"), ("time", _TIMES[version][0]), *fields])
+        kinds[number] = _Kind(name, layout, tuple(names))
+    return version, kinds, place
+
+
+def _events(
+    path: Path, data: bytes, kinds: Mapping[int, _Kind], begin: int
+) -> tuple[dict[int, NDArray[Any]], int]:
+    """Return the events of each type, and the place of the first byte that is none."""
+    pieces: dict[int, list[NDArray[Any]]] = {}
+    end, count = begin, 0
+    for number, rows, after in _runs(data, kinds, begin):
+        pieces.setdefault(number, []).append(rows)
+        end, count = after, count + len(rows)
+        if count > LIMITS.table_rows:
+            raise InputError(f"{path}: more than {LIMITS.table_rows} events; expected one flight")
+    return {number: np.concatenate(rows) for number, rows in pieces.items()}, end
+
+
+def _runs(
+    data: bytes, kinds: Mapping[int, _Kind], begin: int
+) -> Iterator[tuple[int, NDArray[Any], int]]:
+    """Yield runs of events of one type, each with its number and the place where it ends."""
+    place = begin
+    while place + 2 <= len(data):
+        number = data[place] | data[place + 1] << 8
+        kind = kinds.get(number)
+        if kind is None:
+            return
+        whole = min((len(data) - place) // kind.layout.itemsize, _RUN)
+        rows = np.frombuffer(data, kind.layout, whole, place)
+        other = np.flatnonzero(rows["event"] != number)
+        rows = rows[: other[0]] if other.size else rows
+        if not len(rows):
+            return
+        place += len(rows) * kind.layout.itemsize
+        yield number, rows, place

@@ -1,0 +1,191 @@
+"""ArduPilot's DataFlash format: a binary log that describes its own messages.
+
+Each message begins with A3 95 and its type's number. Type 128, FMT, states of a type its number,
+its length, its name, and the letters and names of its columns. pymavlink reads it, too: as Python
+objects, one by one, with a printed line for each byte that is damaged, and with 100 MB of disk.
+Here compiled code goes through a file, first to count and then to note the places of the messages
+that are wanted, and their columns are read at once, so that any file costs a bounded time.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....runtime.compiled import compiled
+from ....runtime.errors import InputError
+from ....runtime.file_limits import LIMITS
+from ....runtime.regular_files import read_bytes
+
+Bytes = NDArray[np.uint8]
+Array = NDArray[np.float64]
+
+BEGINS = (b"\xa3\x95",)
+
+_WHAT = "an ArduPilot log (.BIN)"
+_FMT, _FMT_LENGTH = 128, 89
+# letters of columns: type, and what one unit of it is
+_LETTERS = {
+    "a": ("(32,)<i2", 1.0),
+    "b": ("i1", 1.0),
+    "B": ("u1", 1.0),
+    "h": ("<i2", 1.0),
+    "H": ("<u2", 1.0),
+    "i": ("<i4", 1.0),
+    "I": ("<u4", 1.0),
+    "f": ("<f4", 1.0),
+    "d": ("<f8", 1.0),
+    "g": ("<f2", 1.0),
+    "n": ("S4", 1.0),
+    "N": ("S16", 1.0),
+    "Z": ("S64", 1.0),
+    "c": ("<i2", 0.01),
+    "C": ("<u2", 0.01),
+    "e": ("<i4", 0.01),
+    "E": ("<u4", 0.01),
+    "L": ("<i4", 1e-7),
+    "M": ("u1", 1.0),
+    "q": ("<i8", 1.0),
+    "Q": ("<u8", 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Messages:
+    """All messages of one type."""
+
+    name: str
+    rows: NDArray[Any]  # (N,) structured, as they stand in the file
+    units: Mapping[str, float]  # of a column
+
+    def __contains__(self, column: str) -> bool:
+        return column in self.units
+
+    def column(self, name: str) -> Array:
+        """Return a column of numbers (N,)."""
+        with np.errstate(invalid="ignore"):  # spoiled bytes may make a signalling NaN
+            return np.asarray(self.rows[name].astype(np.float64) * self.units[name])
+
+    def columns(self, names: Collection[str]) -> Array:
+        """Return columns (N, len(names))."""
+        return np.column_stack([self.column(name) for name in names])
+
+    def where(self, mask: NDArray[np.bool_]) -> "Messages":
+        """Return the messages of a mask (N,)."""
+        return Messages(self.name, self.rows[mask], self.units)
+
+
+@dataclass(frozen=True)
+class DataFlash:
+    """The messages of a log by the name of their type, and how many bytes belonged to none."""
+
+    messages: Mapping[str, Messages]
+    skipped: int
+
+
+def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
+    """Return the messages of the types that are wanted and there.
+
+    Raises:
+        InputError: the file cannot be read, is no such log, or has more messages of a type than
+            ``FileLimits.table_rows``.
+    """
+    data = np.frombuffer(read_bytes(path, _WHAT, LIMITS.binary_log), np.uint8)
+    if len(data) < _FMT_LENGTH or data[:2].tobytes() != BEGINS[0]:
+        raise InputError(
+            f"{path}: cannot be read as {_WHAT}: begins with "
+            f"{data[:2].tobytes().hex(' ') or 'nothing'}, {len(data)} bytes; expected a3 95"
+        )
+    counts, used = _count(data)
+    kinds = {}
+    for place in _places(data, _FMT, min(int(counts[_FMT]), 100_000)):
+        kind = _layout(data[place : place + _FMT_LENGTH].tobytes(), wanted)
+        if kind is not None:
+            kinds[kind[0]] = kind[1:]
+    found: dict[str, Messages] = {}
+    for number, (name, layout, units) in kinds.items():
+        count = int(counts[number])
+        if count > LIMITS.table_rows:
+            raise InputError(
+                f"{path}: {name}: more than {LIMITS.table_rows} messages; expected one flight"
+            )
+        if not count:
+            continue
+        places = _places(data, number, count)
+        block = data[places[:, None] + np.arange(3, 3 + layout.itemsize)]
+        rows = np.ascontiguousarray(block).view(layout)[:, 0]
+        found[name] = Messages(name, rows, units)
+    if not kinds and not counts[_FMT]:
+        raise InputError(f"{path}: cannot be read as {_WHAT}: no FMT message; expected some")
+    return DataFlash(found, len(data) - int(used))
+
+
+def _layout(
+    message: bytes, wanted: Collection[str]
+) -> tuple[int, str, np.dtype[Any], dict[str, float]] | None:
+    """Return number, name, layout and units of the type that a FMT message describes; None where it
+    is not wanted, or does not describe what it says.
+    """
+    number, length = message[3], message[4]
+    name = message[5:9].split(b"\0")[0].decode("ascii", "replace")
+    if name not in wanted:
+        return None
+    letters = message[9:25].split(b"\0")[0].decode("ascii", "replace")
+    columns = message[25:89].split(b"\0")[0].decode("ascii", "replace").split(",")
+    if len(letters) != len(columns) or len(set(columns)) < len(columns):
+        return None
+    if any(letter not in _LETTERS for letter in letters) or not all(columns):
+        return None
+    pairs = list(zip(columns, letters, strict=True))
+    layout = np.dtype([(column, _LETTERS[letter][0]) for column, letter in pairs])
+    if layout.itemsize + 3 != length:
+        return None
+    return number, name, layout, {column: _LETTERS[letter][1] for column, letter in pairs}
+
+
+def _count(data: Bytes) -> tuple[NDArray[np.int64], int]:
+    """Return how many messages of each type there are (256,), and how many bytes they take."""
+    counts = np.zeros(256, np.int64)
+    return counts, _walk(data, counts, -1, np.empty(0, np.int64))
+
+
+def _places(data: Bytes, number: int, count: int) -> NDArray[np.int64]:
+    """Return where the messages of a type begin (count,)."""
+    places = np.empty(count, np.int64)
+    _walk(data, np.zeros(256, np.int64), number, places)
+    return places
+
+
+@compiled
+def _walk(data: Bytes, counts: NDArray[np.int64], number: int, places: NDArray[np.int64]) -> int:
+    """Go through all messages; count them by type, and note the places of the first of one type.
+
+    Return how many bytes they take. What is no message is passed byte by byte.
+    """
+    lengths = np.zeros(256, np.int64)
+    lengths[128] = 89
+    place, used, noted = 0, 0, 0
+    while place + 3 <= len(data):
+        kind = data[place + 2]
+        length = lengths[kind]
+        if (
+            data[place] != 0xA3
+            or data[place + 1] != 0x95
+            or length < 3
+            or place + length > len(data)
+        ):
+            place += 1
+            continue
+        if kind == 128:
+            lengths[data[place + 3]] = data[place + 4]
+            lengths[128] = 89
+        counts[kind] += 1
+        if kind == number and noted < len(places):
+            places[noted] = place
+            noted += 1
+        place += length
+        used += length
+    return used

@@ -1,0 +1,57 @@
+"""Orders in which vehicles number their motors, by name.
+
+An order says which motor each of the kit's rotors is: 1 front-left, 2 rear-left, 3 rear-right,
+4 front-right. Sources: PX4's airframe reference (quad x), ArduPilot's motor order (QUAD/X),
+Betaflight's and INAV's mixer QUADX, Bitcraze's manual of the Crazyflie 2.
+"""
+
+from ...runtime.errors import InputError, unknown_name
+
+Order = tuple[int, int, int, int]
+
+PLACES = ("front-left", "rear-left", "rear-right", "front-right")  # of the kit's rotors 1 to 4
+
+# motor, from 1, of each of the kit's rotors
+ORDERS: dict[str, Order] = {
+    "windwrench": (1, 2, 3, 4),
+    "px4-x": (3, 2, 4, 1),  # 1 front-right, 2 rear-left, 3 front-left, 4 rear-right
+    "ardupilot-x": (3, 2, 4, 1),  # the same
+    "betaflight": (4, 3, 1, 2),  # 1 rear-right, 2 front-right, 3 rear-left, 4 front-left
+    "crazyflie": (4, 3, 2, 1),  # 1 front-right, 2 rear-right, 3 rear-left, 4 front-left
+}
+
+
+def rotor_order(value: object, where: str) -> Order:
+    """Return which motor, from 1, each of the kit's rotors is.
+
+    Args:
+        value: a name of ``ORDERS``, or the four motors' numbers, front-left first.
+        where: for errors.
+
+    Raises:
+        InputError: neither.
+    """
+    if isinstance(value, str):
+        if value not in ORDERS:
+            raise unknown_name("rotor order", value, ORDERS, where)
+        return ORDERS[value]
+    if isinstance(value, list | tuple) and sorted(map(str, value)) == ["1", "2", "3", "4"]:
+        a, b, c, d = (int(str(x)) for x in value)
+        return a, b, c, d
+    raise InputError(
+        f"{where}: {value!r}; expected one of {', '.join(ORDERS)}, or the numbers of the motors "
+        f"at the {', '.join(PLACES)}, such as [3, 2, 4, 1]"
+    )
+
+
+def order_names(order: Order) -> list[str]:
+    """Return the names of an order; none where it has none."""
+    return [name for name, known in ORDERS.items() if known == order]
+
+
+def order_words(order: Order) -> str:
+    """Return an order in words."""
+    places = ", ".join(
+        f"{motor} {place}" for motor, place in sorted(zip(order, PLACES, strict=True))
+    )
+    return f"motors {places}"

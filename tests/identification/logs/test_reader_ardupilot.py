@@ -1,0 +1,297 @@
+"""ArduPilot's DataFlash logs: a real one on the ground, read as pymavlink reads it where that is
+installed, and synthetic flights.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.data_paths import data_file
+from tests.support.dataflash_writer import dataflash
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.identification.logs.readers.dataflash import read_dataflash
+from windwrench.identification.logs.reading import read_log
+
+FLIP = np.diag([1.0, -1.0, -1.0])
+T = 5.0 + 0.02 * np.arange(300)
+SLOW = T[::5]
+FAST = 5.0 + 0.0025 * np.arange(2400)
+PARAMETERS = {
+    "FRAME_CLASS": 1.0,
+    "FRAME_TYPE": 1.0,
+    "MOT_PWM_MIN": 1100.0,
+    "MOT_PWM_MAX": 1900.0,
+    "MOT_THST_EXPO": 0.5,
+    "MOT_SPIN_MIN": 0.1,
+    "MOT_SPIN_MAX": 0.9,
+    "SERVO9_FUNCTION": 33.0,
+    "SERVO10_FUNCTION": 34.0,
+    "SERVO11_FUNCTION": 35.0,
+    "SERVO12_FUNCTION": 36.0,
+}
+COMMAND = np.array([0.50, 0.52, 0.54, 0.56])  # ours: front-left, rear-left, rear-right, front-right
+
+
+def motion(t):
+    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
+    turn = Rotation.from_euler(
+        "ZYX", np.column_stack([2.0 + 0.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
+    )
+    return position, turn
+
+
+def inertial(t):
+    """Angular velocity (rad/s) and specific force (m/s2), body axes forward, left, up."""
+    turn, after = motion(t)[1], motion(t + 1e-5)[1]
+    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
+    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
+
+
+def ned(t):
+    position, turn = motion(t)
+    return position @ FLIP, Rotation.from_matrix(FLIP @ turn.as_matrix() @ FLIP)
+
+
+def micro(t):
+    return 1e6 * t
+
+
+def xkf1(t):
+    position, _ = ned(t)
+    angles = {name: np.zeros(len(t)) for name in ("Roll", "Pitch", "Yaw")}
+    places = {name: position[:, i] for i, name in enumerate(("PN", "PE", "PD"))}
+    return "XKF1", "QBcccfff", {"TimeUS": micro(t), "C": np.zeros(len(t)), **angles, **places}
+
+
+def xkq(t):
+    q = ned(t)[1].as_quat(scalar_first=True)
+    return (
+        "XKQ",
+        "QBffff",
+        {
+            "TimeUS": micro(t),
+            "C": np.zeros(len(t)),
+            **{f"Q{i + 1}": q[:, i] for i in range(4)},
+        },
+    )
+
+
+def att(t):
+    yaw, pitch, roll = ned(t)[1].as_euler("ZYX", degrees=True).T
+    angles = {"Roll": roll, "Pitch": pitch, "Yaw": yaw % 360.0}
+    return "ATT", "QccC", {"TimeUS": micro(t), **angles}
+
+
+def imu(t):
+    gyro, force = inertial(t)
+    columns = {f"Gyr{a}": (gyro @ FLIP)[:, i] for i, a in enumerate("XYZ")}
+    columns |= {f"Acc{a}": (force @ FLIP)[:, i] for i, a in enumerate("XYZ")}
+    return "IMU", "QBffffff", {"TimeUS": micro(t), "I": np.zeros(len(t)), **columns}
+
+
+def rcou(t, channels=(9, 10, 11, 12)):
+    pulses = {f"C{i}": np.zeros(len(t)) for i in range(1, 15)}
+    for channel, u in zip(channels, COMMAND[[3, 1, 0, 2]], strict=True):
+        pulses[f"C{channel}"] = np.full(len(t), 1100.0 + 800.0 * u)
+    return "RCOU", "Q" + "H" * 14, {"TimeUS": micro(t), **pulses}
+
+
+def parm(**changes):
+    values = {k: v for k, v in (PARAMETERS | changes).items() if v is not None}
+    return (
+        "PARM",
+        "QNf",
+        {
+            "TimeUS": [1.0] * len(values),
+            "Name": [name.encode() for name in values],
+            "Value": list(values.values()),
+        },
+    )
+
+
+def esc(t):
+    rows = [(x, i, 5000.0 + 100.0 * i) for x in t for i in range(4)]
+    return (
+        "ESC",
+        "QBf",
+        {
+            "TimeUS": [micro(x) for x, _, _ in rows],
+            "Instance": [i for _, i, _ in rows],
+            "RPM": [rpm for _, _, rpm in rows],
+        },
+    )
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(*messages):
+        path = tmp_path / "00000001.BIN"
+        path.write_bytes(dataflash(messages))
+        return path
+
+    return to_file
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return load_vehicle("ardrone2")
+
+
+def assert_pose(log, atol):
+    position, turn = motion(log.t[log.valid] + 5.0)
+    np.testing.assert_allclose(log.position[log.valid], position, atol=atol)
+    seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
+    assert (turn.inv() * seen).magnitude().max() < 10 * atol
+
+
+def test_frames_motors_and_commands(write, vehicle):
+    battery = "BAT", "QBf", {"TimeUS": micro(SLOW), "Inst": 0 * SLOW, "Volt": 16.0 - 0.1 * SLOW}
+    log = read_log(write(parm(), xkf1(T), xkq(T), imu(T), rcou(T), battery), None, vehicle)
+    assert "reader ardupilot_bin" in log.source
+    assert_pose(log, 1e-5)
+    np.testing.assert_allclose(log.gyro, inertial(T)[0], atol=1e-4)
+    np.testing.assert_allclose(log.accelerometer, inertial(T)[1], atol=1e-4)
+    np.testing.assert_allclose(log.command, np.tile(COMMAND, (len(T), 1)), atol=1e-9)
+    np.testing.assert_allclose(log.voltage[0], 16.0 - 0.5, atol=1e-5)
+    # ArduPilot's own curve, scaled to the accelerometer's specific force
+    a = (COMMAND - 0.1) / 0.8
+    shape = 0.5 * a + 0.5 * a * a
+    thrust = vehicle.k * log.rotor_speeds**2
+    np.testing.assert_allclose(thrust[9] / thrust[9].sum(), shape / shape.sum(), rtol=1e-6)
+    needed = np.median(vehicle.mass * inertial(T)[1][:, 2])
+    np.testing.assert_allclose(thrust[9].sum(), needed, rtol=1e-3)
+    assert log.commanded
+    assert any("e = 0.5 (MOT_THST_EXPO)" in note for note in log.notes)
+
+
+def test_a_motor_curve_stands_before_arducopters(write, vehicle):
+    curve = MotorCurve(thrust=(0.0, 0.0, 3.0), voltage_exponent=0.0, command=(1100.0, 1900.0))
+    log = read_log(
+        write(parm(), xkf1(T), xkq(T), rcou(T)), None, replace(vehicle, motor_curve=curve)
+    )
+    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[3] ** 2, 3.0 * COMMAND**2, rtol=1e-9)
+
+
+def test_a_slow_pose_beside_a_fast_imu(write):
+    log = read_log(write(parm(), xkf1(SLOW), att(T), imu(FAST), rcou(T)))
+    assert len(log.t) > 2000
+    assert 50 < log.valid.sum() <= len(SLOW)
+    assert_pose(log, 2e-3)
+
+
+def test_escs_that_report_their_speed(write):
+    log = read_log(write(parm(), xkf1(T), xkq(T), rcou(T), esc(T)))
+    ours = np.array([5200.0, 5100.0, 5300.0, 5000.0]) * 2 * np.pi / 60  # motors 3, 2, 4, 1
+    np.testing.assert_allclose(log.rotor_speeds[7], ours, rtol=1e-6)
+    assert not log.commanded
+    assert log.command is not None
+
+
+def test_without_a_position_the_imu_is_read(write):
+    log = read_log(write(parm(), att(T), imu(FAST), rcou(T)))
+    assert not log.has_pose
+    assert not log.has_rotor_speeds
+    np.testing.assert_allclose(log.gyro, inertial(log.t + 5.0)[0], atol=1e-3)
+
+
+def test_places_on_the_globe_become_metres(write):
+    position, _ = ned(T)
+    lat, lng = 52.0, 10.0
+    place = {
+        "TimeUS": micro(T),
+        "Lat": lat + np.degrees(position[:, 0] / 6_378_137.0),
+        "Lng": lng + np.degrees(position[:, 1] / 6_378_137.0 / np.cos(np.radians(lat))),
+        "Alt": -position[:, 2],
+    }
+    log = read_log(write(parm(), ("POS", "QLLf", place), att(T), imu(T), rcou(T)))
+    wanted = motion(T)[0] - motion(T[:1])[0] * [1.0, 1.0, 0.0]
+    np.testing.assert_allclose(log.position, wanted, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "order"),
+    [(1, (3, 1, 0, 2)), (12, (3, 0, 2, 1)), (13, (3, 0, 1, 2)), (14, (3, 2, 1, 0))],
+)
+def test_frame_types_number_their_motors(write, kind, order):
+    """``order``: which of our rotors, from 0, each motor of the frame is."""
+    if kind == 12:  # rear-right, front-right, rear-left, front-left
+        order = (2, 3, 1, 0)
+    log = read_log(write(parm(FRAME_TYPE=float(kind)), xkf1(T), xkq(T), rcou(T)))
+    sent = COMMAND[[3, 1, 0, 2]]  # by motor, as rcou has them
+    wanted = np.empty(4)
+    for motor, rotor in enumerate(order):
+        wanted[rotor] = sent[motor]
+    np.testing.assert_allclose(log.command[0], wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("messages", "expected"),
+    [
+        ((parm(), xkf1(T), xkq(T)), "no motors; expected RCOU, or ESC with RPM, found PARM, XKF1"),
+        ((parm(), rcou(T)), "no pose, and no accelerometer and no gyro; expected a pose, or"),
+        ((parm(FRAME_CLASS=2.0), rcou(T)), "FRAME_CLASS and FRAME_TYPE are 2 and 1; expected a"),
+        ((parm(FRAME_TYPE=0.0), rcou(T)), "FRAME_CLASS and FRAME_TYPE are 1 and 0; expected a"),
+        (
+            (parm(MOT_PWM_MIN=1900.0), xkf1(T), xkq(T), rcou(T)),
+            "MOT_PWM_MIN and MAX are 1900 and 1900 us; expected MIN below MAX",
+        ),
+        ((parm(), xkf1(T), xkq(T), rcou(T + 90.0)), "do not overlap"),
+    ],
+)
+def test_what_is_missing_is_named(write, messages, expected):
+    with pytest.raises(InputError, match=f"00000001.BIN: .*{expected}"):
+        read_log(write(*messages))
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_cut_or_spoiled_log_reads_or_is_refused(write):
+    path = write(parm(), xkf1(T), xkq(T), imu(T), rcou(T))
+    data = path.read_bytes()
+    rng = np.random.default_rng(0)
+    read = 0
+    for k in range(60):
+        spoiled = bytearray(data if k % 2 else data[: rng.integers(2, len(data))])
+        for place in rng.integers(0, len(spoiled), 20 if k % 2 else 0):
+            spoiled[place] = rng.integers(256)
+        path.write_bytes(bytes(spoiled))
+        try:
+            log = read_log(path, "ardupilot_bin")
+        except InputError:
+            continue
+        read += 1
+        assert np.isfinite(log.command).all()
+    assert read > 5
+
+
+@pytest.mark.measured
+def test_a_real_log_on_the_ground(vehicle):
+    """Half a second of a copter that stands: gravity is seen, the motors are off."""
+    path = data_file("ardupilot/backend_log_80k.BIN")
+    log = read_log(path)
+    np.testing.assert_allclose(np.linalg.norm(log.accelerometer, axis=1), 9.81, atol=0.1)
+    up = Rotation.from_quat(log.quaternion, scalar_first=True).apply(log.accelerometer)
+    np.testing.assert_allclose(up, np.tile([0.0, 0.0, 9.81], (len(up), 1)), atol=0.3)
+    np.testing.assert_array_equal(log.command, 0.0)
+    with pytest.raises(InputError, match="RCOU: no sample in flight; expected motors that run"):
+        read_log(path, None, vehicle)
+
+
+@pytest.mark.measured
+def test_pymavlink_reads_the_same_numbers():
+    dfreader = pytest.importorskip("pymavlink.DFReader", reason="pip install pymavlink")
+    path = data_file("ardupilot/backend_log_80k.BIN")
+    wanted = ("IMU", "ATT", "XKF1", "XKQ", "RCOU", "BAT", "POS")
+    ours = read_dataflash(path, wanted).messages
+    reader = dfreader.DFReader_binary(str(path))
+    theirs: dict[str, list[object]] = {name: [] for name in wanted}
+    while (message := reader.recv_msg()) is not None:
+        if message.get_type() in wanted:
+            theirs[message.get_type()].append(message)
+    for name, messages in theirs.items():
+        assert len(ours[name].rows) == len(messages) > 0
+        for column in ours[name].units:
+            values = [getattr(message, column) for message in messages]
+            np.testing.assert_allclose(ours[name].column(column), values, rtol=1e-6)

@@ -1,0 +1,174 @@
+"""Blackboxes of Betaflight: synthetic ones alone, decoded by this kit and, where it is installed,
+by orangebox.
+"""
+
+import numpy as np
+import pytest
+
+from tests.support.blackbox_writer import FIELDS, LEAST_MOTOR, blackbox
+from windwrench.dynamics import InputError
+from windwrench.identification.logs.reading import read_log
+
+COUNT = 400
+G = 9.80665
+
+
+def flight(count=COUNT, seed=0):
+    """Rows of a flight at 1 kHz: half a second on the ground, then all fields wander, now and then
+    by a leap.
+    """
+    rng = np.random.default_rng(seed)
+    values = dict.fromkeys(FIELDS, 0) | {
+        "accSmooth[2]": 2048,
+        "rcCommand[3]": 1200,
+        "vbatLatest": 2480,
+    }
+    values |= {f"motor[{i}]": 300 + 100 * i for i in range(4)}
+    values |= {f"eRPM[{i}]": 900 + 10 * i for i in range(4)}
+    rows = []
+    for k in range(count):
+        if k:
+            leap = rng.choice([0, 1, 5, 20, 300], size=len(FIELDS), p=[0.3, 0.3, 0.2, 0.15, 0.05])
+            for name, size in zip(FIELDS, leap, strict=True):
+                still = name.startswith(("accSmooth", "gyroADC")) and k < 0.6 * count
+                if not still:
+                    values[name] += int(rng.integers(-size, size + 1))
+        for name in values:
+            low = LEAST_MOTOR if name.startswith("motor") else 0
+            if name.startswith(("motor", "eRPM", "rssi", "rcCommand[3]", "vbat")):
+                values[name] = min(max(values[name], low), 2047)
+        rows.append(values | {"loopIteration": 2 * k, "time": 5_000_000 + 1000 * k + k % 3})
+    return rows
+
+
+def column(rows, name):
+    return np.array(
+        [[row[f"{name}[{i}]"] for i in range(4 if name in "motor eRPM" else 3)] for row in rows]
+    )
+
+
+@pytest.fixture
+def bbl(tmp_path):
+    def write(data, name="LOG00001.BBL"):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return path
+
+    return write
+
+
+def test_a_blackbox_is_read_field_by_field(bbl):
+    rows = flight()
+    log = read_log(bbl(blackbox(rows)))
+    assert not log.has_pose
+    t = np.array([row["time"] for row in rows])
+    np.testing.assert_allclose(log.t, 1e-6 * (t - t[0]), atol=1e-9)
+    np.testing.assert_allclose(log.gyro, np.radians(column(rows, "gyroADC")), atol=1e-12)
+    np.testing.assert_allclose(log.accelerometer, column(rows, "accSmooth") * G / 2048, atol=1e-9)
+    ours = [3, 2, 0, 1]  # Betaflight's motors, from 0, front-left first
+    command = (column(rows, "motor")[:, ours] - LEAST_MOTOR) / (2047 - LEAST_MOTOR)
+    np.testing.assert_allclose(log.command, command, atol=1e-12)
+    speeds = column(rows, "eRPM")[:, ours] * 200 / 14 * 2 * np.pi / 60
+    np.testing.assert_allclose(log.rotor_speeds, speeds, rtol=1e-12)
+    np.testing.assert_allclose(log.voltage, [0.01 * row["vbatLatest"] for row in rows])
+    assert any("motor_poles of the header" in note for note in log.notes)
+
+
+def test_the_magnet_poles_are_an_option(bbl):
+    path = bbl(blackbox(flight(60)))
+    speeds = read_log(path).rotor_speeds
+    np.testing.assert_allclose(read_log(path, "betaflight:28").rotor_speeds, 0.5 * speeds)
+    with pytest.raises(
+        InputError, match="reader option 'x'; expected the motors' number of magnet"
+    ):
+        read_log(path, "betaflight:x")
+
+
+def test_orangebox_decodes_the_same(bbl):
+    orangebox = pytest.importorskip("orangebox", reason="pip install orangebox")
+    rows = flight(seed=3)
+    path = bbl(blackbox(rows, variable=False))  # orangebox lacks that encoding
+    parser = orangebox.Parser.load(str(path))
+    frames = [frame.data[: len(FIELDS)] for frame in parser.frames()]
+    assert frames == [tuple(row[name] for name in FIELDS) for row in rows]
+    assert len(read_log(path).t) == len(frames)
+
+
+def test_what_is_damaged_is_left_out_until_the_next_whole_frame(bbl):
+    rows = flight()
+    data = bytearray(blackbox(rows))
+    for place in range(len(data) // 2, len(data) // 2 + 40):
+        data[place] = 0
+    log = read_log(bbl(bytes(data)))
+    assert 0.8 * COUNT < len(log.t) < COUNT
+    assert any("could not be decoded" in note for note in log.notes)
+    cut = read_log(bbl(blackbox(rows)[: 3 * len(data) // 4]))
+    assert 0.6 * COUNT < len(cut.t) < 0.9 * COUNT
+
+
+def test_the_longest_of_several_logs_is_read(bbl):
+    log = read_log(bbl(blackbox(flight(50)) + blackbox(flight(200)) + blackbox(flight(20))))
+    assert len(log.t) == 200
+    assert any("3 logs; the longest, number 2" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (
+            (b"H Field P encoding:9", b"H Field P encoding:5"),
+            "header Field P encoding: 5; expected",
+        ),
+        ((b"H Field P encoding:9,", b"H Field P encoding:"), "expected as many as the 30 names"),
+        ((b"Data version:2", b"Data version:1"), "header Data version: '1'; expected 2"),
+        ((b"motorOutput:158,2047", b"motorOutput:a"), "header motorOutput: 'a'; expected two"),
+        ((b"motor[0],", b"moter[0],"), r"no motors; expected motor\[0\]"),
+        ((b"S\x03\x01", b""), None),
+    ],
+)
+def test_headers_that_say_something_else_are_named(bbl, change, expected):
+    path = bbl(blackbox(flight(60)).replace(*change))
+    if expected is None:
+        assert len(read_log(path).t) == 60
+        return
+    with pytest.raises(InputError, match=f"LOG00001.BBL: .*{expected}"):
+        read_log(path)
+
+
+def table(rows, path, units=("", ""), erpm=False):
+    """Write what blackbox_decode writes, with a space behind each comma."""
+    names = {name: name for name in FIELDS if erpm or "eRPM" not in name}
+    names["time"] = "time (us)"
+    names["vbatLatest"] = "vbatLatest (V)"
+    names |= {f"accSmooth[{i}]": f"accSmooth[{i}]{units[0]}" for i in range(3)}
+    names |= {f"gyroADC[{i}]": f"gyroADC[{i}]{units[1]}" for i in range(3)}
+    lines = [", ".join([*names.values(), "flightModeFlags (flags)"])]
+    for row in rows:
+        fields = [
+            f"{0.01 * row[name]:.2f}" if name == "vbatLatest" else str(row[name]) for name in names
+        ]
+        lines.append(", ".join([*fields, "ARM|ANGLE"]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_table_of_blackbox_decode_is_the_same_log(tmp_path, bbl):
+    rows = flight(600)
+    whole = read_log(bbl(blackbox(rows)))
+    log = read_log(table(rows, tmp_path / "LOG00001.01.csv", erpm=True))
+    assert "reader betaflight_csv" in log.source
+    for name in ("t", "gyro", "accelerometer", "rotor_speeds", "voltage"):
+        np.testing.assert_allclose(getattr(log, name), getattr(whole, name), atol=1e-6)
+    assert any("2048 counts taken as 1 g" in note for note in log.notes)
+    assert any("14 magnet poles (assumed" in note for note in log.notes)
+    # without headers DShot's whole range is assumed
+    motors = column(rows, "motor")[:, [3, 2, 0, 1]]
+    np.testing.assert_allclose(log.command, (motors - 48) / 1999, atol=1e-9)
+    commands = read_log(table(rows, tmp_path / "b.csv"))
+    assert not commands.has_rotor_speeds
+    assert commands.command is not None
+
+
+def test_stated_units_are_taken(tmp_path):
+    log = read_log(table(flight(60), tmp_path / "a.csv", units=(" (m/s2)", " (rad/s)")))
+    np.testing.assert_allclose(log.accelerometer[0], [0, 0, 2048])  # as the column says

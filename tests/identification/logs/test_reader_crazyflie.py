@@ -1,0 +1,206 @@
+"""A Crazyflie's SD-card logs and tables of its log variables: real SD-card logs, read from where
+they lie, and synthetic ones.
+"""
+
+import struct
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt
+from scipy.spatial.transform import Rotation
+
+from tests.support.data_paths import data_file
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.identification.logs.readers import crazyflie_sd
+from windwrench.identification.logs.readers.nanobench import motor_thrust
+from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.file_limits import LIMITS
+
+T = 30.0 + 0.002 * np.arange(1000)
+SLOW = 30.0 + 0.008 * np.arange(250)
+MOTORS = np.array([40000, 41000, 42000, 43000])  # m1 front-right to m4 front-left
+OURS = MOTORS[::-1]
+
+
+def motion(t):
+    position = np.column_stack([0.5 * np.cos(t), 0.8 * np.sin(t), 1.0 + 0.1 * t])
+    angles = np.column_stack([2.0 + 0.5 * t, 0.2 * np.sin(2 * t), 0.3 * np.cos(t)])
+    return position, Rotation.from_euler("ZYX", angles), angles
+
+
+def inertial(t):
+    turn, after = motion(t)[1], motion(t + 1e-5)[1]
+    acceleration = np.column_stack([-0.5 * np.cos(t), -0.8 * np.sin(t), np.full(len(t), 9.81)])
+    return (turn.inv() * after).as_rotvec() / 1e-5, turn.inv().apply(acceleration)
+
+
+def fast(t):
+    """Variables of gyro, accelerometer and motors, as the firmware logs them."""
+    gyro, force = inertial(t)
+    out = {f"gyro.{a}(f)": np.degrees(gyro[:, i]) for i, a in enumerate("xyz")}
+    out |= {f"acc.{a}(f)": force[:, i] / 9.80665 for i, a in enumerate("xyz")}
+    return out | {f"motor.m{i + 1}(H)": np.full(len(t), m) for i, m in enumerate(MOTORS)}
+
+
+def slow(t):
+    """Variables of the onboard filter: legacy Euler angles, nose up positive."""
+    position, _, angles = motion(t)
+    yaw, pitch, roll = np.degrees(angles).T
+    out = {f"stateEstimate.{a}(f)": position[:, i] for i, a in enumerate("xyz")}
+    out |= {"stateEstimate.roll(f)": roll, "stateEstimate.pitch(f)": -pitch}
+    return out | {"stateEstimate.yaw(f)": yaw, "pm.vbat(f)": 4.1 - 0.01 * (t - t[0])}
+
+
+def sd_card(events, version=2, checksum=True):
+    """Return the bytes of a log of events ``{name: (times, variables)}``, in order of time."""
+    out = struct.pack("<BHH", 0xBC, version, len(events))
+    records = []
+    for number, (name, (t, variables)) in enumerate(events.items(), 7):
+        out += struct.pack("<H", number) + name.encode() + b"\0"
+        out += struct.pack("<H", len(variables))
+        out += b"".join(key.encode() + b"\0" for key in variables)
+        layout = "<H" + ("Q" if version == 2 else "I") + "".join(key[-2] for key in variables)
+        for k, at in enumerate(t):
+            stamp = round(1e6 * at) if version == 2 else round(1e3 * at)
+            values = [int(c[k]) if key[-2] != "f" else float(c[k]) for key, c in variables.items()]
+            records.append((at, struct.pack(layout, number, stamp, *values)))
+    out += b"".join(record for _, record in sorted(records, key=lambda r: r[0]))
+    return out + struct.pack("<I", zlib.crc32(out)) if checksum else out
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(data, name="log03"):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return path
+
+    return to_file
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_events_of_several_rates(write, version):
+    log = read_log(write(sd_card({"imu": (T, fast(T)), "pose": (SLOW, slow(SLOW))}, version)))
+    assert "reader crazyflie_sd" in log.source
+    # the inertial sensor is four times as fast as the pose: it has no rows of its own yet
+    position, turn, _ = motion(log.t + SLOW[0])
+    np.testing.assert_allclose(log.position, position, atol=2e-3)
+    seen = Rotation.from_quat(log.quaternion, scalar_first=True)
+    assert (turn.inv() * seen).magnitude().max() < 2e-3
+    gyro, force = inertial(log.t + SLOW[0])
+    np.testing.assert_allclose(log.gyro, gyro, atol=5e-3)
+    np.testing.assert_allclose(log.accelerometer, force, atol=5e-3)
+    np.testing.assert_allclose(log.command, np.tile(OURS / 65535, (len(log.t), 1)), atol=1e-9)
+    np.testing.assert_allclose(log.voltage, 4.1 - 0.01 * log.t, atol=1e-4)
+    assert not any("damaged" in note for note in log.notes)
+    assert any("stood at 30 s at the first event" in note for note in log.notes)
+
+
+def test_set_points_become_rotor_speeds_by_a_curve(write):
+    path, vehicle = write(sd_card({"imu": (T, fast(T))})), load_vehicle("crazyflie")
+    assert not read_log(path).has_rotor_speeds
+    log = read_log(path, None, replace(vehicle, motor_curve=None))
+    reference = np.array([vehicle.voltage_ref or 4.2])
+    thrust = motor_thrust(OURS[None].astype(float), reference)[0]
+    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, thrust, rtol=1e-9)
+    assert log.commanded
+    curve = MotorCurve(thrust=(0.0, 0.0, 0.2), voltage_exponent=0.0, command=(0.0, 65535.0))
+    log = read_log(path, None, replace(vehicle, motor_curve=curve))
+    wanted = 0.2 * (OURS / 65535) ** 2
+    np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, wanted, rtol=1e-9)
+
+
+def test_measured_rotor_speeds_come_first(write):
+    variables = fast(T) | {f"rpm.m{i + 1}(H)": np.full(len(T), 20000 + i) for i in range(4)}
+    log = read_log(write(sd_card({"imu": (T, variables)})))
+    wanted = np.array([20003, 20002, 20001, 20000]) * 2 * np.pi / 60
+    np.testing.assert_allclose(log.rotor_speeds[0], wanted, rtol=1e-12)
+    assert not log.commanded
+
+
+def test_a_log_that_was_cut_or_spoiled(write):
+    data = sd_card({"imu": (T, fast(T))})
+    log = read_log(write(data[:-3000]))
+    assert 0.8 * len(T) < len(log.t) < len(T)
+    assert any("is damaged or was cut" in note for note in log.notes)
+    wrong = data[:-1] + bytes([data[-1] ^ 1])
+    assert any("is damaged or was cut" in note for note in read_log(write(wrong)).notes)
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (b"\xbc\x02\x00", "ends within its header|begins with"),
+        (b"\xbc\x02\x00\x01\x00\xff\xff" + b"a" * 300, "a name in its header does not end within"),
+        (b"\xbc\x02\x00\x01\x00\xff\xffa\0\x01\x00x(s)\0", "a variable of type 's'; expected one"),
+        (b"\xbc\x02\x00\x01\x00\xff\xffa\0\x02\x00x(f)\0x(f)\0", "stands there twice"),
+        (b"\xbc\x02\x00\x00\x00", "no event twice; expected at least two samples"),
+        (b"\xbc\x02\x00\xff\xff" + b"\0" * 9, "stands there twice|ends within"),
+        (sd_card({"imu": (T[:1], fast(T[:1]))}), "no event twice"),
+        (
+            sd_card({"pose": (SLOW, slow(SLOW))}),
+            "no motors; expected motor.m1 to m4, .* found stateEstimate.x",
+        ),
+    ],
+)
+def test_what_is_no_log_is_named(write, data, expected):
+    with pytest.raises(InputError, match=f"log03: .*({expected})"):
+        read_log(write(data))
+
+
+def test_events_are_counted(write, monkeypatch):
+    monkeypatch.setattr(crazyflie_sd, "LIMITS", replace(LIMITS, table_rows=100))
+    with pytest.raises(InputError, match="more than 100 events; expected one flight"):
+        read_log(write(sd_card({"imu": (T, fast(T))})))
+
+
+@pytest.mark.parametrize(("time", "unit"), [("timestamp", 1e3), ("Timestamp", 1e3), ("t", 1.0)])
+def test_a_table_of_log_variables(tmp_path, time, unit):
+    """As cflib's examples write them: blocks of two rates, empty where one has no sample."""
+    columns = {key[:-3]: values for key, values in fast(T[::2]).items()}
+    rows = len(T[::2])
+    for key in slow(SLOW):
+        columns[key[:-3]] = np.full(rows, np.nan)
+        columns[key[:-3]][::5] = slow(T[::10])[key]
+    lines = [",".join([time, *columns])]
+    for k in range(rows):
+        fields = [
+            f"{unit * T[2 * k]:.9g}",
+            *("" if np.isnan(c[k]) else f"{c[k]:.9g}" for c in columns.values()),
+        ]
+        lines.append(",".join(fields))
+    path = tmp_path / "cf.csv"
+    path.write_text("\n".join(lines) + "\n")
+    log = read_log(path)
+    assert "reader crazyflie_csv" in log.source
+    position, turn, _ = motion(log.t[log.valid] + T[0])
+    np.testing.assert_allclose(log.position[log.valid], position, atol=3e-3)
+    seen = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
+    assert (turn.inv() * seen).magnitude().max() < 3e-3
+    np.testing.assert_allclose(log.command[0], OURS / 65535, atol=1e-6)
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize(("number", "axes"), [(15, (0, 1)), (16, (2,))])
+def test_real_logs_turn_as_their_motors_say(number, axes):
+    """Units, axes and the motors' order: angular accelerations follow the commands 40 ms later
+    (roll and pitch are excited in log15, yaw in log16), and a vehicle that stands feels gravity.
+    """
+    log = read_log(data_file(f"crazyflie_imu/log{number}"))
+    assert not log.has_pose
+    assert 980.0 < 1.0 / log.period < 1030.0
+    assert not any("damaged" in note for note in log.notes)
+    still = np.linalg.norm(log.accelerometer[log.command.max(axis=1) == 0.0], axis=1)
+    np.testing.assert_allclose(np.median(still), 9.81, atol=0.3)
+    b, a = butter(2, 8.0 / 500.0)
+    turn = np.gradient(filtfilt(b, a, np.nan_to_num(log.gyro), axis=0), log.t, axis=0)
+    command = filtfilt(b, a, log.command, axis=0)
+    flying = command.min(axis=1) > 0.1
+    torque = command @ np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1]]).T
+    for axis in axes:
+        delay = 40 if axis < 2 else 0
+        a, b = turn[flying][delay:, axis], torque[flying][: flying.sum() - delay, axis]
+        assert np.corrcoef(a, b)[0, 1] > 0.85

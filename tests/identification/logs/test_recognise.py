@@ -1,0 +1,155 @@
+"""Which reader a log needs is told from what is in it, whatever its name."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.fuzz.forms import _crazyswarm2, _nanobench, _own_log, _text_table
+from tests.support.data_paths import data_file
+from windwrench.dynamics import InputError
+from windwrench.identification.logs.readers import READERS
+from windwrench.identification.logs.readers.recognise import (
+    reader_by_columns,
+    reader_by_content,
+)
+from windwrench.identification.logs.reading import read_log
+
+REAL = {
+    "px4/sample_log_small.ulg": "px4_ulog",
+    "motor_faults/TestCase_3_1000000002.ulg": "px4_ulog",
+    "ardupilot/backend_log_80k.BIN": "ardupilot_bin",
+    "crazyflie_imu/log10": "crazyflie_sd",
+    "nanobench/B6_linear_ramp_rep1.csv.gz": "nanobench",
+    "crazyswarm2_payload/csv/log165.csv": "crazyswarm2",
+    "crazypad/normal_flight__E8_log00.csv.gz": "crazypad",
+    "racer/flight_c.csv.gz": "racer",
+    "flights/labelled_00.csv.gz": None,
+}
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize("name", REAL)
+def test_real_logs_need_no_reader_named(name):
+    path = data_file(name)
+    reader = REAL[name]
+    log = read_log(path)
+    assert log.source.endswith(f"(reader {reader})") if reader else log.source == str(path)
+    assert len(log.t) > 2
+
+
+@pytest.mark.measured
+def test_the_racers_flights_are_in_the_kits_conventions():
+    """Rotors lift the vehicle, and its pose was filtered."""
+    log = read_log(data_file("racer/flight_c.csv.gz"))
+    turned = np.einsum("ij,ij->i", log.extra["velocity_world"][1:], np.diff(log.position, axis=0))
+    assert np.median(turned) > 0.0
+    lift = np.sum(log.rotor_speeds**2, axis=1)
+    assert np.corrcoef(lift, log.accelerometer[:, 2])[0, 1] > 0.9
+    assert any("filtered before they were written" in note for note in log.notes)
+
+
+BEGINNINGS = {
+    b"ULog\x01\x12\x35\x01": "px4_ulog",
+    b"\xa3\x95\x80\x80": "ardupilot_bin",
+    b"#ROSBAG V2.0\n": "rosbag",
+    b"\x89MCAP0\r\n": "rosbag",
+    b"SQLite format 3\0": "rosbag",
+    b"\xbc\x02\x00\x01\x00": "crazyflie_sd",
+    b"\xbc\x01\x00\x01\x00": "crazyflie_sd",
+    b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n": "betaflight",
+}
+
+
+@pytest.mark.parametrize("begins", BEGINNINGS)
+@pytest.mark.parametrize("name", ["a", "a.csv", "a.BIN", "a.bag"])
+def test_the_first_bytes_decide_whatever_the_name(tmp_path, begins, name):
+    (tmp_path / name).write_bytes(begins + bytes(20))
+    found = reader_by_content(tmp_path / name)
+    assert found is not None
+    assert found.name == BEGINNINGS[begins]
+    with pytest.raises(InputError):  # that reader's own words
+        read_log(tmp_path / name)
+
+
+@pytest.mark.parametrize("entry", ["metadata.yaml", "a.db3", "b.mcap"])
+def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
+    (tmp_path / entry).write_bytes(b"")
+    assert reader_by_content(tmp_path) is READERS["rosbag"]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", r"begins with nothing \(it is empty\)"),
+        (b"PK\x03\x04" + bytes(30), "begins with 50 4b 03 04 00 00 00 00"),
+        (b"<html><body>not found</body>", "begins with '<html><body>not '"),
+        (gzip.compress(b"ULog\x01\x12\x35"), "packed .gzip.; expected a table, .csv.gz by name"),
+    ],
+)
+def test_what_no_reader_knows_says_what_was_found_and_looked_for(tmp_path, content, expected):
+    path = tmp_path / "flight.dat"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"flight.dat: .*{expected}") as refused:
+        read_log(path)
+    if b"\x1f" not in content[:1]:
+        for words in ("ULog", "DataFlash", "ROS bag", "SD-card", "blackbox", ".csv, .csv.gz"):
+            assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_table_of_unknown_columns_lists_what_was_looked_for(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,alpha,beta\n0,1,2\n")
+    with pytest.raises(InputError, match=r"missing column\(s\) t, px") as refused:
+        read_log(path)
+    for words in ("nanobench", "crazyswarm2", "racer", "found time, alpha, beta"):
+        assert words in str(refused.value)
+
+
+def test_a_table_that_fits_two_readers_is_refused():
+    header = [*READERS["racer"].signature, *READERS["nanobench"].signature]
+    with pytest.raises(InputError, match="--reader nanobench or --reader racer"):
+        reader_by_columns(Path("a.csv"), header)
+
+
+@pytest.mark.parametrize(
+    ("make", "reader"),
+    [(_nanobench, "nanobench"), (_crazyswarm2, "crazyswarm2")],
+)
+def test_tables_are_known_by_their_columns(tmp_path, make, reader):
+    path = tmp_path / "flight.csv"
+    path.write_bytes(make())
+    assert f"reader {reader}" in read_log(path).source
+    (tmp_path / "own.csv").write_bytes(_own_log("own.csv"))
+    assert "reader" not in read_log(tmp_path / "own.csv").source
+
+
+def test_a_reader_that_is_named_is_taken(tmp_path):
+    path = tmp_path / "flight.csv"
+    path.write_bytes(_nanobench())
+    with pytest.raises(InputError, match="expected those of a crazyswarm2 log"):
+        read_log(path, "crazyswarm2")
+
+
+@pytest.mark.parametrize("wrong", ["quat_w", "rpm_rear_left"])
+def test_the_racers_table(tmp_path, wrong):
+    t = 0.005 * np.arange(50)
+    zero = ("pos_x", "pos_y", "quat_x", "quat_y", "quat_z", "gyro_x", "gyro_y", "gyro_z")
+    columns = {"timestamp_s": t, **dict.fromkeys(zero, 0.0 * t), "pos_z": 1.0 + t}
+    columns |= {"quat_w": 1.0 + 0.0 * t, "battery_v": 16.0 - t}
+    columns |= {
+        f"rpm_{place}": np.full(50, 6000.0 + i)
+        for i, place in enumerate(("rear_right", "front_right", "rear_left", "front_left"))
+    }
+    path = tmp_path / "flight.csv"
+    path.write_bytes(_text_table(columns))
+    log = read_log(path)
+    wanted = np.array([6003.0, 6002.0, 6000.0, 6001.0]) * np.pi / 30.0
+    np.testing.assert_allclose(log.rotor_speeds[0], wanted)
+    np.testing.assert_allclose(log.voltage, 16.0 - t)
+    del columns[wrong]
+    path.write_bytes(_text_table(columns))
+    with pytest.raises(InputError, match=rf"missing column\(s\) {wrong}; expected those of the"):
+        read_log(path, "racer")

@@ -1,0 +1,235 @@
+"""A small writer of Betaflight blackboxes, with each encoding and predictor that a quadrotor's log
+has, after the format's description in Betaflight's documentation.
+"""
+
+from collections.abc import Mapping, Sequence
+
+# field: predictor and encoding in I frames, predictor and encoding in P frames
+FIELDS = {
+    "loopIteration": (0, 1, 6, 9),
+    "time": (0, 1, 2, 0),
+    "axisP[0]": (0, 0, 1, 0),
+    "axisI[0]": (0, 0, 1, 7),
+    "axisI[1]": (0, 0, 1, 7),
+    "axisI[2]": (0, 0, 1, 7),
+    "axisD[0]": (0, 0, 1, 10),
+    "axisD[1]": (0, 0, 1, 10),
+    "axisD[2]": (0, 0, 1, 10),
+    "rcCommand[0]": (0, 0, 1, 8),
+    "rcCommand[1]": (0, 0, 1, 8),
+    "rcCommand[2]": (0, 0, 1, 8),
+    "rcCommand[3]": (4, 1, 1, 8),
+    "vbatLatest": (9, 3, 1, 6),
+    "amperageLatest": (0, 0, 1, 6),
+    "rssi": (0, 1, 1, 6),
+    "gyroADC[0]": (0, 0, 3, 0),
+    "gyroADC[1]": (0, 0, 3, 0),
+    "gyroADC[2]": (0, 0, 3, 0),
+    "accSmooth[0]": (0, 0, 3, 0),
+    "accSmooth[1]": (0, 0, 3, 0),
+    "accSmooth[2]": (0, 0, 3, 0),
+    "motor[0]": (11, 1, 3, 0),
+    "motor[1]": (5, 0, 3, 0),
+    "motor[2]": (5, 0, 3, 0),
+    "motor[3]": (5, 0, 3, 0),
+    "eRPM[0]": (0, 1, 1, 0),
+    "eRPM[1]": (0, 1, 1, 0),
+    "eRPM[2]": (0, 1, 1, 0),
+    "eRPM[3]": (0, 1, 1, 0),
+}
+VBATREF, MINTHROTTLE, LEAST_MOTOR = 2520, 1070, 158
+HEADERS = {
+    "Data version": "2",
+    "Firmware revision": "Betaflight 4.4.2",
+    "I interval": "32",
+    "P interval": "1/2",
+    "acc_1G": "2048",
+    "motorOutput": f"{LEAST_MOTOR},2047",
+    "vbatref": str(VBATREF),
+    "minthrottle": str(MINTHROTTLE),
+    "motor_poles": "14",
+}
+
+
+def blackbox(
+    rows: Sequence[Mapping[str, int]],
+    headers: Mapping[str, str] | None = None,
+    variable: bool = True,
+) -> bytes:
+    """Return a log of rows, each with every field; loopIteration counts by two. Encoding 10 is left
+    out where not ``variable``.
+    """
+    stated = HEADERS | dict(headers or {})
+    fields = FIELDS
+    if not variable:
+        fields = {k: (a, b, c, 7 if d == 10 else d) for k, (a, b, c, d) in FIELDS.items()}
+    lists = {
+        "I name": fields,
+        "I signed": [0] * len(fields),
+        "I predictor": [f[0] for f in fields.values()],
+        "I encoding": [f[1] for f in fields.values()],
+        "P predictor": [f[2] for f in fields.values()],
+        "P encoding": [f[3] for f in fields.values()],
+    }
+    lists |= {
+        "S name": ["flightModeFlags", "stateFlags"],
+        "S signed": [0, 0],
+        "S predictor": [0, 0],
+        "S encoding": [1, 1],
+    }
+    lines = [
+        "H Product:Blackbox flight data recorder by Nicholas Sherlock",
+        *(f"H Field {key}:{','.join(map(str, values))}" for key, values in lists.items()),
+        *(f"H {key}:{value}" for key, value in stated.items()),
+    ]
+    out = ["\n".join(lines).encode() + b"\n"]
+    before: Mapping[str, int] = {}
+    older: Mapping[str, int] = {}
+    for row in rows:
+        if row["loopIteration"] % 32 == 0:
+            out.append(b"I" + _frame(fields, row, {}, {}, 0))
+            older = row
+        else:
+            out.append(b"P" + _frame(fields, row, before, older, 2))
+            older = before
+        if not before:
+            out.append(b"S" + _unsigned(3) + _unsigned(1))
+        before = row
+        if row["loopIteration"] % 64 == 0:
+            out.append(b"E\x1e" + _unsigned(5) + _unsigned(1))  # a flight mode
+    out.append(b"E\xffEnd of log\x00")
+    return b"".join(out)
+
+
+def _frame(
+    fields: Mapping[str, tuple[int, int, int, int]],
+    row: Mapping[str, int],
+    before: Mapping[str, int],
+    older: Mapping[str, int],
+    which: int,
+) -> bytes:
+    out, names, i = b"", list(fields), 0
+    while i < len(names):
+        encoding = fields[names[i]][which + 1]
+        group = [names[i]]
+        while (
+            i + len(group) < len(names)
+            and fields[names[i + len(group)]][which + 1] == encoding
+            and len(group) < {6: 8, 7: 3, 10: 3, 8: 4}.get(encoding, 1)
+        ):
+            group.append(names[i + len(group)])
+        values = [
+            row[name] - _foreseen(fields[name][which], name, row, before, older) for name in group
+        ]
+        out += _encoded(encoding, values)
+        i += len(group)
+    return out
+
+
+def _foreseen(
+    predictor: int,
+    name: str,
+    row: Mapping[str, int],
+    before: Mapping[str, int],
+    older: Mapping[str, int],
+) -> int:
+    if predictor == 1:
+        return before[name]
+    if predictor == 2:
+        return 2 * before[name] - older[name]
+    if predictor == 3:
+        return int((before[name] + older[name]) / 2)
+    return {
+        0: 0,
+        4: MINTHROTTLE,
+        5: row["motor[0]"],
+        6: row[name],
+        9: VBATREF,
+        11: LEAST_MOTOR,
+    }[predictor]
+
+
+def _encoded(encoding: int, values: list[int]) -> bytes:
+    if encoding == 0:
+        return _signed(values[0])
+    if encoding == 1:
+        return _unsigned(values[0])
+    if encoding == 3:
+        return _unsigned(-values[0] & 0x3FFF)
+    if encoding == 6:
+        there = sum(1 << k for k, value in enumerate(values) if value)
+        return bytes([there]) + b"".join(_signed(value) for value in values if value)
+    if encoding == 7:
+        return _three(values)
+    if encoding == 8:
+        return _four(values)
+    if encoding == 10:
+        return _variable(values)
+    return b""
+
+
+def _unsigned(value: int) -> bytes:
+    out = []
+    value &= 0xFFFFFFFF
+    while value > 127:
+        out.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*out, value])
+
+
+def _signed(value: int) -> bytes:
+    return _unsigned((value << 1) ^ (value >> 31))
+
+
+def _fits(values: Sequence[int], widths: Sequence[int]) -> bool:
+    return all(-(1 << (w - 1)) <= v < 1 << (w - 1) for v, w in zip(values, widths, strict=True))
+
+
+def _three(values: list[int]) -> bytes:
+    a, b, c = values
+    if _fits(values, (2, 2, 2)):
+        return bytes([(a & 3) << 4 | (b & 3) << 2 | c & 3])
+    if _fits(values, (4, 4, 4)):
+        return bytes([0x40 | a & 15, (b & 15) << 4 | c & 15])
+    if _fits(values, (6, 6, 6)):
+        return bytes([0x80 | a & 63, b & 63, c & 63])
+    return _wide(values)
+
+
+def _wide(values: list[int]) -> bytes:
+    selector, out = 0xC0, b""
+    for i, value in enumerate(values):
+        width = next(w for w in (1, 2, 3, 4) if _fits([value], [8 * w]))
+        selector |= (width - 1) << (2 * i)
+        out += (value & ((1 << 8 * width) - 1)).to_bytes(width, "little")
+    return bytes([selector]) + out
+
+
+def _variable(values: list[int]) -> bytes:
+    a, b, c = values
+    if _fits(values, (2, 2, 2)):
+        return bytes([(a & 3) << 4 | (b & 3) << 2 | c & 3])
+    if _fits(values, (5, 5, 4)):
+        bits = 1 << 14 | (a & 31) << 9 | (b & 31) << 4 | c & 15
+        return bits.to_bytes(2, "big")
+    if _fits(values, (8, 7, 7)):
+        bits = 2 << 22 | (a & 255) << 14 | (b & 127) << 7 | c & 127
+        return bits.to_bytes(3, "big")
+    return _wide(values)
+
+
+def _four(values: list[int]) -> bytes:
+    selector, halves = 0, []
+    for i, value in enumerate(values):
+        kind = (
+            0
+            if value == 0
+            else next(k for k, w in ((1, 4), (2, 8), (3, 16)) if _fits([value], [w]))
+        )
+        selector |= kind << (2 * i)
+        width = (0, 1, 2, 4)[kind]
+        halves += [value >> (4 * (width - 1 - k)) & 15 for k in range(width)]
+    if len(halves) % 2:
+        halves.append(0)
+    pairs = zip(halves[::2], halves[1::2], strict=True)
+    return bytes([selector, *(high << 4 | low for high, low in pairs)])
