@@ -12,6 +12,7 @@ from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
+from .commands.identifying import identify
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.logs import diagnose, estimate, replay
@@ -78,6 +79,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     convert,
     estimate,
     diagnose,
+    identify,
     record,
     replay,
     reproduce,

@@ -1,0 +1,141 @@
+"""A vehicle from its logs."""
+
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich import box
+from rich.table import Table
+
+from ..runtime.errors import InputError, unknown_name
+from .terminal import ReaderOption, console, note, offering, run, say, working
+
+if TYPE_CHECKING:
+    from ..identification.logs.flight_log import FlightLog
+
+_WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
+
+
+def _formats() -> list[str]:
+    from ..identification.vehicle_fit.exports import EXPORTS
+
+    return list(EXPORTS)
+
+
+def parse_window(text: str) -> tuple[Path, tuple[float, float]]:
+    """Return the path and the times (s after the log's start) of ``LOG`` or ``LOG:FROM-TO``.
+
+    Raises:
+        InputError: the second time does not come after the first.
+    """
+    match = _WINDOW.fullmatch(text)
+    if match is None:
+        return Path(text), (0.0, math.inf)
+    begin, end = float(match[2]), float(match[3])
+    if not begin < end:
+        raise InputError(f"{text}: expected LOG:FROM-TO with FROM before TO, in s")
+    return Path(match[1]), (begin, end)
+
+
+def _read(path: Path, reader: str | None) -> "FlightLog":
+    import warnings
+
+    from ..identification.logs.reading import read_log
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        return read_log(path, reader)
+
+
+def identify(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            help="Flight logs of one vehicle; LOG:FROM-TO takes a part, in s after its start."
+        ),
+    ],
+    mass: Annotated[float, typer.Option(help="Mass in flight, kg: what the scales say.")],
+    geometry: Annotated[
+        str | None,
+        typer.Option(
+            help="Distance of the rotors from the body x and y axes, m, or their four positions "
+            "'x,y;x,y;x,y;x,y', front-left, rear-left, rear-right, front-right. Without it, "
+            "inertia is known over the arm alone."
+        ),
+    ] = None,
+    reader: ReaderOption = None,
+    begin: Annotated[
+        float, typer.Option("--from", min=0.0, help="Use each log from here on, s after its start.")
+    ] = 0.0,
+    end: Annotated[
+        float | None, typer.Option("--to", help="Use each log up to here, s after its start.")
+    ] = None,
+    export: Annotated[
+        str | None,
+        typer.Option(
+            help="Also print what another program takes: px4, ardupilot, rotorpy, drone-models or "
+            "gazebo.",
+            autocompletion=offering(_formats),
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", help="Vehicle file to write, .yaml.")] = Path(
+        "results/vehicle.yaml"
+    ),
+) -> dict[str, Any]:
+    """Identify a vehicle from its flight logs. Thrust and torque coefficients or the thrust curve,
+    inertia, motor lag, centre of mass and drag, each with a 95 % interval; what the flights do not
+    tell is said. Write the vehicle file, the intervals beside it and a picture.
+
+    Example: windwrench identify flight.csv --mass 0.465 --geometry 0.126 --out my_drone.yaml
+    """
+    from ..identification.vehicle_fit.exports import EXPORTS
+    from ..identification.vehicle_fit.geometry import parse_geometry
+    from ..identification.vehicle_fit.identify import identify as fit
+    from ..identification.vehicle_fit.report import headline, identified_data, write_identified
+
+    if out.suffix not in (".yaml", ".yml"):
+        raise InputError(f"--out {out}: expected a name that ends in .yaml")
+    if not (math.isfinite(mass) and 0.0 < mass < 1e4):
+        raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
+    if export is not None and export not in EXPORTS:
+        raise unknown_name("export", export, EXPORTS)
+    where = parse_geometry(geometry)
+    common = (begin, math.inf if end is None else end)
+    if not common[0] < common[1]:
+        raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
+    parts = [parse_window(text) for text in logs]
+    flights = [_read(path, reader) for path, _ in parts]
+    windows = [w if math.isfinite(w[1]) else common for _, w in parts]
+    with working("identifying") as progress:
+        found = fit(flights, mass, where, windows, out.stem, report=progress)
+    run.record = out.with_name(f"{out.stem}.run.json")
+    written = write_identified(found, out)
+    for text in dict.fromkeys(text for flight in flights for text in flight.notes):
+        note(text)
+    for text in found.notes:
+        note(text)
+    console.print(
+        f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
+        highlight=False,
+        markup=False,
+    )
+    table = Table("quantity", "value", "95 % interval", "unit", "", box=box.SIMPLE_HEAD)
+    for e in found.estimates:
+        interval = f"{e.low:.4g} to {e.high:.4g}" if math.isfinite(e.low) else ""
+        value = f"{e.value:.4g}" if math.isfinite(e.value) else "–"
+        table.add_row(e.name, value, interval, e.unit, e.status)
+    console.print(table)
+    for e in found.estimates:
+        if e.status in ("assumed", "not identifiable"):
+            console.print(f"{e.name}: {e.status}: {e.how}", highlight=False, markup=False)
+    for line in found.advice:
+        console.print(line, highlight=False, markup=False)
+    result = identified_data(found)
+    if export is not None:
+        text = EXPORTS[export](found)
+        console.print(text, highlight=False, markup=False, soft_wrap=True)
+        result["export"] = {export: text}
+    say(*written)
+    return result

@@ -1,0 +1,163 @@
+"""The vehicle that estimates make, and what to fly where they say too little."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Vehicle
+from ..logs.flight_log import FlightLog
+from ..motion.sensor_noise import sensor_noise
+from .geometry import Geometry
+from .result import IDENTIFIED, Estimate
+from .solve import Fit
+from .usual import USUAL
+
+Array = NDArray[np.float64]
+
+# of the library's effects, the coefficients that a vehicle file takes
+_EFFECTS = {
+    "rotor_drag": ("kdx", "kdy"),
+    "body_drag": ("dx", "dy", "dz", "cx", "cy"),
+    "inflow_thrust": ("kz",),
+    "translational_lift": ("kh",),
+    "rate_damping": ("dx", "dy", "dz"),
+}
+_EITHER_SIGN = ("translational_lift",)
+
+
+def vehicle_of(
+    name: str,
+    fit: Fit,
+    estimates: Mapping[str, Estimate],
+    geometry: Geometry,
+    logs: Sequence[FlightLog],
+    gravity: float,
+    voltage: float,
+    step: float,
+) -> Vehicle:
+    """Return the vehicle, ready for estimate, diagnose and the environment."""
+    arm = estimates["arm_l"].value
+    reach = estimates["p/k"].value
+    effects = list(_effects(estimates))
+    curve = None
+    if fit.drive.commands:
+        curve = _curve(fit)
+        weight = fit.model.mass * gravity
+        k = weight / (4.0 * USUAL.hover_speed**2)
+    else:
+        k = estimates["k"].value
+    lag = estimates["motor_lag"]
+    if lag.status == IDENTIFIED:
+        effects.append(EffectSetting("motor_lag", {"tau": lag.value}))
+    inertia = np.diag([estimates[f"J{a}{a}"].value for a in "xyz"])
+    for i, j, product in ((0, 1, "Jxy"), (0, 2, "Jxz"), (1, 2, "Jyz")):
+        if product in estimates:
+            inertia[i, j] = inertia[j, i] = estimates[product].value
+    com = np.array([_shown(estimates.get(f"com {a}")) for a in "xyz"])
+    vehicle = Vehicle(
+        name=name,
+        mass=fit.model.mass,
+        inertia=inertia,
+        arm_l=arm,
+        k=np.full(4, k),
+        p=np.full(4, reach * k),
+        rotor_radius=USUAL.radius * arm,
+        omega_lsb=step,
+        omega_source="measured" if lag.status != IDENTIFIED else "commanded",
+        voltage_ref=voltage,
+        gravity=gravity,
+        spin=fit.drive.spin.copy(),
+        rotor_positions=geometry.positions if geometry.known and _uneven(geometry) else None,
+        com=com,
+        effects=tuple(effects),
+        motor_curve=curve,
+    )
+    posed = [log for log in logs if log.has_pose]
+    if not posed:
+        return vehicle
+    noise = sensor_noise(posed[0], vehicle)
+    seen = posed[0].t[posed[0].valid]
+    from dataclasses import replace
+
+    return replace(
+        vehicle,
+        mocap=Mocap(
+            float(1.0 / np.median(np.diff(seen))),
+            max(noise.position, 1e-5),
+            max(noise.attitude, 1e-4),
+        ),
+    )
+
+
+def _uneven(geometry: Geometry) -> bool:
+    size = np.abs(geometry.positions[:, :2])
+    return bool(np.ptp(size) > 1e-9 or np.any(geometry.positions[:, 2] != 0.0))
+
+
+def _shown(estimate: Estimate | None) -> float:
+    """Return a value whose interval leaves nothing out; else nothing."""
+    if estimate is None or estimate.status != IDENTIFIED or estimate.low < 0.0 < estimate.high:
+        return 0.0
+    return estimate.value
+
+
+def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
+    out = []
+    for effect, letters in _EFFECTS.items():
+        found = {
+            letter: _shown(estimates.get(f"{effect} {letter}"))
+            for letter in letters
+            if f"{effect} {letter}" in estimates
+        }
+        if effect not in _EITHER_SIGN:
+            found = {letter: value for letter, value in found.items() if value > 0.0}
+        if any(found.values()):
+            out.append(EffectSetting(effect, found))
+    if any(e.name == "rotor_drag" for e in out):  # which damps by itself, rotor by rotor
+        out = [e for e in out if e.name != "rate_damping"]
+    return out
+
+
+def _curve(fit: Fit) -> MotorCurve:
+    values = fit.values
+    thrust = [0.0] * (max(fit.drive.exponents) + 1)
+    for j, e in enumerate(fit.drive.exponents):
+        thrust[e] = values[f"a{j}"]
+    return MotorCurve(tuple(thrust), values.get("gamma", 0.0))
+
+
+def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
+    """Return what to fly, or to give, where the logs say too little."""
+    out = []
+
+    def unknown(name: str) -> bool:
+        return name in estimates and estimates[name].status != IDENTIFIED
+
+    if estimates["arm_l"].status == "assumed":
+        out.append("Give --geometry, the rotors' distance from the body axes: inertia follows.")
+    else:
+        for name, motion in (("Jxx", "roll"), ("Jyy", "pitch")):
+            if unknown(name):
+                out.append(f"Fly quick {motion} movements for 20 s: they show {name}.")
+        if unknown("Jzz"):
+            out.append(
+                "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
+                "gyroscopic torque shows Jzz, and with it p."
+            )
+    if unknown("(p/k)/Jzz"):
+        out.append("Turn quickly to the left and to the right: it shows p/k over Jzz.")
+    if unknown("motor_lag"):
+        out.append("Log the motor commands beside the rotor speeds: together they show the lag.")
+    if unknown("thrust(0.75)") or unknown("thrust(0.25)"):
+        out.append("Climb hard and let the vehicle sink: the thrust curve is known where it flew.")
+    if unknown("com x") or unknown("com y"):
+        out.append("Climb and sink briskly: thrust that changes shows the centre of mass.")
+    drag = estimates.get("drag")
+    if drag is not None:
+        out.append(
+            "Log the position: drag needs a velocity."
+            if drag.low != drag.low and drag.value != drag.value
+            else "Fly to and fro at 2 m/s and more along both body axes: it shows drag."
+        )
+    return out

@@ -1,0 +1,273 @@
+"""What a log measures of force and torque balance, evenly sampled, piece by piece.
+
+Specific force and angular velocity come from the IMU where the log has one, and from the pose's
+derivatives where it has none. Rotors come as measured speeds, or as motor commands.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+from ..motion.signals import log_signals
+from ..motion.smoothing import derivative, low_pass
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ChannelSettings:
+    """How signals are made of a log."""
+
+    shortest_piece: float = 3.0  # s; shorter ones have no frequency low enough to tell a bias
+    gap: float = 0.1  # s without a sample, at which a piece ends
+    # Hz: of angular velocity and velocity where they multiply something: what a quadrotor's motion
+    # has, without the noise that would enter a product squared
+    product_hz: float = 8.0
+    # Hz: faster logs are thinned out, behind a low-pass at 0.4 of it: rotors follow no faster
+    fastest_hz: float = 200.0
+    # share of the hover thrust's command below which a vehicle stands on the ground
+    flying_share: float = 0.3
+
+
+CHANNELS = ChannelSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """n evenly spaced samples of one unbroken piece of a log; body axes forward, left, up."""
+
+    log: int  # which of the logs
+    t: Array  # (n,) s
+    period: float  # s
+    specific_force: Array | None  # (n, 3) m/s2
+    angular_acceleration: Array  # (n, 3) rad/s2
+    angular_velocity: Array  # (n, 3) rad/s, smoothed
+    velocity: Array | None  # (n, 3) m/s, body axes, smoothed
+    rotor_speeds: Array | None  # (n, 4) rad/s
+    command: Array | None  # (n, 4), 0 to 1
+    voltage: Array | None  # (n,) V
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Which sensors the balance rests on."""
+
+    force: str  # "accelerometer", "pose" or "" (none)
+    rate: str  # "gyro" or "pose"
+    rotors: str  # "rotor speeds" or "commands"
+    velocity: bool
+
+
+def sources_of(logs: Sequence[FlightLog]) -> Sources:
+    """Return the sensors that all logs have.
+
+    Raises:
+        InputError: a log has no motion, or logs differ in what their rotors are given as.
+    """
+    for log in logs:
+        if not log.has_pose and log.gyro is None:
+            raise InputError(
+                f"{log.source or log.name}: has neither a pose nor a gyro (gx, gy, gz); expected "
+                "one of them"
+            )
+    commands = [log.command is not None for log in logs]
+    speeds = [log.has_rotor_speeds and not log.commanded for log in logs]
+    if not all(speeds) and not all(commands):
+        raise InputError(
+            f"{logs[speeds.index(False)].source or logs[0].name}: expected rotor speeds "
+            "(omega1..omega4) in every log, or motor commands (cmd1..cmd4) in every log"
+        )
+    accelerometer = all(log.accelerometer is not None for log in logs)
+    gyro = all(log.gyro is not None for log in logs)
+    pose = all(log.has_pose for log in logs)
+    if not gyro and not pose:
+        raise InputError(
+            f"{logs[0].name}: some logs have a pose and others a gyro alone; expected a gyro in "
+            "every log, or a pose"
+        )
+    return Sources(
+        "accelerometer" if accelerometer else "pose" if pose else "",
+        "gyro" if gyro else "pose",
+        "rotor speeds" if all(speeds) else "commands",
+        pose,
+    )
+
+
+def pieces_of(
+    logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]], gravity: float
+) -> tuple[list[Piece], Sources]:
+    """Return all unbroken pieces of the logs in flight, and what they rest on.
+
+    Args:
+        logs: flights of one vehicle.
+        windows: for each log, from and to in s after its start.
+        gravity: m/s2.
+
+    Raises:
+        InputError: a log lacks what is needed, or none of it is long enough in flight.
+    """
+    sources = sources_of(logs)
+    pieces: list[Piece] = []
+    for number, (log, window) in enumerate(zip(logs, windows, strict=True)):
+        found = _pieces(log, number, sources, gravity)
+        for piece in found:
+            for part in _inside(piece, window, log.t[0]):
+                pieces += _flying(part)
+    if not pieces:
+        raise InputError(
+            f"{logs[0].name}: no piece of {CHANNELS.shortest_piece:g} s in flight is unbroken "
+            "there; expected a longer flight, or another --from and --to"
+        )
+    return pieces, sources
+
+
+def _pieces(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
+    if sources.rate == "pose" or sources.force == "pose":
+        return _posed(log, number, sources, gravity)
+    return _inertial(log, number, sources, gravity)
+
+
+def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
+    """Pieces whose force, and rate where there is no gyro, are the pose's derivatives."""
+    out = []
+    for s in log_signals(log, wide_hz=np.inf):
+        inverse = Rotation.from_matrix(s.rotation).inv()
+        force = inverse.apply(s.acceleration + np.array([0.0, 0.0, gravity]))
+        rate, turning = s.angular_velocity, s.angular_acceleration
+        if sources.force == "accelerometer" and log.accelerometer is not None:
+            force = _sensor(log, log.accelerometer, s.t)
+        if sources.rate == "gyro" and log.gyro is not None:
+            rate = _sensor(log, log.gyro, s.t)
+            turning = derivative(rate, s.period)
+        velocity = inverse.apply(s.velocity)
+        out.append(_piece(log, number, s.t, s.period, force, rate, turning, velocity, sources))
+    return out
+
+
+def _inertial(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
+    """Pieces whose rate, and force if any, are the IMU's; velocity is the pose's, where it is."""
+    assert log.gyro is not None
+    read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
+    step = np.diff(log.t[read])
+    period = float(np.median(step))
+    breaks = np.flatnonzero(step > max(CHANNELS.gap, 3.5 * period)) + 1
+    out = []
+    for rows in np.split(read, breaks):
+        if len(rows) < 16 or log.t[rows[-1]] - log.t[rows[0]] < CHANNELS.shortest_piece:
+            continue
+        t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
+        rate = _sensor(log, log.gyro, t)
+        force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
+        turning = derivative(rate, period)
+        velocity = _velocity(log, t) if sources.velocity else None
+        out.append(_piece(log, number, t, period, force, rate, turning, velocity, sources))
+    return out
+
+
+def _piece(
+    log: FlightLog,
+    number: int,
+    t: Array,
+    period: float,
+    force: Array | None,
+    rate: Array,
+    turning: Array,
+    velocity: Array | None,
+    sources: Sources,
+) -> Piece:
+    def at(columns: Array | None) -> Array | None:
+        if columns is None:
+            return None
+        return np.column_stack([np.interp(t, log.t, c) for c in columns.T])
+
+    speeds = at(log.rotor_speeds) if sources.rotors == "rotor speeds" else None
+    command = at(log.command)
+    voltage = at(None if log.voltage is None else log.voltage[:, None])
+    if period < 0.8 / CHANNELS.fastest_hz:
+        thin = 1.0 / CHANNELS.fastest_hz
+        times = np.arange(t[0], t[-1], thin)
+
+        def thinned(x: Array | None) -> Array | None:
+            if x is None:
+                return None
+            quiet = low_pass(x, 0.4 * CHANNELS.fastest_hz, period)
+            return np.column_stack([np.interp(times, t, c) for c in quiet.T])
+
+        many = (force, rate, turning, velocity, speeds, command, voltage)
+        force, thin_rate, thin_turning, velocity, speeds, command, voltage = map(thinned, many)
+        assert thin_rate is not None
+        assert thin_turning is not None
+        t, period, rate, turning = times, thin, thin_rate, thin_turning
+    smooth = low_pass(rate, CHANNELS.product_hz, period)
+    moving = None if velocity is None else low_pass(velocity, CHANNELS.product_hz, period)
+    volts = None if voltage is None else voltage[:, 0]
+    return Piece(number, t, period, force, turning, smooth, moving, speeds, command, volts)
+
+
+def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
+    read = np.isfinite(values[:, 0])
+    return np.column_stack([np.interp(t, log.t[read], c) for c in values[read].T])
+
+
+def _velocity(log: FlightLog, t: Array) -> Array | None:
+    """Return the velocity (n, 3) in body axes at times, NaN where the pose does not say."""
+    try:
+        signals = log_signals(log)
+    except InputError:
+        return None
+    out = np.full((len(t), 3), np.nan)
+    for s in signals:
+        inside = (t >= s.t[0]) & (t <= s.t[-1])
+        body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
+        out[inside] = np.column_stack([np.interp(t[inside], s.t, c) for c in body.T])
+    return None if np.isnan(out).any() else out
+
+
+def _inside(piece: Piece, window: tuple[float, float], start: float) -> list[Piece]:
+    keep = (piece.t >= start + window[0]) & (piece.t <= start + window[1])
+    return _cut(piece, keep)
+
+
+def _flying(piece: Piece) -> list[Piece]:
+    """Return the parts of a piece in which the rotors carry the vehicle, without take-off and
+    landing.
+    """
+    drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
+    assert drive is not None
+    load = low_pass(np.mean(np.square(drive), axis=1), 1.0, piece.period)
+    usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
+    return _cut(piece, load > CHANNELS.flying_share * usual)
+
+
+def _cut(piece: Piece, keep: NDArray[np.bool_]) -> list[Piece]:
+    if keep.all():
+        return [piece]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(int)))
+    out = []
+    for a, b in edges.reshape(-1, 2):
+        if (b - a) * piece.period < CHANNELS.shortest_piece:
+            continue
+
+        def part(x: Array | None, a: int = int(a), b: int = int(b)) -> Array | None:
+            return None if x is None else x[a:b]
+
+        out.append(
+            Piece(
+                piece.log,
+                piece.t[a:b],
+                piece.period,
+                part(piece.specific_force),
+                piece.angular_acceleration[a:b],
+                piece.angular_velocity[a:b],
+                part(piece.velocity),
+                part(piece.rotor_speeds),
+                part(piece.command),
+                part(piece.voltage),
+            )
+        )
+    return out

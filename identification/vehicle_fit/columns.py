@@ -1,0 +1,198 @@
+"""The columns that force and torque balance are made of: what rotors, turning and moving through
+the air may contribute, before any coefficient.
+
+A rotor's thrust is ``sum_j a_j phi_j``: of measured speeds ``phi = [W^2]``, of commands
+``phi = [1, u, u^2] (V/V_ref)^gamma`` or some of these. Rotors follow with a first-order lag and a
+time offset.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from ..motion.smoothing import derivative, low_pass
+from .channels import Piece
+from .spectra import SPECTRUM, Complex, Segment, segments_of
+
+Array = NDArray[np.float64]
+
+MEASURED = ("fx", "fy", "fz", "ax", "ay", "az")
+_STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How the rotors' columns are made."""
+
+    positions: Array  # (4, 3) m, or of length 1 where the arm is not known
+    spin: Array  # (4,)
+    commands: bool = False  # the rotors are known by their commands, not by their speeds
+    exponents: tuple[int, ...] = (2,)  # of the basis functions
+    voltage_ref: float = 0.0  # V; 0: voltage is not used
+    lag: float = 0.0  # s
+    delay: float = 0.0  # s, by which the motion comes behind the rotors
+    gamma: float = 0.0  # exponent of the voltage
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """All pieces' transforms: the measured six first, then the columns, then their derivatives by
+    the nonlinear parameters.
+    """
+
+    names: tuple[str, ...]  # of the columns
+    nonlinear: tuple[str, ...]  # "lag", "delay", "gamma"
+    segments: tuple[Segment, ...]
+    seconds: float
+    noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
+
+
+def lagged(x: Array, lag: float, period: float) -> Array:
+    """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
+    effect ``motor_lag`` has it, each sample held over the step that ends there.
+    """
+    if lag <= 1e-9:
+        return x
+    keep = np.exp(-period / lag)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], x, axis=0, zi=keep * x[:1])[0])
+
+
+def balance(
+    pieces: list[Piece], drive: Drive, nonlinear: tuple[str, ...], rotor_noise: float = 0.0
+) -> Balance:
+    """Return the transforms of all pieces at a drive's lag, delay and exponent.
+
+    Args:
+        pieces: of the logs.
+        drive: where to linearise.
+        nonlinear: which of ``lag``, ``delay`` and ``gamma`` are fitted.
+        rotor_noise: rad/s, standard deviation of one measured rotor speed.
+    """
+    segments: list[Segment] = []
+    names: tuple[str, ...] = ()
+    noise: list[Array] = []
+    for piece in pieces:
+        here = rotor_columns(piece, drive)
+        air = air_columns(piece)
+        names = (*here, *air)
+        base = np.column_stack([*_measured(piece), *here.values(), *air.values()])
+        parts, count = [base], len(names)
+        for name in nonlinear:
+            if name == "delay":
+                continue
+            there = replace(drive, **{name: getattr(drive, name) + _STEP[name]})
+            moved = np.column_stack(list(rotor_columns(piece, there).values()))
+            change = (moved - base[:, 6 : 6 + len(here)]) / _STEP[name]
+            parts += [change, np.zeros((len(piece.t), count - len(here)))]
+        stacked = low_pass(np.column_stack(parts), SPECTRUM.band, piece.period)
+        for s in segments_of(stacked, piece.period, piece.log):
+            segments.append(_with_delay(s, drive, nonlinear, count, len(here)))
+        noise.append(_rotor_noise(piece, drive, names, rotor_noise))
+    weights = np.array([len(p.t) * p.period for p in pieces])
+    mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
+    signs = np.sign(np.sum(noise, axis=0))
+    return Balance(names, nonlinear, tuple(segments), float(weights.sum()), mean * signs)
+
+
+def _measured(piece: Piece) -> list[Array]:
+    force = piece.specific_force
+    if force is None:
+        force = np.zeros_like(piece.angular_velocity)
+    return [*force.T, *piece.angular_acceleration.T]
+
+
+def basis(piece: Piece, drive: Drive) -> Array:
+    """Return the basis functions (n, 4, m) of each rotor's thrust, behind the lag."""
+    u = turning(piece, drive)
+    out = np.stack([u**e for e in drive.exponents], axis=2)
+    if drive.commands and drive.voltage_ref > 0.0 and piece.voltage is not None:
+        out = out * np.power(piece.voltage / drive.voltage_ref, drive.gamma)[:, None, None]
+    return out
+
+
+def turning(piece: Piece, drive: Drive) -> Array:
+    """Return each rotor's speed (n, 4), behind the lag: as measured, or its command."""
+    source = piece.command if drive.commands else piece.rotor_speeds
+    assert source is not None
+    return lagged(source, drive.lag, piece.period)
+
+
+def rotor_columns(piece: Piece, drive: Drive) -> dict[str, Array]:
+    """Return the columns (n,) that depend on the rotors."""
+    phi, speed = basis(piece, drive), turning(piece, drive)
+    x, y = drive.positions[:, 0], drive.positions[:, 1]
+    out: dict[str, Array] = {}
+    for j in range(phi.shape[2]):
+        out[f"T{j}"] = phi[:, :, j].sum(axis=1)
+        out[f"X{j}"] = phi[:, :, j] @ y
+        out[f"Y{j}"] = -phi[:, :, j] @ x
+        out[f"Z{j}"] = -phi[:, :, j] @ drive.spin
+    momentum = speed @ drive.spin
+    w = piece.angular_velocity
+    smooth = low_pass(momentum[:, None], 2.0 * SPECTRUM.band, piece.period)
+    out["spin up"] = -derivative(smooth, piece.period)[:, 0]
+    out["spin x"], out["spin y"] = -w[:, 1] * momentum, w[:, 0] * momentum
+    if piece.velocity is not None:
+        total = speed.sum(axis=1)
+        for i, axis in enumerate("xyz"):
+            out[f"rotor drag {axis}"] = -total * piece.velocity[:, i]
+    return out
+
+
+def air_columns(piece: Piece) -> dict[str, Array]:
+    """Return the columns (n,) that do not depend on the rotors."""
+    w, period = piece.angular_velocity, piece.period
+    dw = derivative(w, period)
+    out = {"1": np.ones(len(piece.t))}
+    for i, a in enumerate("xyz"):
+        out[f"w{a}"], out[f"dw{a}"] = w[:, i], dw[:, i]
+        for j, b in enumerate("xyz"):
+            if j >= i:
+                out[f"w{a}w{b}"] = w[:, i] * w[:, j]
+    if piece.velocity is not None:
+        v = piece.velocity
+        speed = np.linalg.norm(v, axis=1)
+        for i, a in enumerate("xyz"):
+            out[f"linear drag {a}"] = -v[:, i]
+            out[f"quadratic drag {a}"] = -speed * v[:, i]
+        out["lift"] = v[:, 0] ** 2 + v[:, 1] ** 2
+    return out
+
+
+def _with_delay(
+    s: Segment, drive: Drive, nonlinear: tuple[str, ...], count: int, rotors: int
+) -> Segment:
+    """Return a segment with its rotors' columns delayed, and their derivative by the delay, in the
+    order of ``nonlinear``.
+    """
+    turn = 2j * np.pi * s.frequency[None, :, None]
+    measured, rest = s.columns[:, :, :6], s.columns[:, :, 6:]
+    blocks = [rest[:, :, i : i + count].copy() for i in range(0, rest.shape[2], count)]
+    for block in blocks:
+        block[:, :, :rotors] *= np.exp(-turn * drive.delay)
+    late: Complex = np.zeros_like(blocks[0])
+    late[:, :, :rotors] = -turn * blocks[0][:, :, :rotors]
+    others = iter(blocks[1:])
+    ordered = [late if name == "delay" else next(others) for name in nonlinear]
+    return replace(s, columns=np.concatenate([measured, blocks[0], *ordered], axis=2))
+
+
+def _rotor_noise(piece: Piece, drive: Drive, names: tuple[str, ...], noise: float) -> Array:
+    """Return what white noise of each rotor's speed makes in each column (4, c), root of a
+    spectrum: its column's standard deviation times the root of the period.
+    """
+    out = np.zeros((4, len(names)))
+    if noise <= 0.0 or drive.commands or piece.rotor_speeds is None:
+        return out
+    size = noise * np.sqrt(piece.period * np.mean(4.0 * np.square(piece.rotor_speeds), axis=0))
+    parts = {
+        "T0": np.ones(4),
+        "X0": drive.positions[:, 1],
+        "Y0": -drive.positions[:, 0],
+        "Z0": -drive.spin,
+    }
+    for name, share in parts.items():
+        out[:, names.index(name)] = size * share
+    return out

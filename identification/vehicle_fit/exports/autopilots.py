@@ -1,0 +1,90 @@
+"""Parameters of PX4 and ArduPilot.
+
+Wind from drag: specific force along a body axis at airspeed v is predicted as
+``MCOEF v + 0.5 rho v^2 / BCOEF`` (PX4 parameter reference, EKF2_BCOEF_X and EKF2_MCOEF, and Tuning
+the ECL/EKF, Multicopter Wind Estimation using Drag Specific Forces; ArduPilot parameter list,
+EK3_DRAG_BCOEF_X, "kg/m/m", and EK3_DRAG_MCOEF, "1.5 m/s/s at 15 m/s: 0.1"). Thrust curve: relative
+thrust ``T = f u^2 + (1 - f) u`` of a relative motor command u (PX4, THR_MDL_FAC; ArduPilot,
+MOT_THST_EXPO), and hover thrust is what of the full thrust carries the weight (MPC_THR_HOVER,
+MOT_THST_HOVER), which is the mixer's throttle where the curve is undone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effect_settings import coefficient_of
+from ..result import IDENTIFIED, Identified
+
+AIR_DENSITY = 1.225  # kg/m3, at sea level, as both autopilots take it
+NO_BLUFF_BODY = 0.0  # of BCOEF: both leave that part out then
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """What an autopilot's parameters hold; None: not known."""
+
+    momentum_drag: float | None  # 1/s
+    ballistic: tuple[float, float] | None  # kg/m2, along x and y
+    hover_thrust: float | None  # of the full thrust
+    curve: float | None  # share of the square in the thrust curve
+
+
+def autopilot_of(found: Identified) -> Autopilot:
+    """Return drag and thrust as autopilots define them."""
+    vehicle = found.vehicle
+    linear, quadratic = [], []
+    for axis in "xy":
+        turning = 4.0 * vehicle.hover_rate * coefficient_of(vehicle, "rotor_drag", f"kd{axis}")
+        linear.append((turning + coefficient_of(vehicle, "body_drag", f"d{axis}")) / vehicle.mass)
+        quadratic.append(coefficient_of(vehicle, "body_drag", f"c{axis}"))
+    momentum = float(np.mean(linear)) if max(linear) > 0.0 else None
+    ballistic = None
+    if min(quadratic) > 0.0:
+        x, y = (0.5 * AIR_DENSITY * vehicle.mass / c for c in quadratic)
+        ballistic = (x, y)
+    if vehicle.motor_curve is None:
+        return Autopilot(momentum, ballistic, None, None)
+    u = np.linspace(0.0, 1.0, 41)
+    thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
+    relative = thrust / thrust[-1]
+    # least squares of T - u = f (u^2 - u)
+    bend = u**2 - u
+    curve = float(np.clip(bend @ (relative - u) / (bend @ bend), 0.0, 1.0))
+    return Autopilot(momentum, ballistic, float(vehicle.weight / (4.0 * thrust[-1])), curve)
+
+
+def px4(found: Identified) -> str:
+    """Return PX4's parameters as lines for its shell."""
+    names = ("EKF2_MCOEF", "EKF2_BCOEF_X", "EKF2_BCOEF_Y", "MPC_THR_HOVER", "THR_MDL_FAC")
+    return _lines(found, names, "param set {} {:.4g}")
+
+
+def ardupilot(found: Identified) -> str:
+    """Return ArduPilot's parameters as lines of a parameter file."""
+    names = (
+        "EK3_DRAG_MCOEF",
+        "EK3_DRAG_BCOEF_X",
+        "EK3_DRAG_BCOEF_Y",
+        "MOT_THST_HOVER",
+        "MOT_THST_EXPO",
+    )
+    return _lines(found, names, "{},{:.4g}")
+
+
+def _lines(found: Identified, names: tuple[str, ...], form: str) -> str:
+    has = autopilot_of(found)
+    x, y = has.ballistic or (None, None)
+    values = (has.momentum_drag, x, y, has.hover_thrust, has.curve)
+    out = [
+        form.format(name, value)
+        for name, value in zip(names, values, strict=True)
+        if value is not None
+    ]
+    missing = [name for name, value in zip(names, values, strict=True) if value is None]
+    if missing:
+        out.append(f"# not known from these logs: {', '.join(missing)}")
+    full = found.by_name.get("thrust(1)")
+    if has.hover_thrust is not None and full is not None and full.status != IDENTIFIED:
+        out.append(f"# {names[3]} and {names[4]}: the full thrust was not flown; {full.how}")
+    return "\n".join(out)

@@ -1,0 +1,58 @@
+"""Where the rotors stand, as a user says it: an arm's length or four positions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.errors import InputError
+
+Array = NDArray[np.float64]
+
+QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Rotor positions (4, 3) in m, front-left, rear-left, rear-right, front-right."""
+
+    positions: Array
+    known: bool = True  # False: of length 1 in x and y, since nobody said
+
+    @property
+    def arm(self) -> float:
+        """Mean distance of the rotors from the body x and y axes, m."""
+        return float(np.mean(np.abs(self.positions[:, :2])))
+
+
+def parse_geometry(text: str | None) -> Geometry:
+    """Return the geometry of ``ARM`` or of ``X1,Y1;X2,Y2;X3,Y3;X4,Y4``, in m; None: not known.
+
+    Raises:
+        InputError: neither of the two, or rotors that do not stand one in each quadrant.
+    """
+    expected = (
+        "expected the rotors' distance from the body x and y axes in m (0.12), or four positions "
+        "x,y in m with semicolons between them, front-left, rear-left, rear-right, front-right"
+    )
+    if text is None:
+        return Geometry(QUADRANT.copy(), known=False)
+    try:
+        rows = [[float(x) for x in row.split(",")] for row in text.split(";")]
+    except ValueError as error:
+        raise InputError(f"--geometry {text}: is not made of numbers; {expected}") from error
+    if len(rows) == 1 and len(rows[0]) == 1:
+        arm = rows[0][0]
+        if not 0.0 < arm < 10.0:
+            raise InputError(f"--geometry {text}: {expected}")
+        return Geometry(arm * QUADRANT)
+    if len(rows) != 4 or any(len(row) not in (2, 3) for row in rows):
+        raise InputError(f"--geometry {text}: {expected}")
+    positions = np.array([[*row, 0.0][:3] for row in rows])
+    if not np.all(np.isfinite(positions)) or np.any(positions[:, :2] * QUADRANT[:, :2] <= 0.0):
+        raise InputError(
+            f"--geometry {text}: the rotors do not stand one in each quadrant, front-left, "
+            f"rear-left, rear-right, front-right; {expected}"
+        )
+    return Geometry(positions)

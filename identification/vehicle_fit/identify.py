@@ -1,0 +1,248 @@
+"""A vehicle from nothing but its mass and its logs.
+
+The mass turns specific force into force, so the force along body z gives the thrust coefficient.
+Torque over inertia is what turning shows: with rotor positions given, roll and pitch give the
+inertia about x and y. Yaw gives reaction torque over the inertia about z alone; the two come apart
+where the vehicle yaws while it rolls or pitches, since ``w x J w`` then shows the inertia itself.
+What a flight does not show is fixed by an assumption that is named, or left out.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+from .assemble import advice_of, vehicle_of
+from .channels import Piece, Sources, pieces_of
+from .columns import Drive
+from .estimates import estimates_of
+from .geometry import SPIN, Geometry
+from .parameters import DELAY, OPTIONAL, POSITIVE, first_model, with_fixed, with_more
+from .result import Identified
+from .rounding import rounding_step
+from .solve import Fit, fall_with, solve, step_with
+from .usual import USUAL
+
+Array = NDArray[np.float64]
+Report = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class IdentifySettings:
+    """What is asked of a fit before it is believed."""
+
+    # half-width of a 95 % interval as a share of the value, beyond which a quantity is not
+    # identifiable: a factor of 2 either way is what one would guess of a vehicle by its looks
+    widest: float = 0.5
+    # fall of twice the negative log-likelihood for each further parameter, in units of ln of the
+    # count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
+    penalty: float = 2.0
+    least_voltage_range: float = 0.03  # share: below it the voltage's exponent is not asked for
+    least_lag: float = 4.0  # standard deviations of a lag behind rotor speeds that were logged
+    lags: tuple[float, ...] = (0.03, 0.08)  # s, where the search for it starts
+
+
+IDENTIFY = IdentifySettings()
+
+
+def identify(
+    logs: Sequence[FlightLog],
+    mass: float,
+    geometry: Geometry,
+    windows: Sequence[tuple[float, float]] | None = None,
+    name: str = "identified",
+    gravity: float = 9.81,
+    report: Report = lambda share, text: None,
+) -> Identified:
+    """Return what flights tell of their vehicle.
+
+    Args:
+        logs: of one vehicle, all with rotor speeds or all with motor commands, and with an
+            accelerometer and a gyro, or a pose.
+        mass: kg.
+        geometry: where the rotors stand, or not known.
+        windows: for each log, from and to in s after its start; None: all of it.
+        name: of the vehicle.
+        gravity: m/s2.
+        report: is told the share that is done, and what is being done.
+
+    Raises:
+        InputError: the logs lack what is needed, or contradict the rotors' order.
+    """
+    if not (math.isfinite(mass) and mass > 0.0):
+        raise InputError(f"--mass {mass:g}: expected the vehicle's mass in kg")
+    whole = [(0.0, math.inf)] * len(logs)
+    pieces, sources = pieces_of(logs, windows or whole, gravity)
+    notes: list[str] = []
+    voltage = _voltage(pieces)
+    commands = sources.rotors == "commands"
+    drive = Drive(geometry.positions, SPIN, commands, voltage_ref=voltage if commands else 0.0)
+    step = 0.0 if commands else rounding_step(logs)
+    report(0.05, "fitting forces and torques")
+    fit, turned = _first_fit(pieces, sources, drive, mass, gravity, step / math.sqrt(12.0))
+    report(0.5, "asking what else shows")
+    fit, kept = _with_optional(pieces, fit, step / math.sqrt(12.0))
+    report(0.8, "asking what can be told")
+    fit, fixed = _settled(pieces, fit, geometry, step / math.sqrt(12.0))
+    if turned:
+        notes.append(
+            "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
+            "above): the opposite ones were taken"
+        )
+    if sources.force == "accelerometer":
+        notes.append(
+            "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
+            "thrust"
+        )
+    estimates = estimates_of(fit, sources, geometry, pieces, fixed, kept, mass * gravity)
+    named = {e.name: e for e in estimates}
+    vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step)
+    return Identified(
+        vehicle,
+        tuple(estimates),
+        sources,
+        geometry,
+        tuple(pieces),
+        fit,
+        tuple(notes),
+        tuple(advice_of(named)),
+        fit.balance.seconds,
+        len(fit.balance.segments),
+    )
+
+
+def _voltage(pieces: Sequence[Piece]) -> float:
+    found = [p.voltage for p in pieces if p.voltage is not None]
+    if len(found) < len(pieces):
+        return 0.0
+    together = np.concatenate(found)
+    middle = float(np.median(together))
+    wide = float(np.ptp(np.quantile(together, [0.05, 0.95])))
+    return middle if middle > 0.0 and wide > IDENTIFY.least_voltage_range * middle else 0.0
+
+
+def _first_fit(
+    pieces: list[Piece],
+    sources: Sources,
+    drive: Drive,
+    mass: float,
+    gravity: float,
+    noise: float,
+) -> tuple[Fit, bool]:
+    """Return the fit of the basic model, and whether the rotors turn the other way."""
+    prior = {"delay": DELAY}
+    if not drive.commands:
+        model, start, drive, turned = first_model(pieces, sources, drive, mass, gravity)
+        plain = solve(pieces, drive, model, start, ("delay",), noise, prior)
+        # do the logged speeds lead the motion as commands do?
+        step, size = step_with(pieces, plain, ("lag", "delay"))
+        if step["lag"] < IDENTIFY.least_lag * size["lag"]:
+            return plain, turned
+        late = replace(plain.drive, lag=IDENTIFY.lags[0])
+        theta = plain.theta[: len(model.free)]
+        other = solve(pieces, late, model, theta, ("lag", "delay"), 0.0, prior)
+        enough = IDENTIFY.penalty * math.log(_frequencies(plain))
+        sure = other.drive.lag > IDENTIFY.least_lag * other.deviation("lag")
+        return (other if sure and plain.loss - other.loss > enough else plain), turned
+    nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
+    best: tuple[float, Fit, bool] | None = None
+    # from the richest curve down: a fit that starts poor takes its own misfit for noise
+    for exponents in ((0, 1, 2), (1, 2), (2,)):
+        here = replace(drive, exponents=exponents)
+        model, start, here, turned = first_model(pieces, sources, here, mass, gravity)
+        lags = IDENTIFY.lags if best is None else (best[1].drive.lag,)
+        fit = min(
+            (
+                solve(pieces, replace(here, lag=lag), model, start, nonlinear, 0.0, prior)
+                for lag in lags
+            ),
+            key=lambda f: f.loss,
+        )
+        cost = fit.loss + IDENTIFY.penalty * math.log(_frequencies(fit)) * len(exponents)
+        if _rises(fit) and (best is None or cost < best[0]):
+            best = cost, fit, turned
+    if best is None:
+        raise InputError(
+            "thrust does not grow with the motor commands; expected cmd1..cmd4, 0 to 1"
+        )
+    return best[1], best[2]
+
+
+def _rises(fit: Fit) -> bool:
+    """Does thrust grow with the command, from nothing to full?"""
+    u = np.linspace(0.05, 1.0, 20)
+    values = fit.values
+    curve = sum(values[f"a{j}"] * u**e for j, e in enumerate(fit.drive.exponents))
+    return bool(np.all(np.diff(curve) > 0.0))
+
+
+def _frequencies(fit: Fit) -> float:
+    """Count of independent numbers that the fit rests on."""
+    return float(6.0 * sum(len(s.frequency) for s in fit.balance.segments))
+
+
+def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, list[str]]:
+    """Return a fit with those further effects that make the logs much likelier, and which."""
+    kept: list[str] = []
+    nonlinear = fit.names[len(fit.model.free) :]
+    for name, parameters in OPTIONAL.items():
+        if not _has_columns(fit, parameters):
+            continue
+        if fit.drive.commands and name in ("rotor_drag", "inflow"):
+            continue  # of speeds
+        model, start = with_more(fit.model, fit.theta[: len(fit.model.free)], parameters)
+        least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
+        if fall_with(fit, model, start) > least:
+            quiet = 0.0 if fit.drive.lag > 0.0 else noise
+            richer = solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY})
+            if all(richer.values[p] > 0.0 for p in parameters if p in POSITIVE):
+                fit = richer
+                kept.append(name)
+    return fit, kept
+
+
+def _has_columns(fit: Fit, parameters: Sequence[str]) -> bool:
+    air = [p for p in parameters if "drag" in p or p == "lift"]
+    return all(p in fit.balance.names for p in air)
+
+
+def _settled(
+    pieces: list[Piece], fit: Fit, geometry: Geometry, noise: float
+) -> tuple[Fit, dict[str, str]]:
+    """Return the fit in which what the flight does not show is fixed at what is usual, and for
+    each the reason.
+    """
+    fixed: dict[str, str] = {}
+    nonlinear = fit.names[len(fit.model.free) :]
+    values = fit.values
+    set_to: dict[str, float] = {}
+    usual = USUAL.gyration * fit.model.mass * geometry.arm**2
+    for axis, motion in (("Jx", "roll"), ("Jy", "pitch")):
+        if 1.96 * fit.deviation(axis) > IDENTIFY.widest:
+            fixed[axis] = f"the flight hardly shows {motion}"
+            set_to[axis] = usual
+    if set_to and not geometry.known:
+        raise InputError(
+            f"{'; '.join(fixed.values())}, and no arm is given; expected --geometry, or a log with "
+            "quick roll and pitch"
+        )
+    if 1.96 * fit.deviation("Jz") > IDENTIFY.widest or not (
+        0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3
+    ):
+        fixed["Jz"] = "the flight does not yaw while it rolls or pitches"
+        both = sum(set_to.get(a, values[a]) for a in ("Jx", "Jy"))
+        set_to["Jz"] = USUAL.flat * both
+    if not set_to:
+        return fit, fixed
+    theta = fit.theta[: len(fit.model.free)]
+    model, start = with_fixed(fit.model, theta, set_to)
+    start = start.copy()
+    if "Jz" in set_to:  # yaw keeps its ratio
+        i = model.free.index("reach")
+        start[i] *= set_to["Jz"] / values["Jz"]
+    quiet = 0.0 if fit.drive.lag > 0.0 else noise
+    return solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY}), fixed

@@ -1,0 +1,130 @@
+"""What identify writes: the vehicle's file, the estimates beside it, and a picture of measured
+against fitted force and torque.
+"""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.vehicle_file import save_vehicle
+from ...runtime.whole_files import replaced
+from ..motion.smoothing import low_pass
+from .channels import Piece
+from .columns import air_columns, rotor_columns
+from .model import coefficients
+from .result import ASSUMED, NOTHING, Identified
+
+Array = NDArray[np.float64]
+
+_SHOWN_HZ = 8.0  # of the picture: what is faster is the pose's noise
+_SHOWN_SECONDS = 10.0
+
+
+def identified_data(found: Identified) -> dict[str, Any]:
+    """Return the dictionary of ``identify.json``."""
+
+    def number(x: float) -> float | None:
+        return float(x) if math.isfinite(x) else None
+
+    return {
+        "vehicle": found.vehicle.name,
+        "mass_kg": found.vehicle.mass,
+        "flight_s": found.seconds,
+        "segments": found.segments,
+        "channels": {
+            "force": found.sources.force,
+            "rate": found.sources.rate,
+            "rotors": found.sources.rotors,
+            "velocity": found.sources.velocity,
+        },
+        "estimates": [
+            {
+                "name": e.name,
+                "value": number(e.value),
+                "interval_95": [number(e.low), number(e.high)],
+                "unit": e.unit,
+                "status": e.status,
+                "how": e.how,
+            }
+            for e in found.estimates
+        ],
+        "notes": list(found.notes),
+        "advice": list(found.advice),
+    }
+
+
+def headline(found: Identified) -> str:
+    """Return one sentence on how much of the vehicle the logs tell."""
+    essential = ["Jxx", "Jyy", "Jzz", "p/k"]
+    open_ones = [n for n in essential if found[n].status in (ASSUMED, NOTHING)]
+    told = "thrust" if found.fit.drive.commands else "k"
+    if not open_ones:
+        return f"{told}, inertia and reaction torque are identified"
+    return f"{told} is identified; assumed, since these logs do not tell: {', '.join(open_ones)}"
+
+
+def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
+    """Write the vehicle to a YAML file, and beside it ``NAME.identify.json`` and
+    ``NAME.identify.png``; return the three.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    save_vehicle(found.vehicle, path)
+    data, picture = (path.with_name(f"{path.stem}.identify.{end}") for end in ("json", "png"))
+    with replaced(data) as partial:
+        partial.write_text(json.dumps(identified_data(found), indent=1) + "\n", encoding="utf-8")
+    _picture(found, picture)
+    return path, data, picture
+
+
+def fitted(found: Identified, piece: Piece) -> tuple[Array, Array]:
+    """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
+    each, of a piece; both through the picture's low-pass.
+    """
+    fit = found.fit
+    rotors = rotor_columns(piece, fit.drive)
+    names = (*rotors, *(air := air_columns(piece)))
+    late = {
+        name: np.interp(piece.t - fit.drive.delay, piece.t, column)
+        for name, column in rotors.items()
+    }
+    columns = np.column_stack([*late.values(), *air.values()])
+    model = columns @ coefficients(fit.values, names, fit.model.mass, fit.model.powers).T
+    force = piece.specific_force
+    if force is None:
+        force = np.full_like(piece.angular_acceleration, np.nan)
+    measured = np.column_stack([force, piece.angular_acceleration])
+    return (
+        low_pass(measured, _SHOWN_HZ, piece.period),
+        low_pass(model, _SHOWN_HZ, piece.period),
+    )
+
+
+def _picture(found: Identified, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    mass, inertia = found.vehicle.mass, np.diag(found.vehicle.inertia)
+    scale = np.concatenate([np.full(3, mass), inertia])
+    longest = max(found.pieces, key=lambda p: len(p.t))
+    measured, model = fitted(found, longest)
+    middle = longest.t[len(longest.t) // 2]
+    shown = np.abs(longest.t - middle) <= 0.5 * _SHOWN_SECONDS
+    figure = Figure(figsize=(11, 6), layout="constrained")
+    axes = figure.subplots(2, 3, sharex=True)
+    for i, axis in enumerate("xyz"):
+        for row, (what, unit) in enumerate((("force", "N"), ("torque", "Nm"))):
+            j = 3 * row + i
+            plot = axes[row, i]
+            plot.plot(longest.t[shown], scale[j] * measured[shown, j], lw=1.4, label="measured")
+            plot.plot(longest.t[shown], scale[j] * model[shown, j], lw=1.0, label="fitted")
+            left = np.std((measured - model)[:, j]) / max(float(np.std(measured[:, j])), 1e-12)
+            plot.set_title(f"{what} {axis} ({unit}), residual {100 * left:.0f} %", fontsize=9)
+        axes[1, i].set_xlabel("time (s)")
+    axes[0, 0].legend(fontsize=8)
+    with replaced(path) as partial:
+        figure.savefig(partial, format="png", dpi=110)

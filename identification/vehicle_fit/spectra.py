@@ -1,0 +1,88 @@
+"""Columns of a regression as tapered Fourier transforms, and the noise's spectrum.
+
+Least squares weighted with the residual's own spectrum is the maximum of Whittle's likelihood: in
+each frequency the motion counts by how much it stands out of disturbance and sensor noise, so no
+cut-off has to be chosen between the two. With a noise model that is free to take the residual's
+shape it is the prediction-error method, which closed-loop flight does not bias as plain least
+squares is biased (Ljung, System Identification, 1999, section 13.4).
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class SpectrumSettings:
+    """How signals are transformed."""
+
+    segment: float = 5.0  # s: of one transform; its inverse is the frequency's step
+    tapers: int = 3  # sine tapers (Riedel and Sidorenko, 1995): a low leak, and little lost
+    # Hz: what is faster is vibration, and the loops' answer to noise; rotors follow no faster
+    band: float = 15.0
+    smoothing: float = 0.35  # of the spectrum: width as a share of the frequency,
+    narrowest: float = 0.4  # and at least so many Hz
+
+
+SPECTRUM = SpectrumSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One segment's transforms."""
+
+    log: int
+    frequency: Array  # (m,) Hz
+    weight: Array  # (m,): 2 of a complex number, 1 of a real one; over the number of tapers
+    columns: Complex  # (K, m, c): per root Hz
+
+
+def segments_of(columns: Array, period: float, log: int) -> list[Segment]:
+    """Return the transforms of a piece's columns (n, c), cut into segments of about equal
+    length.
+    """
+    n = len(columns)
+    count = max(1, round(n * period / SPECTRUM.segment))
+    edges = np.linspace(0, n, count + 1).astype(int)
+    out = []
+    for a, b in itertools.pairwise(edges):
+        size = b - a
+        frequency = np.fft.rfftfreq(size, period)
+        inside = frequency <= min(SPECTRUM.band, 0.4 / period)
+        weight = np.where(frequency[inside] == 0.0, 1.0, 2.0) / SPECTRUM.tapers
+        places = np.arange(1, size + 1) * (np.pi / (size + 1))
+        transforms = []
+        for k in range(1, SPECTRUM.tapers + 1):
+            taper = np.sqrt(2.0 * period / (size + 1)) * np.sin(k * places)
+            transforms.append(np.fft.rfft(taper[:, None] * columns[a:b], axis=0)[inside])
+        out.append(Segment(log, frequency[inside], weight, np.array(transforms)))
+    return out
+
+
+def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> list[Array]:
+    """Return, for each segment, the spectrum (m, 6) of residuals whose powers (m, 6) are given,
+    smoothed over the segments of a log and over frequency; infinite where there is none.
+    """
+    out: list[Array] = []
+    by_log: dict[int, tuple[Array, Array]] = {}
+    for log in {s.log for s in segments}:
+        own = [(s, p) for s, p in zip(segments, powers, strict=True) if s.log == log]
+        frequency = np.concatenate([s.frequency for s, _ in own])
+        power = np.concatenate([p for _, p in own])
+        order = np.argsort(frequency, kind="stable")
+        by_log[log] = frequency[order], power[order]
+    for s in segments:
+        frequency, power = by_log[s.log]
+        total = np.concatenate([np.zeros((1, power.shape[1])), np.cumsum(power, axis=0)])
+        half = 0.5 * np.maximum(SPECTRUM.smoothing * s.frequency, SPECTRUM.narrowest)
+        low = np.searchsorted(frequency, s.frequency - half - 1e-9)
+        high = np.searchsorted(frequency, s.frequency + half + 1e-9, side="right")
+        mean = (total[high] - total[low]) / (high - low)[:, None]
+        out.append(np.where(mean > 0.0, mean, np.inf))
+    return out

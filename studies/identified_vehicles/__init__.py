@@ -1,0 +1,1 @@
+"""How right identified vehicles are: simulated ones whose truth is known."""
