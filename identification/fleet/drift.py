@@ -119,7 +119,7 @@ def meta_regression(
     def fit(variance: float) -> tuple[Array, Array, float]:
         weight = 1.0 / (np.square(s) + variance)
         information = design.T @ (weight[:, None] * design)
-        covariance = np.linalg.inv(information)
+        covariance: Array = np.asarray(np.linalg.inv(information), dtype=float)
         coefficients: Array = covariance @ (design.T @ (weight * y))
         return coefficients, covariance, float(weight @ np.square(y - design @ coefficients))
 

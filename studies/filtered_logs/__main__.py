@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from windwrench.studies.filtered_logs.filtered_logs import run, save
+from windwrench.studies.filtered_logs.filtered_logs import resume, run, save
 from windwrench.studies.filtered_logs.page import write_table
 
 if __name__ == "__main__":
@@ -13,7 +13,15 @@ if __name__ == "__main__":
     parser.add_argument("--flights", type=int, default=None, help="only the first so many")
     parser.add_argument("--out", type=Path, default=Path("results/filtered_logs"))
     parser.add_argument("--page", type=Path, default=None, help="page whose tables are made anew")
+    parser.add_argument(
+        "--saved",
+        type=Path,
+        default=None,
+        help="filtered_logs.json of an earlier run, to go on from",
+    )
     given = parser.parse_args()
+    if given.saved is not None:
+        resume(given.out, given.saved)
     outcomes = run(given.out, range(given.seeds), given.jobs, given.flights)
     save(outcomes, given.out / "filtered_logs.json")
     print(write_table(outcomes, given.page))

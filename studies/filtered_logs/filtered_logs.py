@@ -15,6 +15,8 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.motion.noise_spectrum import noise_spectra, pose_was_filtered
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
+from windwrench.runtime.regular_files import read_json
+from windwrench.runtime.whole_files import replaced
 from windwrench.runtime.workers import workers
 from windwrench.studies.filtered_logs.filters import FILTERS
 from windwrench.studies.trials.practice_flights import practise, shown_in
@@ -145,6 +147,29 @@ def run(
                     file.write(json.dumps({"flight": flight, "outcomes": done[flight]}) + "\n")
                 print(f"{len(done)} of {len(wanted)} flights", flush=True)
     return [outcome for flight in wanted for outcome in done.get(flight, [])]
+
+
+def resume(folder: Path, saved: Path) -> None:
+    """Begin a folder with outcomes that were saved, unless it has its own; only flights that have
+    an outcome for each filter count as done.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    path = folder / "flights.jsonl"
+    if path.exists():
+        return
+    by_flight: dict[tuple[str, str, int], list[Any]] = {}
+    for outcome in read_json(saved, "outcomes of this study"):
+        flight = (outcome["effect"], outcome["trajectory"], outcome["seed"])
+        by_flight.setdefault(flight, []).append(outcome)
+    lines = [
+        json.dumps({"flight": flight, "outcomes": found}) + "\n"
+        for flight, found in by_flight.items()
+        if [o["filter"] for o in found] == list(FILTERS)
+    ]
+    with replaced(path) as partial:
+        partial.write_text("".join(lines), encoding="utf-8")
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:

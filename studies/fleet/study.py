@@ -2,6 +2,7 @@
 
 import json
 import resource
+import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any
 from windwrench import __version__
 from windwrench.identification.fleet.drift import Fleet, fleet_of
 from windwrench.identification.fleet.files import fleet_data, write_fleet
-from windwrench.identification.fleet.manifest import find_logs
+from windwrench.identification.fleet.flight import Job, diagnose_one
+from windwrench.identification.fleet.manifest import FleetLog, find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES, rows, run_fleet
 from windwrench.runtime.lasting_workers import Lost, crew_of, each
@@ -20,6 +22,7 @@ from windwrench.studies.fleet.flights import SECONDS, Flight, drifting, flights,
 
 COUNTED_AT = (20, 50, 100, 200, 500)  # logs, at which memory and time are noted
 _LIMIT_S = 600.0
+_STARTS = 3  # processes that are started for nothing else
 MEMORY = "memory.jsonl"
 
 
@@ -65,6 +68,7 @@ def run(
             with (folder / MEMORY).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(memory) + "\n")
 
+    steady = next(log for log in found if "steady" in log.id)
     with closing(outcomes):
         done = run_fleet(found, outcomes, jobs=jobs, report=note)
         fleet = fleet_of(rows(done, outcomes))
@@ -83,9 +87,30 @@ def run(
             for row in _refused(done, folder)
         ],
         "costs": [cost for cost in costs if cost],
+        "starts": starts(steady),
         "parent": _parent(folder / MEMORY),
         "truth": _truth(fleet, count),
     }
+
+
+def _start(log: FleetLog) -> dict[str, float]:
+    """Return what a process' start and its first diagnosis cost, and a later one, s of a core."""
+    begun = time.process_time()
+    cost = {"start": begun}
+    for name in ("first", "second"):
+        before = time.process_time()
+        diagnose_one(Job(log, "00"))
+        cost[name] = time.process_time() - before
+    return cost
+
+
+def starts(log: FleetLog) -> list[dict[str, float]]:
+    """Return the costs of some processes, each started anew."""
+    found = []
+    for _ in range(_STARTS):
+        with crew_of(_start, 1) as (crew, count):
+            found += [cost for _, cost in each([log], crew, count, _LIMIT_S)]
+    return found
 
 
 def _refused(done: Any, folder: Path) -> list[dict[str, Any]]:
