@@ -243,6 +243,58 @@ def test_body_drag_has_a_linear_part_and_acts_at_the_geometric_centre():
     np.testing.assert_allclose(got[1], np.cross(-com, force), rtol=1e-12)
 
 
+@pytest.mark.parametrize("com", [(0.0, 0.0, 0.0), (0.01, -0.02, 0.03)])
+def test_inflow_drag_acts_at_each_rotor_and_grows_with_its_inflow(com):
+    kl, wind = 3e-3, np.array([0.5, 2.0, -0.3])
+    force, torque = np.zeros(3), np.zeros(3)
+    for r in VEHICLE.positions:
+        u = R.T @ (V - wind) + np.cross(OMEGA, r)
+        F = -kl * u[2] * np.array([u[0], u[1], 0.0])
+        force, torque = force + R @ F, torque + np.cross(r - com, F)
+    vehicle = VEHICLE.with_effects(
+        EffectSetting("com_offset", dict(zip(("cx", "cy", "cz"), com, strict=True))),
+        EffectSetting("inflow_drag", {"kl": kl}),
+    )
+    got = wrench(vehicle, wind=wind)
+    np.testing.assert_allclose(got[0], force, rtol=1e-12)
+    np.testing.assert_allclose(got[1], torque, rtol=1e-12, atol=1e-15)
+
+
+def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart():
+    kx, ky, wind = 5e-4, -2e-4, np.array([0.5, 2.0, -0.3])
+    u = R.T @ (V - wind)
+    direction = VEHICLE.positions[:, :2] / np.linalg.norm(
+        VEHICLE.positions[:, :2], axis=1, keepdims=True
+    )
+    lift = -np.sum(W[:, None] * direction * np.array([kx, ky]) * u[:2])
+    force, torque = wrench(setting("rotor_interaction", kx=kx, ky=ky), wind=wind)
+    np.testing.assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-12)
+    np.testing.assert_allclose(torque, 0.0, atol=1e-15)
+
+
+def test_rotor_interaction_of_rotors_that_turn_alike_is_nothing():
+    alike = np.full(4, 400.0)
+    bundle = compile_effects(setting("rotor_interaction", kx=5e-4, ky=5e-4))
+    out = np.full(6, np.nan)
+    effect_wrench(
+        bundle.wrench_models,
+        bundle.wrench_coefficients,
+        bundle.constants,
+        body_record(VEHICLE)[0],
+        np.zeros(3),
+        R,
+        V,
+        OMEGA,
+        alike,
+        np.zeros(3),
+        0.0,
+        0.0,
+        np.zeros(STATE_SIZE),
+        out,
+    )
+    np.testing.assert_allclose(out, 0.0, atol=1e-12)
+
+
 def test_rate_damping_opposes_the_body_rate():
     force, torque = wrench(setting("rate_damping", dx=1e-3, dy=2e-3, dz=3e-3))
     np.testing.assert_allclose(torque, -np.array([1e-3, 2e-3, 3e-3]) * OMEGA, rtol=1e-15)
