@@ -32,6 +32,7 @@ from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import read_bytes
 from ...runtime.yaml_file import read_yaml
 from ..logs.readers import READERS, find_reader
+from ..logs.readers.recognise import reader_by_content
 
 MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
 VEHICLE_FILE = "vehicle.yaml"
@@ -201,8 +202,9 @@ def find_logs(
             logs.setdefault(os.path.realpath(path), _with_manifest(one, manifest, used))
     if not logs:
         raise InputError(
-            f"{', '.join(map(str, given))}: no flight log found; expected files that end in "
-            f"{', '.join(_suffixes())}"
+            f"{', '.join(map(str, given))}: no flight log found; expected tables "
+            f"({', '.join(_TABLES)}), or files that a reader knows: "
+            f"{', '.join(reader.what for reader in READERS.values() if reader.begins)}"
         )
     for name in dict.fromkeys(log.vehicle for log in logs.values() if log.vehicle):
         load_vehicle(name)  # a mistake in the vehicle is no log's
@@ -224,8 +226,9 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     )
 
 
-def _suffixes() -> tuple[str, ...]:
-    return (*_TABLES, *(suffix for reader in READERS.values() for suffix in reader.suffixes))
+def _is_log(path: Path) -> bool:
+    """Return whether a file is a table by its name, or begins as a reader's logs do."""
+    return path.name.lower().endswith(_TABLES) or reader_by_content(path) is not None
 
 
 def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
@@ -246,8 +249,8 @@ def _logs_in(root: Path, without: Path | None) -> Iterator[Path]:
         folders[:] = [name for name in folders if name not in bags]
         yield from (Path(folder, name) for name in bags)
         for name in sorted(files):
-            if name.lower().endswith(_suffixes()) and not name.startswith("."):
-                yield Path(folder, name)
+            if not name.startswith(".") and _is_log(path := Path(folder, name)):
+                yield path
 
 
 def _vehicle_beside(path: Path, root: Path) -> str | None:
