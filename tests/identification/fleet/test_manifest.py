@@ -23,7 +23,7 @@ def folder(tmp_path):
     ):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("")
+        path.write_bytes(b"ULog\x01\x12\x35" if name == "beta/b.ulg" else b"")
     (tmp_path / "beta" / "vehicle.yaml").write_text(dump_vehicle(load_vehicle("crazyflie")))
     return tmp_path
 
