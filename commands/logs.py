@@ -96,7 +96,7 @@ def _notes(texts: Iterable[str]) -> None:
 
 
 def estimate(
-    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
     reader: ReaderOption = None,
     vehicle: LogVehicleOption = None,
     smooth: Annotated[
@@ -123,7 +123,7 @@ def estimate(
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
-    Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
+    Example: windwrench estimate flight.csv --vehicle crazyflie
     """
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
@@ -194,7 +194,8 @@ def estimate(
 
 def diagnose(
     logs: Annotated[
-        list[Path], typer.Argument(help="Flight logs of one vehicle: .csv, .csv.gz or .parquet.")
+        list[Path],
+        typer.Argument(help="Flight logs of one vehicle: tables, or of autopilots or bags."),
     ],
     test: Annotated[
         list[Path] | None,
@@ -315,7 +316,7 @@ def _compare(
 
 
 def replay(
-    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
     reader: ReaderOption = None,
     vehicle: LogVehicleOption = None,
     video: Annotated[
@@ -345,7 +346,7 @@ def replay(
     """Draw a logged flight and its wrench. The external wrench is drawn as arrows; write the last
     frame, and video or animation on request.
 
-    Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
+    Example: windwrench replay flight.csv --vehicle crazyflie --gif
     """
     import numpy as np
 
