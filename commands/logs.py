@@ -100,7 +100,7 @@ def _notes(texts: Iterable[str]) -> None:
 
 
 def estimate(
-    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
     reader: ReaderOption = None,
     map: MapOption = None,
     vehicle: LogVehicleOption = None,
@@ -128,7 +128,7 @@ def estimate(
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture.
 
-    Example: windwrench estimate flight.csv --reader nanobench --vehicle crazyflie
+    Example: windwrench estimate flight.csv --vehicle crazyflie
     """
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
@@ -201,8 +201,8 @@ def diagnose(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="Flight logs of one vehicle: .csv, .csv.gz or .parquet; with --fleet, logs of any "
-            "vehicles and folders of them."
+            help="Flight logs of one vehicle: tables, or of autopilots or bags; with --fleet, logs "
+            "of any vehicles and folders of them."
         ),
     ],
     test: Annotated[
@@ -430,7 +430,7 @@ def _rotor_faults(
 
 
 def replay(
-    log: Annotated[Path, typer.Argument(help="Flight log: .csv, .csv.gz or .parquet.")],
+    log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
     reader: ReaderOption = None,
     map: MapOption = None,
     vehicle: LogVehicleOption = None,
@@ -461,7 +461,7 @@ def replay(
     """Draw a logged flight and its wrench. The external wrench is drawn as arrows; write the last
     frame, and video or animation on request.
 
-    Example: windwrench replay flight.csv --reader nanobench --vehicle crazyflie --gif
+    Example: windwrench replay flight.csv --vehicle crazyflie --gif
     """
     import numpy as np
 

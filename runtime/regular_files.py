@@ -80,10 +80,12 @@ def read_bytes(path: Path, what: str, most: int) -> bytes:
     """
     with open_regular(path, what) as file:
         try:
-            data = file.read(most + 1)
+            # what states too large a size is not read; what states none may still hold more
+            large = os.fstat(file.fileno()).st_size > most
+            data = b"" if large else file.read(most + 1)
         except OSError as error:
             raise InputError(f"{path}: cannot be read as {what}: {_reason(error)}") from error
-    if len(data) > most:
+    if large or len(data) > most:
         raise InputError(f"{path}: more than {most} bytes; expected {what}, no larger")
     return data
 

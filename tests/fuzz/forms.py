@@ -8,6 +8,7 @@ import json
 import math
 import random
 import shutil
+import struct
 import tempfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -22,6 +23,9 @@ from numpy.typing import NDArray
 
 from tests.fuzz.mutations import spoil_bytes, spoil_table, spoil_text
 from tests.fuzz.ulog_writer import ulog_bytes
+from tests.support.blackbox_writer import FIELDS as BLACKBOX_FIELDS
+from tests.support.blackbox_writer import blackbox
+from tests.support.dataflash_writer import dataflash
 from tests.support.paths import ROOT
 from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
@@ -224,7 +228,7 @@ TOPIC_MAP = (
 def _log(path: Path, reader: str | None = None, vehicle: str = "ardrone2") -> None:
     """Read a log, and estimate the wrench on it where it is short."""
     log = read_log(path, reader, _vehicle(vehicle))
-    if len(log.t) <= _LONGEST:
+    if len(log.t) <= _LONGEST and log.has_pose and log.has_rotor_speeds:
         series = estimate_log(log, _vehicle(vehicle))
         assert np.isfinite(series.force).all()
 
@@ -338,6 +342,110 @@ def _effects() -> bytes:
     return "\n".join(lines).encode()
 
 
+@cache
+def _dataflash() -> bytes:
+    t = 1e6 * (10.0 + _times())
+    zero, none = np.zeros(_COUNT), np.zeros(_COUNT)
+    place = {"PN": zero, "PE": 0.1 * np.sin(_times()), "PD": zero - 1.0}
+    turn = {"Q1": zero + 1.0, "Q2": zero, "Q3": zero, "Q4": zero}
+    force = {"AccX": zero, "AccY": zero, "AccZ": zero - 9.81}
+    gyro = {"GyrX": zero, "GyrY": zero, "GyrZ": zero}
+    pulses = {f"C{i}": zero + 1500.0 for i in range(1, 5)}
+    volts = {"TimeUS": t, "Inst": none, "Volt": zero + 11.1}
+    named = {b"FRAME_CLASS": 1.0, b"FRAME_TYPE": 1.0, b"MOT_PWM_MIN": 1000.0, b"MOT_PWM_MAX": 2e3}
+    parameters = {"TimeUS": [0.0] * 4, "Name": [*named], "Value": [*named.values()]}
+    return dataflash(
+        [
+            ("PARM", "QNf", parameters),
+            ("XKF1", "QBfff", {"TimeUS": t, "C": none, **place}),
+            ("XKQ", "QBffff", {"TimeUS": t, "C": none, **turn}),
+            ("IMU", "QBffffff", {"TimeUS": t, "I": none, **gyro, **force}),
+            ("RCOU", "QHHHH", {"TimeUS": t, **pulses}),
+            ("BAT", "QBf", volts),
+        ]
+    )
+
+
+@cache
+def _blackbox() -> bytes:
+    rng = np.random.default_rng(0)
+    rows = []
+    for k in range(_COUNT):
+        row = dict.fromkeys(BLACKBOX_FIELDS, 0) | {"accSmooth[2]": 2048, "rcCommand[3]": 1500}
+        row |= {f"gyroADC[{i}]": int(rng.integers(-50, 50)) for i in range(3)}
+        row |= {f"motor[{i}]": 700 + int(rng.integers(40)) for i in range(4)}
+        row |= {f"eRPM[{i}]": 900 + int(rng.integers(40)) for i in range(4)}
+        rows.append(row | {"loopIteration": 2 * k, "time": 1_000_000 + 10_000 * k})
+    return blackbox(rows)
+
+
+@cache
+def _sd_card() -> bytes:
+    names = [f"stateEstimate.{axis}(f)" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz")]
+    names += [f"acc.{axis}(f)" for axis in "xyz"] + [f"gyro.{axis}(f)" for axis in "xyz"]
+    names += [f"motor.m{i}(H)" for i in range(1, 5)] + ["pm.vbat(f)"]
+    out = struct.pack("<BHHH", 0xBC, 2, 1, 7) + b"fixedFrequency\0"
+    out += struct.pack("<H", len(names)) + b"".join(name.encode() + b"\0" for name in names)
+    for k, t in enumerate(_times()):
+        values = (0.1 * math.sin(t), 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1 * k, 0.0, 0.0)
+        record = (7, round(1e6 * (30.0 + t)), *values, *[40_000] * 4, 3.9)
+        out += struct.pack("<HQ13f4Hf", *record)
+    return out
+
+
+def _racer() -> bytes:
+    t = _times()
+    zero = (
+        *("pos_x", "pos_y", "quat_x", "quat_y", "quat_z", "spec_force_x", "spec_force_y"),
+        *("gyro_x", "gyro_y", "gyro_z", "vel_body_x", "vel_body_y", "vel_body_z"),
+    )
+    places = ("rear_right", "front_right", "rear_left", "front_left")
+    return _text_table(
+        {
+            "timestamp_s": t,
+            **dict.fromkeys(zero, 0.0 * t),
+            "pos_z": 1.0 + 0.0 * t,
+            "quat_w": 1.0 + 0.0 * t,
+            "spec_force_z": 9.81 + 0.0 * t,
+            **{f"rpm_{place}": 3600.0 + 0.0 * t for place in places},
+            "battery_v": 11.1 + 0.0 * t,
+        }
+    )
+
+
+def _cflib() -> bytes:
+    t = _times()
+    zero = [f"stateEstimate.{name}" for name in ("x", "y", "qx", "qy", "qz")]
+    zero += ["acc.x", "acc.y", "gyro.x", "gyro.y", "gyro.z"]
+    return _text_table(
+        {
+            "timestamp": 1e3 * t,
+            **dict.fromkeys(zero, 0.0 * t),
+            "stateEstimate.z": 1.0 + 0.01 * t,
+            "stateEstimate.qw": 1.0 + 0.0 * t,
+            "acc.z": 1.0 + 0.0 * t,
+            **{f"motor.m{i}": np.full(_COUNT, 40_000.0) for i in range(1, 5)},
+            "pm.vbat": np.full(_COUNT, 3.9),
+        }
+    )
+
+
+def _decoded_blackbox() -> bytes:
+    t = _times()
+    sensors = {f"{name}[{i}]": 0.0 * t for name in ("gyroADC", "accSmooth") for i in range(3)}
+    return _text_table(
+        {
+            "loopIteration": np.arange(_COUNT, dtype=np.float64),
+            "time (us)": 1e6 * t,
+            **sensors,
+            "accSmooth[2]": np.full(_COUNT, 2048.0),
+            **{f"motor[{i}]": 1500.0 + 0.0 * t for i in range(4)},
+            **{f"eRPM[{i}]": 420.0 + 0.0 * t for i in range(4)},
+            "vbatLatest (V)": 11.1 + 0.0 * t,
+        }
+    )
+
+
 def _zipped(spoiled: Way) -> Way:
     """Return a way to spoil what a gzip file holds."""
 
@@ -425,6 +533,33 @@ def forms() -> dict[str, Form]:
             table,
             partial(_log, reader="crazyswarm2", vehicle="crazyflie"),
             (*estimate, "--reader", "crazyswarm2", "--vehicle", "crazyflie"),
+        ),
+        Form("racer", "log.csv", _racer, table, _log, estimate),
+        Form("crazyflie_csv", "log.csv", _cflib, table, partial(_log, vehicle="crazyflie")),
+        Form("betaflight_csv", "log.csv", _decoded_blackbox, table, _log, estimate),
+        Form(
+            "ardupilot_bin",
+            "log.BIN",
+            _dataflash,
+            (spoil_bytes,),
+            partial(_log, reader="ardupilot_bin"),
+            (*estimate, "--reader", "ardupilot_bin"),
+        ),
+        Form(
+            "betaflight",
+            "log.bbl",
+            _blackbox,
+            (spoil_bytes,),
+            partial(_log, reader="betaflight"),
+            (*estimate, "--reader", "betaflight"),
+        ),
+        Form(
+            "crazyflie_sd",
+            "log00",
+            _sd_card,
+            (spoil_bytes,),
+            partial(_log, reader="crazyflie_sd", vehicle="crazyflie"),
+            (*estimate, "--reader", "crazyflie_sd", "--vehicle", "crazyflie"),
         ),
         Form(
             "vehicle",

@@ -80,8 +80,8 @@ def test_a_px4_log_of_motors_that_stand_still_is_refused(vehicle):
     with pytest.raises(
         InputError,
         match=(
-            r"sample\.ulg: no motors: expected .* of four motors, found actuator_outputs, "
-            "vehicle_attitude, vehicle_local_position"
+            r"sample\.ulg: no motors: expected .* of four motors that turn, found "
+            "actuator_outputs, vehicle_attitude, vehicle_local_position"
         ),
     ):
         read_log(excerpt("px4/sample.ulg"), "px4_ulog", vehicle)

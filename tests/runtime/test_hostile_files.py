@@ -48,8 +48,8 @@ def peak_memory():
 for path in sys.argv[1:]:
     began = time.perf_counter()
     try:
-        if path.endswith(".ulg"):
-            read_log(path, "px4_ulog", load_vehicle("ardrone2"))
+        if path.endswith((".ulg", ".BIN", ".bbl", "log00")):
+            read_log(path, None, load_vehicle("ardrone2"))
         elif path.endswith(".npz"):
             load_policy(path)
         elif path.endswith(".yaml"):
@@ -117,6 +117,19 @@ NESTED_ULOG = ulog(
     ("F", b"vehicle_attitude:uint64_t timestamp;b[60000] z;"),
     *[("A", struct.pack("<BH", 0, i) + b"vehicle_attitude") for i in range(100)],
 )
+# a type of message without a column, 20 million times
+EMPTY_DATAFLASH = struct.pack("<3sBB4s16s64s", b"\xa3\x95\x80", 9, 3, b"RCOU", b"", b"")
+# a log whose events hold 400 variables of a byte each
+NARROW_SD_CARD = struct.pack("<BHHH", 0xBC, 2, 1, 7) + b"e\0" + struct.pack("<H", 400)
+NARROW_SD_CARD += b"".join(b"v%d(B)\0" % i for i in range(400))
+# a log whose frames are a letter each
+EMPTY_FRAMES = b"".join(
+    [
+        b"H Product:Blackbox\nH Data version:2\n",
+        b"H Field I name:loopIteration,time\nH Field I predictor:0,0\nH Field I encoding:9,9\n",
+        b"H Field P predictor:6,0\nH Field P encoding:9,9\n",
+    ]
+)
 TEXTS_ULOG = ulog(*[("P", b"\x09float " + b"%3x" % i + b"\0\0\0\0") for i in range(4096)] * 60)
 
 
@@ -149,6 +162,20 @@ def test_files_that_unpack_to_gigabytes_cost_little(tmp_path):
         expected["nested.ulg"] = "more than 200000 fields"
         (tmp_path / "texts.ulg").write_bytes(TEXTS_ULOG)
         expected["texts.ulg"] = "more than 200000 parameters"
+    (tmp_path / "empty.BIN").write_bytes(
+        EMPTY_DATAFLASH + (b"\xa3\x95\x09" * 2**20) * 20 + bytes(7)
+    )
+    expected["empty.BIN"] = "no motors; expected RCOU"
+    (tmp_path / "narrow_log00").write_bytes(NARROW_SD_CARD + (b"\x07\0" + bytes(408)) * 90_000)
+    expected["narrow_log00"] = "more than 4000000 events or 33554432 numbers"
+    (tmp_path / "empty.bbl").write_bytes(EMPTY_FRAMES + b"IP" * 2**22)
+    expected["empty.bbl"] = "more than 4000000 frames"
+    (tmp_path / "damaged.bbl").write_bytes(EMPTY_FRAMES + b"I\xff" * 2**22)
+    expected["damaged.bbl"] = "frame(s) that can be decoded"
+    with (tmp_path / "sparse.BIN").open("wb") as file:
+        file.write(EMPTY_DATAFLASH)
+        file.truncate(2**34)
+    expected["sparse.BIN"] = "more than 268435456 bytes"
     done = subprocess.run(
         [sys.executable, "-c", CHILD, *(str(tmp_path / name) for name in expected)],
         capture_output=True,

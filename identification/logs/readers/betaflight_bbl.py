@@ -67,16 +67,16 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         raise InputError(f"{path}: no field time; found {', '.join(names[:20])}")
     where = np.array([names.index(name) for name in keep], dtype=np.int64)
     frames = np.frombuffer(data[: section.end], np.uint8)
-    most = LIMITS.table_rows + 1
+    longest_log = min(LIMITS.table_rows, LIMITS.table_numbers // len(keep))
     count, _, _ = decode(
-        frames, section.begin, layout, where, np.zeros((0, len(keep)), np.int64), most
+        frames, section.begin, layout, where, np.zeros((0, len(keep)), np.int64), longest_log + 1
     )
-    if count > LIMITS.table_rows:
-        raise InputError(f"{path}: more than {LIMITS.table_rows} frames; expected one flight")
+    if count > longest_log:
+        raise InputError(f"{path}: more than {longest_log} frames; expected one flight")
     if count < 2:
         raise InputError(f"{path}: {count} frame(s) that can be decoded; expected at least two")
     rows = np.zeros((count, len(keep)), np.int64)
-    _, lost, _ = decode(frames, section.begin, layout, where, rows, most)
+    _, lost, _ = decode(frames, section.begin, layout, where, rows, count)
     columns = {name: rows[:, i].astype(np.float64) for i, name in enumerate(keep)}
     t = 1e-6 * columns.pop("time")
     firmware = section.headers.get("Firmware revision", "an unknown firmware")[:60]

@@ -151,12 +151,16 @@ def _events(
 ) -> tuple[dict[int, NDArray[Any]], int]:
     """Return the events of each type, and the place of the first byte that is none."""
     pieces: dict[int, list[NDArray[Any]]] = {}
-    end, count = begin, 0
+    end, count, numbers = begin, 0, 0
     for number, rows, after in _runs(data, kinds, begin):
         pieces.setdefault(number, []).append(rows)
         end, count = after, count + len(rows)
-        if count > LIMITS.table_rows:
-            raise InputError(f"{path}: more than {LIMITS.table_rows} events; expected one flight")
+        numbers += len(rows) * len(kinds[number].variables)
+        if count > LIMITS.table_rows or numbers > LIMITS.table_numbers:
+            raise InputError(
+                f"{path}: more than {LIMITS.table_rows} events or {LIMITS.table_numbers} numbers; "
+                "expected one flight"
+            )
     return {number: np.concatenate(rows) for number, rows in pieces.items()}, end
 
 

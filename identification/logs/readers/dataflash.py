@@ -27,6 +27,7 @@ BEGINS = (b"\xa3\x95",)
 
 _WHAT = "an ArduPilot log (.BIN)"
 _FMT, _FMT_LENGTH = 128, 89
+_GATHERED = 10_000  # messages copied at a time
 # letters of columns: type, and what one unit of it is
 _LETTERS = {
     "a": ("(32,)<i2", 1.0),
@@ -114,13 +115,20 @@ def read_dataflash(path: Path, wanted: Collection[str]) -> DataFlash:
             )
         if not count:
             continue
-        places = _places(data, number, count)
-        block = data[places[:, None] + np.arange(3, 3 + layout.itemsize)]
-        rows = np.ascontiguousarray(block).view(layout)[:, 0]
-        found[name] = Messages(name, rows, units)
+        found[name] = Messages(name, _rows(data, _places(data, number, count), layout), units)
     if not kinds and not counts[_FMT]:
         raise InputError(f"{path}: cannot be read as {_WHAT}: no FMT message; expected some")
     return DataFlash(found, len(data) - int(used))
+
+
+def _rows(data: Bytes, places: NDArray[np.int64], layout: np.dtype[Any]) -> NDArray[Any]:
+    """Return the messages (N,) that begin at places (N,), without their three first bytes."""
+    block = np.empty((len(places), layout.itemsize), np.uint8)
+    within = np.arange(3, 3 + layout.itemsize)
+    for first in range(0, len(places), _GATHERED):
+        part = places[first : first + _GATHERED]
+        block[first : first + _GATHERED] = data[part[:, None] + within]
+    return block.view(layout)[:, 0]
 
 
 def _layout(

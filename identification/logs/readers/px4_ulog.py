@@ -132,15 +132,13 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
     log = _open(path)
     pose, pose_notes = _pose(log)
     gyro, accelerometer = (_inertial(log, field) for field in _INERTIAL)
-    if pose is None and (gyro is None or accelerometer is None):
-        raise InputError(
-            f"{path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
-            f"{' and no '.join(t for t in _ONBOARD if t not in log.topics) or 'valid position'}; "
-            "expected one of the former or vehicle_local_position with vehicle_attitude, or gyro "
-            "and accelerometer"
-        )
+    nothing = pose is None and (gyro is None or accelerometer is None)
+    if nothing and not all(topic in log.topics for topic in _ONBOARD):
+        raise _no_motion(log)
     order, order_note = _motor_order(log)
     measured, command, relative, rotor_notes = _rotors(log, order)
+    if nothing:
+        raise _no_motion(log)
     rotors, scale_notes = measured, []
     curve = vehicle is not None and vehicle.motor_curve is not None
     if measured is None and relative is not None and vehicle is not None and not curve:
@@ -168,6 +166,17 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         command=command,
         vehicle=vehicle,
         commanded=measured is None,
+    )
+
+
+def _no_motion(log: _Log) -> InputError:
+    """Return the error for a log in which nothing says how the vehicle moved."""
+    missing = [topic for topic in _ONBOARD if topic not in log.topics]
+    return InputError(
+        f"{log.path}: no pose: no usable {' or '.join(_ODOMETRY)}, and no "
+        f"{' and no '.join(missing) or 'valid position'}; "
+        "expected one of the former or vehicle_local_position with vehicle_attitude, or gyro "
+        "and accelerometer"
     )
 
 

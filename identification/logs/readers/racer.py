@@ -11,6 +11,7 @@ no sensor's noise in them. ``extra`` keeps ``velocity`` (N, 3) m/s, body, and, w
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ....dynamics.vehicle import Vehicle
@@ -62,7 +63,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         check_finite(table, name, column)
     check_times(table, columns[_TIME])
 
-    def block(names: tuple[str, ...]) -> np.ndarray:  # type: ignore[type-arg]
+    def block(names: tuple[str, ...]) -> NDArray[np.float64]:
         return np.column_stack([columns[name] for name in names])
 
     t = columns[_TIME] - columns[_TIME][0]

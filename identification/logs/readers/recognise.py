@@ -108,6 +108,6 @@ def _shown(head: bytes) -> str:
     if not head:
         return "nothing (it is empty)"
     start = head[:16]
-    if all(32 <= byte < 127 for byte in start):
+    if all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start):
         return repr(start.decode("ascii"))
     return " ".join(f"{byte:02x}" for byte in start[:8])

@@ -179,7 +179,7 @@ def flight_log(
         )
     t, values, row_notes = _rows(path, pose, motors, gyro or accelerometer)
     notes += row_notes
-    valid: Mask = np.isfinite(values).all(axis=1)
+    valid: Mask = np.asarray(np.isfinite(values).all(axis=1))
     length = np.linalg.norm(values[:, 3:], axis=1)
     values = np.where(valid[:, None], values, np.nan)
     if rotors is not None and np.any(rotors.values < 0.0):

@@ -153,7 +153,7 @@ def test_what_is_no_log_is_named(write, data, expected):
 
 def test_events_are_counted(write, monkeypatch):
     monkeypatch.setattr(crazyflie_sd, "LIMITS", replace(LIMITS, table_rows=100))
-    with pytest.raises(InputError, match="more than 100 events; expected one flight"):
+    with pytest.raises(InputError, match=r"more than 100 events or .* expected one flight"):
         read_log(write(sd_card({"imu": (T, fast(T))})))
 
 

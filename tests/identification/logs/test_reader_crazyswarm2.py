@@ -154,7 +154,7 @@ def test_bad_logs_are_named(write, tmp_path, vehicle):
 def test_an_unknown_reader_is_told_all():
     with pytest.raises(
         InputError,
-        match=r"unknown reader 'ros'; expected one of .*crazyswarm2, .*px4_ulog, rosbag",
+        match=r"unknown reader 'ros'; expected one of ardupilot_bin, .*px4_ulog, racer, rosbag",
     ):
         read_log("flight.bag", "ros")
 
