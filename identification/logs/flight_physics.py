@@ -133,7 +133,7 @@ class FlightPhysics:
     def _on_grid(self, values: Array, rows: NDArray[np.intp] | None = None) -> Array:
         """Return columns (N, k) of the rows on the common clock (n, k)."""
         rows = self._rows if rows is None else rows
-        flat = values.reshape(len(values), -1)
+        flat = values.reshape(len(values), int(np.prod(values.shape[1:])))
         there = np.isfinite(flat).all(axis=1)
         t, flat = self._t[rows][there], flat[there]
         if len(t) < 2:

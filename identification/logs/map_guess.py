@@ -9,6 +9,7 @@ the field is a guess.
 """
 
 import io
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -165,7 +166,12 @@ def guess_map(
         InputError: no columns look like a time, a pose or an IMU, and motors; the message says
             which are missing.
     """
-    names = take_apart(table.header, layout.units)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
+        return _guess(table, take_apart(table.header, layout.units), vehicle, name)
+
+
+def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) -> Guess:
     clock = _time_column(table, names)
     rest = [n for n in names if n.column != clock.column]
     parts, rivals = _groups(rest)
@@ -319,7 +325,7 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
         )
     step = float(np.median(steps))
     unit = name.unit if name.unit in TIME_UNITS else ""
-    rates = {u: 1.0 / (step * TIME_UNITS[u]) for u in ("s", "ms", "us", "ns")}
+    rates = {u: 1.0 / max(step * TIME_UNITS[u], 1e-300) for u in ("s", "ms", "us", "ns")}
     if unit:
         found.say("time", "unit", True, f"{unit} by the name of the column")
     else:
