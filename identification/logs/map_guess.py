@@ -51,6 +51,7 @@ class GuessSettings:
     sure_rates: tuple[float, float] = (15.0, 2500.0)
     rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
     # rate in rad/s
+    counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     gravity: float = 0.15  # relative difference of the median specific force from 1 g
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     carries: tuple[float, float] = (0.6, 1.7)  # thrust by weight of rotors in their right unit
@@ -571,10 +572,11 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
             if pulses and not named:
                 why += ", though they may be pulses in us"
             return "rotors", fitting[0], named or not pulses, why
+    if middle > GUESS.counts and high <= 65535.5 and not is_command:
+        why = f"values up to {high:.6g}, which may be 16 bits of a command, or rpm"
+        return "commands", "counts", False, why
     if middle > GUESS.rpm and not is_command:
-        whole = bool(np.all(turning == np.round(turning)))
-        sure = not (whole and high <= 65535.0 and middle > 20_000.0)
-        return "rotors", "rpm", sure, f"the median is {middle:.5g}, too fast for rad/s"
+        return "rotors", "rpm", True, f"the median is {middle:.5g}, too fast for rad/s"
     if pulses and "omega" not in names:
         return "commands", "us", False, f"values from {low:.4g} to {high:.4g}"
     return "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"
@@ -614,6 +616,13 @@ def _order(
     ranked = sorted(known.items(), key=lambda item: item[1])
     (best, left), (_, second) = ranked[0], ranked[1]
     sure = physics.sure_order(left, second)
+    if not sure and order_names(best) and physics.likely_order(left, second):
+        return (
+            best,
+            False,
+            f"{order_names(best)[0]}: likeliest, it leaves {left / 2:.0%} of the angular "
+            f"acceleration unexplained, the next best {second / 2:.0%}",
+        )
     if not sure:
         return (
             ORDERS[hint],

@@ -92,7 +92,7 @@ def read_log(
             )
         foreign = is_text_table(path) and not path.name.lower().endswith(SUFFIXES)
         table = None if foreign else open_table(path)
-        missing = [] if table is None else _missing(table)
+        missing = [] if table is None else missing_columns(table)
         if table is None:
             log = read_known_table(path, vehicle, f"expected columns {', '.join(REQUIRED)}")
         elif missing:
@@ -124,7 +124,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return _with_doubts(log, vehicle)
 
 
-def _missing(table: Table) -> list[str]:
+def missing_columns(table: Table) -> list[str]:
     """Return the columns that a table of the kit's format lacks."""
     return [name for name in _needed(table) if name not in table.header]
 
