@@ -375,7 +375,7 @@ def _pose(
         hint=hint,
     )
     fit = f"{best.left:.0%} of the horizontal acceleration is left unexplained by the tilt"
-    sections = {"world": best.world, "body": best.body}
+    sections: dict[str, Any] = {"world": best.world, "body": best.body}
     found.say("world", "", best.sure("world"), f"{best.world}: {fit}{best.margin('world')}")
     found.say(
         "body", "", best.sure("body"), f"{best.body}: the thrust points up{best.margin('body')}"
