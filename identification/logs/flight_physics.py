@@ -29,7 +29,10 @@ class PhysicsSettings:
     period: float = 0.02  # s, of the common clock
     longest: float = 120.0  # s of the flight that are looked at, its middle
     cutoff_hz: float = 3.0  # of the motion: above, noise of twice differentiated poses is larger
-    turn_cutoff_hz: float = 5.0  # of the angular acceleration
+    turn_cutoff_hz: float = 5.0  # of the angular velocity
+    # of the angular acceleration: below, rotors balance steady moments of the air, which are larger
+    # than what turns the body
+    turn_band_hz: tuple[float, float] = (1.0, 8.0)
     blocks: int = 4  # parts of the flight, each of which must say the same
     good: float = 0.5  # share left unexplained up to which the best reading is believed
     clear: float = 0.2  # more left by another value of a field is clearly worse
@@ -39,6 +42,8 @@ class PhysicsSettings:
     upright: float = 0.5  # mean cosine of the thrust axis below which nothing flies
     order_left: float = 1.3  # of 2, the two torques
     order_clear: float = 0.25
+    likely_left: float = 1.8  # the same of an order that is a guess, but a better one than the
+    likely_clear: float = 0.05  # usual
     delays: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # periods by which a body answers its motors
 
 
@@ -57,6 +62,7 @@ class _Reading:
     parts: Array  # the same in each part of the flight
     gain: float
     turns: Array  # (n, 3, 3) body to world in the kit's frames
+    prior: float  # part of the cost: how unusual it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +100,8 @@ class Pose:
     def margin(self, name: str) -> str:
         """Return in words how much worse the next best value of a field is."""
         best = self.readings[0]
+        if best.left > PHYSICS.good:
+            return ""
         other = next((r for r in self.readings if r.values[name] != best.values[name]), None)
         return (
             ""
@@ -121,7 +129,9 @@ class FlightPhysics:
         begin, end = float(t[good].min()), float(t[good].max())
         middle, half = 0.5 * (begin + end), 0.5 * min(end - begin, PHYSICS.longest)
         count = max(2, int(2.0 * half / PHYSICS.period))
-        self.grid: Array = middle - half + PHYSICS.period * np.arange(count)
+        self.grid: Array = np.asarray(
+            middle - half + PHYSICS.period * np.arange(count, dtype=np.float64)
+        )
         inside = np.flatnonzero(good & (t >= middle - half - 1.0) & (t <= middle + half + 1.0))
         self._rows = inside[:: max(1, len(inside) // samples)]
 
@@ -133,7 +143,7 @@ class FlightPhysics:
     def _on_grid(self, values: Array, rows: NDArray[np.intp] | None = None) -> Array:
         """Return columns (N, k) of the rows on the common clock (n, k)."""
         rows = self._rows if rows is None else rows
-        flat = values.reshape(len(values), -1)
+        flat = values.reshape(len(values), int(np.prod(values.shape[1:])))
         there = np.isfinite(flat).all(axis=1)
         t, flat = self._t[rows][there], flat[there]
         if len(t) < 2:
@@ -142,6 +152,11 @@ class FlightPhysics:
 
     def _smooth(self, values: Array, cutoff: float) -> Array:
         sos = butter(2, cutoff * 2.0 * PHYSICS.period, output="sos")
+        return np.asarray(sosfiltfilt(sos, values, axis=0))
+
+    def _band(self, values: Array) -> Array:
+        low, high = (2.0 * PHYSICS.period * f for f in PHYSICS.turn_band_hz)
+        sos = butter(2, [low, high], btype="band", output="sos")
         return np.asarray(sosfiltfilt(sos, values, axis=0))
 
     def _derivative(self, values: Array) -> Array:
@@ -206,6 +221,8 @@ class FlightPhysics:
                 )
                 readings.append(self._reading(values, matrices, acceleration, total, length, prior))
         readings.sort(key=lambda reading: reading.cost)
+        if readings[0].left > PHYSICS.good:  # the flight does not tell: what is usual
+            readings.sort(key=lambda reading: reading.prior)
         best = readings[0]
         unit, miss = self._length(best.gain, length)
         v = best.values
@@ -261,7 +278,7 @@ class FlightPhysics:
         turns = world[:, None] * matrices * body
         if not self.long_enough or not np.isfinite(turns).all():
             nothing = np.full(PHYSICS.blocks, 1.0)
-            return _Reading(values, 1.0 + prior, 1.0, nothing, 1.0, turns)
+            return _Reading(values, 1.0 + prior, 1.0, nothing, 1.0, turns, prior)
         axis = self._smooth(turns[:, :, 2], PHYSICS.cutoff_hz)
         a = acceleration * world
         up = np.clip(axis[:, 2], 0.2, None)
@@ -290,7 +307,7 @@ class FlightPhysics:
             cost += 2.0
         if gain > 0.0:
             cost += 2.0 * max(0.0, self._length(gain, length)[1] - PHYSICS.unit_slack)
-        return _Reading(values, cost, left, parts, gain, turns)
+        return _Reading(values, cost, left, parts, gain, turns, prior)
 
     @staticmethod
     def _length(gain: float, named: str) -> tuple[str, float]:
@@ -362,8 +379,8 @@ class FlightPhysics:
             rates = self.pose_rates(pose)
         if rates is None or not self.long_enough or not np.isfinite(rates).all():
             return {}
-        turning = self._derivative(self._smooth(rates, PHYSICS.turn_cutoff_hz))[:, :2]
-        push = self._smooth(self._on_grid(thrusts[self._rows]), PHYSICS.turn_cutoff_hz)
+        turning = self._band(self._derivative(rates))[:, :2]
+        push = self._band(self._on_grid(thrusts[self._rows]))
         if not np.isfinite(push).all():
             return {}
         out: dict[Order, float] = {}
@@ -383,6 +400,11 @@ class FlightPhysics:
                 order = (a + 1, b + 1, c + 1, d + 1)
                 out[order] = min(out.get(order, 2.0), float(left))
         return out
+
+    @staticmethod
+    def likely_order(left: float, second: float) -> bool:
+        """Return whether an order is likelier than what is usual, though it is not sure."""
+        return left <= PHYSICS.likely_left and second - left >= PHYSICS.likely_clear
 
     @staticmethod
     def sure_order(left: float, second: float) -> bool:

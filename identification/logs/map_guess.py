@@ -9,6 +9,7 @@ the field is a guess.
 """
 
 import io
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -50,6 +51,7 @@ class GuessSettings:
     sure_rates: tuple[float, float] = (15.0, 2500.0)
     rpm: float = 4500.0  # median above which no unit but rpm is left: no propeller turns at that
     # rate in rad/s
+    counts: float = 20_000.0  # median above which rpm may also be a command of 16 bits
     gravity: float = 0.15  # relative difference of the median specific force from 1 g
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     carries: tuple[float, float] = (0.6, 1.7)  # thrust by weight of rotors in their right unit
@@ -165,7 +167,12 @@ def guess_map(
         InputError: no columns look like a time, a pose or an IMU, and motors; the message says
             which are missing.
     """
-    names = take_apart(table.header, layout.units)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # columns that hold nothing, or the absurd
+        return _guess(table, take_apart(table.header, layout.units), vehicle, name)
+
+
+def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) -> Guess:
     clock = _time_column(table, names)
     rest = [n for n in names if n.column != clock.column]
     parts, rivals = _groups(rest)
@@ -319,7 +326,7 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
         )
     step = float(np.median(steps))
     unit = name.unit if name.unit in TIME_UNITS else ""
-    rates = {u: 1.0 / (step * TIME_UNITS[u]) for u in ("s", "ms", "us", "ns")}
+    rates = {u: 1.0 / max(step * TIME_UNITS[u], 1e-300) for u in ("s", "ms", "us", "ns")}
     if unit:
         found.say("time", "unit", True, f"{unit} by the name of the column")
     else:
@@ -368,7 +375,7 @@ def _pose(
         hint=hint,
     )
     fit = f"{best.left:.0%} of the horizontal acceleration is left unexplained by the tilt"
-    sections = {"world": best.world, "body": best.body}
+    sections: dict[str, Any] = {"world": best.world, "body": best.body}
     found.say("world", "", best.sure("world"), f"{best.world}: {fit}{best.margin('world')}")
     found.say(
         "body", "", best.sure("body"), f"{best.body}: the thrust points up{best.margin('body')}"
@@ -565,10 +572,11 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
             if pulses and not named:
                 why += ", though they may be pulses in us"
             return "rotors", fitting[0], named or not pulses, why
+    if middle > GUESS.counts and high <= 65535.5 and not is_command:
+        why = f"values up to {high:.6g}, which may be 16 bits of a command, or rpm"
+        return "commands", "counts", False, why
     if middle > GUESS.rpm and not is_command:
-        whole = bool(np.all(turning == np.round(turning)))
-        sure = not (whole and high <= 65535.0 and middle > 20_000.0)
-        return "rotors", "rpm", sure, f"the median is {middle:.5g}, too fast for rad/s"
+        return "rotors", "rpm", True, f"the median is {middle:.5g}, too fast for rad/s"
     if pulses and "omega" not in names:
         return "commands", "us", False, f"values from {low:.4g} to {high:.4g}"
     return "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"
@@ -608,6 +616,13 @@ def _order(
     ranked = sorted(known.items(), key=lambda item: item[1])
     (best, left), (_, second) = ranked[0], ranked[1]
     sure = physics.sure_order(left, second)
+    if not sure and order_names(best) and physics.likely_order(left, second):
+        return (
+            best,
+            False,
+            f"{order_names(best)[0]}: likeliest, it leaves {left / 2:.0%} of the angular "
+            f"acceleration unexplained, the next best {second / 2:.0%}",
+        )
     if not sure:
         return (
             ORDERS[hint],

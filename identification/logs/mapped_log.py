@@ -60,6 +60,7 @@ BODY_TURNS: dict[str, Array] = {"flu": np.eye(3), "frd": _HALF_TURN}
 _SHOWN = 30  # columns that an error lists
 _ATTITUDE_GAP = 0.1  # s, across which an attitude is not interpolated
 _OUTSIDE = 0.5  # share of commands beyond their range from which on the range is wrong
+_SPECIFIC_FORCE = 6.0, 16.0  # m/s2: a flight's median is within; outside a scale is wrong
 _NO_QUATERNION = 0.5  # length; shorter stands for one that is not there
 
 
@@ -147,6 +148,14 @@ def map_table(
         valid=valid[keep],
         vehicle=log_map.vehicle,
     )
+    if log.accelerometer is not None:
+        size = float(np.nanmedian(np.linalg.norm(log.accelerometer, axis=1)))
+        if not _SPECIFIC_FORCE[0] <= size <= _SPECIFIC_FORCE[1]:
+            text = (
+                f"warning: the accelerometer's median size is {size:.3g} m/s2; expected about 9.8 "
+                "in flight: check its unit and scale in the map"
+            )
+            log = replace(log, notes=(*log.notes, text))
     factor = log_map.commands.thrust_factor if log_map.commands else 1.0
     return with_commanded_speeds(log, vehicle, factor)
 
@@ -275,6 +284,11 @@ def _samples(table: Table, log_map: LogMap) -> tuple[_Samples, list[str]]:
     begin = raw[0] if clock.offset is None else 0.0
     t = (raw - begin) * TIME_UNITS[clock.unit] + (clock.offset or 0.0)
     columns = {name: column[rows] for name, column in columns.items()}
+    if not np.all(np.isfinite(t)) or np.any((np.diff(t) <= 0.0) & (np.diff(raw) > 0.0)):
+        raise InputError(
+            f"{table.path}: column {clock.column}: times of {raw[0]:.6g} to {raw[-1]:.6g} "
+            f"{clock.unit} cannot be told apart; expected those of one flight"
+        )
     first = np.flatnonzero(np.diff(raw, prepend=np.nan) != 0.0)
     if len(first) < len(t):
         notes.append(f"{len(t) - len(first)} row(s) repeat a time and were joined to the one row")

@@ -91,7 +91,7 @@ def finished(log: FlightLog, vehicle: Vehicle | None) -> FlightLog:
     return _with_doubts(log, vehicle)
 
 
-def _missing(table: Table) -> list[str]:
+def missing_columns(table: Table) -> list[str]:
     """Return the columns that a table of the kit's format lacks."""
     return [name for name in _needed(table) if name not in table.header]
 
@@ -115,7 +115,7 @@ def _read(
             raise unknown_content(path)
         return read_known_table(path, vehicle, f"expected columns {expected}")
     table = open_table(path)
-    missing = _missing(table)
+    missing = missing_columns(table)
     if not missing:
         return _canonical(table, vehicle)
     chosen = reader_by_columns(path, table.header)

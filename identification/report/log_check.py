@@ -20,7 +20,8 @@ from ..logs.layout_guess import is_parquet, is_text_table, open_any_table
 from ..logs.log_map import MAPS, map_names
 from ..logs.map_guess import Guess, guess_map, map_yaml
 from ..logs.mapped_log import map_table
-from ..logs.reading import finished, read_log
+from ..logs.readers import READERS
+from ..logs.reading import finished, missing_columns, read_log
 from ..logs.screening import screen_log
 from ..motion.noise_spectrum import noise_spectra
 
@@ -150,7 +151,9 @@ def _read_by(path: Path, log: FlightLog) -> tuple[str, str]:
 
 def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[FlightLog, Guess]:
     table, layout = open_any_table(path)
-    if known_map(table.header) is not None:
+    if known_map(table.header) is not None or not missing_columns(table):
+        raise error  # it is known what the columns mean: the fault is in what they hold
+    if any(r.signature and set(r.signature) <= set(table.header) for r in READERS.values()):
         raise error
     guess = guess_map(table, layout, vehicle)
     if vehicle is not None:

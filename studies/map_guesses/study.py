@@ -83,7 +83,8 @@ def judge(guess: Guess, truth: LogMap) -> tuple[list[Field], list[Field]]:
     """
     doubtful = {(r.section, r.field) for r in guess.doubts}
     found, true = fields_of(guess.log_map), fields_of(truth)
-    flagged, silent = [], []
+    flagged: list[Field] = []
+    silent: list[Field] = []
     motors = {"rotors", "commands"}
     for key in sorted(set(found) | set(true)):
         if found.get(key) == true.get(key):

@@ -37,7 +37,10 @@ from windwrench.dynamics.vehicle_file import dump_vehicle, load_vehicle, parse_v
 from windwrench.envs.scenarios import get_scenario
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.identification.logs.flight_log import FlightLog, write_log
-from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.layout_guess import open_any_table
+from windwrench.identification.logs.map_guess import guess_map
+from windwrench.identification.logs.mapped_log import map_table
+from windwrench.identification.logs.reading import finished, read_log
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.yaml_file import parse_yaml
@@ -231,6 +234,36 @@ def _log(path: Path, reader: str | None = None, vehicle: str = "ardrone2") -> No
     if len(log.t) <= _LONGEST and log.has_pose and log.has_rotor_speeds:
         series = estimate_log(log, _vehicle(vehicle))
         assert np.isfinite(series.force).all()
+
+
+_MAP = (
+    b"about: a table\nworld: ned\nbody: frd\n"
+    b"time: {column: t, unit: s, offset: 0}\n"
+    b"position: {columns: [px, py, pz], unit: m, signs: [1, -1, 1]}\n"
+    b"attitude: {columns: [qw, qx, qy, qz], order: wxyz, sense: body_to_world}\n"
+    b"rotors: {columns: [omega1, omega2, omega3, omega4], unit: rad/s, order: [1, 2, 3, 4]}\n"
+    b"battery: {column: vbat, unit: V, cells: 1, optional: true}\n"
+)
+
+
+def _use_map(path: Path) -> None:
+    """Read a good table by a map."""
+    read_log(path.parent / "log.csv", vehicle=_vehicle("ardrone2"), map=path)
+
+
+def _foreign_table() -> bytes:
+    text = _own_log("log.csv").decode()
+    head, _, rest = text.partition("\n")
+    head = head.replace("omega", "rpm").replace("px", "x").replace("py", "y").replace("pz", "z")
+    return f"{head}\n{rest}".encode()
+
+
+def _use_foreign(path: Path) -> None:
+    """Guess a map for a table, and read it by that."""
+    table, layout = open_any_table(path)
+    guess = guess_map(table, layout, _vehicle("ardrone2"))
+    with np.errstate(over="ignore", invalid="ignore"):
+        finished(map_table(table, layout, guess.log_map), _vehicle("ardrone2"))
 
 
 def _folder_bag(path: Path) -> None:
@@ -576,6 +609,23 @@ def forms() -> dict[str, Form]:
             text,
             _use_vehicle,
             ("record", "--seconds", "1", "--out", "out", "--vehicle"),
+        ),
+        Form(
+            "log map",
+            "map.yaml",
+            lambda: _MAP,
+            text,
+            _use_map,
+            ("convert", "log.csv", "--out", "out.csv", "--map"),
+            lambda: {"log.csv": _own_log("log.csv")},
+        ),
+        Form(
+            "table of other columns",
+            "log.csv",
+            _foreign_table,
+            table,
+            _use_foreign,
+            ("check", "--out", "out", "--vehicle", "ardrone2"),
         ),
         Form("effect settings", "effects.txt", _effects, text, _use_effect),
         Form("names", "names.txt", lambda: b"base\nadmittance\nardrone2", text, _use_names),

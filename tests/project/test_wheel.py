@@ -134,6 +134,7 @@ def test_the_wheel_holds_code_and_data_and_nothing_else(installed):
         "dynamics/vehicles/ardrone2.yaml",
         "dynamics/effects/rotor_drag.py",
         "identification/logs/readers/nanobench.py",
+        "identification/logs/maps/betaflight.yaml",
     ):
         assert (package / name).is_file(), name
     assert not (package / "tests").exists()
