@@ -109,7 +109,7 @@ def _curve(
     for j, e in enumerate(exponents):
         say(f"thrust u^{e}", lambda v, j=j: v[f"a{j}"], "N", how, IDENTIFIED, False)
     flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
-    low, high = np.quantile(flown, [0.005, 0.995])
+    low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
     for u in (0.25, 0.5, 0.75, 1.0):
         inside = low <= u <= high
         say(

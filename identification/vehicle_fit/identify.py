@@ -19,10 +19,10 @@ from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
 from .channels import Piece, Sources, pieces_of
 from .columns import Drive
-from .estimates import estimates_of
+from .estimates import Reading, estimates_of
 from .geometry import SPIN, Geometry
 from .parameters import DELAY, OPTIONAL, POSITIVE, first_model, with_fixed, with_more
-from .result import Identified
+from .result import IDENTIFIED, Estimate, Identified
 from .rounding import rounding_step
 from .solve import Fit, fall_with, solve, step_with
 from .usual import USUAL
@@ -99,6 +99,8 @@ def identify(
             "thrust"
         )
     estimates = estimates_of(fit, sources, geometry, pieces, fixed, kept, mass * gravity)
+    if "lag" in fit.names:
+        estimates.append(_lag_alone(pieces, fit))
     named = {e.name: e for e in estimates}
     vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step)
     return Identified(
@@ -113,6 +115,16 @@ def identify(
         fit.balance.seconds,
         len(fit.balance.segments),
     )
+
+
+def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
+    """Return the lag of a model that has no time offset, which then is in the lag."""
+    nonlinear = tuple(name for name in fit.names[len(fit.model.free) :] if name != "delay")
+    drive = replace(fit.drive, delay=0.0)
+    alone = solve(pieces, drive, fit.model, fit.theta[: len(fit.model.free)], nonlinear)
+    known = Reading(alone).interval(lambda v: v["lag"])
+    how = "of a model without a time offset: what other tools call the lag"
+    return Estimate("lag without offset", *known, "s", IDENTIFIED, how)
 
 
 def _voltage(pieces: Sequence[Piece]) -> float:

@@ -152,7 +152,9 @@ def fall_with(fit: Fit, model: Model, start: Array) -> float:
     made, zero = fit.balance, np.zeros(len(fit.balance.nonlinear))
     total = np.sum([_grams(made, fit.spectra, i) for i in range(len(made.segments))], axis=0)
     step, information, *_ = _newton(made, total, model, start, zero, fit.drive, {})
-    return float(step @ information @ step)
+    now = fit.theta[: len(fit.model.free)]
+    own, known, *_ = _newton(made, total, fit.model, now, zero, fit.drive, {})
+    return float(step @ information @ step - own @ known @ own)
 
 
 def step_with(

@@ -55,7 +55,7 @@ def segments_of(columns: Array, period: float, log: int) -> list[Segment]:
         size = b - a
         frequency = np.fft.rfftfreq(size, period)
         inside = frequency <= min(SPECTRUM.band, 0.4 / period)
-        weight = np.where(frequency[inside] == 0.0, 1.0, 2.0) / SPECTRUM.tapers
+        weight: Array = np.where(frequency[inside] == 0.0, 1.0, 2.0) / float(SPECTRUM.tapers)
         places = np.arange(1, size + 1) * (np.pi / (size + 1))
         transforms = []
         for k in range(1, SPECTRUM.tapers + 1):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flight
+from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
 from windwrench.cli import main
 from windwrench.commands.identifying import parse_window
 from windwrench.dynamics import load_vehicle
@@ -18,7 +18,7 @@ from windwrench.runtime.errors import InputError
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("flights") / "flight.csv.gz"
-    flight, speeds = inertial_flight(3, seconds=12.0)
+    ((flight, speeds),) = inertial_flights([3], seconds=12.0)
     write_log(replace(flight, command=None, rotor_speeds=speeds), path)
     return path
 
