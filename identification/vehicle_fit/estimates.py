@@ -13,6 +13,7 @@ from .channels import Piece, Sources
 from .geometry import Geometry
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate
 from .solve import Fit
+from .spectra import SPECTRUM
 from .usual import USUAL
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ def estimates_of(
     sources: Sources,
     geometry: Geometry,
     pieces: Sequence[Piece],
-    fixed: Mapping[str, str],
+    not_told: tuple[Mapping[str, str], Mapping[str, float]],
     kept: Sequence[str],
     weight: float,
 ) -> list[Estimate]:
@@ -76,7 +77,7 @@ def estimates_of(
         sources: what the logs measure.
         geometry: where the rotors stand.
         pieces: of the logs.
-        fixed: parameters that were fixed at what is usual, and why.
+        not_told: inertias that the flight does not show: why, and what is usual instead.
         kept: names of the further effects that show.
         weight: N.
     """
@@ -94,8 +95,8 @@ def estimates_of(
     else:
         say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
     arm, arm_range = _arm(out, read, geometry)
-    _inertia(out, read, sources, arm, arm_range, fixed, kept)
-    _yaw(out, read, sources, arm, arm_range, fixed)
+    _inertia(out, read, sources, arm, arm_range, not_told, kept)
+    _yaw(out, read, sources, arm, arm_range)
     _lag(out, read, sources)
     _centre(out, read, sources, geometry, arm)
     _drag(out, read, sources, arm, kept)
@@ -183,13 +184,14 @@ def _inertia(
     sources: Sources,
     arm: float,
     arm_range: tuple[float, float],
-    fixed: Mapping[str, str],
+    not_told: tuple[Mapping[str, str], Mapping[str, float]],
     kept: Sequence[str],
 ) -> None:
+    fixed, instead = not_told
     scaled = arm_range != (1.0, 1.0)
     for name, axis in (("Jxx", "Jx"), ("Jyy", "Jy"), ("Jzz", "Jz")):
         if axis in fixed:
-            value = read.fit.values[axis] * arm
+            value = instead[axis] * arm
             if axis == "Jz":
                 both = out[-1], out[-2]
                 low, high = (
@@ -242,14 +244,18 @@ def _yaw(
     sources: Sources,
     arm: float,
     arm_range: tuple[float, float],
-    fixed: Mapping[str, str],
 ) -> None:
     commands = read.fit.drive.commands
     how = f"{sources.rate} in yaw against {sources.rotors}"
     gain = read.interval(lambda v: v["reach"] / v["Jz"])
     name = "(p/k)/Jzz"
-    if gain[2] > 2.5 * gain[0]:
-        reason = "the flight hardly accelerates in yaw"
+    doubtful = read.fit.drive.band < SPECTRUM.band
+    if doubtful or gain[2] > 2.5 * gain[0]:
+        reason = (
+            "quick motion contradicts slow motion in these logs"
+            if doubtful
+            else "the flight hardly accelerates in yaw"
+        )
         out.append(Estimate(name, *gain, "1/(kg m)", NOTHING, reason))
         length = float(np.mean(np.abs(read.fit.drive.positions[:, :2]))) * arm
         low, high = (r * length for r in USUAL.reach_range)

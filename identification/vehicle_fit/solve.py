@@ -183,7 +183,7 @@ def _grams(made: Balance, spectra: Sequence[Array], i: int) -> Array:
     columns = s.columns[:, :, 6:]
     out = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
     noise = made.noise.T @ made.noise
-    gain = 1.0 / (1.0 + (s.frequency / SPECTRUM.band) ** 4) ** 2
+    gain = 1.0 / (1.0 + (s.frequency / made.band) ** 4) ** 2
     for axis in range(6):
         weight = s.weight / spectrum[:, axis]
         both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)

@@ -112,6 +112,19 @@ def test_measured_speeds_show_no_lag(inertial):
     assert found.vehicle.motor_curve is None
 
 
+def test_speeds_beside_commands_show_the_motors(inertial):
+    logs = [replace(log, rotor_speeds=speeds) for log, speeds in inertial[:2]]
+    found = identify(logs, MASS, parse_geometry(str(ARM)))
+    check(found, "k", K, 0.05)
+    # a row's command is held over the step that ends there: half a step of 4 ms each way
+    assert found["motor_lag"].value == pytest.approx(0.05, abs=0.004)
+    vehicle = parse_vehicle(dump_vehicle(found.vehicle))
+    assert vehicle.effects == ()
+    assert vehicle.omega_source == "measured"
+    thrust = vehicle.commanded_thrust(np.full((1, 4), 0.5))
+    assert thrust[0] == pytest.approx(np.full(4, K * (0.5 * FULL) ** 2), rel=0.05)
+
+
 def test_intervals_hold_the_truth_about_as_often_as_they_say(inertial):
     held = []
     for log, speeds in inertial:
