@@ -55,7 +55,7 @@ class Fit:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
         """
-        inverse = np.linalg.inv(self.information)
+        inverse = np.asarray(np.linalg.inv(self.information), dtype=np.float64)
         count = len(self.scores)
         if count < 4:
             return inverse
