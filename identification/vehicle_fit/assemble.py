@@ -1,6 +1,7 @@
 """The vehicle that estimates make, and what to fly where they say too little."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Vehicle
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .geometry import Geometry
+from .motors import MotorResponse
 from .result import IDENTIFIED, Estimate
 from .solve import Fit
 from .usual import USUAL
@@ -35,8 +37,11 @@ def vehicle_of(
     gravity: float,
     voltage: float,
     step: float,
+    motors: MotorResponse | None = None,
 ) -> Vehicle:
-    """Return the vehicle, ready for estimate, diagnose and the environment."""
+    """Return the vehicle, ready for estimate, diagnose and the environment. Where its logs hold
+    measured speeds the lag is behind them, and no effect of the model.
+    """
     arm = estimates["arm_l"].value
     reach = estimates["p/k"].value
     effects = list(_effects(estimates))
@@ -47,8 +52,12 @@ def vehicle_of(
         k = weight / (4.0 * USUAL.hover_speed**2)
     else:
         k = estimates["k"].value
+        if motors is not None:  # thrust against command by way of the speed
+            steady = np.polynomial.polynomial.polypow(motors.speed, 2)
+            curve = MotorCurve(tuple(k * steady))
+    late = "lag" in fit.names
     lag = estimates["motor_lag"]
-    if lag.status == IDENTIFIED:
+    if late:
         effects.append(EffectSetting("motor_lag", {"tau": lag.value}))
     inertia = np.diag([estimates[f"J{a}{a}"].value for a in "xyz"])
     for i, j, product in ((0, 1, "Jxy"), (0, 2, "Jxz"), (1, 2, "Jyz")):
@@ -64,7 +73,7 @@ def vehicle_of(
         p=np.full(4, reach * k),
         rotor_radius=USUAL.radius * arm,
         omega_lsb=step,
-        omega_source="measured" if lag.status != IDENTIFIED else "commanded",
+        omega_source="commanded" if late else "measured",
         voltage_ref=voltage,
         gravity=gravity,
         spin=fit.drive.spin.copy(),
@@ -78,8 +87,6 @@ def vehicle_of(
         return vehicle
     noise = sensor_noise(posed[0], vehicle)
     seen = posed[0].t[posed[0].valid]
-    from dataclasses import replace
-
     return replace(
         vehicle,
         mocap=Mocap(

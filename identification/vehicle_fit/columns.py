@@ -34,6 +34,7 @@ class Drive:
     lag: float = 0.0  # s
     delay: float = 0.0  # s, by which the motion comes behind the rotors
     gamma: float = 0.0  # exponent of the voltage
+    band: float = SPECTRUM.band  # Hz, up to which force and turning are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,7 @@ class Balance:
     nonlinear: tuple[str, ...]  # "lag", "delay", "gamma"
     segments: tuple[Segment, ...]
     seconds: float
+    band: float  # Hz
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
@@ -86,14 +88,16 @@ def balance(
             moved = np.column_stack(list(rotor_columns(piece, there).values()))
             change = (moved - base[:, 6 : 6 + len(here)]) / _STEP[name]
             parts += [change, np.zeros((len(piece.t), count - len(here)))]
-        stacked = low_pass(np.column_stack(parts), SPECTRUM.band, piece.period)
-        for s in segments_of(stacked, piece.period, piece.log):
+        stacked = low_pass(np.column_stack(parts), drive.band, piece.period)
+        for s in segments_of(stacked, piece.period, piece.log, drive.band):
             segments.append(_with_delay(s, drive, nonlinear, count, len(here)))
         noise.append(_rotor_noise(piece, drive, names, rotor_noise))
     weights = np.array([len(p.t) * p.period for p in pieces])
     mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
     signs = np.sign(np.sum(noise, axis=0))
-    return Balance(names, nonlinear, tuple(segments), float(weights.sum()), mean * signs)
+    return Balance(
+        names, nonlinear, tuple(segments), float(weights.sum()), drive.band, mean * signs
+    )
 
 
 def _measured(piece: Piece) -> list[Array]:

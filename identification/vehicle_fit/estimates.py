@@ -13,6 +13,7 @@ from .channels import Piece, Sources
 from .geometry import Geometry
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate
 from .solve import Fit
+from .spectra import SPECTRUM
 from .usual import USUAL
 
 Array = NDArray[np.float64]
@@ -55,6 +56,14 @@ class Reading:
         return {**self.fit.model.values(theta[:n]), **{name: float(x) for name, x in named}}
 
 
+def _value(name: str, factor: float = 1.0) -> Function:
+    return lambda v: factor * v[name]
+
+
+def _over(value: float, name: str) -> Function:
+    return lambda v: value / v[name]
+
+
 def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
     """Return one rotor's thrust (N) at a speed in rad/s or a command."""
     return sum(values[f"a{j}"] * u**e for j, e in enumerate(exponents))
@@ -65,7 +74,7 @@ def estimates_of(
     sources: Sources,
     geometry: Geometry,
     pieces: Sequence[Piece],
-    fixed: Mapping[str, str],
+    not_told: tuple[Mapping[str, str], Mapping[str, float]],
     kept: Sequence[str],
     weight: float,
 ) -> list[Estimate]:
@@ -76,7 +85,7 @@ def estimates_of(
         sources: what the logs measure.
         geometry: where the rotors stand.
         pieces: of the logs.
-        fixed: parameters that were fixed at what is usual, and why.
+        not_told: inertias that the flight does not show: why, and what is usual instead.
         kept: names of the further effects that show.
         weight: N.
     """
@@ -94,8 +103,8 @@ def estimates_of(
     else:
         say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
     arm, arm_range = _arm(out, read, geometry)
-    _inertia(out, read, sources, arm, arm_range, fixed, kept)
-    _yaw(out, read, sources, arm, arm_range, fixed)
+    _inertia(out, read, sources, arm, arm_range, not_told, kept)
+    _yaw(out, read, sources, arm, arm_range)
     _lag(out, read, sources)
     _centre(out, read, sources, geometry, arm)
     _drag(out, read, sources, arm, kept)
@@ -109,7 +118,7 @@ def _curve(
     for j, e in enumerate(exponents):
         say(f"thrust u^{e}", lambda v, j=j: v[f"a{j}"], "N", how, IDENTIFIED, False)
     flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
-    low, high = np.quantile(flown, [0.005, 0.995])
+    low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
     for u in (0.25, 0.5, 0.75, 1.0):
         inside = low <= u <= high
         say(
@@ -142,7 +151,9 @@ def _arm(
 ) -> tuple[float, tuple[float, float]]:
     """Return the arm's length and its range as shares of it, and say it."""
     if geometry.known:
-        out.append(Estimate("arm_l", *[geometry.arm] * 3, "m", GIVEN, "--geometry"))
+        out.append(
+            Estimate("arm_l", geometry.arm, geometry.arm, geometry.arm, "m", GIVEN, "--geometry")
+        )
         return 1.0, (1.0, 1.0)
     # with rotors at unit distance the fit's inertia is inertia over arm, which for a usual radius
     # of gyration is gyration * mass * arm
@@ -183,13 +194,14 @@ def _inertia(
     sources: Sources,
     arm: float,
     arm_range: tuple[float, float],
-    fixed: Mapping[str, str],
+    not_told: tuple[Mapping[str, str], Mapping[str, float]],
     kept: Sequence[str],
 ) -> None:
+    fixed, instead = not_told
     scaled = arm_range != (1.0, 1.0)
     for name, axis in (("Jxx", "Jx"), ("Jyy", "Jy"), ("Jzz", "Jz")):
         if axis in fixed:
-            value = read.fit.values[axis] * arm
+            value = instead[axis] * arm
             if axis == "Jz":
                 both = out[-1], out[-2]
                 low, high = (
@@ -202,7 +214,7 @@ def _inertia(
                 how = f"{fixed[axis]}; {USUAL.gyration:g} mass arm^2"
             out.append(Estimate(name, value, low, high, "kg m2", ASSUMED, how))
             continue
-        known = read.interval(lambda v, axis=axis: v[axis])
+        known = read.interval(_value(axis))
         motion = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}[axis]
         how = f"{sources.rate} in {motion} against {sources.rotors}, with the arm"
         out.append(
@@ -218,12 +230,12 @@ def _inertia(
         if axis not in fixed:
             length = read.fit.drive.positions
             own = float(np.mean(np.abs(length[:, 1 if axis == "Jx" else 0])))
-            known = read.interval(lambda v, axis=axis, own=own: own / v[axis])
+            known = read.interval(_over(own, axis))
             how = f"{sources.rate} against {sources.rotors}: needs no arm"
             out.append(Estimate(name, *known, "1/(kg m)", IDENTIFIED, how))
     if "products of inertia" in kept:
         for name in ("Jxy", "Jxz", "Jyz"):
-            known = read.interval(lambda v, name=name: v[name], False)
+            known = read.interval(_value(name), False)
             status = ASSUMED if scaled else IDENTIFIED
             out.append(
                 Estimate(
@@ -242,14 +254,18 @@ def _yaw(
     sources: Sources,
     arm: float,
     arm_range: tuple[float, float],
-    fixed: Mapping[str, str],
 ) -> None:
     commands = read.fit.drive.commands
     how = f"{sources.rate} in yaw against {sources.rotors}"
     gain = read.interval(lambda v: v["reach"] / v["Jz"])
     name = "(p/k)/Jzz"
-    if gain[2] > 2.5 * gain[0]:
-        reason = "the flight hardly accelerates in yaw"
+    doubtful = read.fit.drive.band < SPECTRUM.band
+    if doubtful or gain[2] > 2.5 * gain[0]:
+        reason = (
+            "quick motion contradicts slow motion in these logs"
+            if doubtful
+            else "the flight hardly accelerates in yaw"
+        )
         out.append(Estimate(name, *gain, "1/(kg m)", NOTHING, reason))
         length = float(np.mean(np.abs(read.fit.drive.positions[:, :2]))) * arm
         low, high = (r * length for r in USUAL.reach_range)
@@ -273,12 +289,12 @@ def _yaw(
         else:
             out.append(Estimate("p/k", *_times(known, arm, arm_range), "m", IDENTIFIED, how))
     if not commands:
-        reach, k = out[-1], out[0]
-        if reach.status == IDENTIFIED:
+        ratio, k = out[-1], out[0]
+        if ratio.status == IDENTIFIED:
             known = read.interval(lambda v: v["reach"] * v["a0"])
         else:
-            known = (reach.value * k.value, reach.low * k.value, reach.high * k.value)
-        out.append(Estimate("p", *known, "Nm/(rad/s)^2", reach.status, reach.how))
+            known = (ratio.value * k.value, ratio.low * k.value, ratio.high * k.value)
+        out.append(Estimate("p", *known, "Nm/(rad/s)^2", ratio.status, ratio.how))
 
 
 def _lag(out: list[Estimate], read: Reading, sources: Sources) -> None:
@@ -312,11 +328,12 @@ def _centre(
         "middle, or unequal rotors"
     )
     for name in ("cx", "cy"):
-        known = read.interval(lambda v, name=name: v[name], False)
+        known = read.interval(_value(name), False)
         wide = known[2] - known[0] > 0.5 * geometry.arm
         status = NOTHING if wide else IDENTIFIED if geometry.known else ASSUMED
         reason = "thrust hardly changes: a constant torque does the same" if wide else how
-        out.append(Estimate(f"com {name[1]}", *(arm * x for x in known), "m", status, reason))
+        value, low, high = (arm * x for x in known)
+        out.append(Estimate(f"com {name[1]}", value, low, high, "m", status, reason))
     if sources.force == "pose":
         known = read.interval(lambda v: -v["rz"], False)
         wide = known[2] - known[0] > 0.5 * arm * geometry.arm
@@ -359,7 +376,7 @@ def _drag(
         effect = "body_drag" if kind == "quadratic drag" else kind
         for axis in "xy":
             name = f"{parameter} {axis}"
-            known = read.interval(lambda v, name=name: v[name], False)
+            known = read.interval(_value(name), False)
             out.append(Estimate(f"{effect} {letter}{axis}", *known, unit, IDENTIFIED, how))
     if "vertical drag" in kept:
         known = read.interval(lambda v: v["linear drag z"], False)
@@ -376,7 +393,7 @@ def _drag(
         )
     for axis in "xyz":
         if f"damping {axis}" in kept:
-            known = read.interval(lambda v, axis=axis: arm * v[f"damping {axis}"])
+            known = read.interval(_value(f"damping {axis}", arm))
             out.append(
                 Estimate(
                     f"rate_damping d{axis}",

@@ -19,12 +19,14 @@ from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
 from .channels import Piece, Sources, pieces_of
 from .columns import Drive
-from .estimates import estimates_of
+from .estimates import Reading, estimates_of, thrust_of
 from .geometry import SPIN, Geometry
-from .parameters import DELAY, OPTIONAL, POSITIVE, first_model, with_fixed, with_more
-from .result import Identified
+from .motors import MotorResponse, motor_response
+from .parameters import DELAY, FORCE_BIAS, OPTIONAL, POSITIVE, first_model, with_more
+from .result import IDENTIFIED, Estimate, Identified
 from .rounding import rounding_step
 from .solve import Fit, fall_with, solve, step_with
+from .spectra import SPECTRUM
 from .usual import USUAL
 
 Array = NDArray[np.float64]
@@ -41,6 +43,10 @@ class IdentifySettings:
     # fall of twice the negative log-likelihood for each further parameter, in units of ln of the
     # count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
     penalty: float = 2.0
+    # Hz: narrower bands, in turn, where the whole band contradicts itself
+    bands: tuple[float, ...] = (4.0, 1.5)
+    apart: float = 3.0  # standard deviations of thrust between two bands, or of a bias' prior
+    close: float = 0.01  # share of thrust by which two bands may differ whatever the intervals say
     least_voltage_range: float = 0.03  # share: below it the voltage's exponent is not asked for
     least_lag: float = 4.0  # standard deviations of a lag behind rotor speeds that were logged
     lags: tuple[float, ...] = (0.03, 0.08)  # s, where the search for it starts
@@ -84,10 +90,18 @@ def identify(
     step = 0.0 if commands else rounding_step(logs)
     report(0.05, "fitting forces and torques")
     fit, turned = _first_fit(pieces, sources, drive, mass, gravity, step / math.sqrt(12.0))
+    report(0.4, "asking whether slow and quick motion agree")
+    fit = _agreeing(pieces, fit, step / math.sqrt(12.0), mass * gravity)
+    if fit.drive.band < SPECTRUM.band:
+        notes.append(
+            f"warning: above {fit.drive.band:g} Hz these logs contradict what they say below, as "
+            "logs do that were smoothed before they were written, or whose rotor speeds are noisy: "
+            "only what is slower was used"
+        )
     report(0.5, "asking what else shows")
     fit, kept = _with_optional(pieces, fit, step / math.sqrt(12.0))
     report(0.8, "asking what can be told")
-    fit, fixed = _settled(pieces, fit, geometry, step / math.sqrt(12.0))
+    reasons, instead = _not_told(fit, geometry)
     if turned:
         notes.append(
             "yaw turns against the usual turning senses of the rotors (front-left clockwise from "
@@ -98,9 +112,16 @@ def identify(
             "the accelerometer's scale is taken as right: an error of 1 % in it is one of 1 % in "
             "thrust"
         )
-    estimates = estimates_of(fit, sources, geometry, pieces, fixed, kept, mass * gravity)
+    estimates = estimates_of(
+        fit, sources, geometry, pieces, (reasons, instead), kept, mass * gravity
+    )
+    if "lag" in fit.names:
+        estimates.append(_lag_alone(pieces, fit))
+    motors = None if commands or "lag" in fit.names else motor_response(pieces)
+    if motors is not None:
+        estimates = [_lag_of(motors) if e.name == "motor_lag" else e for e in estimates]
     named = {e.name: e for e in estimates}
-    vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step)
+    vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step, motors)
     return Identified(
         vehicle,
         tuple(estimates),
@@ -113,6 +134,21 @@ def identify(
         fit.balance.seconds,
         len(fit.balance.segments),
     )
+
+
+def _lag_of(motors: MotorResponse) -> Estimate:
+    how = f"rotor speeds against commands, {100 * motors.left:.0f} % of their swing left over"
+    return Estimate("motor_lag", motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
+
+
+def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
+    """Return the lag of a model that has no time offset, which then is in the lag."""
+    nonlinear = tuple(name for name in fit.names[len(fit.model.free) :] if name != "delay")
+    drive = replace(fit.drive, delay=0.0)
+    alone = solve(pieces, drive, fit.model, fit.theta[: len(fit.model.free)], nonlinear)
+    known = Reading(alone).interval(lambda v: v["lag"])
+    how = "of a model without a time offset: what other tools call the lag"
+    return Estimate("lag without offset", *known, "s", IDENTIFIED, how)
 
 
 def _voltage(pieces: Sequence[Piece]) -> float:
@@ -172,6 +208,41 @@ def _first_fit(
     return best[1], best[2]
 
 
+def _agreeing(pieces: list[Piece], fit: Fit, noise: float, weight: float) -> Fit:
+    """Return the fit up to the widest frequency at which thrust is what slower motion alone says
+    (Hausman's test), and no sensor's bias is beyond belief.
+    """
+    n = len(fit.model.free)
+    nonlinear = fit.names[n:]
+    quiet = 0.0 if fit.drive.lag > 0.0 else noise
+    for band in IDENTIFY.bands:
+        drive = replace(fit.drive, band=band)
+        slow = solve(pieces, drive, fit.model, fit.theta[:n], nonlinear, quiet, {"delay": DELAY})
+        wide, narrow = _hover_thrust(fit, weight), _hover_thrust(slow, weight)
+        apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
+        bias = abs(fit.values.get("force bias z", 0.0))
+        sure = apart > IDENTIFY.apart * math.hypot(narrow[1], IDENTIFY.close)
+        if not sure and bias < IDENTIFY.apart * FORCE_BIAS:
+            return fit
+        fit = slow
+    return fit
+
+
+def _hover_thrust(fit: Fit, weight: float) -> tuple[float, float]:
+    """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
+    its standard deviation.
+    """
+    read = Reading(fit)
+    exponents = fit.drive.exponents
+    # where the start's curve, in which each power carries its share, carries the weight
+    scale = fit.model.scale
+    u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
+    value, low, high = read.interval(
+        lambda v: 4.0 * thrust_of(v, exponents, u) / weight, logarithm=False
+    )
+    return value, (high - low) / (2.0 * read.width * max(abs(value), 1e-9))
+
+
 def _rises(fit: Fit) -> bool:
     """Does thrust grow with the command, from nothing to full?"""
     u = np.linspace(0.05, 1.0, 20)
@@ -199,7 +270,7 @@ def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, li
         if fall_with(fit, model, start) > least:
             quiet = 0.0 if fit.drive.lag > 0.0 else noise
             richer = solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY})
-            if all(richer.values[p] > 0.0 for p in parameters if p in POSITIVE):
+            if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
                 fit = richer
                 kept.append(name)
     return fit, kept
@@ -210,39 +281,36 @@ def _has_columns(fit: Fit, parameters: Sequence[str]) -> bool:
     return all(p in fit.balance.names for p in air)
 
 
-def _settled(
-    pieces: list[Piece], fit: Fit, geometry: Geometry, noise: float
-) -> tuple[Fit, dict[str, str]]:
-    """Return the fit in which what the flight does not show is fixed at what is usual, and for
-    each the reason.
+def _not_told(fit: Fit, geometry: Geometry) -> tuple[dict[str, str], dict[str, float]]:
+    """Return the inertias that the flight does not show: why, and what is usual instead.
+
+    Raises:
+        InputError: neither turning nor an arm says how large the vehicle is.
     """
-    fixed: dict[str, str] = {}
-    nonlinear = fit.names[len(fit.model.free) :]
+    reasons: dict[str, str] = {}
+    instead: dict[str, float] = {}
     values = fit.values
-    set_to: dict[str, float] = {}
     usual = USUAL.gyration * fit.model.mass * geometry.arm**2
+    doubtful = fit.drive.band < SPECTRUM.band
     for axis, motion in (("Jx", "roll"), ("Jy", "pitch")):
-        if 1.96 * fit.deviation(axis) > IDENTIFY.widest:
-            fixed[axis] = f"the flight hardly shows {motion}"
-            set_to[axis] = usual
-    if set_to and not geometry.known:
+        if doubtful:  # turning is quick, and quick motion contradicts itself here
+            reasons[axis] = f"quick {motion} contradicts slow motion in these logs"
+            instead[axis] = usual
+        elif 1.96 * fit.deviation(axis) > IDENTIFY.widest:
+            reasons[axis] = f"the flight hardly shows {motion}"
+            instead[axis] = usual
+    if reasons and not geometry.known:
         raise InputError(
-            f"{'; '.join(fixed.values())}, and no arm is given; expected --geometry, or a log with "
-            "quick roll and pitch"
+            f"{'; '.join(reasons.values())}, and no arm is given; expected --geometry, or a log "
+            "with quick roll and pitch"
         )
-    if 1.96 * fit.deviation("Jz") > IDENTIFY.widest or not (
-        0.3 < values["Jz"] / (values["Jx"] + values["Jy"]) < 1.3
-    ):
-        fixed["Jz"] = "the flight does not yaw while it rolls or pitches"
-        both = sum(set_to.get(a, values[a]) for a in ("Jx", "Jy"))
-        set_to["Jz"] = USUAL.flat * both
-    if not set_to:
-        return fit, fixed
-    theta = fit.theta[: len(fit.model.free)]
-    model, start = with_fixed(fit.model, theta, set_to)
-    start = start.copy()
-    if "Jz" in set_to:  # yaw keeps its ratio
-        i = model.free.index("reach")
-        start[i] *= set_to["Jz"] / values["Jz"]
-    quiet = 0.0 if fit.drive.lag > 0.0 else noise
-    return solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY}), fixed
+    both = values["Jx"] + values["Jy"]
+    wide = 1.96 * fit.deviation("Jz") > IDENTIFY.widest
+    if doubtful or wide or not 0.3 < values["Jz"] / both < 1.3:
+        reasons["Jz"] = (
+            "quick motion contradicts slow motion in these logs"
+            if doubtful
+            else "the flight does not yaw while it rolls or pitches"
+        )
+        instead["Jz"] = USUAL.flat * sum(instead.get(a, values[a]) for a in ("Jx", "Jy"))
+    return reasons, instead

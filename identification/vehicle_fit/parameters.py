@@ -120,20 +120,6 @@ def with_more(model: Model, start: Array, names: Sequence[str]) -> tuple[Model, 
     return more, np.concatenate([start, np.zeros(len(names))])
 
 
-def with_fixed(model: Model, start: Array, values: dict[str, float]) -> tuple[Model, Array]:
-    """Return a model in which some parameters have a given value (SI units) and are not fitted."""
-    keep = [name not in values for name in model.free]
-    fewer = Model(
-        model.mass,
-        model.powers,
-        tuple(n for n in model.free if n not in values),
-        model.scale,
-        {**model.fixed, **values},
-        model.prior,
-    )
-    return fewer, start[: len(model.free)][keep]
-
-
 def _mean_speed(pieces: list[Piece], drive: Drive) -> float:
     source = [p.command if drive.commands else p.rotor_speeds for p in pieces]
     return max(float(np.mean(np.concatenate([x for x in source if x is not None]))), 1e-6)

@@ -55,7 +55,7 @@ class Fit:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
         """
-        inverse = np.linalg.inv(self.information)
+        inverse = np.asarray(np.linalg.inv(self.information), dtype=np.float64)
         count = len(self.scores)
         if count < 4:
             return inverse
@@ -152,7 +152,9 @@ def fall_with(fit: Fit, model: Model, start: Array) -> float:
     made, zero = fit.balance, np.zeros(len(fit.balance.nonlinear))
     total = np.sum([_grams(made, fit.spectra, i) for i in range(len(made.segments))], axis=0)
     step, information, *_ = _newton(made, total, model, start, zero, fit.drive, {})
-    return float(step @ information @ step)
+    now = fit.theta[: len(fit.model.free)]
+    own, known, *_ = _newton(made, total, fit.model, now, zero, fit.drive, {})
+    return float(step @ information @ step - own @ known @ own)
 
 
 def step_with(
@@ -181,7 +183,7 @@ def _grams(made: Balance, spectra: Sequence[Array], i: int) -> Array:
     columns = s.columns[:, :, 6:]
     out = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
     noise = made.noise.T @ made.noise
-    gain = 1.0 / (1.0 + (s.frequency / SPECTRUM.band) ** 4) ** 2
+    gain = 1.0 / (1.0 + (s.frequency / made.band) ** 4) ** 2
     for axis in range(6):
         weight = s.weight / spectrum[:, axis]
         both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)

@@ -43,7 +43,7 @@ class Segment:
     columns: Complex  # (K, m, c): per root Hz
 
 
-def segments_of(columns: Array, period: float, log: int) -> list[Segment]:
+def segments_of(columns: Array, period: float, log: int, band: float) -> list[Segment]:
     """Return the transforms of a piece's columns (n, c), cut into segments of about equal
     length.
     """
@@ -53,15 +53,16 @@ def segments_of(columns: Array, period: float, log: int) -> list[Segment]:
     out = []
     for a, b in itertools.pairwise(edges):
         size = b - a
-        frequency = np.fft.rfftfreq(size, period)
-        inside = frequency <= min(SPECTRUM.band, 0.4 / period)
-        weight = np.where(frequency[inside] == 0.0, 1.0, 2.0) / SPECTRUM.tapers
+        frequency = np.asarray(np.fft.rfftfreq(size, period), dtype=np.float64)
+        inside = frequency <= min(band, 0.4 / period)
+        frequency = frequency[inside]
+        weight = np.where(frequency == 0.0, 1.0, 2.0) / SPECTRUM.tapers
         places = np.arange(1, size + 1) * (np.pi / (size + 1))
         transforms = []
         for k in range(1, SPECTRUM.tapers + 1):
             taper = np.sqrt(2.0 * period / (size + 1)) * np.sin(k * places)
             transforms.append(np.fft.rfft(taper[:, None] * columns[a:b], axis=0)[inside])
-        out.append(Segment(log, frequency[inside], weight, np.array(transforms)))
+        out.append(Segment(log, frequency, weight, np.array(transforms)))
     return out
 
 

@@ -56,7 +56,8 @@ def flown(name: str, seed: int, commanded: bool) -> tuple[Vehicle, float, list[F
         lag = LAG[name] * float(rng.uniform(0.6, 1.6)) if commanded else 0.0
         effects = (EffectSetting("motor_lag", {"tau": lag}),) if commanded else ()
         try:
-            return vehicle, lag, [_log(vehicle, effects, t, seed) for t in TRAJECTORIES]
+            own = len(VEHICLES) * seed + VEHICLES.index(name)  # of its own, for each vehicle
+            return vehicle, lag, [_log(vehicle, effects, t, own) for t in TRAJECTORIES]
         except InputError:
             continue
     raise InputError(f"{name}: none of {_ATTEMPTS} drawn vehicles flew; expected one that does")

@@ -1,0 +1,92 @@
+"""How measured rotor speeds follow logged commands: the steady speed as a polynomial of the command
+behind a first-order lag.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.stats import t as student
+
+from .channels import Piece
+from .columns import lagged
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MotorSettings:
+    """How the response is fitted."""
+
+    shortest_lag: float = 1e-3  # s
+    longest_lag: float = 0.5  # s
+    segment: float = 5.0  # s: errors further apart are taken as independent
+    powers: int = 3  # speed against u^0, u^1, u^2
+
+
+MOTORS = MotorSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class MotorResponse:
+    """Rotor speed in rad/s against command, and its lag."""
+
+    speed: Array  # (3,) coefficients of u^0, u^1, u^2
+    lag: float  # s
+    low: float  # of its 95 % interval
+    high: float
+    left: float  # share of the speeds' standard deviation that it does not explain
+
+
+def motor_response(pieces: list[Piece]) -> MotorResponse | None:
+    """Return how speeds follow commands; None where one of them is not in every piece, or where
+    commands do not move.
+    """
+    if any(p.command is None or p.rotor_speeds is None for p in pieces):
+        return None
+    speeds = np.concatenate([p.rotor_speeds for p in pieces if p.rotor_speeds is not None])
+    commands = np.concatenate([p.command for p in pieces if p.command is not None])
+    if np.std(commands) < 1e-3 or np.std(speeds) == 0.0:
+        return None
+
+    def columns(lag: float) -> Array:
+        parts = []
+        for p in pieces:
+            assert p.command is not None
+            u = lagged(p.command, lag, p.period)
+            parts.append(np.stack([u**j for j in range(MOTORS.powers)], axis=2))
+        return np.concatenate(parts).reshape(-1, MOTORS.powers)
+
+    target = speeds.ravel()
+
+    def fitted(lag: float) -> tuple[Array, Array]:
+        x = columns(lag)
+        best = np.linalg.lstsq(x, target, rcond=None)[0]
+        return best, target - x @ best
+
+    bounds = (np.log(MOTORS.shortest_lag), np.log(MOTORS.longest_lag))
+    found = minimize_scalar(
+        lambda s: float(np.sum(np.square(fitted(float(np.exp(s)))[1]))),
+        bounds=bounds,
+        method="bounded",
+        options={"xatol": 1e-3},
+    )
+    lag = float(np.exp(found.x))
+    best, residual = fitted(lag)
+    step = 0.01 * lag
+    slope = (columns(lag + step) - columns(lag - step)) @ best / (2.0 * step)
+    moves = np.column_stack([columns(lag), slope])
+    inverse = np.linalg.inv(moves.T @ moves)
+    seconds = pieces[0].period * np.arange(len(speeds)).repeat(speeds.shape[1])
+    block = (seconds / MOTORS.segment).astype(int)
+    count = int(block.max()) + 1
+    scores = np.array(
+        [moves[block == b].T @ residual[block == b] for b in range(count)]
+    )  # errors go on within a segment: a sandwich over segments
+    meat = scores.T @ scores * (count / max(count - 1, 1))
+    size = float(np.sqrt((inverse @ meat @ inverse)[-1, -1]))
+    width = float(student.ppf(0.975, max(count - 1, 3))) * size
+    return MotorResponse(
+        best, lag, max(lag - width, 0.0), lag + width, float(np.std(residual) / np.std(target))
+    )
