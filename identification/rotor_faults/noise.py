@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ORDER = 5  # of the autoregression: 0.1 s, and a disturbance's memory in its poles
+ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of activity against the quiet level, tried in turn
 
 
