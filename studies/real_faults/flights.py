@@ -1,8 +1,9 @@
 """Flights with a rotor that loses thrust at a random time, of vehicles drawn at random.
 
 A rigid body at 1 kHz and a flight loop at 250 Hz of its own: nothing of the plant or of the search
-is in it. It has what the search does not model: motors whose speed lags and not their thrust, a dead
-zone, drag, gusts that correlate, a centre of mass that is off, gyro bias, delay, saturation, ground.
+is in it. It has what the search does not model: motors whose speed lags and not their thrust, a
+dead zone, drag, gusts that correlate, a centre of mass that is off, gyro bias, delay, saturation,
+ground.
 """
 
 from dataclasses import dataclass
@@ -155,7 +156,9 @@ def _fly(
     for _ in range(60):
         v -= (bend * v * v + (1.0 - bend) * v - level) / (2.0 * bend * v + 1.0 - bend)
     hover = dead + v * (1.0 - dead)
-    slope = (2.0 * bend * v + 1.0 - bend) * ratio / (1.0 - dead)  # of a rotor's thrust, in its hover
+    slope = (
+        (2.0 * bend * v + 1.0 - bend) * ratio / (1.0 - dead)
+    )  # of a rotor's thrust, in its hover
     speed = np.zeros(4)  # square root of thrust, in parts of the hover's
     integral, seen, u = np.zeros(3), np.zeros(3), np.zeros(4)
     climb = 0.0
