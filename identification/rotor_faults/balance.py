@@ -155,7 +155,7 @@ class Balance:
                 std[c] = math.sqrt(max(float(slope @ covariance[:2, :2] @ slope), 1e-12))
         return ratio, std
 
-    def steps(self, noises: list[Noise], rows: Array, begin: Begin) -> Array:
+    def steps(self, noises: list[Noise], rows: NDArray[np.int64], begin: Begin) -> Array:
         """Return the log-likelihoods (K,) of a step in each channel from each of ``rows`` on, of
         whatever size explains it best, at the price of a normal prior as wide as that size, or of
         one that is worth a single sample where that is wider.
@@ -186,7 +186,7 @@ class _Fixed:
         (self.yy, self.my), (_, self.mm) = (self.both.T @ self.both).tolist()
         self.mm = max(self.mm, 1e-300)
 
-    def beginning(self, column: Array, rows: Array, ramp: Array) -> Array:
+    def beginning(self, column: Array, rows: NDArray[np.int64], ramp: Array) -> Array:
         """Return products (3, K) of a column (N,) that begins at each of ``rows`` (K,) by a ramp:
         with y, with the moment, with itself; after projection.
         """

@@ -130,12 +130,17 @@ def _patterns(event: "_Event", use: FaultSettings) -> tuple[Array, Array, Array]
     """
     shares = np.linspace(*use.losses, use.steps)
     found, weights = [], []
+    # only what speaks under every hypothesis, so that all explain the same numbers
+    every = [std for _, std in (*event.losses, event.jumps)]
+    silent = ~np.isfinite(every).all(axis=0)
     for rotor in range(4):
         seen, std = event.losses[rotor]
+        std = np.where(silent, np.inf, std)
         log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
         found.append(float(logsumexp(log)) - math.log(len(shares)))
         weights.append(np.exp(log - logsumexp(log)))
     seen, std = event.jumps
+    std = np.where(silent, np.inf, std)
     lost = shares[shares <= use.all_lose]
     means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
     spread = use.error * lost[:, None] * np.array([2.0, 2.0, 2.0, 4.0])
@@ -273,8 +278,7 @@ class _Search:
 
 def _remaining(shares: Array, weight: Array) -> tuple[float, float, float]:
     """Return the share of thrust that is left: mean and the ends of a 95 % interval."""
-    middle, low, high = _quantiles(shares, weight, 0.5 * float(shares[1] - shares[0]))
-    del middle
+    _, low, high = _quantiles(shares, weight, 0.5 * float(shares[1] - shares[0]))
     return 1.0 - float(weight @ shares), max(0.0, 1.0 - high), min(1.0, 1.0 - low)
 
 

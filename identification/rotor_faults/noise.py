@@ -6,6 +6,7 @@ innovations (Willsky and Jones, *A generalized likelihood ratio approach to the 
 estimation of jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +70,9 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         poles = np.linalg.solve(gram, past.T @ now)
         left = now - past @ poles
         n = len(now)
-        score = -0.5 * n * np.log(left @ left / n) - float(np.log(scale[whole]).sum())
+        score = -0.5 * n * math.log(max(float(left @ left), 1e-300) / n) - float(
+            np.log(scale[whole]).sum()
+        )
         if best is None or score > best[0]:
             weights = np.concatenate([[1.0], -poles])
             best = (score, Noise(scale, weights, whole, float(left @ left / n)))
