@@ -308,7 +308,7 @@ def diagnose(
         found = run(
             flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
         )
-    found = _with_rotor_faults(found, flights)
+    found = _with_rotor_faults(found, logs, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
     _notes(found.notes)
@@ -382,19 +382,21 @@ def _compare(
     return change_data(change)
 
 
-def _with_rotor_faults(found: "Diagnosis", flights: "Sequence[FlightLog]") -> "Diagnosis":
+def _with_rotor_faults(
+    found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
+) -> "Diagnosis":
     """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
-    from ..identification.rotor_faults.channels import channels_of_log
     from ..identification.rotor_faults.detection import find_fault
+    from ..identification.rotor_faults.reading import channels_of
     from ..identification.rotor_faults.words import fault_data
 
     faults = []
     with working("looking for a rotor that lost thrust"):
-        for log in flights:
+        for path, log in zip(paths, flights, strict=True):
             try:
-                faults.append(fault_data(find_fault(channels_of_log(log))))
+                faults.append(fault_data(find_fault(channels_of(path, log))))
             except InputError:
-                continue  # no gyro, no accelerometer, or too little flight
+                continue  # no gyro, no accelerometer, no command, or too little flight
     notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
     return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
 

@@ -2,7 +2,7 @@
 
 * Angular acceleration about x, y and z: ``a (s . g) + b + d w + e w' w''``, where ``g`` are the
   rotors' thrusts, ``s`` the signs of their moments, ``w`` the angular velocity (damping) and
-  ``w' w''`` the product of the other two (gyroscopic).
+  ``w' w''`` the product of the other two (gyroscopic); about z also parts of what x and y do.
 * Specific force along z: ``a`` times the sum of ``g``.
 
 The coefficients ``a`` are positive and otherwise free, so neither mass, inertia nor arm has to be
@@ -11,9 +11,11 @@ sums that run backwards.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from ...runtime.compiled import compiled
 from .channels import STEP, Samples
@@ -24,7 +26,19 @@ Array = NDArray[np.float64]
 # signs of the rotors' moments about x, y, z; the last row is the force along z
 _SIGNS = np.array([[1, 1, -1, -1], [-1, 1, 1, -1], [1, -1, 1, -1], [1, 1, 1, 1]], dtype=np.float64)
 CHANNELS = 4
+_AROUND = 5  # intervals, around a strong acceleration in which the model may be as wrong
 _TURNING = 0.1  # of activity, per (rad/s)^2: what the model lacks when the vehicle turns
+
+
+class Begin(NamedTuple):
+    """How a loss comes."""
+
+    part: float  # of the first interval that is over when it begins
+    # as the rotors' speed falls (a motor that fails), or at once (a propeller that breaks)
+    lagged: bool
+
+
+AT_ONCE = Begin(0.0, False)
 
 
 class Balance:
@@ -41,40 +55,48 @@ class Balance:
             np.column_stack([ones, w[:, [i]], (w[:, (i + 1) % 3] * w[:, (i + 2) % 3])[:, None]])
             for i in range(3)
         ] + [np.zeros((len(w), 0))]
+        # a gyro that is mounted askew by a few degrees shows a part of what the strong axes do
+        # about the weak one
+        self.others[2] = np.column_stack([self.others[2], samples.angular_acceleration[:, :2]])
         self.moment = thrust @ _SIGNS.T  # (N, 4)
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between
+        # where a fault begins, what is wrong of its shape grows with what it does
+        strong = np.linalg.norm(samples.angular_acceleration[:, :2], axis=1)
+        strong = maximum_filter1d(strong, _AROUND)
+        away += strong / max(float(strong.max()), 1e-300)
         # a rotor that is late by an interval is wrong there too
         self.activity = np.maximum(away, np.concatenate([away[:1], away[:-1]]))
 
-    def ramp(self, part: float) -> Array:
-        """Return the share (J,) by which a loss that began ``part`` of an interval after the first
-        one's start has come, as the rotors' lag lets it; 1 after that.
-        """
-        count = 1 + math.ceil(4.0 * self.lag / STEP)
+    def ramp(self, begin: Begin) -> Array:
+        """Return the share (J,) of a loss that has come in each interval; 1 after that."""
+        lag = self.lag if begin.lagged else 0.0
+        count = 1 + math.ceil(4.0 * lag / STEP)
         x = STEP * np.arange(count + 1)
-        begin = part * STEP
-        since = np.maximum(x - begin, 0.0)
+        since = np.maximum(x - begin.part * STEP, 0.0)
         # integral of 1 - exp(-since / lag)
-        area = since + self.lag * np.expm1(-since / self.lag) if self.lag > 0.0 else since
+        area = since + lag * np.expm1(-since / lag) if lag > 0.0 else since
         share: Array = np.diff(area) / STEP
         return share
 
-    def residuals(self, rotors: Array, row: int, loss: float, part: float = 0.0) -> Array:
-        """Return residuals (N, 4) where ``rotors`` (4,) lose a share from a row on."""
-        lost = np.zeros(len(self.y))
-        ramp = self.ramp(part)
-        lost[row:] = 1.0
-        lost[row : row + len(ramp)] = ramp[: len(lost) - row]
-        g = self.thrust * (1.0 - loss * lost[:, None] * rotors)
-        return np.column_stack([self._left(c, g @ _SIGNS[c]) for c in range(CHANNELS)])
+    def plain_residuals(self) -> Array:
+        """Return residuals (N, 4) where nothing happens."""
+        return np.column_stack([self._left(c, self.moment[:, c]) for c in range(CHANNELS)])
 
-    def step_residuals(self, row: int) -> Array:
+    def step_residuals(self, row: int, begin: Begin = AT_ONCE) -> Array:
         """Return residuals (N, 4) with a step in each channel."""
-        step = (np.arange(len(self.y)) >= row).astype(np.float64)
+        step = self._share(row, begin)
         return np.column_stack(
             [self._left(c, self.moment[:, c], step[:, None]) for c in range(CHANNELS)]
         )
+
+    def _share(self, row: int, begin: Begin) -> Array:
+        """Return the share (N,) of something that begins at a row that has come."""
+        share = np.zeros(len(self.y))
+        ramp = self.ramp(begin)
+        share[row:] = 1.0
+        share[row : row + len(ramp)] = ramp[: len(share) - row]
+        return share
 
     def _left(self, c: int, moment: Array, *more: Array) -> Array:
         """Return the residual (N,) of a channel."""
@@ -101,53 +123,53 @@ class Balance:
         return total
 
     def losses(
-        self,
-        noises: list[Noise],
-        rotors: Array,
-        rows: Array,
-        losses: Array,
-        part: float,
-        error: float,
-    ) -> Array:
-        """Return the log-likelihoods (K, E) of a loss of ``rotors`` (4,) from each of ``rows`` (K,)
-        on, by each of ``losses`` (E,).
-
-        What the model gets wrong of a loss is a step in each channel that begins with it, of
-        standard deviation ``error`` times what is lost.
+        self, noises: list[Noise], rotor: int, row: int, begin: Begin
+    ) -> tuple[Array, Array]:
+        """Return the share that a rotor (0 to 3) seems to have lost by each channel alone (4,), and
+        the standard deviations (4,), infinite where a channel does not show it.
         """
-        total = np.zeros((len(rows), len(losses)))
-        ramp = self.ramp(part)
-        for c, noise in enumerate(noises):
-            fixed = _Fixed(noise, self.others[c], self.y[:, c], self.moment[:, c])
-            lost = self.thrust @ (rotors * _SIGNS[c])
-            h = fixed.beginning(np.column_stack([lost, np.ones_like(lost)]), rows, ramp)
-            hy, sy, hm, sm, hh, ss, hs = (v[:, None] for v in h)
-            mm = np.maximum(fixed.mm - 2.0 * losses * hm + np.square(losses) * hh, 1e-300)
-            my = fixed.my - losses * hy
-            ms = sm - losses * hs
-            a = np.maximum(my, 0.0) / mm
-            rest = fixed.yy - a * my
-            used = a > 0.0
-            against = np.where(used, sy - ms * a, sy)
-            own = np.maximum(np.where(used, ss - ms * ms / mm, ss), 0.0)
-            prior = np.square(error * a * losses * np.abs(rotors).sum()) / noise.variance
-            gain = np.square(against) * prior / (1.0 + prior * own)
-            total += _log_likelihood(rest - gain, noise) - 0.5 * np.log1p(prior * own)
-        return total
+        lost = self.thrust[:, rotor] * self._share(row, begin)
+        return self._shares(noises, [lost * sign for sign in _SIGNS[:, rotor]])
 
-    def steps(self, noises: list[Noise], rows: Array) -> Array:
+    def jumps(self, noises: list[Noise], row: int, begin: Begin) -> tuple[Array, Array]:
+        """Return by how much each channel jumps (4,), downwards and in parts of what one rotor's
+        usual thrust does there, and the standard deviations (4,).
+        """
+        return self._shares(noises, [self._share(row, begin)] * CHANNELS)
+
+    def _shares(self, noises: list[Noise], columns: list[Array]) -> tuple[Array, Array]:
+        """Return ratios (4,) of the coefficients of a column and of the moment, negative, and their
+        standard deviations.
+        """
+        ratio, std = np.zeros(CHANNELS), np.full(CHANNELS, np.inf)
+        for c, noise in enumerate(noises):
+            x = noise.whiten(np.column_stack([self.moment[:, c], columns[c], self.others[c]]))
+            y = noise.whiten(self.y[:, c])
+            beta, *_ = np.linalg.lstsq(x, y, rcond=None)
+            left = y - x @ beta
+            covariance = np.linalg.pinv(x.T @ x) * float(left @ left) / max(1, len(y) - len(beta))
+            a, b = float(beta[0]), float(beta[1])
+            if a > 2.0 * math.sqrt(covariance[0, 0]):  # the channel follows the commands
+                slope = np.array([b / a**2, -1.0 / a])
+                ratio[c] = -b / a
+                std[c] = math.sqrt(max(float(slope @ covariance[:2, :2] @ slope), 1e-12))
+        return ratio, std
+
+    def steps(self, noises: list[Noise], rows: NDArray[np.int64], begin: Begin) -> Array:
         """Return the log-likelihoods (K,) of a step in each channel from each of ``rows`` on, of
-        whatever size explains it best, at the price of a normal prior as wide as that size.
+        whatever size explains it best, at the price of a normal prior as wide as that size, or of
+        one that is worth a single sample where that is wider.
         """
         total = np.zeros(len(rows))
         for c, noise in enumerate(noises):
             fixed = _Fixed(noise, self.others[c], self.y[:, c], self.moment[:, c])
-            one = np.ones((len(self.y), 2))
-            _, sy, _, sm, _, ss, _ = fixed.beginning(one, rows, np.ones(1))
+            sy, sm, ss = fixed.beginning(np.ones(len(self.y)), rows, self.ramp(begin))
             a = max(fixed.my, 0.0) / fixed.mm
             own = np.maximum(ss - sm * sm / fixed.mm, 1e-12 * ss + 1e-300)
             gain = np.square(sy - sm * fixed.my / fixed.mm) / own
-            price = 0.5 * (1.0 + np.log(np.maximum(gain / noise.variance, 1.0)))
+            n = int(noise.whole.sum())
+            width = np.log(np.maximum(gain / noise.variance, 1.0))
+            price = 0.5 * np.maximum(1.0 + width, math.log(n))
             total += _log_likelihood(fixed.yy - a * fixed.my - gain, noise) - price
         return total
 
@@ -164,38 +186,25 @@ class _Fixed:
         (self.yy, self.my), (_, self.mm) = (self.both.T @ self.both).tolist()
         self.mm = max(self.mm, 1e-300)
 
-    def beginning(self, columns: Array, rows: Array, ramp: Array) -> Array:
-        """Return products (7, K) of two columns (N, 2) that begin at each of ``rows`` (K,) by a
-        ramp: first and second with y, with the moment, with themselves, and with each other; after
-        projection.
+    def beginning(self, column: Array, rows: NDArray[np.int64], ramp: Array) -> Array:
+        """Return products (3, K) of a column (N,) that begins at each of ``rows`` (K,) by a ramp:
+        with y, with the moment, with itself; after projection.
         """
         noise = self.noise
-        n, order = len(columns), len(noise.filter) - 1
-        weighted = columns / noise.scale[:, None]
+        n, order = len(column), len(noise.filter) - 1
         against = np.zeros((n, 2 + self.basis.shape[1]))
         against[noise.whole] = np.column_stack([self.both, self.basis])
-        full = np.where(noise.whole[:, None], noise.filtered(columns), 0.0)
+        full = np.where(noise.whole, noise.filtered(column), 0.0)
         early = order + len(ramp)  # intervals in which the ramp still shows
-        pairs = np.column_stack([full**2, full[:, 0] * full[:, 1]])
-        with_all = np.einsum("nd,nk->ndk", full, against).reshape(n, -1)
-        late = np.column_stack([with_all, pairs])
+        late = np.column_stack([full[:, None] * against, full**2])
         late = np.cumsum(late[::-1], axis=0)[::-1]
         late = np.concatenate([late, np.zeros((early + 1, late.shape[1]))])
         sums = late[rows + early].copy()
         weight = np.concatenate([ramp, np.ones(early)])
+        weighted = column / noise.scale
         _add_beginnings(sums, rows, weight, early, weighted, noise.filter, noise.whole, against)
-        both = sums[:, : with_all.shape[1]].reshape(len(rows), 2, -1)
-        first, second = both[:, 0], both[:, 1]
-        p, q = first[:, 2:], second[:, 2:]
-        own = sums[:, -3:]
-        return np.array(
-            [
-                *(first[:, 0], second[:, 0], first[:, 1], second[:, 1]),
-                own[:, 0] - (p * p).sum(axis=1),
-                own[:, 1] - (q * q).sum(axis=1),
-                own[:, 2] - (p * q).sum(axis=1),
-            ]
-        )
+        p = sums[:, 2:-1]
+        return np.array([sums[:, 0], sums[:, 1], sums[:, -1] - (p * p).sum(axis=1)])
 
 
 @compiled
@@ -209,26 +218,21 @@ def _add_beginnings(
     whole: NDArray[np.bool_],
     against: Array,
 ) -> None:
-    """Add to ``sums`` (K, 2 q + 3) what the first ``early`` outputs of the filter bring after each
+    """Add to ``sums`` (K, q + 1) what the first ``early`` outputs of the filter bring after each
     beginning: there the column has begun in part only.
     """
-    count, width = weighted.shape[0], against.shape[1]
+    count, width = len(weighted), against.shape[1]
     for r in range(len(rows)):
         for j in range(early):
             at = rows[r] + j
             if at >= count or not whole[at]:
                 continue
-            one, two = 0.0, 0.0
+            value = 0.0
             for k in range(min(j, len(taps) - 1) + 1):
-                share = taps[k] * weight[j - k]
-                one += share * weighted[at - k, 0]
-                two += share * weighted[at - k, 1]
+                value += taps[k] * weight[j - k] * weighted[at - k]
             for q in range(width):
-                sums[r, q] += one * against[at, q]
-                sums[r, width + q] += two * against[at, q]
-            sums[r, 2 * width] += one * one
-            sums[r, 2 * width + 1] += two * two
-            sums[r, 2 * width + 2] += one * two
+                sums[r, q] += value * against[at, q]
+            sums[r, width] += value * value
 
 
 def _log_likelihood(rest: Array, noise: Noise) -> Array:

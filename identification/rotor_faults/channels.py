@@ -21,7 +21,9 @@ Mask = NDArray[np.bool_]
 
 STEP = 0.02  # s, of the grid: a rotor takes about that long to follow
 FINE = 0.004  # s, on which commands are filtered by the rotors' lag
-FLYING = 0.5  # of the level that a tenth of the samples exceed: the rotors carry the vehicle
+# of the largest command, above which the rotors are not idle; and of the median of what is: above
+# that they carry the vehicle. After a fault commands may stay at their limit for long.
+IDLE, FLYING = 0.15, 0.5
 SETTLED = 1.5  # s after the rotors first carry the vehicle: it has left the ground
 LEAST_SECONDS = 3.0  # in flight: less says nothing of what is usual
 LONGEST_GAP = 0.1  # s without a sample, across which nothing is interpolated
@@ -141,8 +143,7 @@ def sample(channels: Channels) -> Samples:
     gyro = np.column_stack([np.interp(edges, c.gyro_times, axis) for axis in c.gyro.T])
     force = _means(c.accelerometer_times, c.accelerometer, t)
     total = np.interp(t, c.command_times, c.command.sum(axis=1))
-    high = float(np.quantile(total, 0.9))
-    flying = total > FLYING * high
+    flying = total > _least(c)
     there = np.ones(len(t), dtype=np.bool_)
     for stream in (c.gyro_times, c.accelerometer_times):
         after = np.clip(np.searchsorted(stream, t), 1, len(stream) - 1)
@@ -167,6 +168,13 @@ def sample(channels: Channels) -> Samples:
         c,
         why,
     )
+
+
+def _least(c: Channels) -> float:
+    """Return the total command above which the rotors carry the vehicle."""
+    total = c.command.sum(axis=1)
+    busy = total[total > IDLE * total.max()]
+    return FLYING * float(np.median(busy)) if len(busy) else np.inf
 
 
 def _between(c: Channels, t: Array) -> Array:
@@ -222,8 +230,7 @@ def _end(c: Channels, t: Array) -> tuple[float, str]:
             found.append((float(c.gyro_times[first]), "the gyro was at its limit"))
     hit = np.linalg.norm(c.accelerometer, axis=1) > IMPACT
     # take-off may be hard: an impact counts once the rotors carry the vehicle
-    total = c.command.sum(axis=1)
-    flying = c.command_times[total > FLYING * np.quantile(total, 0.9)]
+    flying = c.command_times[c.command.sum(axis=1) > _least(c)]
     hit &= c.accelerometer_times > flying[0] + SETTLED if len(flying) else False
     if hit.any():
         found.append(

@@ -1,11 +1,14 @@
-"""Which rotor lost thrust, when and how much: a likelihood ratio over every rotor and every time.
+"""Which rotor lost thrust, when and how much.
 
 The thrusts follow the commands with a lag and a curve, both fitted. A quadrotor with one rotor in
-each quadrant is all that is assumed. A fault of rotor i at a time leaves the share ``1 - loss`` of
-its thrust from then on, in all four channels of the balance (``balance.py``). Rivals: nothing
-happened; all rotors lost; a steady force and torque began (a gust, a load that fell), free in each
-channel. Each hypothesis is weighed by its evidence, summed over times and losses, with the noise,
-the lag and the curve that fit it best.
+each quadrant is all that is assumed. Two questions are asked apart:
+
+* Did torque or force jump, and when? A likelihood ratio over every time, with a step of whatever
+  size in each channel of the balance (``balance.py``) against none.
+* What jumped? Each channel says by itself what share of a rotor's thrust would be lost. For the
+  rotor that failed, they agree, within what the model gets wrong of a rotor that suddenly works
+  elsewhere; for another rotor they contradict each other in sign. Rivals are all rotors together,
+  and a force and a torque that no rotor makes (a gust, a load that fell, a collision).
 """
 
 import math
@@ -15,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from .balance import Balance
+from .balance import AT_ONCE, Balance, Begin
 from .channels import STEP, Channels, Samples, sample
 from .noise import Noise
 
@@ -29,6 +32,7 @@ class FaultSettings:
     """What is tried, and when a fault is named."""
 
     losses: tuple[float, float] = (0.05, 1.0)  # share of a rotor's thrust
+    all_lose: float = 0.5  # the most that is tried of all rotors together
     lags: tuple[float, ...] = (0.0, 0.015, 0.03, 0.05, 0.08, 0.12)  # s
     # curves of thrust against command: the square's share, and the dead zone in parts of the
     # median command
@@ -45,9 +49,10 @@ class FaultSettings:
     places: int = 2000  # where a fault may begin, at most
     steps: int = 39  # of ``losses`` that are tried
     parts: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75)  # of an interval, where a fault may begin
-    # lags and curves that are looked at this finely: so many, and this near to the best
-    finer: int = 5
-    finer_within: float = 12.0  # of log-likelihood
+    # standard deviation of a jump that no rotor makes, about x, y, z and along z, in parts of what
+    # one rotor's usual thrust does there: a load of a third of the weight that falls
+    other: tuple[float, float, float, float] = (0.5, 0.5, 0.5, 1.3)
+    rounds: int = 2  # of fitting the noise and looking again
     sure: float = 0.95  # probability from which a fault is named without a doubt
 
 
@@ -87,34 +92,74 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
     """
     use = FaultSettings() if settings is None else settings
     samples = sample(channels)
-    losses = np.linspace(*use.losses, use.steps)
-    rows = _rows(len(samples.t), use)
-    search = _Search(samples, rows, losses, use)
+    search = _Search(samples, _rows(len(samples.t), use), use)
     search.find_curve(channels.thrust_known)
-    nothing = search.nothing()
-    found = {name: search.best(name) for name in _LOSERS}
-    other = search.steps()
-    logs = np.array([nothing, *(found[name][0] for name in found), other])
-    prior = [use.prior[0], *[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]]
-    logs += np.log(prior)
-    names = [NOTHING, *found, OTHER]
-    chances = np.exp(logs - logsumexp(logs))
-    rotor = 1 + int(np.argmax(logs[1:5]))
-    _, starts, weight, lag = found[str(rotor)]
-    when = _quantiles(starts, weight.sum(axis=1), 0.5 * STEP * use.parts[1])
-    remaining = _remaining(losses, weight.sum(axis=0), use.error)
+    event = search.event()
+    names = ["1", "2", "3", "4", ALL, OTHER]
+    each, shares, weights = _patterns(event, use)
+    prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
+    logs = np.log(prior) + each
+    # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
+    # sizes left free, is the search's
+    whole = np.array([math.log(use.prior[0]) + search.nothing()])
+    shape = logs - logsumexp(logs)
+    happened = event.evidence + math.log(float(prior.sum()))
+    every = np.concatenate([whole, happened + shape])
+    chances = np.exp(every - logsumexp(every))
+    rotor = 1 + int(np.argmax(logs[:4]))
+    when = _quantiles(event.starts, event.weights, STEP)
+    remaining = _remaining(shares, weights[rotor - 1])
     return RotorFault(
         channels.name,
-        dict(zip(names, chances.tolist(), strict=True)),
+        dict(zip([NOTHING, *names], chances.tolist(), strict=True)),
         rotor,
         when,
         remaining,
         use.sure,
         len(samples.t) * STEP,
         samples.ended,
-        lag,
+        event.balance.lag,
         channels.motor_names,
     )
+
+
+def _patterns(event: "_Event", use: FaultSettings) -> tuple[Array, Array, Array]:
+    """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
+    from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
+    (4, E).
+    """
+    shares = np.linspace(*use.losses, use.steps)
+    found, weights = [], []
+    # only what speaks under every hypothesis, so that all explain the same numbers
+    every = [std for _, std in (*event.losses, event.jumps)]
+    silent = ~np.isfinite(every).all(axis=0)
+    for rotor in range(4):
+        seen, std = event.losses[rotor]
+        std = np.where(silent, np.inf, std)
+        log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
+        found.append(float(logsumexp(log)) - math.log(len(shares)))
+        weights.append(np.exp(log - logsumexp(log)))
+    seen, std = event.jumps
+    std = np.where(silent, np.inf, std)
+    lost = shares[shares <= use.all_lose]
+    means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
+    spread = use.error * lost[:, None] * np.array([2.0, 2.0, 2.0, 4.0])
+    log = _normal(seen[None], means, np.hypot(std, spread))
+    found.append(float(logsumexp(log)) - math.log(len(lost)))
+    wide = np.hypot(std, np.array(use.other))
+    found.append(float(_normal(seen[None], np.zeros((1, 4)), wide[None])[0]))
+    return np.array(found), shares, np.array(weights)
+
+
+def _normal(seen: Array, means: Array, std: Array) -> Array:
+    """Return the log-densities (E,) of what the channels say (1, 4); a channel that says nothing
+    (infinite standard deviation) is left out.
+    """
+    says = np.isfinite(std)
+    use = np.where(says, std, 1.0)
+    each = -0.5 * np.square((seen - means) / use) - np.log(use) - 0.5 * math.log(2.0 * math.pi)
+    total: Array = np.where(says, each, 0.0).sum(axis=1)
+    return total
 
 
 def _rows(count: int, use: FaultSettings) -> NDArray[np.int64]:
@@ -129,20 +174,37 @@ def _rows(count: int, use: FaultSettings) -> NDArray[np.int64]:
     return rows
 
 
-class _Search:
-    """Evidence of each hypothesis, with the lags and curves that were tried."""
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """One lag and curve: the noise that fits it best, and the likeliest jump with that."""
 
-    def __init__(
-        self, samples: Samples, rows: NDArray[np.int64], losses: Array, use: FaultSettings
-    ) -> None:
-        self.samples, self.rows, self.losses, self.use = samples, rows, losses, use
-        self.coarse_losses = losses[:: max(1, len(losses) // 10)]
-        self.balances: dict[tuple[float, float, float], Balance] = {}
-        self.usual: dict[tuple[float, float, float], list[Noise]] = {}
-        # by hypothesis, then by lag and curve: log-likelihood at its best and the noise there
-        self.tried: dict[str, dict[tuple[float, float, float], tuple[float, list[Noise]]]] = {
-            name: {} for name in _LOSERS
-        }
+    balance: Balance
+    usual: list[Noise]  # if nothing happened
+    noise: list[Noise]  # with the jump
+    log: float
+    row: int
+    begin: Begin
+
+
+@dataclass(frozen=True, eq=False)
+class _Event:
+    """The likeliest jump of a flight."""
+
+    balance: Balance
+    evidence: float
+    starts: Array  # (T,) s, when it may have begun
+    weights: Array  # (T,) how likely each is
+    losses: list[tuple[Array, Array]]  # of each rotor, by channel, and their standard deviations
+    jumps: tuple[Array, Array]  # of each channel, in parts of one rotor's
+
+
+class _Search:
+    """The likeliest jump, with the lags and curves that were tried."""
+
+    def __init__(self, samples: Samples, rows: NDArray[np.int64], use: FaultSettings) -> None:
+        self.samples, self.rows, self.use = samples, rows, use
+        self.begins = [Begin(part, lagged) for lagged in (False, True) for part in use.parts]
+        self.tried: dict[tuple[float, float, float], _Tried] = {}
 
     def find_curve(self, thrust_known: bool) -> None:
         """Try lags, and then curves, each from the best so far."""
@@ -159,100 +221,71 @@ class _Search:
             self._try((lag, *curve))
 
     def _likeliest(self) -> tuple[float, float, float]:
-        scores = {key: max(self.tried[name][key][0] for name in _LOSERS) for key in self.balances}
-        return max(scores, key=scores.__getitem__)
+        return max(self.tried, key=lambda key: self.tried[key].log)
 
     def _try(self, key: tuple[float, float, float]) -> None:
-        if key in self.balances:
+        if key in self.tried:
             return
         one = Balance(self.samples, self.samples.thrust(*key), key[0])
-        self.balances[key] = one
-        self.usual[key] = one.noises(one.residuals(np.zeros(4), 0, 0.0))
-        for name, rotors in _LOSERS.items():
-            noise = self.usual[key]
-            best = -math.inf
-            for _ in range(2):
-                log = one.losses(noise, rotors, self.rows, self.coarse_losses, 0.0, self.use.error)
-                k, e = np.unravel_index(int(np.argmax(log)), log.shape)
-                best = float(log.max())
-                row, loss = int(self.rows[k]), float(self.coarse_losses[e])
-                noise = one.noises(one.residuals(rotors, row, loss))
-            self.tried[name][key] = (best, noise)
+        usual = one.noises(one.plain_residuals())
+        noise = usual
+        for _ in range(self.use.rounds):
+            _, row, begin = self._jump(one, noise)
+            noise = one.noises(one.step_residuals(row, begin))
+        self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
+
+    def _jump(self, one: Balance, noise: list[Noise]) -> tuple[float, int, Begin]:
+        """Return the log-likelihood, the row and the kind of the likeliest jump."""
+        near = self._near(one.steps(noise, self.rows, AT_ONCE))
+        logs = np.array([one.steps(noise, near, begin) for begin in self.begins])
+        j, k = np.unravel_index(int(np.argmax(logs)), logs.shape)
+        return float(logs[j, k]), int(near[k]), self.begins[j]
+
+    def _near(self, log: Array) -> NDArray[np.int64]:
+        """Return the rows around the likeliest of ``rows``, also those left out between them."""
+        k = int(np.argmax(log))
+        low, high = self.rows[max(k - 2, 0)], self.rows[min(k + 2, len(log) - 1)]
+        return np.arange(low, high + 1)
 
     def nothing(self) -> float:
-        """Return the evidence that nothing happened."""
-        return max(one.nothing(self.usual[key]) for key, one in self.balances.items())
+        """Return the log-likelihood of no jump."""
+        return max(
+            max(one.balance.nothing(one.usual), one.balance.nothing(one.noise))
+            for one in self.tried.values()
+        )
 
-    def best(self, name: str) -> tuple[float, Array, Array, float]:
-        """Return the evidence of a loss, the times (T,) at which it may have begun, the weights (T,
-        E) of times and sizes, and the rotors' lag in s.
-        """
-        use, rotors = self.use, _LOSERS[name]
-        ranked = sorted(self.tried[name].items(), key=lambda item: -item[1][0])
-        fine = []
-        for key, (best, noise) in ranked[: use.finer]:
-            if best < ranked[0][1][0] - use.finer_within:
-                break
-            one = self.balances[key]
-            log = one.losses(noise, rotors, self.rows, self.losses, 0.0, use.error)
-            k, e = np.unravel_index(int(np.argmax(log)), log.shape)
-            noise = one.noises(one.residuals(rotors, int(self.rows[k]), float(self.losses[e])))
-            log = one.losses(noise, rotors, self.rows, self.losses, 0.0, use.error)
-            fine.append((log, one, noise))
-        coarse = np.array([log for log, _, _ in fine])
-        over = coarse.max(axis=(0, 2))
-        near = np.flatnonzero(over > over.max() - use.finer_within)
-        # the rows beside those that count, also those that a long flight's spacing left out
-        low, high = self.rows[max(near[0] - 1, 0)], self.rows[min(near[-1] + 1, len(over) - 1)]
-        rows = np.arange(low, high + 1) if high - low < use.places else self.rows[near]
-        logs = np.array(
-            [
-                [one.losses(noise, rotors, rows, self.losses, p, use.error) for p in use.parts]
-                for _, one, noise in fine
-            ]
-        )  # (combinations, P, K, E)
-        top = logs.max()
-        weight = np.exp(logs - top)
-        each = weight.sum(axis=(1, 2, 3))
-        places = len(self.samples.t) * len(use.parts) * len(self.losses)
-        evidence = top + math.log(each.max()) - math.log(places)
-        lag = float(each @ [one.lag for _, one, _ in fine] / each.sum())
-        weight = weight.sum(axis=0).transpose(1, 0, 2).reshape(-1, len(self.losses))
-        starts = self.samples.t[rows][:, None] + STEP * (np.array(use.parts) - 0.5)
-        return float(evidence), starts.ravel(), weight / weight.sum(), lag
-
-    def steps(self) -> float:
-        """Return the evidence of another force and torque that began."""
-        found = -math.inf
-        for key, one in self.balances.items():
-            noise = self.usual[key]
-            for _ in range(2):
-                k = int(np.argmax(one.steps(noise, self.rows)))
-                noise = one.noises(one.step_residuals(int(self.rows[k])))
-            log = one.steps(noise, self.rows)
-            found = max(found, float(logsumexp(log)) - math.log(len(self.rows)))
-        return found
+    def event(self) -> _Event:
+        """Return the likeliest jump."""
+        one = self.tried[self._likeliest()]
+        balance, noise = one.balance, one.noise
+        logs = np.array([balance.steps(noise, self.rows, begin) for begin in self.begins])
+        near = np.arange(max(one.row - 5, self.use.before), min(one.row + 6, self.rows[-1] + 1))
+        fine = np.array([balance.steps(noise, near, begin) for begin in self.begins])
+        parts = np.array([begin.part for begin in self.begins])
+        starts = self.samples.t[near][None] + STEP * (parts[:, None] - 0.5)
+        weights = np.exp(fine - logsumexp(fine))
+        evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
+        places = len(self.begins) * len(self.samples.t)
+        return _Event(
+            balance,
+            evidence - math.log(places),
+            starts.ravel(),
+            weights.ravel(),
+            [balance.losses(noise, rotor, one.row, one.begin) for rotor in range(4)],
+            balance.jumps(noise, one.row, one.begin),
+        )
 
 
-# which rotors lose thrust, by hypothesis
-_LOSERS: dict[str, Array] = {**{str(i + 1): np.eye(4)[i] for i in range(4)}, ALL: np.ones(4)}
-
-
-def _remaining(losses: Array, weight: Array, error: float) -> tuple[float, float, float]:
-    """Return the share of thrust that is left, and the ends of a 95 % interval.
-
-    The thrust that a rotor would have is known to the share ``error`` where it works far from what
-    is usual, and what is lost is seen as a share of that.
-    """
-    mean = float(weight @ losses)
-    width = float(losses[1] - losses[0])
-    variance = float(weight @ np.square(losses - mean)) + width**2 / 12.0 + (error * mean) ** 2
-    reach = 1.96 * math.sqrt(variance)
-    return 1.0 - mean, max(0.0, 1.0 - mean - reach), min(1.0, 1.0 - mean + reach)
+def _remaining(shares: Array, weight: Array) -> tuple[float, float, float]:
+    """Return the share of thrust that is left: mean and the ends of a 95 % interval."""
+    _, low, high = _quantiles(shares, weight, 0.5 * float(shares[1] - shares[0]))
+    return 1.0 - float(weight @ shares), max(0.0, 1.0 - high), min(1.0, 1.0 - low)
 
 
 def _quantiles(values: Array, weight: Array, margin: float) -> tuple[float, float, float]:
     """Return the median and the ends of a 95 % interval, widened by a step of the grid."""
+    order = np.argsort(values, kind="stable")
+    values, weight = values[order], weight[order]
     total = np.cumsum(weight)
     low, middle, high = (
         float(values[min(int(np.searchsorted(total, q)), len(values) - 1)])

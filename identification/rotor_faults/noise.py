@@ -6,6 +6,7 @@ innovations (Willsky and Jones, *A generalized likelihood ratio approach to the 
 estimation of jumps in linear systems*, IEEE Transactions on Automatic Control 21, 1976).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ORDER = 5  # of the autoregression: 0.1 s, and a disturbance's memory in its poles
+ORDER = 10
 SHARES = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of activity against the quiet level, tried in turn
 
 
@@ -69,7 +70,9 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         poles = np.linalg.solve(gram, past.T @ now)
         left = now - past @ poles
         n = len(now)
-        score = -0.5 * n * np.log(left @ left / n) - float(np.log(scale[whole]).sum())
+        score = -0.5 * n * math.log(max(float(left @ left), 1e-300) / n) - float(
+            np.log(scale[whole]).sum()
+        )
         if best is None or score > best[0]:
             weights = np.concatenate([[1.0], -poles])
             best = (score, Noise(scale, weights, whole, float(left @ left / n)))

@@ -5,6 +5,7 @@ them.
 from pathlib import Path
 
 from ...dynamics.vehicle import Vehicle
+from ..logs.flight_log import FlightLog
 from ..logs.readers import px4_channels, px4_ulog
 from ..logs.reading import read_log
 from .channels import Channels, channels_of_log
@@ -18,16 +19,34 @@ def read_channels(
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    if reader in (None, "px4_ulog") and path.name.lower().endswith(px4_ulog.SUFFIXES):
-        streams, notes, motors = px4_channels.read_streams(path)
-        names = tuple(f"PX4 motor {motor}" for motor in motors)
-        channels = Channels(
-            str(path),
-            *streams["gyro"],
-            *streams["accelerometer"],
-            *streams["command"],
-            motor_names=(names[0], names[1], names[2], names[3]),
-        )
-        return channels, notes
+    if reader in (None, "px4_ulog") and _is_ulog(path):
+        return _of_ulog(path)
     log = read_log(path, reader, vehicle)
     return channels_of_log(log), log.notes
+
+
+def channels_of(path: Path, log: FlightLog) -> Channels:
+    """Return the channels of a log that was read from a file: a PX4 log's own rates are in the file
+    alone.
+
+    Raises:
+        InputError: gyro, accelerometer or commands are missing.
+    """
+    return _of_ulog(path)[0] if _is_ulog(path) else channels_of_log(log)
+
+
+def _is_ulog(path: Path) -> bool:
+    return path.name.lower().endswith(px4_ulog.SUFFIXES)
+
+
+def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]]:
+    streams, notes, motors = px4_channels.read_streams(path)
+    first, second, third, fourth = (f"PX4 motor {motor}" for motor in motors)
+    channels = Channels(
+        str(path),
+        *streams["gyro"],
+        *streams["accelerometer"],
+        *streams["command"],
+        motor_names=(first, second, third, fourth),
+    )
+    return channels, notes

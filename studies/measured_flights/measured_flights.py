@@ -381,6 +381,9 @@ def page(result: Mapping[str, Any], folder: str) -> str:
         "",
         *_WARNING,
         "",
+        "Cut propellers, weights and failing motors have a page of their own: [real faults]"
+        "(real-faults.md).",
+        "",
         "## NanoBench",
         "",
         *_nanobench_lines(result["nanobench"], folder),

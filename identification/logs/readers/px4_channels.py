@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ....runtime.errors import InputError
 from .px4_ulog import _inertial, _motor_order, _open, _output_slots, _times
+from .streams import Stream
 
 Array = NDArray[np.float64]
 
@@ -33,12 +34,12 @@ def read_streams(path: Path) -> tuple[dict[str, tuple[Array, Array]], tuple[str,
         found = _inertial(log, field)
         if found is None:
             raise InputError(f"{path}: no sensor_combined; expected gyro and accelerometer in it")
-        streams[name] = (found.t, found.values)
+        streams[name] = _clean(found.t, found.values)
     for fields in log.topics.get("actuator_motors", []):
         names = tuple(f"control[{i}]" for i in range(4))
         control = np.nan_to_num(log.columns("actuator_motors", fields, names), nan=0.0)
         if np.any(control > 0.0):
-            streams["command"] = (_times(fields), np.clip(control, 0.0, 1.0)[:, order])
+            streams["command"] = _clean(_times(fields), np.clip(control, 0.0, 1.0)[:, order])
             return streams, (order_note, "commands: actuator_motors"), [i + 1 for i in order]
     _, slots = _output_slots(log)
     for fields in log.topics.get("actuator_outputs", []):
@@ -49,8 +50,15 @@ def read_streams(path: Path) -> tuple[dict[str, tuple[Array, Array]], tuple[str,
         if outputs.max() > 1.5:
             outputs = (outputs - _LOW) / _SPAN
         t = 1e-6 * np.asarray(fields["timestamp"], dtype=np.float64)
-        streams["command"] = (t, np.maximum(outputs, 0.0)[:, order])
+        streams["command"] = _clean(t, np.maximum(outputs, 0.0)[:, order])
         return streams, (order_note, "commands: actuator_outputs"), [i + 1 for i in order]
     raise InputError(
         f"{path}: no motors: expected actuator_motors or actuator_outputs of four motors that ran"
     )
+
+
+def _clean(t: Array, values: Array) -> tuple[Array, Array]:
+    """Return the samples that are finite and later than every one before them."""
+    finite = np.isfinite(t) & np.isfinite(values).all(axis=1)
+    found, _ = Stream("", t[finite], values[finite]).forward()
+    return found.t, found.values

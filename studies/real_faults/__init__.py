@@ -1,0 +1,1 @@
+"""Real faults: what is found of them on measured flights, and how sure it may be, on simulated."""

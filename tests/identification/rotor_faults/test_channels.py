@@ -1,0 +1,112 @@
+"""The streams on the grid: means are exact, and nothing is read where the model does not hold."""
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import InputError
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.rotor_faults.channels import (
+    STEP,
+    Channels,
+    channels_of_log,
+    sample,
+)
+
+
+def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
+    rng = np.random.default_rng(0)
+    t, u = np.arange(0.0, seconds, 1.0 / rate), np.arange(0.0, seconds, 1.0 / command_rate)
+    streams = {
+        "gyro": 0.01 * rng.standard_normal((len(t), 3)),
+        "accelerometer": np.tile([0.0, 0.0, 9.81], (len(t), 1)),
+        "command": np.full((len(u), 4), 0.4),
+    } | changed
+    return Channels(
+        "hover.csv", t, streams["gyro"], t, streams["accelerometer"], u, streams["command"]
+    )
+
+
+def test_means_over_an_interval_are_those_of_what_is_linear_between_samples():
+    t = np.arange(0.0, 8.0, 0.005)
+    rate = np.column_stack([np.sin(t), np.cos(2.0 * t), 0.3 * t])
+    force = np.column_stack([0.0 * t, 0.0 * t, 9.81 + np.sin(3.0 * t)])
+    samples = sample(hover(gyro=rate, accelerometer=force))
+    low, high = samples.t - 0.5 * STEP, samples.t + 0.5 * STEP
+    expected = (np.sin(high) - np.sin(low)) / STEP
+    np.testing.assert_allclose(samples.angular_acceleration[:, 0], expected, atol=1e-3)
+    mean = 9.81 + (np.cos(3.0 * low) - np.cos(3.0 * high)) / (3.0 * STEP)
+    np.testing.assert_allclose(samples.specific_force, mean, atol=1e-3)
+    assert samples.ended == ""
+    assert samples.t[0] > 1.5  # what may still be taking off is left out
+
+
+@pytest.mark.parametrize(
+    ("bend", "dead", "expected"), [(0.0, 0.0, 1.5), (1.0, 0.0, 2.25), (1.0, 0.5, 4.0)]
+)
+def test_thrust_follows_the_command_by_its_curve(bend, dead, expected):
+    command = np.full((1600, 4), 0.4)
+    command[1200:, 2] = 0.6
+    samples = sample(hover(command=command))
+    thrust = samples.thrust(0.0, bend, dead)
+    np.testing.assert_allclose(thrust[:100], 1.0)
+    np.testing.assert_allclose(thrust[-20:], np.tile([1.0, 1.0, expected, 1.0], (20, 1)))
+    lagged = samples.thrust(0.05, bend, dead)
+    k = np.searchsorted(samples.t, 6.0 + 0.05)
+    assert lagged[k, 2] - 1.0 == pytest.approx((1.0 - np.exp(-1.0)) * (expected - 1.0), rel=0.15)
+
+
+def test_nothing_is_read_behind_a_clipped_gyro_or_an_impact():
+    t = np.arange(0.0, 8.0, 0.005)
+    clipped = np.zeros((len(t), 3))
+    clipped[:, 0] = np.clip(40.0 * (t - 6.0), 0.0, 500.0 * np.pi / 180.0)
+    samples = sample(hover(gyro=clipped))
+    assert samples.ended == "the gyro was at its limit"
+    assert samples.t[-1] == pytest.approx(6.0 + 8.73 / 40.0, abs=0.03)
+    hit = np.tile([0.0, 0.0, 9.81], (len(t), 1))
+    hit[t > 7.0, 1] = 90.0
+    samples = sample(hover(accelerometer=hit))
+    assert samples.ended == "the vehicle hit something"
+    assert samples.t[-1] < 7.0
+    turning = np.zeros((len(t), 3))
+    turning[:, 2] = 2.0  # a steady turn is no clipped gyro
+    assert sample(hover(gyro=turning)).ended == ""
+
+
+def test_commands_are_uncertain_between_their_own_samples_where_these_are_far_apart():
+    rng = np.random.default_rng(1)
+    command = 0.4 + 0.05 * rng.standard_normal((80, 4))
+    between = sample(hover(command_rate=10.0, command=command)).between
+    assert between.max() > 0.03
+    assert not sample(hover()).between.any()
+
+
+def test_a_log_of_the_kits_format_gives_its_channels():
+    channels = hover()
+    n = len(channels.gyro_times)
+    nothing = np.full((n, 4), np.nan)
+    gyro = channels.gyro.copy()
+    gyro[::2] = np.nan
+    log = FlightLog(
+        t=channels.gyro_times,
+        position=nothing[:, :3],
+        quaternion=nothing,
+        rotor_speeds=np.full((n, 4), 400.0),
+        gyro=gyro,
+        accelerometer=channels.accelerometer,
+        name="flight",
+    )
+    found = channels_of_log(log)
+    assert found.thrust_known
+    assert len(found.gyro_times) == n // 2
+    np.testing.assert_allclose(found.command, 160_000.0)
+
+
+def test_what_cannot_show_a_fault_is_refused():
+    with pytest.raises(InputError, match=r"hover\.csv: 0 s in flight; expected at least 3 s"):
+        sample(hover(seconds=1.4))
+    with pytest.raises(InputError, match="fewer than ten samples"):
+        sample(hover(seconds=0.04))
+    t = np.arange(10.0)
+    log = FlightLog(t, np.zeros((10, 3)), np.tile([1.0, 0, 0, 0], (10, 1)), np.ones((10, 4)))
+    with pytest.raises(InputError, match="no gyro or no accelerometer"):
+        channels_of_log(log)

@@ -1,0 +1,111 @@
+"""Rotor faults: simulated flights of another simulator, and measured logs."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.support.data_paths import data_file
+from windwrench.cli import app
+from windwrench.identification.rotor_faults.balance import AT_ONCE, Balance, Begin
+from windwrench.identification.rotor_faults.channels import sample
+from windwrench.identification.rotor_faults.detection import find_fault
+from windwrench.identification.rotor_faults.noise import ORDER, fit_noise
+from windwrench.identification.rotor_faults.words import fault_data, headline
+from windwrench.studies.real_faults.flights import draw_flight
+
+
+def test_the_noise_of_an_autoregression_is_whitened():
+    rng = np.random.default_rng(0)
+    drive = rng.standard_normal(4000)
+    value = np.zeros(4000)
+    for i in range(2, 4000):
+        value[i] = 0.6 * value[i - 1] + 0.3 * value[i - 2] + drive[i]
+    follows = np.ones(4000, dtype=bool)
+    follows[0] = False
+    noise = fit_noise(value, np.zeros(4000), follows)
+    np.testing.assert_allclose(noise.filter[1:3], [-0.6, -0.3], atol=0.06)
+    white = noise.whiten(value)
+    np.testing.assert_allclose(white, drive[noise.whole], atol=0.5)
+    assert noise.variance == pytest.approx(1.0, abs=0.06)
+    assert not noise.whole[:ORDER].any()
+
+
+def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
+    """The sums that run backwards, against one regression a time."""
+    samples = sample(draw_flight(1, "fault").channels)
+    balance = Balance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
+    noise = balance.noises(balance.plain_residuals())
+    rows = np.array([60, 150, len(samples.t) - 6])
+    for begin in (AT_ONCE, Begin(0.25, True)):
+        found = balance.steps(noise, rows, begin)
+        for row, value in zip(rows, found, strict=True):
+            share = balance._share(int(row), begin)
+            expected = 0.0
+            for c, one in enumerate(noise):
+                columns = [balance.moment[:, c], share, balance.others[c]]
+                x = one.whiten(np.column_stack(columns))
+                plain = np.delete(x, 1, axis=1)
+                y = one.whiten(balance.y[:, c])
+                left, before = (
+                    float(np.sum(np.square(y - m @ np.linalg.lstsq(m, y, rcond=None)[0])))
+                    for m in (x, plain)
+                )
+                width = np.log(max((before - left) / one.variance, 1.0))
+                price = 0.5 * max(1.0 + width, np.log(len(y)))
+                expected += -0.5 * len(y) * np.log(left / len(y)) - one.log_scale - price
+            assert value == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_failing_rotor_is_named_with_its_time():
+    drawn = draw_flight(1001, "fault")
+    found = find_fault(drawn.channels)
+    assert found.likeliest == str(drawn.rotor)
+    assert found.sure
+    assert found.onset[1] <= drawn.onset <= found.onset[2]
+    assert found.onset[2] - found.onset[1] < 0.1
+    assert 0.5 * drawn.loss < 1.0 - found.remaining[0] < 1.5 * drawn.loss
+    said = headline(found)
+    assert f"Rotor {drawn.rotor} (" in said
+    assert fault_data(found)["rotor"] == drawn.rotor
+    assert json.dumps(fault_data(found))
+
+
+def test_a_flight_without_a_fault_names_no_rotor():
+    found = find_fault(draw_flight(0, "none").channels)
+    assert found.likeliest == "nothing"
+    assert headline(found).startswith("No rotor lost thrust")
+    assert fault_data(found)["rotor"] is None
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+
+
+def test_the_command_says_what_does_not_go_together(tmp_path):
+    log = tmp_path / "a.csv"
+    log.write_text("t\n0\n", encoding="utf-8")
+    words = ["diagnose", str(log), "--rotor-faults", "--against", str(log)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code != 0
+    assert "--rotor-faults" in str(result.exception)
+
+
+@pytest.mark.measured
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "commanded"),
+    [("TestCase_3_1000000002.ulg", 35.365), ("TestCase_3_2000000002.ulg", 54.416)],
+)
+def test_a_px4_log_names_the_motor_and_the_time(name, commanded, tmp_path):
+    """The fault's command is logged at 10 Hz: it came up to 0.1 s before what is logged."""
+    log = data_file(f"motor_faults/{name}")
+    result = CliRunner().invoke(
+        app, ["diagnose", str(log), "--rotor-faults", "--out", str(tmp_path)]
+    )
+    assert result.exit_code == 0, result.output
+    (found,) = json.loads((tmp_path / "rotor_faults.json").read_text(encoding="utf-8"))
+    assert found["found"] == "rotor 4"
+    assert found["motor"] == "PX4 motor 1"
+    assert found["sure"]
+    assert commanded - 0.12 < found["onset_s"] < commanded
+    assert found["remaining_ci95"][0] <= 0.2 <= found["remaining_ci95"][1]
+    assert (tmp_path / "rotor_faults.png").stat().st_size > 5000
