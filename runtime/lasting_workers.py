@@ -145,7 +145,7 @@ def crew_of(
         InputError: as ``runtime.cluster.connected``.
     """
     if cluster is None:
-        yield (lambda: _Process(work)), jobs or len(os.sched_getaffinity(0))
+        yield (lambda: _Process(work)), jobs or os.cpu_count() or 1
         return
     with connected(cluster) as ray:
         cores = int(ray.cluster_resources().get("CPU", 1))
@@ -185,7 +185,13 @@ def each(
     def begin(task: _Task[T]) -> None:
         worker = idle.pop() if idle else crew()
         task.attempts += 1
-        busy[worker.start(task.task)] = _Busy(worker, task)
+        try:
+            future = worker.start(task.task)
+        except BrokenProcessPool:  # it died while it had nothing to do
+            worker.end()
+            worker = crew()
+            future = worker.start(task.task)
+        busy[future] = _Busy(worker, task)
 
     try:
         while True:

@@ -67,7 +67,7 @@ class Trend:
     adjusted_p: float | None = None
     drifts: bool = False
     tentative: bool = False  # too few flights that are sure of the name
-    # fitted at the first and the last of the flights
+    # fitted at the first and the last flight that names the effect
     ends: tuple[float, float] | None = None
 
 
@@ -162,6 +162,10 @@ def trend_of(series: Series, among: int) -> Trend:
     design = np.column_stack([np.ones(len(y)), x - middle])
     line, covariance, _ = meta_regression(design, y, s, False)
     slope, error = float(line[1]), math.sqrt(covariance[1, 1])
+
+    def at(flight: int) -> float:
+        return float(line[0]) + slope * (flight - middle)
+
     half = float(t.ppf(0.975, len(y) - 2) * error)
     return Trend(
         series,
@@ -173,7 +177,7 @@ def trend_of(series: Series, among: int) -> Trend:
         (slope - half, slope + half),
         float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0,
         tentative=tentative,
-        ends=(float(line[0] + slope * (x[0] - middle)), float(line[0] + slope * (x[-1] - middle))),
+        ends=(at(series.flights[0]), at(series.flights[-1])),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import __version__
 from ...runtime.whole_files import replaced
-from ..report.words import MISSING, coefficient_meaning, in_words, rounded, with_std
+from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def _count(number: int, word: str) -> str:
 
 def change_in_words(one: Trend | Appearance) -> str:
     """Return a sentence on what changed."""
-    p = f"adjusted p = {rounded(one.adjusted_p or 0.0, 2)}" if one.adjusted_p else "adjusted p = 0"
+    p = f"adjusted p = {short(one.adjusted_p)}"
     if isinstance(one, Appearance):
         when = "later" if one.later else "earlier"
         return (

@@ -139,12 +139,8 @@ def _cost(result: Mapping[str, Any]) -> str:
     }
     mean = float(cpu.mean())
     many = [float(_TARGET * x / 3600.0) for x in (mean, *_interval(cpu))]
+    steady = [cost["cpu_s"] for cost in result["costs"] if "steady" in cost["id"]][-3:]
     warm = (start["start"] + start["first"]).mean() / start["second"].mean()
-    constant = (
-        "as far as this shows, the cost is linear"
-        if abs(100 * line.slope) <= half
-        else "not the same for all logs"
-    )
     further = (
         f"\n\nExtrapolated, not measured: {_TARGET} such flights take {many[0]:.2f} hours of one "
         f"core ({many[1]:.2f} to {many[2]:.2f}, by the interval of the mean alone)."
@@ -163,8 +159,14 @@ def _cost(result: Mapping[str, Any]) -> str:
             ),
             rows,
         )
-        + f"\n\nFrom log to log the time changed by {100 * line.slope:+.2f} s a 100 logs (95 %: "
-        f"{100 * line.slope - half:+.2f} to {100 * line.slope + half:+.2f}): {constant}. A process "
+        + "\n\nThe machine did other work beside it, whose load grew meanwhile, and a core that is "
+        "shared needs more time for the same. From log to log the time changed by "
+        f"{100 * line.slope:+.2f} s a 100 logs (95 %: {100 * line.slope - half:+.2f} to "
+        f"{100 * line.slope + half:+.2f}). Whether that is the worker's age: the last three "
+        f"flights of vehicles that lack nothing took {np.mean(steady):.2f} s each in the worker "
+        "that had done all before; such a flight took "
+        f"{start['second'].mean():.2f} s in processes that were "
+        f"started for it right after (each its second diagnosis).\n\nA process "
         f"that starts for one log pays {start['start'].mean():.1f} s to start and import, and "
         f"{start['first'].mean():.1f} s for its first diagnosis, which loads compiled code; the "
         f"same diagnosis again takes {start['second'].mean():.1f} s ({len(result['starts'])} "

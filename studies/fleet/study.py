@@ -74,7 +74,11 @@ def run(
         fleet = fleet_of(rows(done, outcomes))
         command = f"python -m studies.fleet --flights {count}"
         write_fleet(fleet, lambda: rows(done, outcomes), folder, command)
-        costs = [outcomes[one.key].get("cost") for one in done]
+        costs = [
+            {**cost, "id": one.log.id}
+            for one in done
+            if (cost := outcomes[one.key].get("cost")) is not None
+        ]
     return {
         "version": __version__,
         "commit": made,
@@ -86,7 +90,7 @@ def run(
             {"log": row["log"], "kind": row["kind"], "reason": _last(row["reason"])}
             for row in _refused(done, folder)
         ],
-        "costs": [cost for cost in costs if cost],
+        "costs": costs,
         "starts": starts(steady),
         "parent": _parent(folder / MEMORY),
         "truth": _truth(fleet, count),
@@ -156,7 +160,7 @@ def _truth(fleet: Fleet, count: int) -> list[dict[str, Any]]:
                 "id": individual,
                 "kind": flight.kind,
                 "diagnosed": counts["diagnosed"],
-                "drifts": drifting(flight.kind),
+                "drifts": list(drifting(flight.kind) or ()),
                 "true_per_flight": true_change(flight.model, flight.kind),
                 "trends": told,
                 "came_or_went": came,

@@ -1,5 +1,6 @@
 """Workers that stay warm: one that dies or takes too long costs its own task alone."""
 
+import multiprocessing
 import os
 import signal
 import time
@@ -85,6 +86,22 @@ def test_tasks_are_taken_when_a_worker_is_free():
         next(running)
         assert taken == [0]
         running.close()
+
+
+def test_a_worker_that_dies_while_it_waits_is_replaced():
+    """As where another program took the memory."""
+    with crew_of(work, 1) as (crew, count):
+        running = each([0, 1], crew, count, 60.0)
+        _, (process, _) = next(running)
+        os.kill(process, signal.SIGKILL)
+        deadline = time.monotonic() + 20.0
+        while lives(process) and time.monotonic() < deadline:
+            multiprocessing.active_children()  # takes note of those that are gone
+            time.sleep(0.05)
+        time.sleep(0.5)  # for the pool to see it
+        (task, (other, _)) = next(running)
+        assert (task, other == process) == (1, False)
+        assert list(running) == []
 
 
 def test_what_the_work_raises_is_raised():

@@ -103,6 +103,8 @@ def test_flights_that_are_sure_count_alone_where_they_are_enough():
     assert sure.mean == pytest.approx(1.0, abs=0.02)
     assert not sure.tentative
     assert trend_of(series(y, s, [True] * 4 + [False] * 2), 6).tentative
+    line = trend_of(series([1.0, 2.0, 3.0, 4.0, 5.0, 9.0], s, [True] * 5 + [False]), 6)
+    assert line.ends == pytest.approx((1.0, 6.0))  # at the first and last flight that names it
 
 
 def test_an_effect_that_comes_is_told_though_its_coefficient_is_constant():

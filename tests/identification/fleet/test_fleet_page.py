@@ -89,7 +89,7 @@ def test_the_first_sentence_says_what_changed():
     (change,) = changes(fleet)
     assert re.fullmatch(
         r"alpha: dm of mass went from 0\.01\d* to 0\.1\d* kg over 10 flights, 0\.0[\d.]+ "
-        r"\[0\.0[\d.]+, 0\.0[\d.]+\] a flight \(adjusted p = [\d.]+\)\.",
+        r"\[0\.0[\d.]+, 0\.0[\d.]+\] a flight \(adjusted p = [\d.]+e−\d+\)\.",
         change_in_words(change),
     )
     calm = fleet_of(FLIGHTS[10:14])
