@@ -59,6 +59,7 @@ FILTER = np.dtype(
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made
         ("patience", "f8"),  # s
         ("prior", "f8", (N,)),  # variances of what nothing is known of
+        ("reason", "f8", (6,)),  # squares of torque and force beyond which none is believed
         ("lost", "f8", (N,)),  # variances beyond which what is not measured is given up
         ("push", "f8", (2,)),  # rad/s2 and m/s2, of the hardest push
         ("response", "f8"),  # s
@@ -138,6 +139,7 @@ def filter_record(
     f = record[0]
     built = load_model(f, vehicle)
     f["last_speeds"] = built.hover_rate
+    f["kappa"], f["period"] = tuning.kappa, period
     load_recovery(f, built, gate, Recovery() if recovery is None else recovery)
     for name, deviation in (
         ("motor_torque", tuning.motor_torque_noise),
@@ -152,7 +154,6 @@ def filter_record(
         np.square(tuning.gyro_noise),
         np.square(tuning.accelerometer_noise),
     )
-    f["kappa"], f["period"] = tuning.kappa, period
     return record
 
 

@@ -4,6 +4,16 @@ The paper: "mass and inertia may be included in the state". A vehicle that picks
 its weight and its response to thrust; the wrench filter calls the first an external force and knows
 nothing of the second. At hover a changed mass and a vertical force are the same thing: which of the
 two takes it is decided by how fast either may walk.
+
+A mass is learned from how the vehicle answers to its thrust, and it stays; so does what a fault
+puts into it, long after the force has come right again. The mass therefore checks what it learns.
+Of a filter whose model holds, the sum of the mass's corrections over some time has just the
+variance by which they claim to make the mass better known. Corrections that add up to far more than
+that come from something that no mass explains: rotor speeds that lie, a push, a load that is picked
+up. Then, after an innovation that a sound filter never sees, and where the filter restarts because
+it was contradicted, the mass is known no better than at the start, jointly with the force: the
+acceleration, which is what was seen, stays as it was (at hover, the sum of vertical force and
+weight), and the standard deviations of both say that they are not told apart.
 """
 
 import math
@@ -19,10 +29,26 @@ from .covariance import add_noise, root_of, subtract_squares, whiten
 from .error_state import displace, error_from, fold, symmetrise
 from .estimate import NIS, RESTARTED, Array, WrenchEstimate
 from .filter_record import N, drive, propagate
-from .recovery import Recovery, after_prediction
+from .recovery import (
+    NOISE,
+    Recovery,
+    after_prediction,
+    largest_nis,
+    lost_attitude,
+    lost_position,
+)
 from .sample import check_sample, copy_estimate, empty_estimate, undo_sensing
 from .tuning import UKFTuning
-from .ukf import NOISE, WrenchUKF, believable, innovate
+from .ukf import WrenchUKF, believable, innovate
+
+# standard deviations by which the corrections of ``Recovery.patience`` may miss what they claim. A
+# sound filter misses more in one of 400 such times; of these only those count that moved the mass
+# by as large a part of its standard deviation as this is the inverse of, and there are none but
+# while a mass is new
+_DOUBTED = 3.0
+# of an innovation: what a sound filter sees less often teaches nothing of the mass
+_UNLIKELY = 1e-6
+_FORCE, _FORCE_ROW = NIS - 3, N - 3  # where the force begins in state and covariance
 
 
 @compiled
@@ -33,12 +59,17 @@ def _step_with_mass(
     dt: float,
     voltage: float,
     mass_walk: float,
-    first_variance: float,
+    first: Array,
+    unlikely: Array,
     P: Array,
+    learned: Array,
     out: Array,
 ) -> int:
-    """Predict over ``dt`` s and correct with what is usable of ``z`` (11,); ``P`` (19, 19) has the
-    mass (kg) last.
+    """Predict over ``dt`` s and correct with what is usable of ``z`` (11,).
+
+    ``first`` (2,) is the mass at the start, kg, and its variance. ``P`` (19, 19) has the mass last.
+    ``learned`` (2,) is the sum of the mass's late corrections, kg, and its variance; ``unlikely``
+    (2,) is the NIS of three numbers and of six from which on an innovation is doubted.
     """
     f = record[0]
     usable: int = check_sample(f, z, parts)
@@ -46,9 +77,20 @@ def _step_with_mass(
         return usable
     sample = undo_sensing(f, z, usable, dt)
     if dt > 0.0:
+        restarts = f.restarts
         _predict(f, sample[0:4], dt, voltage, mass_walk, P)
+        faded = math.exp(-dt / f.patience)
+        learned[0] *= faded
+        learned[1] *= faded * faded
+        if f.restarts > restarts:  # numbers overflowed, perhaps those of the mass as well
+            f.body.mass = first[0]
+            for i in range(N + 1):
+                P[i, N], P[N, i] = 0.0, 0.0
+            P[N, N] = first[1]
+            _take_over(f, P)
+            _forget_mass(f, P, first, learned)
     if usable > 0:
-        _correct(f, sample, usable, P, first_variance)
+        _correct(f, sample, usable, P, first, unlikely, learned)
     copy_estimate(f, out)
     return usable
 
@@ -110,19 +152,24 @@ def _predict(
 
 
 @compiled
-def _correct(f: Record, z: Array, parts: int, P: Array, first_variance: float) -> None:
+def _correct(
+    f: Record, z: Array, parts: int, P: Array, first: Array, unlikely: Array, learned: Array
+) -> None:
     """(29)-(37): the correction of ``ukf``, with a nineteenth row."""
     position, quaternion = z[4:7], z[7:11]
     with_position, with_attitude = parts & 1 != 0, parts & 2 != 0
+    lost = (with_position and lost_position(f)) or (with_attitude and lost_attitude(f))
     nis = innovate(f, position, quaternion, with_position, with_attitude)
     taken = believable(f, position, quaternion, with_position, with_attitude, nis)
     if not taken:
         _take_over(f, P)
         if f.status == RESTARTED:
-            # what contradicts the estimate of the wrench does so of the mass, which stood for it
             for i in range(N):
                 P[i, N], P[N, i] = 0.0, 0.0
-            P[N, N] = max(P[N, N], first_variance)
+            # a gap says nothing of the mass; what contradicts the estimate of the wrench does so of
+            # the mass, which stood for it
+            if not lost:
+                _forget_mass(f, P, first, learned)
         return
     # the whitened cross covariance of the mass, as ``whiten`` has it of the others
     w = np.empty(6)
@@ -132,13 +179,15 @@ def _correct(f: Record, z: Array, parts: int, P: Array, first_variance: float) -
             w[i] -= f.L[i, k] * w[k]
         w[i] *= f.scales[i]
     whiten(f)
-    step = 0.0
+    step, gained = 0.0, 0.0
     for k in range(6):
         step += w[k] * f.innovation[k]
+        gained += w[k] * w[k]
         for i in range(N):
             P[i, N] -= w[k] * f.W[k, i]
             P[N, i] = P[i, N]
-        P[N, N] -= w[k] * w[k]
+    # never below what rounding leaves of it
+    P[N, N] = max(P[N, N] - gained, 1e-14 * P[N, N])
     subtract_squares(f)
     for i in range(N):
         for j in range(N):
@@ -147,6 +196,50 @@ def _correct(f: Record, z: Array, parts: int, P: Array, first_variance: float) -
         f.centre[i] = f.x[i]
     fold(f, f.centre, f.mean)
     f.body.mass = max(f.body.mass + step, 1e-6)
+    learned[0] += step
+    learned[1] += gained
+    moved, doubted = learned[0] * learned[0], _DOUBTED * _DOUBTED
+    contradicted = moved > doubted * learned[1] and doubted * moved > P[N, N]
+    if contradicted or nis > unlikely[1 if with_position and with_attitude else 0]:
+        _forget_mass(f, P, first, learned)
+
+
+@compiled
+def _forget_mass(f: Record, P: Array, first: Array, learned: Array) -> None:
+    """Know the mass no better than at the start, and the force no better than the mass.
+
+    What is known of everything else, given the mass, stays; so does the acceleration, which is
+    what was observed: at hover the sum of vertical force and weight.
+    """
+    variance = P[N, N]
+    for i in range(N):
+        for j in range(N):
+            P[i, j] -= P[i, N] * P[j, N] / variance
+    for i in range(N):
+        P[i, N], P[N, i] = 0.0, 0.0
+    # force per mass at one acceleration: that and gravity
+    share = np.zeros(3)
+    if f.status == RESTARTED:  # an acceleration that was contradicted
+        share[2] = f.body.gravity
+    else:
+        for i in range(3):
+            thrust = f.centre_rotation[i, 2] * f.rotor_wrench[0]
+            share[i] = (thrust + f.effect_wrench[i] + f.x[_FORCE + i]) / f.body.mass
+    for i in range(3):
+        force = f.x[_FORCE + i] + share[i] * (first[0] - f.body.mass)
+        if f.status == RESTARTED and force * force > f.reason[3 + i]:
+            force = 0.0  # as ``recovery`` has it of wrenches that are out of all reason
+        f.x[_FORCE + i] = force
+        P[_FORCE_ROW + i, N] = share[i] * first[1]
+        P[N, _FORCE_ROW + i] = P[_FORCE_ROW + i, N]
+        for j in range(3):
+            P[_FORCE_ROW + i, _FORCE_ROW + j] += share[i] * share[j] * first[1]
+    f.body.mass = first[0]
+    P[N, N] = first[1]
+    for i in range(N):
+        for j in range(N):
+            f.P[i, j] = P[i, j]
+    learned[0], learned[1] = 0.0, 0.0
 
 
 @compiled
@@ -159,8 +252,7 @@ def _take_over(f: Record, P: Array) -> None:
         for j in range(N):
             alone = alone and (i == j or f.P[i, j] == 0.0)
         # scaled as a whole: the mass keeps its correlation
-        scale = 0.0 if alone else math.sqrt(f.P[i, i] / P[i, i])
-        P[i, N] *= scale
+        P[i, N] = 0.0 if alone else P[i, N] * math.sqrt(f.P[i, i] / P[i, i])
         P[N, i] = P[i, N]
     for i in range(N):
         for j in range(N):
@@ -177,7 +269,7 @@ class WrenchMassUKF(WrenchUKF):
             what is vertical.
         period: time between steps, s.
         gate: as for ``WrenchUKF``.
-        recovery: as for ``WrenchUKF``; a restart keeps the mass.
+        recovery: as for ``WrenchUKF``; after a gap the mass is still known.
         mass_std: of the first guess, kg; default: a tenth of it.
         mass_walk: change of the mass in a step, standard deviation, kg.
 
@@ -203,6 +295,9 @@ class WrenchMassUKF(WrenchUKF):
                 raise InputError(f"WrenchMassUKF: {name} must be positive, in kg, got {value!r}")
         self._mass_walk = mass_walk
         self._P = np.zeros((N + 1, N + 1))
+        self._first = np.array([self._first_mass, self._mass_std**2])
+        self._unlikely = np.array([largest_nis(1.0 - _UNLIKELY, dof) for dof in (3, 6)])
+        self._learned = np.zeros(2)
 
     def reset(
         self,
@@ -219,12 +314,17 @@ class WrenchMassUKF(WrenchUKF):
         self._P[:] = 0.0
         self._P[:N, :N] = self.record[0]["P"]
         self._P[N, N] = self._mass_std**2
+        self._learned[:] = 0.0
         self.record[0]["body"]["mass"] = self._first_mass
 
     @property
     def memory(self) -> tuple[NDArray[np.uint8], ...]:
         """All that a step changes, as bytes that can be copied and put back."""
-        return (*super().memory, self._P.reshape(-1).view(np.uint8))
+        return (
+            *super().memory,
+            self._P.reshape(-1).view(np.uint8),
+            self._learned.view(np.uint8),
+        )
 
     @property
     def mass(self) -> float:
@@ -255,8 +355,10 @@ class WrenchMassUKF(WrenchUKF):
                 dt,
                 volts,
                 self._mass_walk,
-                self._mass_std**2,
+                self._first,
+                self._unlikely,
                 self._P,
+                self._learned,
                 out,
             )
             < 0

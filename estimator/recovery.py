@@ -15,9 +15,9 @@ by what each of them breaks:
   that the filter restarts there; without a gate it does so at once.
 
 A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates
-and are doubted, their variances widened: a wrench that the model took for impossible explains a
-contradiction as well as a pose that jumped, and after a gap nothing says that the wrench of before
-still acts.
+and are doubted, their variances widened so far that there may be no wrench at all: a wrench that
+the model took for impossible explains a contradiction as well as a pose that jumped, and after a
+gap nothing says that the wrench of before still acts.
 """
 
 import math
@@ -34,6 +34,7 @@ from .error_state import LARGEST_MRP_VARIANCE
 from .estimate import COASTING, REJECTED, RESTARTED, Array
 
 N = 18  # error state (rho, omega, x, v, torque, force)
+NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 _LOST = 0.9  # of a prior's variance: known no better than that
 
 
@@ -56,7 +57,8 @@ class Recovery:
     # predicted: where its thrust points has become a guess, and sigma points reach half a turn
     attitude_std: float = 0.4
     # m/s and rad/s: standard deviations of velocity and angular velocity of a vehicle of which only
-    # the pose is known; a small multirotor in brisk flight
+    # the pose is known; a small multirotor in brisk flight. At long periods the latter, and that of
+    # the torque, are less: no more than attitudes a period apart can tell
     velocity_std: float = 5.0
     angular_velocity_std: float = 10.0
     # m: standard deviation beyond which a position means nothing; a flight hall
@@ -79,18 +81,29 @@ class Recovery:
 
 
 def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: Recovery) -> None:
-    """Write a filter's gate (a probability or None) and recovery into its record."""
+    """Write a filter's gate (a probability or None) and recovery into its record, which has its
+    period and kappa.
+    """
     weight = vehicle.weight
     record["gated"] = gate is not None
     # largest NIS that is taken in unseen, of three numbers and of six
     jump_at = given.jump_at**2
-    record["alarm"] = jump_at if gate is None else [_quantile(gate, dof) for dof in (3, 6)]
+    record["alarm"] = jump_at if gate is None else [largest_nis(gate, dof) for dof in (3, 6)]
     record["restart_at"] = given.restart_at**2
     record["patience"] = given.patience
     torque = given.torque_std * weight * vehicle.arm_l
+    # attitudes do not tell a rate from one that is faster by a turn from each to the next: sigma
+    # points that lie further out than half a turn would find such rates, and torques that make them
+    period, inertia = float(record["period"]), float(np.linalg.eigvalsh(vehicle.inertia)[0])
+    rate = math.pi / (math.sqrt(N + NOISE + float(record["kappa"])) * period)
+    told = rate / period * inertia
+    record["reason"] = np.repeat(
+        np.square((min(4.0 * torque, told), 4.0 * given.force_std * weight)), 3
+    )
+    torque = min(torque, told)
     deviations = (
         math.sqrt(LARGEST_MRP_VARIANCE),
-        given.angular_velocity_std,
+        min(given.angular_velocity_std, rate),
         given.position_std,
         given.velocity_std,
         torque,
@@ -103,13 +116,13 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     # accelerations of a push of two weights, and of the same about the arm
     push = 2.0 * weight
     record["push"] = (
-        push * vehicle.arm_l / float(np.linalg.eigvalsh(vehicle.inertia)[0]),
+        push * vehicle.arm_l / inertia,
         push / vehicle.mass,
     )
     record["response"] = given.response
 
 
-def _quantile(probability: float, dof: int) -> float:
+def largest_nis(probability: float, dof: int) -> float:
     """Return the NIS below which a consistent measurement of ``dof`` numbers lies."""
     from scipy.stats import chi2
 
@@ -233,7 +246,8 @@ def judge(
         f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
     )
     jumped = choose(alarming, choose(pushed, 0.0, 1.0), 0.0)
-    contradicted = alarming & (pushed & (nis > f.restart_at))
+    aliased = with_attitude & turns_between(f)
+    contradicted = alarming & (pushed & ((nis > f.restart_at) | aliased))
     refused = choose(lost, 0.0, jumped)
     if f.gated > 0:
         agreed = continues(
@@ -267,6 +281,20 @@ def judge(
     remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)
     plain: bool = taken & (choose(restarted, 1.0, refused) < 0.5)
     return plain
+
+
+@compiled
+def turns_between(f: Record) -> bool:
+    """Return whether the vehicle is estimated to turn by more than half a turn from one measured
+    attitude to the next: as many attitudes are explained by one turn more in each, or one less.
+
+    Where attitudes contradict the filter as well, it has taken a vehicle that was elsewhere for one
+    that spins, and a torque for what keeps it spinning up.
+    """
+    x, age = f.x, f.gap[1]
+    rate = x[10] * x[10] + x[11] * x[11] + x[12] * x[12]
+    more: bool = rate * age * age > math.pi * math.pi
+    return more
 
 
 @compiled
@@ -317,6 +345,7 @@ def _restart(
     """Start pose and twist anew at what was measured, and doubt the wrench."""
     x, P, prior = f.x, f.P, f.prior
     restarted = at_position | at_attitude
+    aliased = at_attitude & turns_between(f)
     _forget(f, at_position, at_attitude)
     for i in range(4):
         x[3 + i] = choose(at_attitude, quaternion[i], x[3 + i])
@@ -328,15 +357,19 @@ def _restart(
         for k in (7 + i, 10 + i):
             row = k + 2 if k < 10 else k - 7
             mad = (at_position if k < 10 else at_attitude) & (x[k] * x[k] > 4.0 * prior[row])
+            if k >= 10:
+                mad = mad | aliased
             x[k] = choose(mad, 0.0, x[k])
     for i in range(12, N):
         for j in range(12):
             P[i, j] = choose(restarted, 0.0, P[i, j])
             P[j, i] = choose(restarted, 0.0, P[j, i])
-        P[i, i] = choose(restarted & (P[i, i] < prior[i]), prior[i], P[i, i])
-        # a wrench that itself is out of all reason was made by what is now forgotten
-        mad = restarted & (x[1 + i] * x[1 + i] > 16.0 * prior[i])
+        # a wrench that itself is out of all reason was made by what is now forgotten; any other may
+        # have been
+        mad = restarted & (x[1 + i] * x[1 + i] > f.reason[i - 12])
         x[1 + i] = choose(mad, 0.0, x[1 + i])
+        doubt = prior[i] + x[1 + i] * x[1 + i]
+        P[i, i] = choose(restarted & (P[i, i] < doubt), doubt, P[i, i])
 
 
 @compiled

@@ -56,12 +56,10 @@ from .error_state import displace, error_from, fold, symmetrise
 from .estimate import ESTIMATE_SIZE, NIS, STATE_SIZE, TRACKING, Array, WrenchEstimate
 from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
-from .recovery import Recovery, after_prediction, judge, remember
+from .recovery import NOISE, Recovery, after_prediction, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
 from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
-
-NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 
 
 @compiled

@@ -45,6 +45,7 @@ _SHARED = (
     "restart_at",
     "patience",
     "prior",
+    "reason",
     "lost",
     "push",
     "response",

@@ -57,6 +57,69 @@ def test_a_reset_forgets_the_mass():
     assert ukf.mass == VEHICLE.mass
 
 
+def hover_under(ukf, forces):
+    """Hover at rest, the rotors balancing vertical forces (K,) in N that come on the way; check
+    that mass and force stay right to three of their own deviations where there is no transient.
+    """
+    ukf.reset([0, 0, 1], [1, 0, 0, 0])
+    since = 0
+    for k, force in enumerate(forces):
+        since = 0 if k == 0 or force != forces[k - 1] else since + 1
+        speed = VEHICLE.hover_rate * np.sqrt(1.0 - force / VEHICLE.weight)
+        e = ukf.step(np.full(4, speed), [0, 0, 1], [1, 0, 0, 0])
+        assert abs(ukf.mass - VEHICLE.mass) < 3.0 * ukf.mass_std
+        if since > 400:  # two rise times
+            assert abs(e.force[2] - force) < 3.0 * np.sqrt(e.covariance[17, 17])
+        whole = ukf.memory[1].view(np.float64).reshape(19, 19)
+        scale = 1.0 / np.sqrt(np.diag(whole))
+        assert np.linalg.eigvalsh(whole * scale[:, None] * scale)[0] > 0.0
+    return e
+
+
+def test_a_force_that_comes_at_once_is_not_taken_for_mass_with_certainty():
+    """With a small vertical walk the filter must explain a step by mass; it then doubts both."""
+    tuning = UKFTuning(force_walk=(3.26e-3, 3.26e-3, 1e-4))
+    ukf = WrenchMassUKF(VEHICLE, tuning, PERIOD)
+    hover_under(ukf, [0.0] * 1000 + [-0.52] * 1000)
+    assert ukf.mass_std > 0.03
+
+
+def test_rotor_speeds_that_lie_leave_no_mass_behind():
+    ukf = WrenchMassUKF(VEHICLE, UKFTuning(), PERIOD)
+    # rotors that read zero, and rotors that read twice their speed, of a vehicle at rest
+    hover_under(ukf, [0.0] * 400 + [VEHICLE.weight] * 200 + [0.0] * 600 + [-4.0] * 200)
+    ukf.reset([0, 0, 1], [1, 0, 0, 0])
+    for fault in ([0.0] * 4, [700.0, 0.0, 900.0, 100.0]):
+        for k in range(800):
+            speeds = fault if k < 150 else np.full(4, VEHICLE.hover_rate)
+            e = ukf.step(speeds, [0, 0, 1], [1, 0, 0, 0])
+        assert abs(ukf.mass - VEHICLE.mass) < 3.0 * ukf.mass_std
+        assert np.all(np.abs(e.force) < 3.0 * np.sqrt(np.diag(e.covariance)[15:18]))
+
+
+def test_a_gap_says_nothing_of_the_mass():
+    flight = yawing_flight(
+        replace(VEHICLE, mass=VEHICLE.mass + 0.03), 1600, seed=3, force=(0, 0, 0), torque=(0, 0, 0)
+    )
+    ukf = WrenchMassUKF(VEHICLE, UKFTuning(), PERIOD)
+    ukf.reset(
+        flight["position"][0],
+        flight["quaternion"][0],
+        velocity=flight["velocity"][0],
+        angular_velocity=flight["omega"][0],
+    )
+    for k in range(1, 1600):
+        ukf.step(flight["rotors"][k], flight["position"][k], flight["quaternion"][k])
+    known = ukf.mass_std
+    assert known < 0.02
+    for _ in range(4000):
+        ukf.step(flight["rotors"][0])
+    e = ukf.step(flight["rotors"][0], [0, 0, 1], [1, 0, 0, 0])
+    assert e.status == "restarted"
+    # it has walked for 20 s
+    assert ukf.mass_std == pytest.approx(np.hypot(known, 1e-5 * np.sqrt(4000)), rel=0.05)
+
+
 @pytest.mark.parametrize("arguments", [{"mass_std": 0.0}, {"mass_walk": -1.0}])
 def test_bad_settings_are_named(arguments):
     with pytest.raises(InputError, match=next(iter(arguments))):

@@ -544,5 +544,6 @@ def test_a_log_names_its_vehicle(tmp_path):
 def test_restarts_are_one_note():
     log = flight(seconds=20.0)
     series = estimate_log(without_pose(log, log.t % 5.0 < 2.2), VEHICLE)
-    (note,) = [note for note in series.notes if "restarts" in note]
-    assert "3 such gaps" in note
+    (note,) = [note for note in series.notes if "restarted" in note]
+    assert "t = 7.2 s, 3 times in all" in note
+    assert series.restarts == 3
