@@ -12,6 +12,7 @@ from windwrench.studies.fast_flight.study import (
     FULL,
     filter_study,
     force_study,
+    pose_study,
     read_flights,
 )
 
@@ -43,6 +44,7 @@ def main() -> None:
         }
         found = {
             "force": force,
+            "pose": pose_study(flights, vehicle),
             "filter": [] if given.no_filter else filter_study(flights, vehicle, fits, report),
         }
         given.out.mkdir(parents=True, exist_ok=True)

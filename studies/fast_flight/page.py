@@ -26,6 +26,7 @@ def tables(found: Mapping[str, Any]) -> str:
     parts.append(_coefficients(force))
     if found["filter"]:
         parts.append(_filter(found["filter"]))
+    parts.append(_pose(found["pose"]))
     return "\n\n".join(parts)
 
 
@@ -126,6 +127,15 @@ def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
         ["flight", "vehicle", "estimate", "N, total force (95 %)", "published estimator", "ratio"],
         rows,
     )
+
+
+def _pose(flights: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        [row["flight"], f"{row['seconds']:.0f}", f"{row['fastest']:.1f}", f"{row['rmse']:.3f}"]
+        for row in flights
+    ]
+    head = ["flight", "s", "fastest, m/s", "force against that of its own pose, N"]
+    return _table(head, rows)
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

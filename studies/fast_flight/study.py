@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.identification.motion.residual import acting_wrench
-from windwrench.identification.motion.smoothing import CUTOFFS, low_pass
+from windwrench.identification.motion.smoothing import CUTOFFS, derivative, low_pass
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
 from windwrench.runtime.errors import InputError
 
@@ -238,6 +238,28 @@ def filter_study(
                         ),
                     }
                 )
+    return rows
+
+
+def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, Any]]:
+    """Return by how much each flight's force differs from that of its own pose, differentiated
+    twice: what no estimate from the pose can lower. With it how long and fast it flew.
+    """
+    gravity = np.array([0.0, 0.0, vehicle.gravity])
+    rows = []
+    for flight in flights:
+        s = flight.signals
+        acceleration = derivative(s.position, s.period, 2)
+        needed = vehicle.mass * np.einsum("nji,nj->ni", s.rotation, acceleration + gravity)
+        inside = slice(round(0.25 / s.period), -round(0.25 / s.period))
+        rows.append(
+            {
+                "flight": flight.name,
+                "seconds": float(s.t[-1] - s.t[0]),
+                "fastest": float(np.linalg.norm(s.velocity, axis=1).max()),
+                "rmse": rmse((flight.force - needed)[inside]),
+            }
+        )
     return rows
 
 

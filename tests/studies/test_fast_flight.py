@@ -17,6 +17,7 @@ from windwrench.studies.fast_flight.study import (
     MODELS,
     force_study,
     interval,
+    pose_study,
     read_flights,
     rmse,
 )
@@ -156,7 +157,12 @@ def test_the_page_holds_a_figure_for_each_flight_and_model(tmp_path, monkeypatch
         read_flight(write_racer(tmp_path / f"flight_{name}.csv", k), VEHICLE)
         for k, name in enumerate("ce")
     ]
-    found = {"force": force_study(flights, VEHICLE, lambda text: None), "filter": []}
+    found = {
+        "force": force_study(flights, VEHICLE, lambda text: None),
+        "pose": pose_study(flights, VEHICLE),
+        "filter": [],
+    }
+    assert found["pose"][0]["seconds"] == pytest.approx(16.0, abs=0.01)
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\n{END}\nafter\n")
     text = write_tables(found, page)
