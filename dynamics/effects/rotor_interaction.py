@@ -1,10 +1,11 @@
-"""Rotor interaction: rotors that lead into the air lift more, at the same rotor speed, than those
-that follow in their wake; the thrust of all grows by what the followers must turn faster.
+"""Rotor interaction: in edgewise flight rotors that follow fly in the wake of those that lead.
 
-With u = R'(v - wind) the airspeed in body axes, and rotor i in the direction (e_ix, e_iy) from the
-geometric centre: F = -sum_i W_i (kx e_ix u_x + ky e_iy u_y) along body z, at the geometric centre.
-In level flight the loop slows the leading rotors until the moments balance; where all rotors turn
-alike the force is zero. The moment that goes with it is that of ``flapping_moment``.
+With u = R'(v - wind) the airspeed in body axes and e_i the direction of rotor i from the geometric
+centre, p_i = e_ix u_x + e_iy u_y says how fast rotor i leads (> 0) or follows (< 0), and
+F = -sum_i W_i (kp p_i + kw max(-p_i, 0)) along body z, at the geometric centre. ``kw`` is thrust
+that the followers lose in the wake. ``kp`` is what all gain where the leading ones need to turn
+slower than the others for the moments to balance; where all rotors turn alike its part is zero. The
+moment that goes with it is that of ``flapping_moment``.
 """
 
 import math
@@ -24,7 +25,8 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         y = vehicle[ROTOR_POSITION + 3 * i + 1]
         arm = math.sqrt(x * x + y * y)
         if arm > 0.0:
-            force -= state[ROTOR_SPEED + i] * (c[0] * x * ux + c[1] * y * uy) / arm
+            leads = (x * ux + y * uy) / arm
+            force -= state[ROTOR_SPEED + i] * (c[0] * leads + c[1] * max(-leads, 0.0))
     add_force_at(vehicle, state, wrench, 0.0, 0.0, 0.0, 0.0, 0.0, force)
 
 
@@ -32,8 +34,8 @@ EFFECT = Effect(
     name="rotor_interaction",
     kind="wrench",
     coefficients=(
-        Coefficient("kx", "N/(rad/s m/s)", (1.4e-3, 2e-5), "per rotor, for motion along body x"),
-        Coefficient("ky", "N/(rad/s m/s)", (1.4e-3, 2e-5), "per rotor, for motion along body y"),
+        Coefficient("kp", "N/(rad/s m/s)", (1.4e-3, 2e-5), "per rotor, by how fast it leads"),
+        Coefficient("kw", "N/(rad/s m/s)", (4e-4, 6e-6), "per rotor, lost where it follows"),
     ),
     source="form: rotors in tandem, Leishman, Principles of Helicopter Aerodynamics, 2006, and "
     "moments in trim; size: least squares on a 0.77 kg racer at 3 to 14 m/s (docs/fast-flight.md), "

@@ -261,20 +261,22 @@ def test_inflow_drag_acts_at_each_rotor_and_grows_with_its_inflow(com):
 
 
 def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart():
-    kx, ky, wind = 5e-4, -2e-4, np.array([0.5, 2.0, -0.3])
+    kp, kw, wind = 5e-4, 2e-4, np.array([0.5, 2.0, -0.3])
     u = R.T @ (V - wind)
     direction = VEHICLE.positions[:, :2] / np.linalg.norm(
         VEHICLE.positions[:, :2], axis=1, keepdims=True
     )
-    lift = -np.sum(W[:, None] * direction * np.array([kx, ky]) * u[:2])
-    force, torque = wrench(setting("rotor_interaction", kx=kx, ky=ky), wind=wind)
+    leads = direction @ u[:2]
+    assert leads.min() < 0.0 < leads.max()
+    lift = -W @ (kp * leads + kw * np.clip(-leads, 0.0, None))
+    force, torque = wrench(setting("rotor_interaction", kp=kp, kw=kw), wind=wind)
     np.testing.assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-12)
     np.testing.assert_allclose(torque, 0.0, atol=1e-15)
 
 
-def test_rotor_interaction_of_rotors_that_turn_alike_is_nothing():
+def test_rotors_that_turn_alike_lose_in_the_wake_alone():
     alike = np.full(4, 400.0)
-    bundle = compile_effects(setting("rotor_interaction", kx=5e-4, ky=5e-4))
+    bundle = compile_effects(setting("rotor_interaction", kp=5e-4))
     out = np.full(6, np.nan)
     effect_wrench(
         bundle.wrench_models,

@@ -1,0 +1,172 @@
+"""Coefficients of named effects, by least squares on the measured force of some flights.
+
+The model is the one that plant, filter and diagnosis run. What is compared passes one low-pass:
+the force of these logs was filtered before it was written, by how much is fitted with the
+coefficients. A nuisance is fitted with them: a share of thrust of each flight's own, of mean zero
+over the flights. A flight that the fit did not see is predicted without one.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from windwrench.dynamics import EffectSetting, Vehicle
+from windwrench.dynamics.effects import get
+from windwrench.identification.motion.residual import acting_wrench, model_wrench
+from windwrench.identification.motion.smoothing import low_pass
+
+from .flights import Flight
+
+Array = NDArray[np.float64]
+Coefficient = tuple[str, str]  # effect and coefficient
+Rows = tuple[Flight, slice]
+
+CUTOFFS_HZ = (5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 15.0)
+_ITERATIONS = 3  # of Gauss-Newton: the models are nearly linear in their coefficients
+_STEP = 0.1  # of a coefficient's typical size, for the derivative by it
+
+
+@dataclass(frozen=True)
+class ForceModel:
+    """Effects with fitted coefficients, and the low-pass of the force that was logged."""
+
+    coefficients: Mapping[Coefficient, float]
+    cutoff_hz: float | None  # None: none
+    own_scales: Mapping[str, float]  # by flight: share of thrust that it alone has
+
+    def vehicle(self, declared: Vehicle) -> Vehicle:
+        """Return the vehicle with these effects."""
+        return _with(declared, self.coefficients)
+
+    def force(self, flight: Flight, declared: Vehicle) -> Array:
+        """Return the force (n, 3) N in body axes that the model says acts at the pose's point."""
+        out = _filtered(flight, _force(flight, self.vehicle(declared)), self.cutoff_hz)
+        return out + self.own_scales.get(flight.name, 0.0) * self.thrust(flight, declared)
+
+    def thrust(self, flight: Flight, declared: Vehicle) -> Array:
+        """Return the part (n, 3) N of it that the rotors' thrust has."""
+        return _filtered(flight, _thrust(flight, self.vehicle(declared)), self.cutoff_hz)
+
+
+def _with(declared: Vehicle, coefficients: Mapping[Coefficient, float]) -> Vehicle:
+    effects: dict[str, dict[str, float]] = {}
+    for (effect, name), value in coefficients.items():
+        effects.setdefault(effect, {})[name] = value
+    return declared.with_effects(*(EffectSetting(k, v) for k, v in effects.items()))
+
+
+def _force(flight: Flight, vehicle: Vehicle) -> Array:
+    acting, _ = acting_wrench(flight.signals, vehicle)
+    return np.einsum("nji,nj->ni", flight.signals.rotation, acting[:, :3])
+
+
+def _thrust(flight: Flight, vehicle: Vehicle) -> Array:
+    out = np.zeros_like(flight.force)
+    out[:, 2] = model_wrench(flight.signals, vehicle)[0][:, 0]
+    return out
+
+
+def _filtered(flight: Flight, x: Array, cutoff_hz: float | None) -> Array:
+    return x if cutoff_hz is None else low_pass(x, cutoff_hz, flight.signals.period)
+
+
+class Regression:
+    """Fits of the same coefficients to different rows of the same flights.
+
+    All are solved with the model's derivatives at one point, the least squares of all flights.
+    """
+
+    def __init__(
+        self, flights: Sequence[Flight], declared: Vehicle, coefficients: Sequence[Coefficient]
+    ) -> None:
+        self.declared, self.coefficients = declared, tuple(coefficients)
+        known = [
+            next(c for c in get(effect).coefficients if c.name == name)
+            for effect, name in coefficients
+        ]
+        self._scale = np.array([c.typical[0] or 1.0 for c in known])
+        self._low = np.array([c.minimum for c in known]) / self._scale
+        self._high = np.array([c.maximum for c in known]) / self._scale
+        self._low, self._high = (
+            np.minimum(self._low, self._high),
+            np.maximum(self._low, self._high),
+        )
+        self._models: dict[str, tuple[Array, Array]] = {}
+        self._smoothed: dict[tuple[str, float | None], tuple[Array, Array]] = {}
+        self._at = np.clip(np.zeros(len(known)), self._low, self._high)
+        for _ in range(_ITERATIONS):
+            self._models = {flight.name: self._linear(flight) for flight in flights}
+            self._smoothed = {}
+            self._at = self._solve([(flight, slice(None)) for flight in flights], None)[0]
+
+    def _force_at(self, flight: Flight, at: Array) -> Array:
+        values = (float(x) for x in at * self._scale)
+        coefficients = dict(zip(self.coefficients, values, strict=True))
+        return _force(flight, _with(self.declared, coefficients))
+
+    def _linear(self, flight: Flight) -> tuple[Array, Array]:
+        """Return the force (n, 3) that is left if all coefficients were zero, and its derivative
+        (n, 3, p + 1) by each over its typical size and by the share of thrust.
+        """
+        base = self._force_at(flight, self._at)
+        slopes = np.empty((*base.shape, len(self._at) + 1))
+        for k in range(len(self._at)):
+            moved = self._at.copy()
+            moved[k] += _STEP if moved[k] + _STEP <= self._high[k] else -_STEP
+            slopes[..., k] = (self._force_at(flight, moved) - base) / (moved[k] - self._at[k])
+        slopes[..., -1] = _thrust(flight, self.declared)
+        return flight.force - base + slopes[..., :-1] @ self._at, slopes
+
+    def _filtered(self, flight: Flight, cutoff_hz: float | None) -> tuple[Array, Array]:
+        key = flight.name, cutoff_hz
+        if key not in self._smoothed:
+            left, slopes = self._models[flight.name]
+            smooth = _filtered(flight, left - flight.force, cutoff_hz) + flight.force
+            self._smoothed[key] = smooth, _filtered(flight, slopes, cutoff_hz)
+        return self._smoothed[key]
+
+    def _solve(
+        self, rows: Sequence[Rows], cutoff_hz: float | None
+    ) -> tuple[Array, dict[str, float], float]:
+        """Return coefficients over their typical sizes, each flight's own share of thrust, and the
+        mean square of what is left.
+        """
+        names = list(dict.fromkeys(flight.name for flight, _ in rows))
+        p, own = len(self._at), len(names) - 1
+        G, h, whole, count = np.zeros((p + own, p + own)), np.zeros(p + own), 0.0, 0
+        for flight, part in rows:
+            left, slopes = self._filtered(flight, cutoff_hz)
+            A = slopes[part].reshape(-1, p + 1)
+            y = left[part].ravel()
+            place = names.index(flight.name)
+            # shares of mean zero: the last flight's is minus the sum of the others'
+            signs = -np.ones(own) if place == own else np.eye(own)[place]
+            A = np.hstack([A[:, :p], A[:, p:] * signs])
+            G, h, whole, count = G + A.T @ A, h + A.T @ y, whole + float(y @ y), count + len(y)
+        size = np.sqrt(np.diag(G)) + 1e-12
+        root = np.linalg.cholesky(G / np.outer(size, size) + 1e-10 * np.eye(p + own))
+        free = np.full(own, np.inf)
+        found = lsq_linear(
+            root.T,
+            np.linalg.solve(root, h / size),
+            (
+                np.concatenate([self._low, -free]) * size,
+                np.concatenate([self._high, free]) * size,
+            ),
+        )
+        x = np.asarray(found.x) / size
+        shares = [*x[p:], -float(np.sum(x[p:]))]
+        loss = (whole - 2.0 * float(x @ h) + float(x @ G @ x)) / count
+        return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, loss
+
+    def fit(
+        self, rows: Sequence[Rows], cutoffs_hz: Sequence[float | None] = CUTOFFS_HZ
+    ) -> ForceModel:
+        """Return the model that leaves least of the force at some rows of some flights."""
+        solved = [(*self._solve(rows, cutoff), cutoff) for cutoff in cutoffs_hz]
+        at, shares, _, cutoff_hz = min(solved, key=lambda found: found[2])
+        values = (float(x) for x in at * self._scale)
+        return ForceModel(dict(zip(self.coefficients, values, strict=True)), cutoff_hz, shares)

@@ -1,0 +1,162 @@
+"""The tables of the study, and the page that holds them between two marks."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.whole_files import replaced
+
+from .study import FULL, MODELS, PUBLISHED
+
+BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+_WAYS = {
+    "others": "all other flights",
+    "one": "{}",
+    "blocks": "all but the block",
+    "all": "all, this one too",
+}
+
+
+def tables(found: Mapping[str, Any]) -> str:
+    """Return the tables of a study's result as Markdown: the losses first."""
+    force = found["force"]
+    flights = list(dict.fromkeys(row["flight"] for row in force))
+    parts = [_losses(force, flights), _full(force), _nested(force, flights)]
+    parts.append(_coefficients(force))
+    if found["filter"]:
+        parts.append(_filter(found["filter"]))
+    parts.append(_pose(found["pose"]))
+    return "\n\n".join(parts)
+
+
+def _published(flight: str, which: int) -> float | None:
+    figures = PUBLISHED.get(flight[-1])
+    return None if figures is None else figures[which]
+
+
+def _figure(row: Mapping[str, Any]) -> str:
+    low, high = row["interval"]
+    return f"{row['rmse']:.3f} ({low:.3f}–{high:.3f})"
+
+
+def _losses(force: Sequence[Mapping[str, Any]], flights: Sequence[str]) -> str:
+    """Say on which flights which way of fitting stays above the published network."""
+    lines = []
+    for row in force:
+        network = _published(row["flight"], 0)
+        if row["model"] == FULL and row["way"] != "all" and network and row["rmse"] >= network:
+            on = _WAYS[row["way"]].format(row["fitted_on"])
+            lines.append(
+                f"* {row['flight']}, fitted on {on}: {row['rmse']:.3f} N, network {network:.3f}"
+            )
+    return f"Above the published network: {len(lines)}." + "".join(f"\n{line}" for line in lines)
+
+
+def _full(force: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for row in (row for row in force if row["model"] == FULL):
+        network = _published(row["flight"], 0)
+        rows.append(
+            [
+                row["flight"],
+                _WAYS[row["way"]].format(row["fitted_on"]),
+                _figure(row),
+                f"{row['rmse_below_5_hz']:.3f}",
+                f"{row['rmse_own_scale']:.3f}" if "rmse_own_scale" in row else "–",
+                "–" if network is None else f"{network:.3f}",
+            ]
+        )
+    head = [
+        "flight",
+        "fitted on",
+        "N, full rate (95 %)",
+        "below 5 Hz",
+        "with the thrust scale of its first second",
+        "network",
+    ]
+    return _table(head, rows)
+
+
+def _nested(force: Sequence[Mapping[str, Any]], flights: Sequence[str]) -> str:
+    rows = []
+    for label, (coefficients, filtered) in MODELS.items():
+        cells = [label, str(len(coefficients) + filtered)]
+        for flight in flights:
+            by_way = {
+                row["way"]: row
+                for row in force
+                if row["model"] == label and row["flight"] == flight
+            }
+            cells.append(" / ".join(f"{by_way[way]['rmse']:.3f}" for way in ("others", "blocks")))
+        rows.append(cells)
+    measured = {row["flight"]: row for row in force if row["way"] == "published"}
+    if measured:
+        rows.append(
+            [
+                "published network",
+                "–",
+                *(_figure(measured[f]) if f in measured else "–" for f in flights),
+            ]
+        )
+    return _table(["model", "coefficients", *flights], rows)
+
+
+def _coefficients(force: Sequence[Mapping[str, Any]]) -> str:
+    row = next(row for row in force if row["model"] == FULL and row["way"] == "all")
+    rows = [[name, f"{value:.3g}"] for name, value in row["coefficients"].items()]
+    rows.append(["low-pass of the logged force", f"{row['cutoff_hz']:g} Hz"])
+    return _table(["coefficient, fitted on all flights", "value"], rows)
+
+
+def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
+    rows = []
+    for row in filtered:
+        published = _published(row["flight"], 1)
+        rows.append(
+            [
+                row["flight"],
+                row["vehicle"],
+                "smoothed" if row["smooth"] else "the past alone",
+                _figure(row),
+                "–" if published is None else f"{published:.3f}",
+                "–" if published is None else f"{row['rmse'] / published:.2f}",
+            ]
+        )
+    return _table(
+        ["flight", "vehicle", "estimate", "N, total force (95 %)", "published estimator", "ratio"],
+        rows,
+    )
+
+
+def _pose(flights: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        [row["flight"], f"{row['seconds']:.0f}", f"{row['fastest']:.1f}", f"{row['rmse']:.3f}"]
+        for row in flights
+    ]
+    head = ["flight", "s", "fastest, m/s", "force against that of its own pose, N"]
+    return _table(head, rows)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def write_tables(found: Mapping[str, Any], page: Path | None) -> str:
+    """Return the tables, and put them between the marks of a page.
+
+    Raises:
+        InputError: the page lacks the marks.
+    """
+    text = tables(found)
+    if page is not None:
+        old = page.read_text(encoding="utf-8")
+        if old.count(BEGIN) != 1 or old.count(END) != 1:
+            raise InputError(f"{page}: expected one line {BEGIN} and one {END}")
+        before, rest = old.split(BEGIN)
+        with replaced(page) as partial:
+            partial.write_text(
+                f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8"
+            )
+    return text

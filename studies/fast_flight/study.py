@@ -1,0 +1,280 @@
+"""Fits of named effects to the racer's force, tested on what they never saw, beside the published
+figures; and the wrench filter on the same flights.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
+from windwrench.identification.motion.residual import acting_wrench
+from windwrench.identification.motion.smoothing import CUTOFFS, derivative, low_pass
+from windwrench.identification.wrench_series import estimate_log, tune_to_log
+from windwrench.runtime.errors import InputError
+
+from .flights import Flight, read_flight
+from .force_fit import Coefficient, ForceModel, Regression, Rows
+
+Array = NDArray[np.float64]
+
+# published vector RMSE of force, N, at 400 Hz, by the last letter of a flight's name: the network
+# and the estimator
+PUBLISHED: Mapping[str, tuple[float, float]] = {
+    "c": (0.250, 0.079),
+    "d": (0.517, 0.204),
+    "e": (0.659, 0.366),
+    "g": (0.345, 0.068),
+    "h": (0.423, 0.099),
+    "j": (1.197, 0.339),
+}
+
+
+def _of(effect: str, *names: str) -> tuple[Coefficient, ...]:
+    return tuple((effect, name) for name in names)
+
+
+_SLOW = (
+    *_of("thrust_scale", "s"),
+    *_of("inflow_thrust", "kz"),
+    *_of("translational_lift", "kh"),
+    *_of("rotor_drag", "kdx", "kdy"),
+    *_of("body_drag", "cx", "cy", "cz"),
+)
+_PLACE = (*_of("com_offset", "cx", "cy", "cz"), *_of("ground_effect", "rho"))
+_FAST = (*_of("rotor_interaction", "kp", "kw"), *_of("inflow_drag", "kl"))
+# nested models: what each adds, and whether the force's own low-pass is part of it
+MODELS: Mapping[str, tuple[tuple[Coefficient, ...], bool]] = {
+    "thrust alone": (_of("thrust_scale", "s"), False),
+    "and drag, inflow and lift": (_SLOW, False),
+    "and the log's low-pass": (_SLOW, True),
+    "and centre of mass and ground": ((*_SLOW, *_PLACE), True),
+    "and the effects of fast flight": ((*_SLOW, *_PLACE, *_FAST), True),
+}
+FULL = "and the effects of fast flight"
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """How flights are divided, and how sure a figure is."""
+
+    blocks: int = 5  # of a flight, each tested on a fit without it
+    resample: float = 2.0  # s, of the blocks of the bootstrap: longer than the residual remembers
+    draws: int = 2000
+    hover: float = 1.0  # s at a flight's start, for a thrust scale of its own
+    settled: float = 1.0  # s after the filter's start that do not count
+
+
+SETTINGS = StudySettings()
+
+
+def read_flights(folder: Path) -> tuple[list[Flight], Vehicle]:
+    """Return the flights ``flight_*.csv*`` of a folder and the vehicle of its ``vehicle.yaml``.
+
+    The floor is put at 0 m where the vehicle states none: the flights land there.
+
+    Raises:
+        InputError: fewer than two flights, or a file that is not what it should be.
+    """
+    paths = sorted(folder.glob("flight_*.csv*"))
+    if len(paths) < 2:
+        raise InputError(f"{folder}: expected at least two files flight_*.csv, found {len(paths)}")
+    vehicle = load_vehicle(folder / "vehicle.yaml")
+    if not np.isfinite(vehicle.floor_z):
+        vehicle = replace(vehicle, floor_z=0.0)
+    return [read_flight(path, vehicle) for path in paths], vehicle
+
+
+def rmse(residual: Array) -> float:
+    """Return the root of the mean squared length of a residual (n, 3)."""
+    return float(np.sqrt(np.mean(np.sum(np.square(residual), axis=1))))
+
+
+def interval(residual: Array, period: float, rng: np.random.Generator) -> tuple[float, float]:
+    """Return the 95 % interval of ``rmse`` by a bootstrap over blocks."""
+    length = max(1, round(SETTINGS.resample / period))
+    squares = np.sum(np.square(residual), axis=1)
+    parts = np.array_split(squares, max(2, len(squares) // length))
+    means = np.array([part.mean() for part in parts])
+    drawn = means[rng.integers(len(means), size=(SETTINGS.draws, len(means)))].mean(axis=1)
+    low, high = np.quantile(np.sqrt(drawn), [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _whole(flights: Sequence[Flight]) -> list[Rows]:
+    return [(flight, slice(None)) for flight in flights]
+
+
+def own_scale(flight: Flight, predicted: Array, thrust: Array) -> float:
+    """Return by which share more thrust a flight's first second shows than a model says."""
+    first = flight.signals.t < flight.signals.t[0] + SETTINGS.hover
+    missing = float(np.mean(flight.force[first, 2] - predicted[first, 2]))
+    return missing / float(np.mean(thrust[first, 2]))
+
+
+def force_study(
+    flights: Sequence[Flight], vehicle: Vehicle, report: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """Return one row a model, test flight and way of fitting: its residual force and what it found.
+
+    Ways: ``others``, fitted on all other flights; ``one``, on each other flight alone; ``blocks``,
+    on all other flights and the other blocks of the same one; ``all``, on every flight, the tested
+    one among them.
+    """
+    rows: list[dict[str, Any]] = []
+    for label, (coefficients, filtered) in MODELS.items():
+        report(f"fitting: {label}")
+        regression = Regression(flights, vehicle, coefficients)
+
+        def fit(
+            parts: Sequence[Rows], of: Regression = regression, smoothed: bool = filtered
+        ) -> ForceModel:
+            return of.fit(parts) if smoothed else of.fit(parts, (None,))
+
+        everything = fit(_whole(flights))
+        for test in flights:
+            others = [flight for flight in flights if flight is not test]
+            ways: list[tuple[str, str, ForceModel]] = [
+                ("all", "", everything),
+                ("others", "", fit(_whole(others))),
+            ]
+            if label == FULL and len(others) > 1:
+                ways += [("one", other.name, fit(_whole([other]))) for other in others]
+            for way, on, model in ways:
+                predicted = model.force(test, vehicle)
+                thrust = model.thrust(test, vehicle)
+                scale = own_scale(test, predicted, thrust)
+                rows.append(_row(label, test, way, on, test.force - predicted, model, scale))
+                rows[-1]["rmse_own_scale"] = rmse(test.force - predicted - scale * thrust)
+            rows.append(_row(label, test, "blocks", "", _blocks(test, others, fit, vehicle), None))
+    for flight in flights:
+        if flight.network is not None:
+            residual = flight.force - flight.network
+            rows.append(_row("published network", flight, "published", "", residual, None))
+    return rows
+
+
+def _blocks(
+    test: Flight,
+    others: Sequence[Flight],
+    fit: Callable[[Sequence[Rows]], ForceModel],
+    vehicle: Vehicle,
+) -> Array:
+    """Return the residual (n, 3) of a flight whose blocks were each left out of the fit."""
+    out = np.empty_like(test.force)
+    edges = np.linspace(0, len(out), SETTINGS.blocks + 1).astype(int)
+    for first, last in pairwise(edges):
+        kept: list[Rows] = [(test, slice(0, first)), (test, slice(last, None))]
+        model = fit([*_whole(others), *(part for part in kept if part[1] != slice(0, 0))])
+        out[first:last] = (test.force - model.force(test, vehicle))[first:last]
+    return out
+
+
+def _row(
+    label: str,
+    test: Flight,
+    way: str,
+    on: str,
+    residual: Array,
+    model: ForceModel | None,
+    scale: float | None = None,
+) -> dict[str, Any]:
+    period = test.signals.period
+    slow = low_pass(residual, CUTOFFS.residual_hz, period)
+    return {
+        "model": label,
+        "flight": test.name,
+        "way": way,
+        "fitted_on": on,
+        "samples": len(residual),
+        "rmse": rmse(residual),
+        "interval": interval(residual, period, np.random.default_rng(0)),
+        "rmse_below_5_hz": rmse(slow),
+        "axes": [float(x) for x in np.sqrt(np.mean(np.square(residual), axis=0))],
+        "own_scale": scale,
+        "cutoff_hz": None if model is None else model.cutoff_hz,
+        "coefficients": {}
+        if model is None
+        else {f"{e}.{n}": value for (e, n), value in model.coefficients.items()},
+    }
+
+
+def filter_study(
+    flights: Sequence[Flight],
+    vehicle: Vehicle,
+    fits: Mapping[str, Mapping[str, float]],
+    report: Callable[[str], None],
+) -> list[dict[str, Any]]:
+    """Return the error of the filter's total force on each flight: with the declared vehicle and
+    with the effects fitted on the other flights, of the past alone and smoothed.
+
+    Total force is what rotors and declared effects give plus the estimated external force. The
+    filter sees pose and rotor speeds alone: the accelerometer is what it is compared with.
+    """
+    rows = []
+    for flight in flights:
+        log = replace(flight.log, accelerometer=None, gyro=None)
+        for label, known in (("declared vehicle", vehicle), ("with named effects", None)):
+            flown = known or _with_fit(vehicle, fits[flight.name])
+            report(f"filtering: {flight.name}, {label}")
+            tuning = tune_to_log(log, flown).tuning
+            for smooth in (False, True):
+                series = estimate_log(log, flown, tuning, smooth=smooth)
+                total = _total(flight, flown, series.force)
+                kept = flight.signals.t >= flight.signals.t[0] + SETTINGS.settled
+                residual = (total - flight.force)[kept]
+                rows.append(
+                    {
+                        "flight": flight.name,
+                        "vehicle": label,
+                        "smooth": smooth,
+                        "rmse": rmse(residual),
+                        "interval": interval(
+                            residual, flight.signals.period, np.random.default_rng(0)
+                        ),
+                    }
+                )
+    return rows
+
+
+def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, Any]]:
+    """Return by how much each flight's force differs from that of its own pose, differentiated
+    twice: what no estimate from the pose can lower. With it how long and fast it flew.
+    """
+    gravity = np.array([0.0, 0.0, vehicle.gravity])
+    rows = []
+    for flight in flights:
+        s = flight.signals
+        acceleration = derivative(s.position, s.period, 2)
+        needed = vehicle.mass * np.einsum("nji,nj->ni", s.rotation, acceleration + gravity)
+        inside = slice(round(0.25 / s.period), -round(0.25 / s.period))
+        rows.append(
+            {
+                "flight": flight.name,
+                "seconds": float(s.t[-1] - s.t[0]),
+                "fastest": float(np.linalg.norm(s.velocity, axis=1).max()),
+                "rmse": rmse((flight.force - needed)[inside]),
+            }
+        )
+    return rows
+
+
+def _total(flight: Flight, vehicle: Vehicle, external: Array) -> Array:
+    """Return rotors, declared effects and an external force (n, 3) N, world, in body axes, as the
+    force at the pose's point, that of the accelerometer.
+    """
+    acting, _ = acting_wrench(flight.signals, vehicle)
+    total: Array = np.einsum("nji,nj->ni", flight.signals.rotation, acting[:, :3] + external)
+    return total
+
+
+def _with_fit(vehicle: Vehicle, coefficients: Mapping[str, float]) -> Vehicle:
+    effects: dict[str, dict[str, float]] = {}
+    for key, value in coefficients.items():
+        effect, name = key.split(".")
+        effects.setdefault(effect, {})[name] = value
+    return vehicle.with_effects(*(EffectSetting(k, v) for k, v in effects.items()))
