@@ -32,6 +32,7 @@ class NamedEffect:
     evidence: Mapping[
         str, float
     ]  # e.g. share of the residual on held-out blocks that it alone explains
+    channels: tuple[str, ...] = ()  # of the logs, that carried the finding
 
 
 @dataclass(frozen=True)
@@ -158,3 +159,5 @@ class Diagnosis:
     # whether the logs' noise was filtered before they were written (or is not white for another
     # reason): then the floor is a lower bound
     floor_is_bound: bool = False
+    # effects that these logs cannot show because the pose is missing, or too slow, beside the IMU
+    needs_pose: tuple[str, ...] = ()

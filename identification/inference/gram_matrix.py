@@ -24,6 +24,7 @@ from .regression import (
     range_of,
     typical_size,
 )
+from .sensor_bias import flight_and_axis, is_bias
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -179,6 +180,10 @@ def priors_and_ranges(
             for c in columns
         ]
     )
+    for i, column in enumerate(columns):
+        if is_bias(column):
+            flight, axis = flight_and_axis(column[1])
+            size[i] = flights.bias_std(flight)[axis] / GRAM.prior_std
     value = np.array(
         [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
     )
