@@ -319,7 +319,7 @@ def fuse(
     turns, ways, moves = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
     _integrate(gyro, force, dt, stride, turns, ways, moves)
     times = t[0] + T * np.arange(count + 1)
-    rates, forces = gyro[::stride], force[::stride]
+    rates, forces = (np.ascontiguousarray(x[::stride]) for x in (gyro, force))
     rotation, heading_std = _first_guess(times, rates, forces, gravity, noise, positions, attitudes)
     linear = np.zeros((count + 1, 12))
     if positions is not None:

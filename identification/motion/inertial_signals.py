@@ -37,6 +37,8 @@ class InertialSettings:
     least_position_std: float = 0.0005
     first_attitude_std: float = 0.01
     least_attitude_std: float = 0.001
+    # standard deviations from which a position or an attitude is a leap and is left out
+    outlier: float = 10.0
     drift_time: float = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
 
 
@@ -214,8 +216,11 @@ def _fused(
     if positions is None:
         return fused
     at = np.column_stack([np.interp(positions.t, fused.t, x) for x in fused.position.T])
-    found = 1.3 * _robust(positions.values - at)  # a smoother leaves less than the noise
-    positions = replace(positions, std=max(found, INERTIAL_SIGNALS.least_position_std))
+    off = positions.values - at
+    found = 1.3 * _robust(off)  # a smoother leaves less than the noise
+    std = max(found, INERTIAL_SIGNALS.least_position_std)
+    near = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
+    positions = Readings(positions.t[near], positions.values[near], std)
     if attitudes is not None:
         near = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
         still = np.abs(fused.t[near] - attitudes.t) < 0.004
