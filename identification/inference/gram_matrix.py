@@ -24,7 +24,7 @@ from .regression import (
     range_of,
     typical_size,
 )
-from .sensor_bias import flight_and_axis, is_bias
+from .sensor_bias import BIAS, flight_and_axis, is_bias
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -189,7 +189,10 @@ def priors_and_ranges(
     )
     low, high = np.empty(len(columns)), np.empty(len(columns))
     for i, c in enumerate(columns):
-        if not c[0]:
+        if is_bias(c):
+            high[i] = BIAS.most_in_std * GRAM.prior_std * size[i]
+            low[i] = -high[i]
+        elif not c[0]:
             low[i], high[i] = range_of(c, flights.filtered)
         elif c[1].startswith(MOMENT_PREFIX):
             low[i], high[i] = -np.inf, np.inf

@@ -302,7 +302,7 @@ class Flights:
             quietly = {e for e, share in shares.items() if share > _most_noise_share(e)}
             noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
             noisy._columns, noisy._drift = {}, np.random.default_rng(1)
-            loud = noisy.columns({}, smooth)
+            loud = {c: self._in_own_axes(x, noisy) for c, x in noisy.columns({}, smooth).items()}
             shares = self._noise_shares(quiet, loud, own, weight)
             self.without_trace = frozenset(e for e, share in shares.items() if not share < np.inf)
         not_identifiable = {e for e, share in shares.items() if share > _most_noise_share(e)}
@@ -340,6 +340,22 @@ class Flights:
             )
         return out
 
+    def _in_own_axes(self, x: Array, noisy: "Flights") -> Array:
+        """Return a column (rows, 6) of a copy whose fusion errs otherwise, its force turned from
+        that copy's attitude to this one's.
+
+        An attitude that is wrong turns needed and modelled force alike: only what acts in other
+        axes than the body's changes with it.
+        """
+        pairs = zip(self.pieces({}), noisy.pieces({}), strict=True)
+        turn = np.concatenate(
+            [
+                np.einsum("nij,nkj->nik", a.signals.rotation[a.rows], b.signals.rotation[b.rows])
+                for a, b in pairs
+            ]
+        )
+        return np.column_stack([np.einsum("nij,nj->ni", turn, x[:, :3]), x[:, 3:]])
+
     def _lost_in_drift(self, noisy: "Flights", weight: Array) -> frozenset[str]:
         """Return which nonlinear effects change by more than a share of themselves where the fusion
         of the IMU errs otherwise.
@@ -353,7 +369,7 @@ class Flights:
                 }
             }
             own = self.residual(setting) - self.residual({})
-            other = noisy.residual(setting) - noisy.residual({})
+            other = self._in_own_axes(noisy.residual(setting) - noisy.residual({}), noisy)
             noise, whole = (
                 float(weight @ np.mean(np.square(x), axis=0)) for x in (other - own, own)
             )

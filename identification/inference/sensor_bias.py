@@ -20,6 +20,9 @@ class BiasSettings:
 
     # m/s2, over which derivatives are taken, and beyond which no MEMS sensor is off
     step: float = 0.04
+    # standard deviations of what the fusion leaves, beyond which a bias is none: a free one takes
+    # the force of an effect on thrust, and its moments then look like an inertia
+    most_in_std: float = 3.0
     largest: float = 2.0
 
 

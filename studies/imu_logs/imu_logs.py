@@ -25,20 +25,26 @@ SECONDS = 30.0  # of each flight
 _ATTEMPTS = 4  # draws of a flight that a flight loop may be unable to fly
 
 
-def flights(seeds: Iterable[int] = (0,)) -> list[tuple[str, str, int]]:
-    """Return the flights: the added effect (empty: none), the trajectory and the seed."""
+Task = tuple[str, str, int, str]  # the added effect, the trajectory, the seed, the kind of log
+
+
+def tasks(seeds: Iterable[int] = (0,), logs: Iterable[str] = tuple(LOGS)) -> list[Task]:
+    """Return what is flown and diagnosed: the added effect (empty: none), the trajectory, the seed
+    and the kind of log.
+    """
     return [
-        flight
+        (effect, trajectory, seed, log)
+        for log in logs
         for seed in seeds
-        for flight in (
-            *((name, shown_in(name)[0], seed) for name in names()),
-            *(("", trajectory, seed) for trajectory in EMPTY),
+        for effect, trajectory in (
+            *((name, shown_in(name)[0]) for name in names()),
+            *(("", trajectory) for trajectory in EMPTY),
         )
     ]
 
 
-def fly_and_diagnose(effect: str, trajectory: str, seed: int) -> list[dict[str, Any]]:
-    """Return what is found on one flight, once for each kind of log."""
+def fly_and_diagnose(effect: str, trajectory: str, seed: int, kind_of_log: str) -> dict[str, Any]:
+    """Return what is found on one flight, empty where no flight loop flies it."""
     vehicle = load_vehicle(VEHICLE)
     for attempt in range(_ATTEMPTS):
         try:
@@ -56,18 +62,15 @@ def fly_and_diagnose(effect: str, trajectory: str, seed: int) -> list[dict[str, 
         except InputError:
             continue
     else:
-        return []
+        return {}
     truth = {e.name: dict(e.coefficients) for e in flown.effects}
-    return [
-        {
-            "effect": effect,
-            "trajectory": trajectory,
-            "seed": seed,
-            "log": name,
-            **_outcome(made(flown.log, flown.seed), flown.vehicle, truth),
-        }
-        for name, made in LOGS.items()
-    ]
+    return {
+        "effect": effect,
+        "trajectory": trajectory,
+        "seed": seed,
+        "log": kind_of_log,
+        **_outcome(LOGS[kind_of_log](flown.log, flown.seed), flown.vehicle, truth),
+    }
 
 
 def _outcome(log: Any, vehicle: Any, truth: Mapping[str, Mapping[str, float]]) -> dict[str, Any]:
@@ -135,9 +138,7 @@ def named(outcome: Mapping[str, Any]) -> bool:
     )
 
 
-def run(
-    folder: Path, seeds: Sequence[int] = (0,), jobs: int = 1, most: int | None = None
-) -> list[dict[str, Any]]:
+def run(folder: Path, wanted: Sequence[Task], jobs: int = 1) -> list[dict[str, Any]]:
     """Fly and diagnose what is not yet in the folder's ``flights.jsonl``; return all outcomes."""
     path = folder / "flights.jsonl"
     folder.mkdir(parents=True, exist_ok=True)
@@ -145,19 +146,18 @@ def run(
     if path.exists():
         for line in path.read_text(encoding="utf-8").splitlines():
             kept = json.loads(line)
-            done[tuple(kept["flight"])] = kept["outcomes"]
-    wanted = flights(seeds)[:most]
-    pending = [flight for flight in wanted if flight not in done]
+            done[tuple(kept["task"])] = kept["outcome"]
+    pending = [task for task in wanted if task not in done]
     if pending:
         with workers(jobs) as pool:
-            running = {pool.submit(fly_and_diagnose, *flight): flight for flight in pending}
+            running = {pool.submit(fly_and_diagnose, *task): task for task in pending}
             for future in as_completed(running):
-                flight = running[future]
-                done[flight] = future.result()
+                task = running[future]
+                done[task] = future.result()
                 with path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps({"flight": flight, "outcomes": done[flight]}) + "\n")
-                print(f"{len(done)} of {len(wanted)} flights", flush=True)
-    return [outcome for flight in wanted for outcome in done.get(flight, [])]
+                    file.write(json.dumps({"task": task, "outcome": done[task]}) + "\n")
+                print(f"{len(done)} of {len(wanted)} logs", flush=True)
+    return [outcome for outcome in done.values() if outcome]
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
