@@ -37,7 +37,7 @@ class InertialWrench:
     torque: Array  # (N, 3) Nm, world
     std_force: Array  # (N, 3) N
     std_torque: Array  # (N, 3) Nm
-    position: Array  # (N, 3) m; zero at the start where nothing measured it
+    position: Array  # (N, 3) m; NaN where nothing measured it, as the velocity is
     quaternion: Array  # (N, 4) body to world, scalar first
     velocity: Array  # (N, 3) m/s
     angular_velocity: Array  # (N, 3) rad/s, body
@@ -75,6 +75,8 @@ def inertial_wrench(
     force, torque, std_force, std_torque, position, velocity, rate = (
         columns[:, 3 * i : 3 * i + 3] for i in range(7)
     )
+    if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from them
+        position, velocity = np.full((2, count, 3), np.nan)
     quaternion = columns[:, 21:]
     quaternion = quaternion / np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
     return InertialWrench(

@@ -38,6 +38,7 @@ from .commanded_rotors import (
     deviations,
     downsampled,
     in_flight,
+    in_flight_by_thrust,
 )
 from .sensor_bias import BIAS, bias, bias_columns, is_bias
 
@@ -190,7 +191,9 @@ class Flights:
         self.commanded = any_commanded(
             self.logs
         )  # torque is left out, and only the time in the air counts
-        if self.commanded:
+        if self.inertial:  # a ground that carries is no effect, and no height shows it
+            self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
+        elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
         # and bandwidth took away
