@@ -109,8 +109,8 @@ def estimate(
         typer.Option(
             "--smooth/--no-smooth",
             help="Use the whole log for each time's estimate, or the past alone as on the vehicle; "
-            "default: smooth, unless the log has a gyro or an accelerometer, which the smoother "
-            "does not take.",
+            "default: smooth, unless the log has one of gyro and accelerometer only, which the "
+            "smoother does not take. A log without a pose is always smoothed, from both.",
         ),
     ] = None,
     gate: Annotated[
@@ -130,6 +130,7 @@ def estimate(
 
     Example: windwrench estimate flight.csv --vehicle crazyflie
     """
+    from ..identification.motion.inertial_signals import reads_imu
     from ..identification.report.wrench_picture import plot_wrench
     from ..identification.wrench_series import (
         GATE,
@@ -148,7 +149,8 @@ def estimate(
     (flight,), model = _read([log], reader, vehicle, map)
     folder = results_folder(out)
     if smooth is None:
-        smooth = flight.gyro is None and flight.accelerometer is None
+        smooth = (flight.gyro is None) == (flight.accelerometer is None)
+    smooth = smooth or reads_imu(flight)
     fit = None
     if tune:
         with working("fitting the tuning"):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..runtime.errors import InputError, unknown_name
@@ -217,6 +218,7 @@ def record_flight(
     settings: PlantSettings | None = None,
     push: Callable[[ClosedLoop], Array | None] | None = None,
     report: Callable[[float], None] = lambda share: None,
+    imu: bool = False,
 ) -> dict[str, Array]:
     """Fly a vehicle with effects that it does not declare; return the columns of a flight log.
 
@@ -231,6 +233,9 @@ def record_flight(
             Nm about the centre of mass, world frame; None leaves the last one on. Default: nothing
             pushes.
         report: called now and then with the share that is done.
+        imu: whether the true ``gyro`` (n, 3) rad/s and ``accelerometer`` (n, 3) m/s2 are wanted,
+            body axes, without noise or bias: angular velocity at the instant of the pose, and the
+            specific force of the geometric centre, its mean over one tick on either side.
 
     Returns:
         ``t`` (n,) s, ``position`` (n, 3) m, ``quaternion`` (n, 4), ``rotor_speeds`` (n, 4) rad/s at
@@ -257,6 +262,7 @@ def record_flight(
     )
     loop.reset(rng, setpoints[0, :3], float(setpoints[0, 9]))
     samples, external, voltage = np.empty((count, 11)), np.zeros((count, 6)), np.empty(count)
+    motion = np.empty((count, 10))  # true attitude, velocity and angular velocity
     for k in range(count):
         if k % _REPORTED == 0:
             report(k / count)
@@ -266,6 +272,7 @@ def record_flight(
             loop.applied[:] = wrench
         # what the rotors did in the interval that ends here, then the pose that this tick samples
         samples[k, :4], voltage[k], external[k] = loop.unrounded, loop.battery, loop.external
+        motion[k, :4], motion[k, 4:] = loop.quaternion, loop.motion[1][:6]
         loop.run(rng.standard_normal((1, NOISE)))
         samples[k, 4:] = loop.sample[4:]
         if not loop.healthy() or loop.position[2] < -0.5:
@@ -291,4 +298,22 @@ def record_flight(
     }
     if vehicle.voltage_ref > 0:
         columns["voltage"] = voltage
+    if imu:
+        columns["gyro"], columns["accelerometer"] = _inertial(motion, vehicle.gravity)
     return columns
+
+
+def _inertial(motion: Array, gravity: float) -> tuple[Array, Array]:
+    """Return the angular velocity (n, 3) and the specific force (n, 3), body, of attitude (n, 4),
+    velocity and angular velocity (n, 6) before each tick.
+
+    The pose is a quarter of a tick ahead of the velocities, as the rotor speeds are brought to it.
+    """
+    rate = motion[:, 7:].copy()
+    rate[:-1] = 0.75 * motion[:-1, 7:] + 0.25 * motion[1:, 7:]
+    between = np.diff(motion[:, 4:7], axis=0) / TICK  # over the tick that begins at a sample
+    fallen = np.vstack([between[:1], between])
+    fallen[:-1] = 0.25 * fallen[:-1] + 0.75 * fallen[1:]
+    fallen[:, 2] += gravity
+    attitude = Rotation.from_quat(motion[:, :4], scalar_first=True)
+    return rate, np.asarray(attitude.inv().apply(fallen))

@@ -28,6 +28,7 @@ from .findings import (
     Trace,
 )
 from .inference.candidate_regressors import explanatory_variables
+from .inference.carrying_channels import carrying_channels
 from .inference.coefficient_range import implausible_coefficients
 from .inference.commanded_rotors import (
     COMMANDED,
@@ -60,11 +61,13 @@ from .inference.regression import (
 )
 from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
+from .inference.sensor_bias import biases
 from .inference.stepwise_search import find_effects
 from .inference.transient_disturbances import transient_disturbances
 from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
+from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .prediction import nis_without_wrench_state, rollout_error
@@ -164,16 +167,21 @@ def diagnose(
         ]
 
     before, after = (
-        flights.residual({}),
+        flights.residual(biases(fit.setting)),
         flights.residual(without_deviations(fit.setting)),
     )  # no flight's own thrust scale or tilt
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
+    calm = vehicle.weight * np.repeat(
+        [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
+    )
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
+    # an IMU's own noise is far below the disturbances that count for none
+    least = tuple(np.hypot(floor, calm[[0, 3]])) if flights.inertial else floor
     noisy = (
         flights.filtered
-        or error_after[0] > DIAGNOSIS.most_floor_ratio * floor[0]
-        or error_after[1] > DIAGNOSIS.most_floor_ratio * floor[1]
+        or error_after[0] > DIAGNOSIS.most_floor_ratio * least[0]
+        or error_after[1] > DIAGNOSIS.most_floor_ratio * least[1]
     )
     disturbances = (
         ()
@@ -184,9 +192,6 @@ def diagnose(
                 CHANNELS, Innovations(flights, fit.setting).disturbances(), strict=True
             )
         )
-    )
-    calm = vehicle.weight * np.repeat(
-        [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
     )
     transients = (
         ()
@@ -202,6 +207,7 @@ def diagnose(
         _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
     )
+    notes += _inertial_notes(flights, fit.effects)
     if not flights.commanded and any(
         effect.tentative for effect in effects
     ):  # what one effect explains too much, another one explains too little
@@ -245,7 +251,13 @@ def diagnose(
         floor_force_rms=floor[0],
         floor_torque_rms=floor[1],
         advice=tuple(
-            _advice(effects, sorted(flights.not_identifiable), remainder, flights.filtered)
+            _advice(
+                effects,
+                sorted(flights.not_identifiable - flights.needs_pose),
+                remainder,
+                flights.filtered,
+                sorted(flights.needs_pose),
+            )
         ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
@@ -260,8 +272,29 @@ def diagnose(
         logs=tuple(log.name for log in logs),
         test_logs=tuple(log.name for log in test),
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
-        floor_is_bound=flights.filtered or any(map(pose_was_filtered, every)),
+        floor_is_bound=not flights.inertial
+        and (flights.filtered or any(map(pose_was_filtered, every))),
+        needs_pose=tuple(sorted(flights.needs_pose)),
     )
+
+
+def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:
+    """Return, as sentences, what follows from a motion that is read from an IMU."""
+    if not flights.inertial:
+        return []
+    rates = [pose_rate(log) for log in flights.logs]
+    notes = [
+        "the log has no pose: the motion is read from gyro and accelerometer. Horizontal axes are "
+        "those in which the vehicle pointed at the start, and drift with the gyro"
+        if not any(rates)
+        else f"the log has {min(rates):.3g} positions a second: fast motion is read from gyro and "
+        "accelerometer, slow motion from the positions"
+    ]
+    if "thrust_axis_tilt" in effects:
+        notes.append(
+            "thrust_axis_tilt: an IMU that is mounted tilted by as much leaves the same log"
+        )
+    return notes
 
 
 def _rms(wrench: Array) -> tuple[float, float]:
@@ -307,6 +340,7 @@ def _named(
             "energy_explained_in_noise_units": gain,
             "largest_coefficient_in_typical_sizes": max(sizes, default=0.0),
         },
+        channels=carrying_channels(search, fit, effect),
     )
 
 
@@ -420,6 +454,7 @@ def _advice(
     not_identifiable: Sequence[str],
     remainder: str,
     filtered: bool,
+    needs_pose: Sequence[str] = (),
 ) -> list[str]:
     out = []
     if filtered:
@@ -441,6 +476,13 @@ def _advice(
             "The residual still has structure that no effect of the library explains, so the "
             "named effects are tentative. Fly one thing at a time (hover, climbs, level flight at "
             "several speeds, turns) to see what the residual follows."
+        )
+    if needs_pose:
+        out.append(
+            "An IMU alone does not show "
+            + ", ".join(needs_pose)
+            + ": they need a velocity, a position or an attitude that no gyro and accelerometer "
+            "know. To identify one of them, log the pose as well."
         )
     if not_identifiable:
         out.append(

@@ -33,6 +33,7 @@ class NamedEffect:
     evidence: Mapping[
         str, float
     ]  # e.g. share of the residual on held-out blocks that it alone explains
+    channels: tuple[str, ...] = ()  # of the logs, that carried the finding
 
 
 @dataclass(frozen=True)
@@ -162,3 +163,5 @@ class Diagnosis:
     # one a log that can show it: whether a rotor lost thrust during the flight, as plain data
     # (``rotor_faults/words.py``); empty where that was not looked for
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
+    # effects that these logs cannot show because the pose is missing, or too slow, beside the IMU
+    needs_pose: tuple[str, ...] = ()

@@ -13,9 +13,11 @@ from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchUKF, fit_noise
 from ..estimator.estimate import STATUSES
 from ..estimator.noise_fit import tuning_note
 from ..runtime.errors import InputError
+from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
 from .logs.screening import screen_for_estimate
 from .logs.tables import write_csv
+from .motion.inertial_signals import reads_imu
 
 Array = NDArray[np.float64]
 
@@ -63,9 +65,11 @@ def estimate_log(
 
     The filter starts at the first pose. Each row's prediction uses the mean of its rotor speeds and
     those of the row before, in steps of at most one median period; a row without a pose is
-    prediction alone, and what gyro and accelerometer measured, if they did. Poses that jump are
-    refused; after gaps and lasting jumps the filter restarts (``estimator.recovery``). Rows before
-    the first pose hold the filter's estimate at that pose: no wrench, and its standard deviation.
+    prediction alone, and what gyro and accelerometer measured, if they did. A log without a pose,
+    or with one too slow to tell the motion, is smoothed from its gyro and accelerometer. Poses that
+    jump are refused; after gaps and lasting jumps the filter restarts (``estimator.recovery``).
+    Rows before the first pose hold the filter's estimate at that pose: no wrench, and its standard
+    deviation.
 
     Args:
         log: the flight.
@@ -76,7 +80,8 @@ def estimate_log(
         smooth: whether each row's estimate also uses the rows after it (``estimator.smoother``):
             the best one of a whole log. Default: those before it alone, as the filter on the
             vehicle would have it. ``nis`` is that of the filter either way, and nothing is smoothed
-            across a restart. The smoother takes poses alone: gyro and accelerometer are left out.
+            across a restart. Gyro and accelerometer are smoothed with the poses
+            (``inertial_wrench``) where the log has both.
         gate: probability; poses whose NIS is beyond it and which jump from the pose before are
             refused. None: none are, and each jump restarts the filter.
 
@@ -85,6 +90,8 @@ def estimate_log(
             (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_for_estimate(log, vehicle)
+    if reads_imu(log) or (smooth and smooths_imu(log)):
+        return _by_imu(log, vehicle, tuning, doubts)
     seen = np.flatnonzero(log.valid)
     period = log.period
     ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, period=period, gate=gate)
@@ -146,6 +153,37 @@ def estimate_log(
     )
 
 
+def smooths_imu(log: FlightLog) -> bool:
+    """Return whether a log has all of an IMU, whose readings can be smoothed."""
+    return log.gyro is not None and log.accelerometer is not None
+
+
+def _by_imu(
+    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None, doubts: tuple[str, ...]
+) -> WrenchSeries:
+    """Return the wrench at every row, smoothed from gyro and accelerometer."""
+    tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
+    found = inertial_wrench(log, vehicle, tuning)
+    status = np.where(found.inside, STATUSES.index("tracking"), STATUSES.index("coasting"))
+    return WrenchSeries(
+        t=log.t,
+        force=found.force,
+        torque=found.torque,
+        std_force=found.std_force,
+        std_torque=found.std_torque,
+        nis=np.full(len(log.t), np.nan),
+        position=found.position,
+        quaternion=found.quaternion,
+        velocity=found.velocity,
+        angular_velocity=found.angular_velocity,
+        vehicle=vehicle,
+        tuning=tuning,
+        status=status,
+        restarts=0,
+        notes=(*log.notes, *doubts, *found.notes),
+    )
+
+
 def counts(series: WrenchSeries) -> dict[str, int]:
     """Return how many rows have each status: tracking, coasting, rejected, restarted."""
     return {name: int(np.sum(series.status == i)) for i, name in enumerate(STATUSES)}
@@ -168,7 +206,7 @@ def _notes(
             "where they went on from elsewhere; there the wrench is uncertain for a while"
         )
     if smooth and (log.gyro is not None or log.accelerometer is not None):
-        yield "smoothing takes poses alone: gyro and accelerometer were not used"
+        yield ("the log has one of gyro and accelerometer only: the poses were smoothed without it")
 
 
 def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
@@ -184,6 +222,11 @@ def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = Non
             poses are left to fit a tuning to.
     """
     screened, _ = screen_for_estimate(log, vehicle)
+    if reads_imu(screened):
+        raise InputError(
+            f"{log.source or log.name}: has no pose, or one that is too slow, to fit a tuning to; "
+            "expected 50 poses a second, or leave --tune out"
+        )
     try:
         return fit_noise(vehicle, *_columns(screened), tuning)
     except InputError as error:
@@ -197,6 +240,8 @@ def tuning_note_of(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = 
         InputError: the log is none to estimate a wrench from.
     """
     screened, _ = screen_for_estimate(log, vehicle)
+    if reads_imu(screened):
+        return None
     return tuning_note(vehicle, *_columns(screened), tuning)
 
 

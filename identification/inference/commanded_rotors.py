@@ -9,7 +9,7 @@ is zero, so that what the flights have in common remains for effects to explain.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ class CommandedSettings:
     """What a regression allows for where rotor speeds are worked out from commands."""
 
     period: float = 0.02  # s, of the samples that are used
+    # of the median thrust in flight, from which rotors carry the vehicle, and s that taking off and
+    # landing last beyond: where no height shows them
+    carrying_share: float = 0.7
+    take_off: float = 1.0
     # factor on what an effect of ``SECOND_CHOICE_EFFECTS`` explains, where it is compared
     second_choice_factor: float = 0.8
     # typical size and range of a flight's deviation from the others: relative, and rad
@@ -91,6 +95,25 @@ def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     return with_rows(log, (log.t >= flight[0].start) & (log.t <= flight[0].end))
 
 
+def in_flight_by_thrust(log: FlightLog, vehicle: Vehicle) -> FlightLog:
+    """Return the rows of a log without a height between take-off and landing, as the rotors' thrust
+    shows them; the log itself where they carry the vehicle all the time.
+    """
+    thrust = np.square(log.rotor_speeds) @ vehicle.k
+    if len(thrust) * log.period > 1.0 / CUTOFFS.flying_hz:
+        thrust = low_pass(thrust, CUTOFFS.flying_hz, log.period)
+    level = np.median(thrust[thrust > 0.5 * np.quantile(thrust, 0.9)])
+    carried = np.flatnonzero(thrust > COMMANDED.carrying_share * level)
+    if not carried.size:
+        return log
+    first, last = carried[0], carried[-1]
+    begin, end = log.t[first], log.t[last]
+    begin += COMMANDED.take_off if first > 0 else 0.0
+    end -= COMMANDED.take_off if last < len(thrust) - 1 else 0.0
+    keep = (log.t >= begin) & (log.t <= end)
+    return with_rows(log, keep) if keep.any() else log
+
+
 def downsampled(signals: Signals) -> Signals:
     """Return signals at 50 Hz or a little more, with the rotor speeds through the same filter as
     the pose.
@@ -98,20 +121,15 @@ def downsampled(signals: Signals) -> Signals:
     step = max(1, int(COMMANDED.period / signals.period + 1e-6))
     if step == 1:
         return signals
-    at = np.arange(0, len(signals.t), step)
+    count = len(signals.t)
+    at = np.arange(0, count, step)
     smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
-    return Signals(
-        signals.t[at],
-        step * signals.period,
-        signals.position[at],
-        signals.rotation[at],
-        signals.velocity[at],
-        signals.acceleration[at],
-        signals.angular_velocity[at],
-        signals.angular_acceleration[at],
-        smooth[at],
-        None if signals.voltage is None else signals.voltage[at],
-    )
+    sampled = {
+        name: x[at]
+        for name, x in {**vars(signals), "rotor_speeds": smooth}.items()
+        if isinstance(x, np.ndarray) and len(x) == count
+    }
+    return replace(signals, period=step * signals.period, **sampled)
 
 
 def similar_effects(effect: str) -> frozenset[str]:

@@ -1,6 +1,8 @@
-"""Disturbances as the pose of a flight shows them: a steady Kalman filter of one axis, its
+"""Disturbances as the sensors of a flight show them: a steady Kalman filter of one axis, its
 innovations, and the disturbance's likelihood.
 
+A sensor measures a disturbance's acceleration integrated twice (a pose), once (a gyro, which shows
+that of an angular acceleration), or as it is (an accelerometer).
 A disturbance is an Ornstein-Uhlenbeck acceleration with a strength and a correlation time: those
 that minimise the innovations.
 """
@@ -59,49 +61,63 @@ def likeliest_disturbance(loss: Callable[[int, int], float]) -> tuple[int, int]:
     return at
 
 
-def innovations(pose: Array, drive: Array, strength: float, time: float, period: float) -> Array:
-    """Return the innovations (n, c) of a pose (n, c) of one axis that an acceleration (n, c) and a
-    disturbance drive.
+def innovations(
+    measured: Array, drive: Array, strength: float, time: float, period: float, integrals: int = 2
+) -> Array:
+    """Return the innovations (n, c) of what a sensor measured (n, c) of one axis that an
+    acceleration (n, c) and a disturbance drive.
 
     ``strength`` is the disturbance's variance, in the acceleration's unit squared, over that of the
-    pose's noise; ``time`` (s) its correlation time.
+    sensor's noise; ``time`` (s) its correlation time; ``integrals`` how often the sensor's quantity
+    is the acceleration integrated: 2 a pose, 1 a gyro, 0 an accelerometer.
     """
-    poles, from_pose, from_drive, _ = _filters(strength, time, period)
+    poles, from_pose, from_drive, _ = _filters(strength, time, period, integrals)
+    if integrals == 0:
+        return np.asarray(lfilter(from_pose, poles, measured - drive, axis=0))
     acting = 0.5 * (drive + np.concatenate([drive[1:], drive[-1:]]))  # until the next pose
     return np.asarray(
-        lfilter(from_pose, poles, pose, axis=0) + lfilter(from_drive, poles, acting, axis=0)
+        lfilter(from_pose, poles, measured, axis=0) + lfilter(from_drive, poles, acting, axis=0)
     )
 
 
-def disturbance_variance(innovation: float, strength: float, time: float, period: float) -> float:
+def disturbance_variance(
+    innovation: float, strength: float, time: float, period: float, integrals: int = 2
+) -> float:
     """Return the disturbance's variance, in the acceleration's unit squared, from that of the
     innovations.
     """
-    return strength * innovation / _filters(strength, time, period)[-1]
+    return strength * innovation / _filters(strength, time, period, integrals)[-1]
 
 
 @lru_cache(maxsize=4096)
-def _filters(strength: float, time: float, period: float) -> tuple[Array, Array, Array, float]:
-    """Return the denominator (4,) and the numerators (4,) of the innovations' filters, of the pose
-    and of what drives it.
+def _filters(
+    strength: float, time: float, period: float, integrals: int
+) -> tuple[Array, Array, Array, float]:
+    """Return the denominator and the numerators (integrals + 2,) of the innovations' filters, of
+    what is measured and of what drives it.
 
-    Those of the steady Kalman filter with the states pose, velocity (a period) and disturbance (a
-    period squared). The last is the innovations' variance over that of the pose's noise.
+    Those of the steady Kalman filter with the states (of a pose) pose, velocity (a period) and
+    disturbance (a period squared). The last is the innovations' variance over that of the sensor's
+    noise.
     """
-    rate = period / time
-    A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -rate]])
+    rate, n = period / time, integrals + 1
+    A = np.eye(n, k=1)
+    A[-1, -1] = -rate
     # C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978): the disturbance over a
     # period
-    both = np.zeros((6, 6))
-    both[:3, :3], both[3:, 3:], both[2, 5] = -A, A.T, 2.0 * rate * strength * period**4
+    both = np.zeros((2 * n, 2 * n))
+    both[:n, :n], both[n:, n:] = -A, A.T
+    both[n - 1, 2 * n - 1] = 2.0 * rate * strength * period ** (2 * integrals)
     both = expm(both)
-    F = both[3:, 3:].T
-    Q = F @ both[:3, 3:]
-    H, B = np.eye(1, 3), np.array([[0.5], [1.0], [0.0]]) * period**2
+    F = both[n:, n:].T
+    Q = F @ both[:n, n:]
+    # what a steady drive adds in a period: 1/2, 1 of a pose and its velocity
+    B = np.append(1.0 / np.cumprod(np.arange(1.0, n))[::-1], 0.0)[:, None] * period**integrals
+    H = np.eye(1, n)
     P = solve_discrete_are(F.T, H.T, 0.5 * (Q + Q.T), np.eye(1))
     variance = float(P[0, 0] + 1.0)
     K = P @ H.T / variance
-    after = F @ (np.eye(3) - K @ H)
+    after = F @ (np.eye(n) - K @ H)
     from_pose, poles = ss2tf(after, F @ K, -H, np.eye(1))
     from_drive, _ = ss2tf(after, B, -H, np.zeros((1, 1)))
     return poles, from_pose[0], from_drive[0], variance

@@ -24,6 +24,7 @@ from .regression import (
     range_of,
     typical_size,
 )
+from .sensor_bias import BIAS, flight_and_axis, is_bias
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -179,12 +180,19 @@ def priors_and_ranges(
             for c in columns
         ]
     )
+    for i, column in enumerate(columns):
+        if is_bias(column):
+            flight, axis = flight_and_axis(column[1])
+            size[i] = flights.bias_std(flight)[axis] / GRAM.prior_std
     value = np.array(
         [flights.coefficients(setting, effect).get(name, 0.0) for effect, name in columns]
     )
     low, high = np.empty(len(columns)), np.empty(len(columns))
     for i, c in enumerate(columns):
-        if not c[0]:
+        if is_bias(c):
+            high[i] = BIAS.most_in_std * GRAM.prior_std * size[i]
+            low[i] = -high[i]
+        elif not c[0]:
             low[i], high[i] = range_of(c, flights.filtered)
         elif c[1].startswith(MOMENT_PREFIX):
             low[i], high[i] = -np.inf, np.inf

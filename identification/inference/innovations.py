@@ -22,6 +22,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import get
+from ..motion.inertial_signals import InertialSignals
 from ..motion.sensing_effects import undo_log_sensing
 from ..motion.signals import log_signals
 from .disturbance_filter import (
@@ -146,12 +147,12 @@ class Innovations:
                 np.stack([*(slope[i][..., axis] for slope in slopes), -motion[..., axis]], axis=-1)
                 for i, motion in enumerate(self._motions)
             ]
-            products = self._products([part[..., -1:] for part in parts])
+            products = self._products([part[..., -1:] for part in parts], axis)
             strength, time = likeliest_disturbance(
                 lambda *disturbance, of=products: float(of(*disturbance)[0, 0])
             )
             sums = self._sums(
-                parts, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+                parts, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time]), axis
             )
             total += sums * self._count / max(sums[-1, -1], INNOVATIONS.least_sum)
         return Gram(
@@ -194,18 +195,20 @@ class Innovations:
             self._flights.vehicle.inertia
         ).tolist()
         return [
-            self._disturbance([-motion[..., [axis]] for motion in self._motions], inertia)
+            self._disturbance([-motion[..., [axis]] for motion in self._motions], inertia, axis)
             for axis, inertia in enumerate(inertias)
         ]
 
-    def _disturbance(self, motions: Sequence[Array], inertia: float) -> tuple[float, float]:
+    def _disturbance(
+        self, motions: Sequence[Array], inertia: float, axis: int
+    ) -> tuple[float, float]:
         period = self._flights.pieces(self._setting)[0].signals.period
-        products = self._products(motions)
+        products = self._products(motions, axis)
         i, j = likeliest_disturbance(lambda strength, time: float(products(strength, time)[0, 0]))
         begun = np.log([DISTURBANCE.strengths[i], DISTURBANCE.times[j]])
 
         def loss(x: Array) -> float:
-            return float(np.log(self._sums(motions, *np.exp(x).tolist())[0, 0]))
+            return float(np.log(self._sums(motions, *np.exp(x).tolist(), axis)[0, 0]))
 
         near = INNOVATIONS.grid_margin * np.array([-1.0, 1.0])
         best = minimize(
@@ -217,7 +220,9 @@ class Innovations:
         )
         strength, time = np.exp(best.x).tolist()
         return inertia * math.sqrt(
-            disturbance_variance(math.exp(best.fun) / self._count, strength, time, period)
+            disturbance_variance(
+                math.exp(best.fun) / self._count, strength, time, period, self._integrals(axis)
+            )
         ), time
 
     def _share(self, changes: Sequence[Array]) -> tuple[float, float]:
@@ -233,7 +238,8 @@ class Innovations:
                 [
                     np.stack([-motion[..., axis], change[..., axis]], axis=-1)
                     for motion, change in zip(self._motions, changes, strict=True)
-                ]
+                ],
+                axis,
             )
             for axis in range(6)
             if any(np.any(change[..., axis]) for change in changes)
@@ -252,13 +258,13 @@ class Innovations:
         )
         return share, ratio
 
-    def _axis(self, both: Sequence[Array]) -> tuple[Array, Array]:
+    def _axis(self, both: Sequence[Array], axis: int) -> tuple[Array, Array]:
         """Return the sums of products (2, 2) of one axis' innovations and of a change's, of which
         each piece is (2, n, 2).
 
         Once with the likeliest disturbance of both, once with that of the innovations alone.
         """
-        products = self._products(both)
+        products = self._products(both, axis)
         found = [
             products(
                 *likeliest_disturbance(lambda *disturbance: _unexplained(products(*disturbance)))
@@ -269,7 +275,7 @@ class Innovations:
         ]
         return min(found, key=_unexplained), min(found, key=lambda x: float(x[0, 0]))
 
-    def _products(self, motions: Sequence[Array]) -> Callable[[int, int], Array]:
+    def _products(self, motions: Sequence[Array], axis: int) -> Callable[[int, int], Array]:
         """Return a function of disturbances that gives the sums of products (c, c) of innovations;
         each piece is (2, n, c).
         """
@@ -277,16 +283,25 @@ class Innovations:
         @cache
         def products(strength: int, time: int) -> Array:
             return self._sums(
-                motions, float(DISTURBANCE.strengths[strength]), float(DISTURBANCE.times[time])
+                motions,
+                float(DISTURBANCE.strengths[strength]),
+                float(DISTURBANCE.times[time]),
+                axis,
             )
 
         return products
 
-    def _sums(self, motions: Sequence[Array], strength: float, time: float) -> Array:
+    def _integrals(self, axis: int) -> int:
+        """Return how often what is measured of an axis is the acceleration integrated."""
+        return (0 if axis < 3 else 1) if self._flights.inertial else 2
+
+    def _sums(self, motions: Sequence[Array], strength: float, time: float, axis: int) -> Array:
         pieces = self._flights.pieces(self._setting)
         found = [
-            innovations(pose, drive, strength, time, piece.signals.period)[counted]
-            for (pose, drive), piece, counted in zip(motions, pieces, self._counts, strict=True)
+            innovations(
+                measured, drive, strength, time, piece.signals.period, self._integrals(axis)
+            )[counted]
+            for (measured, drive), piece, counted in zip(motions, pieces, self._counts, strict=True)
         ]
         return np.asarray(sum(x.T @ x for x in found))
 
@@ -310,7 +325,7 @@ class Innovations:
 
     def _motions_of(self, setting: Setting) -> list[Array]:
         """Return for each piece (2, n, 6) the pose as measured, and the model's acceleration,
-        linear (world) and angular (body).
+        linear (world) and angular (body). Of an IMU it is its acceleration and angular velocity.
 
         The pose's angle (rad) is the sum of its rotations. The attitude is always the same: an
         attitude_gain would make the innovations small by removing their own noise.
@@ -324,6 +339,8 @@ class Innovations:
                 [self._raw(setting, piece)[:, :3], self._raw(self._setting, like)[:, 3:]]
             )
             begun = np.concatenate([like.signals.velocity[0], like.signals.angular_velocity[0]])
+            if self._flights.inertial:  # what is measured is no pose
+                begun[:] = 0.0
             fallen = self._flights.vehicle.gravity * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
             out.append(
                 np.stack(
@@ -339,6 +356,8 @@ class Innovations:
         """Return the pose (n, 6) of a piece, from its start, without the low-pass, which uses the
         future.
         """
+        if isinstance(piece.signals, InertialSignals):
+            return piece.signals.measured
         if id(piece) not in self._poses:
             log = undo_log_sensing(self._flights.logs[piece.log], self._flights.amended(setting))
             signals = next(s for s in log_signals(log, np.inf) if s.t[0] == piece.signals.t[0])

@@ -17,8 +17,10 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.effects import get, names
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
+from ...runtime.errors import InputError
 from ..logs.excerpt import excerpt
 from ..logs.flight_log import FlightLog
+from ..motion.inertial_signals import InertialSignals, inertial_signals, reads_imu, with_drift
 from ..motion.noise_spectrum import pose_was_filtered
 from ..motion.residual import acting_wrench, needed_wrench
 from ..motion.sensing_effects import undo_log_sensing
@@ -36,7 +38,9 @@ from .commanded_rotors import (
     deviations,
     downsampled,
     in_flight,
+    in_flight_by_thrust,
 )
+from .sensor_bias import BIAS, bias, bias_columns, is_bias
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -120,6 +124,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """
     if column in TIME_OFFSETS:
         return REGRESSION.time_offset_size
+    if is_bias(column):
+        return BIAS.step
     if not column[0] and (size := deviation_size(column[1])) is not None:
         return size[0]
     if column[1].startswith(START_PREFIX) or column[1] == CENTRAL:
@@ -143,6 +149,8 @@ def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
     """
     if filtered and column == ROTOR_TIME_OFFSET:
         return REGRESSION.filtered_rotor_time_offset_range
+    if is_bias(column):
+        return -BIAS.largest, BIAS.largest
     size = deviation_size(column[1])
     return REGRESSION.rotor_time_offset_range if size is None else (-size[1], size[1])
 
@@ -172,19 +180,34 @@ class Flights:
         self.vehicle = vehicle
         self._declared: Setting = {e.name: e.coefficients for e in vehicle.effects}
         self.logs = (*logs, *test)
+        # the motion is that of an IMU: no pose, or one that is too slow to tell it
+        self.inertial = any(map(reads_imu, self.logs))
+        for log in self.logs if self.inertial else ():
+            if log.gyro is None or log.accelerometer is None:
+                raise InputError(
+                    f"{log.source or log.name}: has a pose and no gyro and accelerometer, and "
+                    "another log has no pose; expected the IMU in all of them, or the pose"
+                )
         self.commanded = any_commanded(
             self.logs
         )  # torque is left out, and only the time in the air counts
-        if self.commanded:
+        if self.inertial:  # a ground that carries is no effect, and no height shows it
+            self.logs = tuple(in_flight_by_thrust(log, vehicle) for log in self.logs)
+        elif self.commanded:
             self.logs = tuple(in_flight(log, vehicle) for log in self.logs)
         # the noise of a filtered pose cannot be read from its log, nor can what the filter's delay
         # and bandwidth took away
-        self.filtered = not self.commanded and any(pose_was_filtered(log) for log in self.logs)
+        self.filtered = not (self.commanded or self.inertial) and any(
+            pose_was_filtered(log) for log in self.logs
+        )
         self.logs = tuple(excerpt(self.logs))
         self.deviating_flights = (
             len(logs) if self.commanded else 0
         )  # flights that have a thrust scale and a tilt of their own
         self.deviations: tuple[Column, ...] = tuple(deviations(self.deviating_flights))
+        if self.inertial:
+            self.deviations += tuple(bias_columns(len(logs)))
+        self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
         self._needs: dict[int, tuple[Piece, Array]] = {}
         self._offset_signals: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
@@ -222,6 +245,10 @@ class Flights:
         self.period = float(np.median(np.diff(self.t)))
         self.sensor_noise: Array  # (rows, 6) a sample of what sensors alone leave
         self.visible_noise: Array  # (rows, 6) of it, what the logs themselves show
+        # of a log that is read by its IMU: effects that leave no trace in it at all, and those that
+        # would show beside a pose
+        self.without_trace: frozenset[str] = frozenset()
+        self.needs_pose: frozenset[str] = frozenset()
         self.not_identifiable: frozenset[
             str
         ]  # effects whose columns are sensor noise to a large part
@@ -258,7 +285,7 @@ class Flights:
             noisy.logs = tuple(noisy_logs(self.logs, self.vehicle, hidden=True))
             floor = noisy.residual({}) - self.residual({})
         weight = 1.0 / (np.mean(np.square(floor), axis=0) + 1e-30)
-        not_identifiable = set()
+        quietly: set[str] = set()  # of these, what the sensors' noise alone hides
         own: list[Column] = [
             (e, c.name)
             for e in names()
@@ -272,17 +299,19 @@ class Flights:
             if any(c.name == CENTRAL for c in get(e).coefficients)
         ]
         quiet, loud = self.columns({}, smooth), noisy.columns({}, smooth)
-        for effect in dict.fromkeys(e for e, _ in smooth):
-            noise = whole = 0.0
-            for c in (c for c in own if c[0] == effect):
-                scale = weight * typical_size(c, self.vehicle) ** 2
-                noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
-                whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
-            if (
-                noise
-                > REGRESSION.most_noise_shares.get(effect, REGRESSION.most_noise_share) * whole
-            ):
-                not_identifiable.add(effect)
+        shares = self._noise_shares(quiet, loud, own, weight)
+        if self.inertial:
+            # a column also depends on what the IMU knows badly
+            quietly = {e for e, share in shares.items() if share > _most_noise_share(e)}
+            noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
+            noisy._columns, noisy._drift = {}, np.random.default_rng(1)
+            loud = {c: self._in_own_axes(x, noisy) for c, x in noisy.columns({}, smooth).items()}
+            shares = self._noise_shares(quiet, loud, own, weight)
+            self.without_trace = frozenset(e for e, share in shares.items() if not share < np.inf)
+        not_identifiable = {e for e, share in shares.items() if share > _most_noise_share(e)}
+        if self.inertial:
+            not_identifiable |= self._lost_in_drift(noisy, weight)
+            self.needs_pose = frozenset(not_identifiable - (quietly - self.without_trace))
         if self.commanded:
             not_identifiable |= EXCLUDED_EFFECTS
         if self.filtered:
@@ -291,6 +320,65 @@ class Flights:
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
         return floor, frozenset(not_identifiable), {c: loud[c] - quiet[c] for c in smooth}, rounded
+
+    def _noise_shares(
+        self,
+        quiet: dict[Column, Array],
+        loud: dict[Column, Array],
+        own: Sequence[Column],
+        weight: Array,
+    ) -> dict[str, float]:
+        """Return the share of noise in the columns of each effect; infinite where an effect leaves
+        no trace at all in an IMU.
+        """
+        out = {}
+        for effect in dict.fromkeys(e for e, _ in own):
+            noise = whole = 0.0
+            for c in (c for c in own if c[0] == effect):
+                scale = weight * typical_size(c, self.vehicle) ** 2
+                noise += float(scale @ np.mean(np.square(loud[c] - quiet[c]), axis=0))
+                whole += float(scale @ np.mean(np.square(quiet[c]), axis=0))
+            out[effect] = (
+                noise / whole if whole > 0.0 else np.inf if self.inertial or noise > 0.0 else 0.0
+            )
+        return out
+
+    def _in_own_axes(self, x: Array, noisy: "Flights") -> Array:
+        """Return a column (rows, 6) of a copy whose fusion errs otherwise, its force turned from
+        that copy's attitude to this one's.
+
+        An attitude that is wrong turns needed and modelled force alike: only what acts in other
+        axes than the body's changes with it.
+        """
+        pairs = zip(self.pieces({}), noisy.pieces({}), strict=True)
+        turn = np.concatenate(
+            [
+                np.einsum("nij,nkj->nik", a.signals.rotation[a.rows], b.signals.rotation[b.rows])
+                for a, b in pairs
+            ]
+        )
+        return np.column_stack([np.einsum("nij,nj->ni", turn, x[:, :3]), x[:, 3:]])
+
+    def _lost_in_drift(self, noisy: "Flights", weight: Array) -> frozenset[str]:
+        """Return which nonlinear effects change by more than a share of themselves where the fusion
+        of the IMU errs otherwise.
+        """
+        lost = set()
+        for effect in NONLINEAR_EFFECTS & set(names()):
+            setting = {
+                effect: {
+                    c.name: abs(typical_size((effect, c.name), self.vehicle))
+                    for c in get(effect).coefficients
+                }
+            }
+            own = self.residual(setting) - self.residual({})
+            other = self._in_own_axes(noisy.residual(setting) - noisy.residual({}), noisy)
+            noise, whole = (
+                float(weight @ np.mean(np.square(x), axis=0)) for x in (other - own, own)
+            )
+            if not noise <= REGRESSION.most_noise_share * whole:
+                lost.add(effect)
+        return frozenset(lost)
 
     def rotor_wrench(self, setting: Setting) -> Array:
         """Return what the rotors deliver at the rows (rows, 4): thrust (N) and torque (Nm, body),
@@ -348,10 +436,14 @@ class Flights:
         return self._pieces[sensing]
 
     def _cut(self, vehicle: Vehicle) -> list[Piece]:
-        found = [
+        found: list[tuple[int, Signals]] = [
             (i, s)
             for i, log in enumerate(self.logs)
-            for s in log_signals(undo_log_sensing(log, vehicle))
+            for s in (
+                self._inertial_signals(log)
+                if self.inertial
+                else log_signals(undo_log_sensing(log, vehicle))
+            )
         ]
         if self.commanded:
             found = [(i, downsampled(s)) for i, s in found]
@@ -370,6 +462,19 @@ class Flights:
                 Piece(first.log, s, np.rint((wanted - s.t[0]) / s.period).astype(np.int64))
             )
         return pieces
+
+    def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
+        found = inertial_signals(log, self.vehicle.gravity)
+        if self._drift is None:
+            return found
+        return [with_drift(s, self._drift, self.vehicle.gravity) for s in found]
+
+    def bias_std(self, flight: int) -> Array:
+        """Return the standard deviation (3,) m/s2 of what is left of a flight's accelerometer
+        bias.
+        """
+        own = [p.signals for p in self._first if p.log == flight]
+        return np.max([s.bias_std for s in own if isinstance(s, InertialSignals)], axis=0)
 
     def amended(self, setting: Setting) -> Vehicle:
         """Return the vehicle with these effects; one that it declares already is replaced."""
@@ -427,6 +532,8 @@ class Flights:
             s = self._with_time_offsets(piece, offsets, scale)
             model, _ = acting_wrench(s, vehicle, self.vehicle)
             model[:, :2] += self.vehicle.weight * np.array(tilt)
+            if self.inertial and (off := bias(setting, piece.log)).any():
+                model[:, :3] += self.vehicle.mass * np.einsum("nij,j->ni", s.rotation, off)
             if self.commanded:
                 model[:, 3:] = 0.0
             out.append(model)
@@ -544,6 +651,10 @@ class Flights:
                 part[:, :3] = 0.0
                 out[column] = part
         return out
+
+
+def _most_noise_share(effect: str) -> float:
+    return REGRESSION.most_noise_shares.get(effect, REGRESSION.most_noise_share)
 
 
 def held_out(number: Index) -> Index:

@@ -117,7 +117,11 @@ class Search:
             ()
             if flights.commanded
             else tuple(
-                e for e in library if e in flights.not_identifiable - flights.explained_by_rounding
+                e
+                for e in library
+                if e
+                in flights.not_identifiable - flights.explained_by_rounding - flights.without_trace
+                and not (flights.inertial and e in STARTING_POINTS)
             )
         )
         self.report = report
@@ -167,10 +171,12 @@ class Search:
             if self.flights.commanded or DELAY_EFFECTS & {*effects, *tried}
             else [ROTOR_TIME_OFFSET]
         )
-        velocity_offset = [] if self.flights.commanded else [VELOCITY_TIME_OFFSET]
+        velocity_offset = (
+            [] if self.flights.commanded or self.flights.inertial else [VELOCITY_TIME_OFFSET]
+        )
         return [
             *rotor_offset,
-            ATTITUDE_TIME_OFFSET,
+            *([] if self.flights.inertial else [ATTITUDE_TIME_OFFSET]),
             *velocity_offset,
             *self.flights.deviations,
             *(c for e in effects for c in self.columns_of(e, True)),

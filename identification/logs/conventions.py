@@ -378,15 +378,18 @@ class Balances:
     Args:
         log: the flight.
         vehicle: as declared.
+        signals: of the log; default: those of its pose.
 
     Raises:
         InputError: no piece is long enough.
     """
 
-    def __init__(self, log: FlightLog, vehicle: Vehicle) -> None:
+    def __init__(
+        self, log: FlightLog, vehicle: Vehicle, signals: Sequence[Signals] | None = None
+    ) -> None:
         self._vehicle = vehicle
         self._log = log
-        signals = log_signals(log)
+        signals = log_signals(log) if signals is None else signals
         self._masks = _flying(signals, vehicle)
         self._motion = {(0, 1, 2, 3): _motion(signals, self._masks, vehicle)}
         self._rotors = _Rotors(
@@ -414,6 +417,11 @@ class Balances:
             ]
         )
         self.height = float(np.median(height)) if height.size else 0.0  # m, as the log has it
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia (3, 3) of the vehicle, kg m2."""
+        return self._vehicle.inertia
 
     @property
     def samples(self) -> int:
@@ -634,6 +642,35 @@ def recognise(balances: Balances) -> tuple[Reading, ...]:
     # a vehicle seldom flies below its origin
     above = [reading for reading in alike if (reading.position[2, 2] < 0) == (balances.height < 0)]
     return tuple(above if above else alike)
+
+
+class TorqueBalance:
+    """How well rotors as declared turn the body, and which other readings do clearly better."""
+
+    def __init__(self, balances: Balances) -> None:
+        self.enough = balances.samples >= _LEAST_SAMPLES
+        plain = Reading("", "")
+        self.shares = (
+            balances.torques(balances.needed_torque(plain), plain)
+            if self.enough
+            else (0.0, 0.0, 0.0)
+        )
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the log as declared fits badly."""
+        return float(np.mean(self.shares)) >= _BAD or max(self.shares) >= _CONTRADICTS
+
+    def alike(self, found: Sequence[tuple[tuple[float, float, float], str]]) -> list[str]:
+        """Return the words of the readings that win clearly, the best and those that fit alike."""
+        limit = min(_GOOD, _CLEAR * float(np.mean(self.shares)))
+        good = [
+            (float(np.mean(shares)), words)
+            for shares, words in found
+            if np.mean(shares) <= limit and max(shares) <= 1.5 * _GOOD
+        ]
+        good.sort()
+        return [words for share, words in good if share <= _TIE[0] * good[0][0] + _TIE[1]]
 
 
 def _only_mirrored(reading: Reading) -> bool:

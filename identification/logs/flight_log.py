@@ -17,8 +17,8 @@ One row a sample, time strictly increasing. Columns of the file:
 =============================  =======  ==========================================================================
 
 A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
-The pose's columns may be left out altogether where accelerometer and gyro are there, and the rotor speeds' where motor
-commands are.
+The pose's columns may be left out altogether where accelerometer and gyro are there, or the quaternion's alone, and the
+rotor speeds' where motor commands are.
 A row whose three fields of an inertial sensor are all empty is one in which it was not read, so a sensor faster than the
 pose has rows of its own. Other columns are ignored. The name of the vehicle stands in a header, so that whatever reads a table of
 numbers still reads one.
@@ -85,7 +85,9 @@ class FlightLog:
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
-            object.__setattr__(self, "valid", np.isfinite(self.position).all(axis=1))
+            pose = np.column_stack([self.position, self.quaternion])
+            there = np.isfinite(pose).all(axis=1)
+            object.__setattr__(self, "valid", there)
 
     @property
     def has_pose(self) -> bool:
@@ -233,6 +235,8 @@ def write_log(log: FlightLog, path: str | Path) -> None:
     pose = np.where(log.valid[:, None], np.column_stack([log.position, log.quaternion]), np.nan)
     if log.has_pose or log.accelerometer is None or log.gyro is None:
         columns |= {name: pose[:, i] for i, name in enumerate(POSE)}
+    elif np.isfinite(log.position).any():
+        columns |= {name: log.position[:, i] for i, name in enumerate(POSE[:3])}
     if log.has_rotor_speeds or log.command is None:
         columns |= {name: log.rotor_speeds[:, i] for i, name in enumerate(ROTORS)}
     if log.command is not None:

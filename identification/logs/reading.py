@@ -127,12 +127,18 @@ def _read(
 
 def _needed(table: Table) -> tuple[str, ...]:
     """Return the columns that a table of the kit's format must have: pose and rotor speeds, unless
-    it has none of the one but an inertial sensor, or none of the other but motor commands.
+    it has none of the one (or a position without an attitude) but an inertial sensor, or none of
+    the other but motor commands.
     """
     there = set(table.header)
-    no_pose = not there & set(POSE) and {*ACCELEROMETER, *GYRO} <= there
+    pose: tuple[str, ...] = POSE
+    if {*ACCELEROMETER, *GYRO} <= there:
+        if not there & set(POSE):
+            pose = ()
+        elif not there & set(POSE[3:]):
+            pose = POSE[:3]
     no_rotors = not there & set(ROTORS) and set(COMMANDS) <= there
-    return ("t", *(() if no_pose else POSE), *(() if no_rotors else ROTORS))
+    return ("t", *pose, *(() if no_rotors else ROTORS))
 
 
 def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
@@ -154,8 +160,9 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
+    no_attitude = POSE[3] not in columns
     accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
-    quaternion = unit_quaternions(table, pose[:, 3:], ~lost, "qw, qx, qy, qz")
+    quaternion = unit_quaternions(table, pose[:, 3:], ~lost & ~no_attitude, "qw, qx, qy, qz")
     rotor_speeds = np.column_stack([columns.get(name, nothing) for name in ROTORS])
     command = np.column_stack([columns[name] for name in COMMANDS]) if commands else None
     _check_commands(table, columns, commands)
@@ -195,7 +202,7 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
             *time_notes(columns["t"]),
             *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
         ),
-        valid=~lost,
+        valid=~lost & (not no_attitude),
         vehicle=_vehicle_name(table),
     )
 

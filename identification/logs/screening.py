@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
+from ..motion.inertial_signals import reads_imu
 from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass
 from .conventions import Balances, recognise, time_shift
 from .excerpt import excerpt
 from .flight_log import FlightLog
+from .inertial_screening import check_imu, check_rotation, inertial_balances
 from .stuck_channels import stuck_notes
 
 Array = NDArray[np.float64]
@@ -150,8 +152,12 @@ class _Screening:
     def run(self, least_seconds: float | None) -> tuple[FlightLog, tuple[str, ...]]:
         """Return the log without held poses, and the notes."""
         log, vehicle, where = self.log, self.vehicle, self.where
-        if not log.valid.any():
-            raise InputError(f"{where}: no row has a pose; expected at least one to start from")
+        by_imu = reads_imu(log)
+        if not by_imu and not log.valid.any():
+            raise InputError(
+                f"{where}: no row has a pose; expected at least one to start from, or gyro and "
+                "accelerometer (gx, gy, gz and ax, ay, az)"
+            )
         if not log.has_rotor_speeds:
             raise InputError(
                 f"{where}: has motor commands and no rotor speeds, and the vehicle "
@@ -162,6 +168,8 @@ class _Screening:
                 f"warning: the log names the vehicle {log.vehicle}; it is read as {vehicle.name}"
             )
         self.notes += _check_rotors(log, vehicle, where)
+        if by_imu:
+            return self.run_by_imu(least_seconds)
         _check_time_unit(log, where, short=not self.refuses_parts)
         self.part(_check_stopped, log, vehicle)
         log = self.turning(log)
@@ -195,6 +203,25 @@ class _Screening:
             self.part(_check_shift, balances)
         return log, tuple(self.notes)
 
+    def run_by_imu(self, least_seconds: float | None) -> tuple[FlightLog, tuple[str, ...]]:
+        """Return the log and the notes, of one whose motion is that of its IMU."""
+        log, vehicle, where = self.log, self.vehicle, self.where
+        period = log.period
+        for unit, factor in _TIME_UNITS.items():
+            if period > _LEAST_PIECE * _PERIODS[1] and _PERIODS[0] <= period / factor <= 0.05:
+                raise InputError(
+                    f"{where}: t looks like {unit}: its median step is {period:.4g}; expected "
+                    f"seconds: divide t by {factor:g}"
+                )
+        self.part(_check_stopped, log, vehicle)
+        log = self.turning(log)
+        check_imu(log, vehicle, least_seconds, where)
+        self.notes += stuck_notes(log, vehicle)
+        balances = inertial_balances(excerpt([log])[0], vehicle)
+        check_rotation(balances, where)
+        self.part(_check_shift, balances)
+        return log, tuple(self.notes)
+
 
 def _check_shift(balances: Balances, where: str) -> None:
     """Check that rotor speeds and pose are on one clock."""
@@ -202,7 +229,7 @@ def _check_shift(balances: Balances, where: str) -> None:
     if shift is not None:
         late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
         raise InputError(
-            f"{where}: the rotor speeds come {abs(shift):.2f} s too {late} against the pose; "
+            f"{where}: the rotor speeds come {abs(shift):.2f} s too {late} against the motion; "
             f"expected both on one "
             f"clock: put omega1..omega4 {abs(shift):.2f} s {sooner}"
         )

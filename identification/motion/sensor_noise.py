@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...dynamics.vehicle import Vehicle
+from ...dynamics.vehicle import Mocap, Vehicle
 from ..logs.flight_log import FlightLog
+from .inertial_signals import imu_noise, pose_rate, reads_imu
 from .smoothing import CUTOFFS, high_pass
 
 Array = NDArray[np.float64]
@@ -23,6 +24,8 @@ class SensorNoise:
     position: float  # m
     attitude: float  # rad
     rotor_speed: float  # rad/s
+    gyro: float = 0.0  # rad/s, where the motion is read from an IMU
+    accelerometer: float = 0.0  # m/s2, likewise
 
 
 def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
@@ -32,6 +35,12 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     The rotor speeds' is the step to which they are rounded, as the log shows it (no more than the
     vehicle's file says).
     """
+    step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
+    if reads_imu(log):  # the few poses beside it show no noise of their own
+        mocap = vehicle.mocap if pose_rate(log) > 0.0 else Mocap(0.0, 0.0, 0.0)
+        return SensorNoise(
+            mocap.sigma_pos_m, mocap.sigma_att_rad, step / np.sqrt(12.0), *imu_noise(log)
+        )
     seen = np.flatnonzero(log.valid)
     steps = np.diff(log.t[seen])
     whole = np.flatnonzero(steps < 1.5 * np.median(steps))
@@ -40,7 +49,6 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
     angle = (
         turned[:-1].inv() * turned[1:]
     ).as_rotvec()  # white noise differenced: twice its power, and a known shape
-    step = vehicle.omega_lsb if vehicle.omega_source == "measured" else 0.0
     return SensorNoise(
         _level(position),
         _level(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
@@ -57,15 +65,22 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
     n = len(log.t)
     turn = Rotation.from_rotvec(noise.attitude * rng.standard_normal((n, 3)))
     quaternion = log.quaternion.copy()
-    quaternion[log.valid] = (
-        Rotation.from_quat(log.quaternion[log.valid], scalar_first=True) * turn[log.valid]
-    ).as_quat(scalar_first=True)
+    if log.valid.any():
+        quaternion[log.valid] = (
+            Rotation.from_quat(log.quaternion[log.valid], scalar_first=True) * turn[log.valid]
+        ).as_quat(scalar_first=True)
+
+    def louder(x: Array | None, std: float) -> Array | None:
+        return x if x is None or std == 0.0 else x + std * rng.standard_normal((n, 3))
+
     return replace(
         log,
         position=log.position + noise.position * rng.standard_normal((n, 3)),
         quaternion=quaternion,
         rotor_speeds=log.rotor_speeds
         + noise.rotor_speed * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
+        gyro=louder(log.gyro, noise.gyro),
+        accelerometer=louder(log.accelerometer, noise.accelerometer),
     )
 
 

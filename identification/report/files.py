@@ -78,6 +78,7 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "notes": diagnosis.notes,
         "headline": headline(diagnosis),
         "floor_is_lower_bound": diagnosis.floor_is_bound,
+        "needs_pose": diagnosis.needs_pose,
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "structure": [asdict(structure) for structure in diagnosis.structure],
         "gusts": [{"channel": g.channel, "rms": g.rms, "time_s": g.time} for g in diagnosis.gusts],

@@ -16,6 +16,7 @@ from .pictures import (
 )
 from .words import (
     MISSING,
+    carried_by,
     coefficient_meaning,
     confusion,
     doubt_sentences,
@@ -174,6 +175,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         "summary": effect_summary(effect.name),
         "evidence": evidence,
         "rows": rows,
+        "carried": carried_by(effect),
     }
 
 

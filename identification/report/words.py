@@ -293,6 +293,13 @@ def name_in_words(effect: NamedEffect) -> str:
     )
 
 
+def carried_by(effect: NamedEffect) -> str:
+    """Return which channels of the logs carried a finding, in one sentence; nothing where that is
+    not known.
+    """
+    return f"Carried by {in_words(effect.channels)}." if effect.channels else ""
+
+
 def confusion(effect: NamedEffect) -> str:
     """Return which other effects would explain these logs as well as this one."""
     return (

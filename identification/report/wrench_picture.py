@@ -43,14 +43,17 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     from matplotlib.figure import Figure
 
     path, vehicle = Path(path), series.vehicle
-    phases = flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle)
+    known = bool(np.isfinite(series.position).all())
+    phases = (
+        flight_phases(series.t, series.position[:, 2], log.rotor_speeds, vehicle) if known else []
+    )
     figure = Figure(figsize=(12.0, 9.0), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     height, force, torque = figure.subplots(3, 1, sharex=True, height_ratios=[1.0, 1.5, 1.5])
     figure.suptitle(f"External wrench: {log.name}, {vehicle.name}")
 
     height.plot(series.t, series.position[:, 2], color="black", lw=1.2)
-    height.set_ylabel("height (m)")
+    height.set_ylabel("height (m)" if known else "height (not known)")
     backdrop = _draw_thrust(height, series.t, log, vehicle)
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
     force.set_ylabel("external force (N)")
@@ -146,7 +149,7 @@ def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
         seen[np.searchsorted(seen, log.t, "left")] - seen[np.searchsorted(seen, log.t, "right") - 1]
     )
     lost = gap > _LASTING
-    if lost.any():
+    if lost.any() and log.has_pose:
         lost[1:] |= lost[:-1]  # up to the next pose
         panel.fill_between(
             log.t,

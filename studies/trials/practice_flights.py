@@ -138,6 +138,7 @@ def fly_practice(
     turbulence: float = 1.0,
     sensor: float = 1.0,
     outsider_size: float = 1.0,
+    imu: bool = False,
 ) -> FlightLog:
     """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
     with the true wrench.
@@ -152,6 +153,7 @@ def fly_practice(
         turbulence: factor on the background turbulence; 0: still air.
         sensor: factor on the declared noise of the pose.
         outsider_size: factor on the disturbance.
+        imu: whether the log has gyro and accelerometer, true to the last digit.
 
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
@@ -181,7 +183,7 @@ def fly_practice(
         disturbance = outside_disturbance(
             outsider, vehicle, np.random.default_rng((seed, 1)), path, outsider_size
         )
-    c = record_flight(flown, effects, trajectory, seconds, seed, settings, disturbance)
+    c = record_flight(flown, effects, trajectory, seconds, seed, settings, disturbance, imu=imu)
     added = "+".join([*(e.name for e in effects), *([outsider] if outsider else [])]) or "nothing"
     return FlightLog(
         c["t"],
@@ -191,6 +193,8 @@ def fly_practice(
         c.get("voltage"),
         c["force"],
         c["torque"],
+        accelerometer=c.get("accelerometer"),
+        gyro=c.get("gyro"),
         name=f"{added}_{trajectory}_{seed}",
         source="flown in MuJoCo by fly_practice",
     )
@@ -243,6 +247,7 @@ def practise(
     seed: int = 0,
     seconds: float = 60.0,
     turbulence: float | None = None,
+    imu: bool = False,
 ) -> Practice:
     """Fly one practice flight.
 
@@ -256,6 +261,7 @@ def practise(
         seed: of everything random.
         seconds: length of the log.
         turbulence: factor on the background; default: 0 or 1 at random.
+        imu: as of ``fly_practice``.
 
     Raises:
         InputError: an unknown name, or a crash.
@@ -286,7 +292,16 @@ def practise(
     turbulence = float(rng.integers(2)) if turbulence is None else turbulence
     sensor = float(rng.choice([0.5, 1.0, 2.0]))
     log = fly_practice(
-        vehicle, effects, trajectory, seconds, seed, outsider, turbulence, sensor, SIZES[size]
+        vehicle,
+        effects,
+        trajectory,
+        seconds,
+        seed,
+        outsider,
+        turbulence,
+        sensor,
+        SIZES[size],
+        imu,
     )
     name = "_".join((kind, *added, size, trajectory, str(seed)))
     return Practice(

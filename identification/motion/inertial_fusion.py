@@ -1,0 +1,459 @@
+"""Attitude, velocity, position and sensor biases from an IMU, with whatever positions and attitudes
+were measured beside it: none, a few a second, or many.
+
+A fixed-interval smoother of the error state (attitude, velocity, position, gyro bias, accelerometer
+bias), linearised about its own result and repeated (Gauss-Newton; H. E. Rauch, F. Tung, C. T.
+Striebel, AIAA Journal 3 (1965), 1445-1450; B. M. Bell, SIAM Journal on Optimization 4 (1994),
+626-636). Without any position one thing is still known: a vehicle's velocity is bounded, so over
+tens of seconds the specific force in the world is gravity. That holds the tilt to some mrad; what
+it does not hold (heading, velocity, position) has large standard deviations, which come with the
+result.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...runtime.compiled import compiled
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FusionSettings:
+    """What is known of a flight and of its inertial sensors beforehand."""
+
+    knot: float = 0.02  # s from state to state; between them the IMU is integrated
+    # m/s, by which a velocity that nothing measured varies, and s between two that are
+    # independent. A steady velocity besides changes nothing that an IMU feels
+    velocity_std: float = 2.0
+    velocity_every: float = 3.0
+    steady_velocity_std: float = 5.0  # m/s, of that one, which stays unknown
+    position_std: float = 10.0  # m, where the flight begins, if nothing measured it
+    tilt_std: float = 0.3  # rad, at the start, from the mean specific force
+    heading_std: float = 0.3  # rad, where positions showed it; exact where nothing can
+    # of MEMS sensors, from one switching-on to the next: rad/s and m/s2, and their walk in a second
+    gyro_bias_std: float = 0.03
+    accelerometer_bias_std: float = 0.2
+    gyro_bias_walk: float = 3e-4
+    accelerometer_bias_walk: float = 3e-3
+    # of one sample, the least that is believed: rad/s and m/s2
+    least_gyro_noise: float = 0.001
+    least_accelerometer_noise: float = 0.01
+    levelling: float = 5.0  # s, time constant of the first guess, which takes gravity for up
+    iterations: int = 6
+    settled: float = 1e-4  # rad, change of attitude by which an iteration is the last
+    # attitude (body), velocity, position (world), gyro bias, accelerometer bias: three each
+    states: int = 15
+
+
+FUSION = FusionSettings()
+N = FUSION.states
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Positions or attitudes measured beside an IMU: m of them, at times (m,) s."""
+
+    t: Array  # (m,) s
+    values: Array  # (m, 3) m, world; or (m, 3, 3) body to world
+    std: float  # m, or rad, of one axis
+
+
+@dataclass(frozen=True, eq=False)
+class FusedMotion:
+    """Motion at m knots, and its standard deviations."""
+
+    t: Array  # (m,) s
+    rotation: Array  # (m, 3, 3) body to world
+    velocity: Array  # (m, 3) m/s, world
+    position: Array  # (m, 3) m, world
+    gyro_bias: Array  # (m, 3) rad/s, body
+    accelerometer_bias: Array  # (m, 3) m/s2, body
+    std: Array  # (m, 15) of attitude (rad, body), velocity, position and the two biases
+
+
+@compiled
+def _exp(x: float, y: float, z: float) -> Array:
+    """Return the rotation matrix of a rotation vector (rad)."""
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-6:
+        a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
+    else:
+        a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    out = np.empty((3, 3))
+    out[0, 0], out[0, 1], out[0, 2] = (
+        1.0 - b * (y * y + z * z),
+        b * x * y - a * z,
+        b * x * z + a * y,
+    )
+    out[1, 0], out[1, 1], out[1, 2] = (
+        b * x * y + a * z,
+        1.0 - b * (x * x + z * z),
+        b * y * z - a * x,
+    )
+    out[2, 0], out[2, 1], out[2, 2] = (
+        b * x * z - a * y,
+        b * y * z + a * x,
+        1.0 - b * (x * x + y * y),
+    )
+    return out
+
+
+@compiled
+def _log(R: Array) -> Array:
+    """Return the rotation vector (3,) of a rotation matrix, of less than half a turn."""
+    out = np.empty(3)
+    out[0], out[1], out[2] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    sine = 0.5 * math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
+    out *= 0.5 if sine < 1e-9 else 0.5 * angle / sine
+    return out
+
+
+@compiled
+def _cross_matrix(x: Array) -> Array:
+    out = np.zeros((3, 3))
+    out[0, 1], out[0, 2], out[1, 2] = -x[2], x[1], -x[0]
+    out[1, 0], out[2, 0], out[2, 1] = x[2], -x[1], x[0]
+    return out
+
+
+@compiled
+def _integrate(
+    gyro: Array, force: Array, dt: float, stride: int, turns: Array, ways: Array, moves: Array
+) -> None:
+    """Write what the IMU says of each interval between knots: turn (m, 3, 3), and what the specific
+    force adds to velocity and position (m, 3), in the axes of its start.
+    """
+    for k in range(len(turns)):
+        turn, speed, way = np.eye(3), np.zeros(3), np.zeros(3)
+        for j in range(k * stride, (k + 1) * stride):
+            w = 0.5 * (gyro[j] + gyro[j + 1]) * dt
+            half = turn @ _exp(0.5 * w[0], 0.5 * w[1], 0.5 * w[2])
+            a = half @ (0.5 * (force[j] + force[j + 1]))
+            way += speed * dt + 0.5 * dt * dt * a
+            speed += a * dt
+            turn = turn @ _exp(w[0], w[1], w[2])
+        turns[k], ways[k], moves[k] = turn, speed, way
+
+
+@compiled
+def _levelled(gyro: Array, force: Array, dt: float, time: float, R: Array, out: Array) -> None:
+    """Write the attitude (n, 3, 3) that the gyro integrates to and the specific force slowly levels
+    (R. Mahony, T. Hamel, J.-M. Pflimlin, IEEE Transactions on Automatic Control 53 (2008)).
+    """
+    for k in range(len(gyro)):
+        out[k] = R
+        size = math.sqrt(np.sum(force[k] ** 2)) + 1e-9
+        up, seen = R[2], force[k] / size
+        w = gyro[k].copy()
+        w[0] += (seen[1] * up[2] - seen[2] * up[1]) / time
+        w[1] += (seen[2] * up[0] - seen[0] * up[2]) / time
+        w[2] += (seen[0] * up[1] - seen[1] * up[0]) / time
+        R = np.ascontiguousarray(R @ _exp(w[0] * dt, w[1] * dt, w[2] * dt))
+
+
+@compiled
+def _predict(
+    k: int,
+    T: float,
+    gravity: float,
+    rotation: Array,
+    linear: Array,
+    turns: Array,
+    ways: Array,
+    moves: Array,
+    F: Array,
+    defect: Array,
+) -> None:
+    """Write the step from knot ``k`` to the next about the nominal motion: its matrix, and what the
+    IMU says the next knot lacks.
+    """
+    R, b, a = rotation[k], linear[k, 6:9], linear[k, 9:12]
+    turn = turns[k] @ _exp(-b[0] * T, -b[1] * T, -b[2] * T)
+    way, move = ways[k] - a * T, moves[k] - 0.5 * T * T * a
+    F[:] = 0.0
+    for i in range(3):
+        F[3 + i, 3 + i] = F[6 + i, 6 + i] = F[9 + i, 9 + i] = F[12 + i, 12 + i] = 1.0
+        F[i, 9 + i], F[6 + i, 3 + i] = -T, T
+    F[0:3, 0:3] = turn.T
+    F[3:6, 0:3] = -R @ _cross_matrix(way)
+    F[6:9, 0:3] = -R @ _cross_matrix(move)
+    F[3:6, 12:15], F[6:9, 12:15] = -T * R, -0.5 * T * T * R
+    defect[0:3] = _log(rotation[k + 1].T @ (R @ turn))
+    defect[3:6] = linear[k, 0:3] + R @ way - linear[k + 1, 0:3]
+    defect[6:9] = linear[k, 3:6] + T * linear[k, 0:3] + R @ move - linear[k + 1, 3:6]
+    defect[5] -= gravity * T
+    defect[8] -= 0.5 * gravity * T * T
+    defect[9:15] = linear[k, 6:12] - linear[k + 1, 6:12]
+
+
+@compiled
+def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: float) -> None:
+    """Take in a measurement (3,) of three of the states from ``first`` on, ``late`` s after the
+    knot (of positions).
+    """
+    for i in range(3):
+        h = np.zeros(N)
+        h[first + i] = 1.0
+        if first == 6:
+            h[3 + i] = late
+        c = P @ h
+        gain = c / (h @ c + variance)
+        x += gain * (z[i] - h @ x)
+        P -= np.outer(gain, c)
+
+
+@compiled
+def _smooth(
+    T: float,
+    gravity: float,
+    rotation: Array,
+    linear: Array,
+    turns: Array,
+    ways: Array,
+    moves: Array,
+    rates: Array,
+    noise: Array,
+    prior: Array,
+    prior_std: Array,
+    kinds: Index,
+    knots: Index,
+    late: Array,
+    vectors: Array,
+    matrices: Array,
+    variances: Array,
+    change: Array,
+    std: Array,
+) -> None:
+    """Write the smoothed error state (m, 15) about a nominal motion, and its standard deviations.
+
+    ``kinds`` of the measurements: 0 attitude, 1 velocity, 2 position; sorted by knot.
+    """
+    m = len(rotation)
+    means, covariances = np.empty((m, N)), np.empty((m, N, N))
+    before, spreads = np.empty((m, N)), np.empty((m, N, N))
+    F, defect = np.zeros((N, N)), np.zeros(N)
+    x, P = prior.copy(), np.diag(prior_std**2)
+    at = 0
+    for k in range(m):
+        if k > 0:
+            _predict(k - 1, T, gravity, rotation, linear, turns, ways, moves, F, defect)
+            x = F @ x + defect
+            P = F @ P @ F.T
+            for i in range(N):
+                P[i, i] += noise[i]
+        before[k], spreads[k] = x, P
+        P = P.copy()
+        while at < len(knots) and knots[at] == k:
+            z = np.empty(3)
+            if kinds[at] == 0:
+                w = rates[k] * late[at]
+                z[:] = _log((rotation[k] @ _exp(w[0], w[1], w[2])).T @ matrices[at])
+                _update(x, P, 0, 0.0, z, variances[at])
+            elif kinds[at] == 1:
+                z[:] = vectors[at] - linear[k, 0:3]
+                _update(x, P, 3, 0.0, z, variances[at])
+            else:
+                z[:] = vectors[at] - linear[k, 3:6] - late[at] * linear[k, 0:3]
+                _update(x, P, 6, late[at], z, variances[at])
+            at += 1
+        P = 0.5 * (P + P.T)
+        means[k], covariances[k] = x, P
+    change[m - 1] = x
+    for i in range(N):
+        std[m - 1, i] = math.sqrt(max(P[i, i], 0.0))
+    for k in range(m - 2, -1, -1):
+        _predict(k, T, gravity, rotation, linear, turns, ways, moves, F, defect)
+        gain = np.linalg.solve(spreads[k + 1], F @ covariances[k]).T.copy()
+        x = means[k] + gain @ (x - before[k + 1])
+        P = covariances[k] + gain @ (P - spreads[k + 1]) @ gain.T
+        P = 0.5 * (P + P.T)
+        change[k] = x
+        for i in range(N):
+            std[k, i] = math.sqrt(max(P[i, i], 0.0))
+
+
+@compiled
+def _fold(rotation: Array, linear: Array, change: Array) -> float:
+    """Add an error state (m, 15) to the nominal motion in place; return its largest angle."""
+    most = 0.0
+    for k in range(len(rotation)):
+        x = change[k]
+        most = max(most, math.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2))
+        rotation[k] = rotation[k] @ _exp(x[0], x[1], x[2])
+        linear[k] += x[3:15]
+    return most
+
+
+def fuse(
+    t: Array,
+    gyro: Array,
+    force: Array,
+    gravity: float,
+    noise: tuple[float, float],
+    positions: Readings | None = None,
+    attitudes: Readings | None = None,
+) -> FusedMotion:
+    """Return the motion of an unbroken, evenly sampled piece of IMU readings.
+
+    Args:
+        t: (n,) s, evenly spaced.
+        gyro: (n, 3) rad/s, body.
+        force: (n, 3) specific force, m/s2, body: +g along z in a hover.
+        gravity: m/s2.
+        noise: standard deviation of one sample of gyro (rad/s) and accelerometer (m/s2).
+        positions: measured beside them, world.
+        attitudes: likewise. Without positions and attitudes the heading is zero at the start.
+    """
+    dt = float((t[-1] - t[0]) / (len(t) - 1))
+    stride = max(1, round(FUSION.knot / dt))
+    count = (len(t) - 1) // stride
+    T = stride * dt
+    gyro, force = (np.ascontiguousarray(x[: count * stride + 1]) for x in (gyro, force))
+    turns, ways, moves = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
+    _integrate(gyro, force, dt, stride, turns, ways, moves)
+    times = t[0] + T * np.arange(count + 1)
+    rates, forces = (np.ascontiguousarray(x[::stride]) for x in (gyro, force))
+    rotation, heading_std = _first_guess(times, rates, forces, gravity, noise, positions, attitudes)
+    linear = np.zeros((count + 1, 12))
+    if positions is not None:
+        linear[:, 3:6] = np.column_stack(
+            [np.interp(times, positions.t, x) for x in positions.values.T]
+        )
+    measured = _measurements(times, positions, attitudes)
+    sizes = np.maximum(noise, [FUSION.least_gyro_noise, FUSION.least_accelerometer_noise])
+    walks = np.array([FUSION.gyro_bias_walk, FUSION.accelerometer_bias_walk])
+    spread = np.concatenate(
+        [
+            np.full(3, sizes[0] ** 2 * dt * T),
+            np.full(3, sizes[1] ** 2 * dt * T),
+            np.full(3, sizes[1] ** 2 * dt * T**3 / 3.0),
+            *(np.full(3, walk**2 * T) for walk in walks),
+        ]
+    )
+    started = rotation[0].copy()
+    up = np.abs(started[2])  # a heading is a turn about the world's vertical, in body axes
+    angles = np.sqrt((FUSION.tilt_std * (1.0 - up)) ** 2 + (heading_std * up) ** 2)
+    priors = [FUSION.steady_velocity_std, FUSION.position_std, FUSION.gyro_bias_std]
+    prior_std = np.concatenate(
+        [angles + 1e-4, np.repeat([*priors, FUSION.accelerometer_bias_std], 3)]
+    )
+    begun = linear[0].copy()
+    begun[6:] = 0.0
+    change, std = np.zeros((count + 1, N)), np.zeros((count + 1, N))
+    for _ in range(FUSION.iterations):
+        prior = np.concatenate([_log(rotation[0].T @ started), begun - linear[0]])
+        _smooth(
+            T, gravity, rotation, linear, turns, ways, moves, rates, spread, prior, prior_std,
+            *measured, change, std,
+        )  # fmt: skip
+        if _fold(rotation, linear, change) < FUSION.settled:
+            break
+    if positions is None:
+        std[:, 3:6] = np.hypot(std[:, 3:6], FUSION.steady_velocity_std)
+    return FusedMotion(
+        times, rotation, linear[:, :3], linear[:, 3:6], linear[:, 6:9], linear[:, 9:], std
+    )
+
+
+def _first_guess(
+    times: Array,
+    gyro: Array,
+    force: Array,
+    gravity: float,
+    noise: tuple[float, float],
+    positions: Readings | None,
+    attitudes: Readings | None,
+) -> tuple[Array, float]:
+    """Return an attitude (m, 3, 3) to linearise about, and the standard deviation (rad) of its
+    heading at the start.
+    """
+    dt = float(times[1] - times[0])
+    out = np.empty((len(times), 3, 3))
+    # roll and pitch come back to where they were: their mean rate is the bias
+    rates = gyro - np.append(gyro.mean(axis=0)[:2], 0.0)
+    first = force[: max(1, round(FUSION.levelling / dt))].mean(axis=0)
+    up = first / np.linalg.norm(first)
+    forward = np.array([1.0, 0.0, 0.0]) - up[0] * up
+    forward /= max(float(np.linalg.norm(forward)), 1e-9)
+    level = np.stack([forward, np.cross(up, forward), up])
+    _levelled(rates, force, dt, FUSION.levelling, np.ascontiguousarray(level), out)
+    if attitudes is not None and len(attitudes.t):
+        near = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
+        turned = attitudes.values[0] @ out[near].T
+        heading = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
+    elif positions is not None and len(positions.t) > 20:
+        heading = _heading(times, out, force, gravity, noise, gyro, positions)
+    else:
+        return out, 0.0
+    return np.ascontiguousarray(_exp(0.0, 0.0, heading) @ out), FUSION.heading_std
+
+
+def _heading(
+    times: Array,
+    rotation: Array,
+    force: Array,
+    gravity: float,
+    noise: tuple[float, float],
+    gyro: Array,
+    positions: Readings,
+) -> float:
+    """Return by which heading (rad) a levelled IMU's horizontal motion is the positions': of the
+    turns by which velocity over some seconds follows.
+    """
+    alone = fuse(times, gyro, force, gravity, noise)
+    step = 2.0  # s: an IMU alone keeps a velocity's change over it, and a position shows it
+    at = np.arange(times[0] + step, times[-1] - step, 0.5 * step)
+
+    def second_difference(t: Array, x: Array) -> Array:
+        a, b, c = (
+            np.column_stack([np.interp(at + k * step, t, column) for column in x.T[:2]])
+            for k in (-1, 0, 1)
+        )
+        return a - 2.0 * b + c
+
+    own = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])
+    seen = second_difference(positions.t, positions.values) @ np.array([1.0, 1.0j])
+    turned = alone.rotation[0] @ rotation[0].T
+    zero = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
+    return float(np.angle(np.sum(np.conj(own) * seen))) + zero
+
+
+def _measurements(
+    times: Array, positions: Readings | None, attitudes: Readings | None
+) -> tuple[Index, Index, Array, Array, Array, Array]:
+    """Return all measurements, sorted by knot: kind, knot, time behind it, vector, matrix and
+    variance.
+    """
+    rows: list[tuple[int, int, float, Array, Array, float]] = []
+    eye, nothing = np.eye(3), np.zeros(3)
+    T = float(times[1] - times[0])
+
+    def nearest(t: Array) -> Index:
+        return np.clip(np.rint((t - times[0]) / T), 0, len(times) - 1).astype(np.int64)
+
+    if positions is None:
+        bound = np.arange(times[0], times[-1], FUSION.velocity_every)
+        rows += [(1, int(k), 0.0, nothing, eye, FUSION.velocity_std**2) for k in nearest(bound)]
+    else:
+        for t, k, x in zip(positions.t, nearest(positions.t), positions.values, strict=True):
+            rows.append((2, int(k), float(t - times[k]), x, eye, positions.std**2))
+    if attitudes is not None:
+        for t, k, x in zip(attitudes.t, nearest(attitudes.t), attitudes.values, strict=True):
+            rows.append((0, int(k), float(t - times[k]), nothing, x, attitudes.std**2))
+    rows.sort(key=lambda row: row[1])
+    kinds, knots, late, vectors, matrices, variances = zip(*rows, strict=True)
+    return (
+        np.array(kinds, dtype=np.int64),
+        np.array(knots, dtype=np.int64),
+        np.array(late, dtype=np.float64),
+        np.array(vectors, dtype=np.float64),
+        np.array(matrices, dtype=np.float64),
+        np.array(variances, dtype=np.float64),
+    )

@@ -1,0 +1,281 @@
+"""What an IMU says of a flight's motion where the pose does not: logs without a pose, or with
+positions a few times a second.
+
+The specific force is the balance of forces in body axes itself, whatever the attitude; the gyro is
+the angular velocity. So what rotors and body do shows without a pose. Attitude, and with it what
+acts in the world's axes, comes from ``inertial_fusion``; its errors turn needed and modelled force
+alike and make no residual of their own. Velocity and position are as uncertain as the fusion says.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
+
+from ...runtime.errors import InputError
+from ..logs.flight_log import FlightLog
+from .inertial_fusion import FusedMotion, Readings, fuse
+from .signals import SIGNALS, Signals
+from .smoothing import CUTOFFS, derivative, high_pass, low_pass
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class InertialSettings:
+    """Which logs are read by their IMU, and at which rate."""
+
+    # poses a second, from which the pose alone tells the motion; with fewer the IMU is needed
+    least_pose_hz: float = 45.0
+    most_hz: float = 250.0  # of the signals; faster IMUs are low-passed and thinned out
+    gap: float = 0.1  # s without a reading, which ends a piece
+    # m and rad, of a first guess, and the least that is believed, of a measured pose's axis
+    first_position_std: float = 0.02
+    least_position_std: float = 0.0005
+    first_attitude_std: float = 0.01
+    least_attitude_std: float = 0.001
+    # standard deviations from which a position or an attitude is a leap and is left out
+    outlier: float = 10.0
+    drift_time: float = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
+
+
+INERTIAL_SIGNALS = InertialSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class InertialSignals(Signals):
+    """Signals of an IMU, with what its sensors read and how well the rest is known."""
+
+    # (n, 6) unfiltered: acceleration (m/s2, world) and angular velocity (rad/s, body)
+    measured: Array
+    attitude_std: Array  # (n, 3) rad, body
+    velocity_std: Array  # (n, 3) m/s, world
+    position_std: Array  # (n, 3) m, world
+    bias_std: Array  # (3,) m/s2, of the accelerometer's bias that was taken out
+
+
+def pose_rate(log: FlightLog) -> float:
+    """Return how many new poses a second a log holds; 0 where it holds none."""
+    rows = np.flatnonzero(np.isfinite(log.position).all(axis=1))
+    if len(rows) < 2:
+        return 0.0
+    new = np.append(True, np.any(np.diff(log.position[rows], axis=0) != 0.0, axis=1))
+    times = log.t[rows[new]]
+    return float(1.0 / np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def reads_imu(log: FlightLog) -> bool:
+    """Return whether a log's motion is that of its IMU: it has one, and no pose that is fast
+    enough.
+    """
+    return (
+        log.gyro is not None
+        and log.accelerometer is not None
+        and pose_rate(log) < INERTIAL_SIGNALS.least_pose_hz
+    )
+
+
+def imu_noise(log: FlightLog) -> tuple[float, float]:
+    """Return the standard deviation of one sample of gyro (rad/s) and accelerometer (m/s2), an
+    axis: what lies above a quarter of the sampling rate.
+    """
+    return _level(log.gyro), _level(log.accelerometer)
+
+
+def _level(x: Array | None) -> float:
+    read = np.empty((0, 3)) if x is None else x[np.isfinite(x).all(axis=1)]
+    if len(read) < 50:
+        return 0.0
+    return float(np.median(np.abs(high_pass(read, CUTOFFS.noise_share_of_rate))) / 0.6745)
+
+
+def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
+    """Return the rows of each unbroken run of IMU readings that is long enough to say something."""
+    if log.gyro is None or log.accelerometer is None:
+        return []
+    read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
+    if not len(read):
+        return []
+    breaks = np.flatnonzero(np.diff(log.t[read]) > INERTIAL_SIGNALS.gap) + 1
+    return [
+        rows
+        for rows in np.split(read, breaks)
+        if len(rows) > 50 and log.t[rows[-1]] - log.t[rows[0]] > SIGNALS.shortest_piece
+    ]
+
+
+def inertial_signals(
+    log: FlightLog, gravity: float = 9.81, wide_hz: float = np.inf
+) -> list[InertialSignals]:
+    """Return the motion over each unbroken piece of a log's IMU.
+
+    Args:
+        log: with gyro and accelerometer; positions and attitudes in it are used, however few.
+        gravity: m/s2.
+        wide_hz: of a low-pass on gyro and specific force. Default: none. A pose needs one, as it is
+            differentiated twice; here it would take a per cent at 5 Hz, and that is a lag.
+
+    Raises:
+        InputError: no piece is longer than 3 s.
+    """
+    pieces = inertial_pieces(log)
+    if not pieces:
+        raise InputError(
+            f"{log.name}: no unbroken piece of gyro and accelerometer is longer than "
+            f"{SIGNALS.shortest_piece:g} s"
+        )
+    noise = imu_noise(log)
+    return [_piece(log, rows, gravity, wide_hz, noise) for rows in pieces]
+
+
+def _piece(
+    log: FlightLog,
+    rows: NDArray[np.intp],
+    gravity: float,
+    wide_hz: float,
+    noise: tuple[float, float],
+) -> InertialSignals:
+    assert log.gyro is not None
+    assert log.accelerometer is not None
+    own = log.t[rows]
+    fine = float(np.median(np.diff(own)))
+    thin = max(1, int(np.ceil(1.0 / (INERTIAL_SIGNALS.most_hz * fine) - 1e-6)))
+    period = thin * fine
+    even = np.arange(own[0], own[-1] + 0.5 * fine, fine)
+    even = even[even <= own[-1]]
+
+    def sampled(times: Array, x: Array) -> Array:
+        found = np.column_stack([np.interp(even, times, column) for column in x.T])
+        return low_pass(found, 0.4 / period, fine)[::thin] if thin > 1 else found
+
+    gyro, force = (sampled(own, x[rows]) for x in (log.gyro, log.accelerometer))
+    speeds = sampled(log.t, log.rotor_speeds)
+    t = even[::thin]
+    fused = _fused(log, t, gyro, force, gravity, noise, thin)
+    count = int(np.searchsorted(t, fused.t[-1] + 1e-9))
+    t, gyro, force, speeds = t[:count], gyro[:count], force[:count], speeds[:count]
+
+    def at_samples(x: Array) -> Array:
+        return np.column_stack([np.interp(t, fused.t, column) for column in x.T])
+
+    gyro = gyro - at_samples(fused.gyro_bias)
+    force = force - at_samples(fused.accelerometer_bias)
+    rotation = _dense(t, gyro, fused)
+    angular_velocity = low_pass(gyro, wide_hz, period)
+    down = np.array([0.0, 0.0, gravity])
+    voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
+    return InertialSignals(
+        t,
+        period,
+        at_samples(fused.position),
+        rotation,
+        at_samples(fused.velocity),
+        np.einsum("nij,nj->ni", rotation, low_pass(force, wide_hz, period)) - down,
+        angular_velocity,
+        derivative(angular_velocity, period),
+        np.maximum(speeds, 0.0),
+        voltage,
+        np.column_stack([np.einsum("nij,nj->ni", rotation, force) - down, gyro]),
+        at_samples(fused.std[:, 0:3]),
+        at_samples(fused.std[:, 3:6]),
+        at_samples(fused.std[:, 6:9]),
+        np.median(fused.std[:, 12:15], axis=0),
+    )
+
+
+def _fused(
+    log: FlightLog,
+    t: Array,
+    gyro: Array,
+    force: Array,
+    gravity: float,
+    noise: tuple[float, float],
+    thin: int,
+) -> FusedMotion:
+    """Return the fused motion, with the noise of positions and attitudes as they themselves show
+    it.
+    """
+    quieter = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
+    placed = _measured(log, np.isfinite(log.position).all(axis=1), t)
+    turned = _measured(log, np.isfinite(log.quaternion).all(axis=1) & log.valid, t)
+    positions = attitudes = None
+    if len(placed) > 3:
+        positions = Readings(
+            log.t[placed], log.position[placed], INERTIAL_SIGNALS.first_position_std
+        )
+    if len(turned) > 3:
+        attitudes = Readings(
+            log.t[turned],
+            Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix(),
+            INERTIAL_SIGNALS.first_attitude_std,
+        )
+    fused = fuse(t, gyro, force, gravity, quieter, positions, attitudes)
+    if positions is None:
+        return fused
+    at = np.column_stack([np.interp(positions.t, fused.t, x) for x in fused.position.T])
+    off = positions.values - at
+    found = 1.3 * _robust(off)  # a smoother leaves less than the noise
+    std = max(found, INERTIAL_SIGNALS.least_position_std)
+    near = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
+    positions = Readings(positions.t[near], positions.values[near], std)
+    if attitudes is not None:
+        near = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
+        still = np.abs(fused.t[near] - attitudes.t) < 0.004
+        if still.sum() > 20:
+            off = Rotation.from_matrix(
+                np.swapaxes(fused.rotation[near[still]], 1, 2) @ attitudes.values[still]
+            ).as_rotvec()
+            attitudes = replace(
+                attitudes, std=max(1.3 * _robust(off), INERTIAL_SIGNALS.least_attitude_std)
+            )
+    return fuse(t, gyro, force, gravity, quieter, positions, attitudes)
+
+
+def _robust(x: Array) -> float:
+    return float(np.median(np.abs(x - np.median(x, axis=0))) / 0.6745)
+
+
+def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
+    """Return the rows of new measurements within a piece; a pose that repeats the one before to the
+    last digit was held.
+    """
+    rows = np.flatnonzero(there & (log.t >= t[0]) & (log.t <= t[-1]))
+    if len(rows) < 2:
+        return rows
+    values = np.column_stack([log.position[rows], np.nan_to_num(log.quaternion[rows])])
+    return rows[np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))]
+
+
+def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
+    """Return the attitude (n, 3, 3) at all samples: from the knot before, by the gyro."""
+    period = float(t[1] - t[0])
+    knot = np.clip(np.searchsorted(fused.t, t + 1e-9, side="right") - 1, 0, len(fused.t) - 1)
+    first = np.clip(np.rint((fused.t[knot] - t[0]) / period).astype(np.int64), 0, len(t) - 1)
+    turned = np.vstack([np.zeros(3), np.cumsum(0.5 * (gyro[1:] + gyro[:-1]) * period, axis=0)])
+    since = Rotation.from_rotvec(turned - turned[first])
+    return np.asarray((Rotation.from_matrix(fused.rotation[knot]) * since).as_matrix())
+
+
+def with_drift(
+    s: InertialSignals, rng: np.random.Generator, gravity: float = 9.81
+) -> InertialSignals:
+    """Return signals as they would be with other errors of what the IMU does not know, drawn from
+    the fusion's standard deviations: attitude, velocity and position that drift slowly.
+    """
+    slow = gaussian_filter1d(
+        rng.standard_normal((len(s.t), 9)), INERTIAL_SIGNALS.drift_time / s.period, axis=0
+    )
+    slow /= np.sqrt(np.mean(np.square(slow), axis=0)) + 1e-30
+    turn = Rotation.from_rotvec(slow[:, :3] * s.attitude_std).as_matrix()
+    down, rotation = np.array([0.0, 0.0, gravity]), s.rotation @ turn
+    felt = np.einsum("nji,nj->ni", s.rotation, s.acceleration + down)
+    return replace(
+        s,
+        rotation=rotation,
+        acceleration=np.einsum("nij,nj->ni", rotation, felt) - down,
+        velocity=s.velocity + slow[:, 3:6] * s.velocity_std,
+        position=s.position + slow[:, 6:] * s.position_std,
+    )

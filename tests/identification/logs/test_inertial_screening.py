@@ -1,0 +1,105 @@
+"""Logs without a pose: what their IMU claims is asked of gravity and of the rotors."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.imu_flights import imu_flight, pose_removed
+from windwrench.dynamics import load_vehicle
+from windwrench.identification.logs.flight_log import FlightLog, write_log
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.motion.inertial_signals import pose_rate, reads_imu
+from windwrench.runtime.errors import InputError
+
+VEHICLE = load_vehicle("ardrone2")
+
+
+@pytest.fixture(scope="module")
+def flown() -> FlightLog:
+    """A flight of 12 s with pose and IMU."""
+    return imu_flight(VEHICLE, seconds=12.0)
+
+
+def test_a_log_without_a_pose_passes(flown: FlightLog) -> None:
+    """Nothing is wrong with it, for either use."""
+    log = pose_removed(flown)
+    assert reads_imu(log)
+    assert not reads_imu(flown)
+    assert screen_log(log, VEHICLE) == ()
+    assert screen_for_estimate(log, VEHICLE)[1] == ()
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"accelerometer": 1.0 / 9.80665}, "ax, ay, az look like g"),
+        ({"accelerometer": [1.0, -1.0, -1.0]}, "forward, right, down, or inverted"),
+        ({"accelerometer": 0.1}, r"expected the specific force|look like"),
+        ({"gyro": 180.0 / np.pi}, "in degrees per second"),
+        ({"gyro": [1.0, -1.0, -1.0]}, "negate gy and gz"),
+        ({"gyro": [0.0, 0.0, 0.0]}, "never change"),
+    ],
+)
+def test_other_units_and_axes_are_refused(
+    flown: FlightLog, fields: dict[str, object], words: str
+) -> None:
+    """The message says what the columns look like and what to do."""
+    log = pose_removed(flown)
+    changed = {name: getattr(log, name) * np.asarray(factor) for name, factor in fields.items()}
+    with pytest.raises(InputError, match=words):
+        screen_log(replace(log, **changed), VEHICLE)
+
+
+def test_gravity_along_another_axis_is_refused(flown: FlightLog) -> None:
+    """A board that is mounted on its side."""
+    log = pose_removed(flown)
+    assert log.accelerometer is not None
+    with pytest.raises(InputError, match="gravity lies along ax"):
+        screen_log(replace(log, accelerometer=log.accelerometer[:, [2, 1, 0]]), VEHICLE)
+
+
+def test_another_rotor_order_is_refused(flown: FlightLog) -> None:
+    """Betaflight's order of rotors, by the torques against the gyro."""
+    log = pose_removed(flown)
+    with pytest.raises(InputError, match="Betaflight"):
+        screen_log(replace(log, rotor_speeds=log.rotor_speeds[:, [2, 3, 1, 0]]), VEHICLE)
+
+
+def test_a_log_that_is_too_slow_or_too_short_is_refused(flown: FlightLog) -> None:
+    """30 readings a second, and 8 s."""
+    log = pose_removed(flown)
+
+    def rows(keep: slice) -> FlightLog:
+        assert log.gyro is not None
+        assert log.accelerometer is not None
+        return FlightLog(
+            log.t[keep],
+            log.position[keep],
+            log.quaternion[keep],
+            log.rotor_speeds[keep],
+            accelerometer=log.accelerometer[keep],
+            gyro=log.gyro[keep],
+        )
+
+    with pytest.raises(InputError, match=r"28\.6 IMU readings a second"):
+        screen_log(rows(slice(None, None, 7)), VEHICLE)
+    with pytest.raises(InputError, match="of unbroken gyro and accelerometer"):
+        screen_log(rows(slice(0, 1600)), VEHICLE)
+
+
+def test_positions_without_an_attitude_are_a_log(flown: FlightLog, tmp_path: Path) -> None:
+    """Ten positions a second beside the IMU: written, read back, and read by the IMU."""
+    log = pose_removed(flown, position_every=20)
+    path = tmp_path / "slow.csv"
+    write_log(log, path)
+    header = path.read_text(encoding="utf-8").splitlines()[0]
+    assert "px" in header
+    assert "qw" not in header
+    back = read_log(path, vehicle=VEHICLE)
+    assert not back.has_pose
+    assert pose_rate(back) == pytest.approx(10.0)
+    np.testing.assert_allclose(back.position[::20], flown.position[::20], rtol=1e-9)
+    assert screen_log(back, VEHICLE) == ()

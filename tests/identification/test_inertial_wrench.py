@@ -1,0 +1,89 @@
+"""The wrench from an IMU: against the truth, and its smoother against dense least squares."""
+
+import numpy as np
+import pytest
+
+from tests.support.imu_flights import imu_flight, pose_removed
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.identification.inertial_wrench import _smoothed_force, _smoothed_turning
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.wrench_series import estimate_log, truth_rmse, tune_to_log
+from windwrench.runtime.errors import InputError
+
+VEHICLE = load_vehicle("ardrone2")
+PUSH = EffectSetting("constant_force", {"fx": 0.0, "fy": 0.0, "fz": -0.4})
+
+
+@pytest.fixture(scope="module")
+def flown() -> FlightLog:
+    """A flight of 15 s under a steady force."""
+    return imu_flight(VEHICLE, (PUSH,), seconds=15.0)
+
+
+def test_an_imu_alone_shows_a_vertical_force(flown: FlightLog) -> None:
+    """Within its own deviations, which say that horizontal ones are worse known."""
+    series = estimate_log(pose_removed(flown), VEHICLE)
+    inner = slice(400, -400)
+    assert abs(float(series.force[inner, 2].mean()) + 0.4) < 0.1
+    z = np.abs(series.force - flown.force)[inner] / series.std_force[inner]
+    assert (z.mean(axis=0) < 2.0).all()
+    assert np.isnan(series.nis).all()
+    assert any("no pose" in note for note in series.notes)
+
+
+def test_an_imu_beside_the_pose_is_smoothed(flown: FlightLog) -> None:
+    """Nearer to the truth than the filter with the same sensors."""
+    smoothed = truth_rmse(estimate_log(flown, VEHICLE, smooth=True), flown)
+    filtered = truth_rmse(estimate_log(flown, VEHICLE), flown)
+    assert smoothed is not None
+    assert filtered is not None
+    assert (smoothed[0] < filtered[0]).all()
+    assert (smoothed[1] < filtered[1]).all()
+
+
+def test_a_tuning_needs_poses(flown: FlightLog) -> None:
+    """One line, and no numbers."""
+    with pytest.raises(InputError, match="to fit a tuning to"):
+        tune_to_log(pose_removed(flown), VEHICLE)
+
+
+def test_the_force_is_the_posterior_of_a_walk() -> None:
+    """Far from the ends, where the start is forgotten, a dense solution says the same."""
+    rng = np.random.default_rng(0)
+    n, walk, variance = 400, 0.01, 1.0
+    y = np.cumsum(np.sqrt(walk) * rng.standard_normal(n)) + rng.standard_normal(n)
+    found, std = _smoothed_force(y, walk, variance)
+    between = np.diff(np.eye(n), axis=0)
+    precision = np.eye(n) / variance + between.T @ between / walk
+    covariance = np.linalg.inv(precision)
+    inner = slice(150, 250)
+    np.testing.assert_allclose(found[inner], (covariance @ y / variance)[inner], atol=1e-5)
+    assert std == pytest.approx(np.sqrt(covariance[200, 200]), rel=1e-4)
+
+
+def test_the_torque_is_the_posterior_of_a_walk_behind_the_gyro() -> None:
+    """The same of an angular acceleration, of which the gyro shows the integral."""
+    rng = np.random.default_rng(1)
+    n, T, walk, miss, variance = 300, 0.01, 0.04, 1e-4, 1e-3
+    a = np.cumsum(np.sqrt(walk) * rng.standard_normal(n))
+    driven = np.sin(0.1 * np.arange(n))
+    acting = np.append(0.0, 0.5 * T * (driven[:-1] + driven[1:]))
+    rate = np.cumsum(np.append(0.0, T * a[:-1]) + acting)
+    rate += np.sqrt(variance) * rng.standard_normal(n)
+    found, std = _smoothed_turning(rate, driven, T, walk, miss, variance)
+    # unknowns: rate and acceleration at each sample
+    eye, nothing = np.eye(n), np.zeros((n, n))
+    rows = [np.hstack([eye, nothing]) / np.sqrt(variance)]
+    right = [rate / np.sqrt(variance)]
+    step = np.diff(eye, axis=0)
+    rows.append(np.hstack([step, -T * eye[:-1]]) / np.sqrt(miss))
+    right.append(acting[1:] / np.sqrt(miss))
+    rows.append(np.hstack([np.zeros((n - 1, n)), step]) / np.sqrt(walk))
+    right.append(np.zeros(n - 1))
+    A, b = np.vstack(rows), np.concatenate(right)
+    covariance = np.linalg.inv(A.T @ A)
+    expected = covariance @ (A.T @ b)
+    inner = slice(130, 170)
+    np.testing.assert_allclose(found[inner], expected[n:][inner], atol=1e-3)
+    assert std == pytest.approx(np.sqrt(covariance[n + 150, n + 150]), rel=1e-3)

@@ -1,0 +1,50 @@
+"""Flights with an IMU, for the tests."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from windwrench.dynamics.vehicle import EffectSetting, Vehicle
+from windwrench.envs.recording import background, record_flight
+from windwrench.identification.logs.flight_log import FlightLog
+
+
+def imu_flight(
+    vehicle: Vehicle,
+    effects: tuple[EffectSetting, ...] = (),
+    seconds: float = 20.0,
+    trajectory: str = "excite",
+    seed: int = 1,
+    turbulence: float = 0.0,
+) -> FlightLog:
+    """A simulated flight: pose, rotor speeds, and an IMU with noise and bias."""
+    settings = background(vehicle, turbulence)
+    c = record_flight(vehicle, effects, trajectory, seconds, seed, settings, imu=True)
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((2, len(c["t"]), 3))
+    return FlightLog(
+        c["t"],
+        c["position"],
+        c["quaternion"],
+        c["rotor_speeds"],
+        c.get("voltage"),
+        c["force"],
+        c["torque"],
+        accelerometer=c["accelerometer"] + 0.1 * noise[0] + [0.05, -0.1, 0.08],
+        gyro=c["gyro"] + 0.005 * noise[1] + [0.01, -0.005, 0.008],
+        name="imu_flight",
+    )
+
+
+def pose_removed(log: FlightLog, position_every: int = 0) -> FlightLog:
+    """The log without its pose, or with each so many-th position alone."""
+    count = len(log.t)
+    position = np.full((count, 3), np.nan)
+    if position_every:
+        position[::position_every] = log.position[::position_every]
+    return replace(
+        log,
+        position=position,
+        quaternion=np.full((count, 4), np.nan),
+        valid=np.zeros(count, dtype=np.bool_),
+    )
