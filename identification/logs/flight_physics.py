@@ -42,6 +42,9 @@ class PhysicsSettings:
     upright: float = 0.5  # mean cosine of the thrust axis below which nothing flies
     order_left: float = 1.3  # of 2, the two torques
     order_clear: float = 0.25
+    # rad/s of roll and pitch in that band: in hovers (0.08 in a simulated one) rotors answer
+    # disturbances more than they turn the body, and the mirrored order may explain more
+    least_turning: float = 0.12
     likely_left: float = 1.8  # the same of an order that is a guess, but a better one than the
     likely_clear: float = 0.05  # usual
     delays: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # periods by which a body answers its motors
@@ -134,6 +137,7 @@ class FlightPhysics:
         )
         inside = np.flatnonzero(good & (t >= middle - half - 1.0) & (t <= middle + half + 1.0))
         self._rows = inside[:: max(1, len(inside) // samples)]
+        self._turning = 0.0  # rad/s, of roll and pitch in the band of the turning
 
     @property
     def long_enough(self) -> bool:
@@ -380,6 +384,7 @@ class FlightPhysics:
         if rates is None or not self.long_enough or not np.isfinite(rates).all():
             return {}
         turning = self._band(self._derivative(rates))[:, :2]
+        self._turning = float(np.sqrt(np.mean(np.square(self._band(rates)[:, :2]))))
         push = self._band(self._on_grid(thrusts[self._rows]))
         if not np.isfinite(push).all():
             return {}
@@ -406,7 +411,10 @@ class FlightPhysics:
         """Return whether an order is likelier than what is usual, though it is not sure."""
         return left <= PHYSICS.likely_left and second - left >= PHYSICS.likely_clear
 
-    @staticmethod
-    def sure_order(left: float, second: float) -> bool:
-        """Return whether an order is sure, of what it and the next best leave."""
-        return left <= PHYSICS.order_left and second - left >= PHYSICS.order_clear
+    def sure_order(self, left: float, second: float) -> bool:
+        """Return whether an order is sure, of what it and the next best leave, once ``orders`` has
+        seen how much the body turns.
+        """
+        enough = self._turning >= PHYSICS.least_turning
+        clear = second - left >= PHYSICS.order_clear
+        return enough and left <= PHYSICS.order_left and clear
