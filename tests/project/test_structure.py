@@ -29,7 +29,7 @@ STOREYS = (
     {"motion"},
     {"logs.conventions", "logs.screening", "findings"},
     {"wrench_series"},
-    {"prediction", "inference", "comparison"},
+    {"prediction", "inference", "comparison", "rotor_faults"},
     {"diagnosis"},
     {"report"},
 )
