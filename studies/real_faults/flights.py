@@ -87,7 +87,7 @@ def _log(
 ) -> Drawn:
     """Return what an autopilot would have written of a flight."""
     every = int(rng.choice([4, 5]))
-    t: Array = _STEP * np.arange(len(states))
+    t = np.asarray(_STEP * np.arange(len(states)), dtype=np.float64)
     imu = slice(None, None, every)
     count = len(t[imu])
     gyro = states[imu, :3] + rng.normal(0.0, 0.02, 3)

@@ -175,6 +175,14 @@ def _searches(result: Result) -> list[str]:
         f"* **A rotor named where none failed**: "
         f"{share(len(false), len(seen['none']) + len(seen['other']))}, of these sure: "
         f"{sum(r['sure'] for r in false)}.",
+        f"* **Something found where nothing happened** (all rotors, or another force): "
+        f"{share(sum(r['likeliest'] != 'nothing' for r in seen['none']), len(seen['none']))}, of "
+        "these sure: "
+        f"{sum(r['likeliest'] != 'nothing' and r['sure'] for r in seen['none'])}.",
+        f"* Another force and torque taken for all rotors at once: "
+        f"{share(sum(r['likeliest'] == 'all rotors' for r in seen['other']), len(seen['other']))}"
+        ", of these sure: "
+        f"{sum(r['likeliest'] == 'all rotors' and r['sure'] for r in seen['other'])}.",
         f"* Refused, too little flight before the model ends to hold: "
         f"{sum('refused' in row for row in rows)} of {len(rows)}.",
         f"* Onset within the stated 95 % interval where the rotor is right: "

@@ -29,7 +29,7 @@ STOREYS = (
     {"motion"},
     {"logs.conventions", "logs.screening", "findings"},
     {"wrench_series"},
-    {"prediction", "inference", "comparison", "vehicle_fit"},
+    {"prediction", "inference", "comparison", "rotor_faults", "vehicle_fit"},
     {"diagnosis"},
     {"report"},
     {"fleet"},
