@@ -62,6 +62,7 @@ _Y_UP = np.array(
     [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 )  # of a frame whose y points up
 _SWAP_YZ = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+_SWAP_XZ = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 _SWAP_XY = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -196,6 +197,33 @@ POSE_READINGS = (
         "px and py are swapped against the attitude; expected both in one world frame: swap the "
         "columns",
         position=_SWAP_XY,
+    ),
+    Reading(
+        "x and z swapped",
+        "px and pz are swapped, the attitude is not; expected z up: swap the columns",
+        position=_SWAP_XZ,
+    ),
+    *(
+        Reading(
+            f"{column} negated",
+            f"{column} points the other way than the attitude's world, which mirrors the flight; "
+            f"expected both in one world frame: negate {column}",
+            position=np.diag(signs),
+        )
+        for column, signs in (("px", [-1.0, 1.0, 1.0]), ("py", [1.0, -1.0, 1.0]))
+    ),
+    *(
+        Reading(
+            "turned position",
+            f"the position's world is turned against the attitude's by {angle} degrees about z; "
+            f"expected both in one world frame: p = {columns}",
+            position=np.array(turn),
+        )
+        for angle, columns, turn in (
+            (180, "(-px, -py, pz)", [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]),
+            (90, "(py, -px, pz)", [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+            (-90, "(-py, px, pz)", [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+        )
     ),
     Reading(
         "conjugate, NED",

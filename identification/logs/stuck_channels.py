@@ -1,4 +1,8 @@
-"""Channels that stand still while their sisters change: what a hung sensor leaves in a log."""
+"""Channels that stand still while their sisters change, and rotor speeds that stand in a log twice:
+what a hung sensor and a wrong column leave.
+"""
+
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +21,7 @@ _AT_LIMIT = 0.99  # of the fastest rotor speed: a rotor at its limit stands stil
 
 def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     """Return a note for each channel that repeats to the last digit, for half a second or more in
-    flight, while the other channels of its kind change.
+    flight, while the other channels of its kind change, and for one that stands there twice.
 
     Args:
         log: the flight.
@@ -42,7 +46,26 @@ def stuck_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     notes += _note(
         "the attitude", "the coordinates", log.t[seen], held & flying[seen], [turning[0], *axes], 0
     )
-    return tuple(notes)
+    return (*notes, *_doubled(rotors))
+
+
+def _doubled(rotors: list[Array]) -> list[str]:
+    """Return a note where two rotors have the same speeds to the last digit in every row and the
+    two others have not: a flight in one plane without noise has two such pairs.
+    """
+    alike = [
+        (i, j)
+        for i, j in combinations(range(4), 2)
+        if np.count_nonzero(np.diff(rotors[i])) >= SISTERS_CHANGE
+        and np.array_equal(rotors[i], rotors[j])
+    ]
+    if len(alike) != 1:
+        return []
+    ((i, j),) = alike
+    return [
+        f"warning: the columns omega{i + 1} and omega{j + 1} are the same in every row: if one is "
+        "written under both names, force and torque are wrong"
+    ]
 
 
 def _note(

@@ -156,6 +156,22 @@ HOSTILE = {
         lambda log: replace(log, position=log.position[:, [1, 0, 2]]),
         "px and py are swapped",
     ),
+    "px negated": (
+        lambda log: replace(log, position=log.position * [-1.0, 1.0, 1.0]),
+        "px points the other way .* negate px",
+    ),
+    "py negated": (
+        lambda log: replace(log, position=log.position * [1.0, -1.0, 1.0]),
+        "py points the other way .* negate py",
+    ),
+    "position turned by 180": (
+        lambda log: replace(log, position=log.position * [-1.0, -1.0, 1.0]),
+        "turned against the attitude's by 180 degrees",
+    ),
+    "position turned by 90": (
+        lambda log: replace(log, position=log.position[:, [1, 0, 2]] * [-1.0, 1.0, 1.0]),
+        "turned against the attitude's by 90 degrees",
+    ),
     "scalar last, NED": (
         lambda log: scalar_last(ned(log)),
         "quaternion is scalar last and the world z down",

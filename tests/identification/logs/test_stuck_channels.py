@@ -66,6 +66,10 @@ TAMPERED = {
     ),
     "revolutions per minute": lambda log: replace(log, rotor_speeds=9.549 * log.rotor_speeds),
     "rotors swapped": lambda log: replace(log, rotor_speeds=log.rotor_speeds[:, [1, 0, 2, 3]]),
+    "a rotor's column twice": lambda log: replace(
+        log, rotor_speeds=log.rotor_speeds[:, [0, 0, 2, 3]]
+    ),
+    "x the other way": column("position", 0, lambda _, values: -values),
     "x stands still": column("position", 0, held),
     "x and y swapped": lambda log: replace(log, position=log.position[:, [1, 0, 2]]),
     "z the other way": column("position", 2, lambda _, values: -values),
@@ -93,6 +97,15 @@ def wrench_errors(log):
         np.sqrt(np.mean(np.square(series.torque - log.torque)[end])),
         series.notes,
     )
+
+
+def test_rotors_that_are_alike_in_pairs_are_a_flight_in_a_plane():
+    log = flight()
+    pairs = replace(log, rotor_speeds=log.rotor_speeds[:, [0, 1, 1, 0]])
+    assert not [note for note in stuck_notes(pairs, VEHICLE) if "same in every row" in note]
+    twice = replace(log, rotor_speeds=log.rotor_speeds[:, [0, 1, 2, 1]])
+    (note,) = [note for note in stuck_notes(twice, VEHICLE) if "same in every row" in note]
+    assert "omega2 and omega4" in note
 
 
 @pytest.mark.parametrize("name", TAMPERED)
