@@ -416,7 +416,7 @@ def _heading(
             np.column_stack([np.interp(at + k * step, t, column) for column in x.T[:2]])
             for k in (-1, 0, 1)
         )
-        return a - 2.0 * b + c
+        return np.asarray(a - 2.0 * b + c)
 
     own = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])
     seen = second_difference(positions.t, positions.values) @ np.array([1.0, 1.0j])
@@ -436,7 +436,8 @@ def _measurements(
     T = float(times[1] - times[0])
 
     def nearest(t: Array) -> Index:
-        return np.clip(np.rint((t - times[0]) / T), 0, len(times) - 1).astype(np.int64)
+        found: Index = np.clip(np.rint((t - times[0]) / T), 0, len(times) - 1).astype(np.int64)
+        return found
 
     if positions is None:
         bound = np.arange(times[0], times[-1], FUSION.velocity_every)
