@@ -177,11 +177,11 @@ def diagnose(
     )
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     # an IMU's own noise is far below the disturbances that count for none
-    least = tuple(np.hypot(floor, calm[[0, 3]])) if flights.inertial else floor
+    least_seen = np.hypot(floor, calm[[0, 3]]) if flights.inertial else np.array(floor)
     noisy = (
         flights.filtered
-        or error_after[0] > DIAGNOSIS.most_floor_ratio * least[0]
-        or error_after[1] > DIAGNOSIS.most_floor_ratio * least[1]
+        or error_after[0] > DIAGNOSIS.most_floor_ratio * least_seen[0]
+        or error_after[1] > DIAGNOSIS.most_floor_ratio * least_seen[1]
     )
     disturbances = (
         ()

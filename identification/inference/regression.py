@@ -215,7 +215,7 @@ class Flights:
         self._residuals: dict[tuple[object, ...], Array] = {}
         self._first: list[Piece] = []
         self._first = pieces = self.pieces({})
-        log, block, fit, start, t = [], [], [], [], []
+        log_of, block, fit, start, t = [], [], [], [], []
         count = 0
         seconds = sum(float(piece.signals.t[-1] - piece.signals.t[0]) for piece in pieces)
         length = (
@@ -226,7 +226,7 @@ class Flights:
         for piece in pieces:
             time = piece.signals.t[piece.rows]
             number = ((time - time[0]) // length).astype(np.int64)
-            log.append(np.full(len(time), piece.log))
+            log_of.append(np.full(len(time), piece.log))
             block.append(number + count)
             seen = (
                 np.full(len(time), piece.log < len(logs))
@@ -237,7 +237,7 @@ class Flights:
             start.append(np.arange(len(time)) == 0)
             t.append(time)
             count += int(number[-1]) + 1
-        self.log: Index = np.concatenate(log)  # (rows,) which log
+        self.log: Index = np.concatenate(log_of)  # (rows,) which log
         self.block: Index = np.concatenate(block)  # (rows,)
         self.fit_rows: Mask = np.concatenate(fit)  # (rows,)
         self.start: Mask = np.concatenate(start)  # (rows,) first row of a piece
@@ -474,7 +474,8 @@ class Flights:
         bias.
         """
         own = [p.signals for p in self._first if p.log == flight]
-        return np.max([s.bias_std for s in own if isinstance(s, InertialSignals)], axis=0)
+        largest: Array = np.max([s.bias_std for s in own if isinstance(s, InertialSignals)], axis=0)
+        return largest
 
     def amended(self, setting: Setting) -> Vehicle:
         """Return the vehicle with these effects; one that it declares already is replaced."""

@@ -315,9 +315,9 @@ def _pose(samples: _Samples, log_map: LogMap) -> tuple[Mask, Array, Array, list[
         return np.zeros(count, bool), nothing[:, :3], nothing[:, 3:], ["no pose in the table"]
     world, body = WORLD_TURNS[log_map.world], BODY_TURNS[log_map.body]
     position = samples.values(log_map.position) * LENGTH_UNITS[log_map.position.unit]
-    placed = np.asarray(np.isfinite(position).all(axis=1))
+    placed: Mask = np.all(np.isfinite(position), axis=1)
     attitude = _attitude(samples, log_map.attitude)
-    turned: Mask = np.isfinite(attitude).all(axis=1)
+    turned: Mask = np.all(np.isfinite(attitude), axis=1)
     notes = []
     table = samples.table
     for name, mask in (("position", placed), ("attitude", turned)):

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog
-from ..logs.readers import px4_channels, px4_ulog
+from ..logs.readers import px4_channels
+from ..logs.readers.recognise import reader_by_content
 from ..logs.reading import read_log
 from .channels import Channels, channels_of_log
 
@@ -36,7 +37,8 @@ def channels_of(path: Path, log: FlightLog) -> Channels:
 
 
 def _is_ulog(path: Path) -> bool:
-    return path.name.lower().endswith(px4_ulog.SUFFIXES)
+    reader = reader_by_content(path)
+    return reader is not None and reader.name == "px4_ulog"
 
 
 def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]]:

@@ -1,5 +1,6 @@
 """``python -m studies.map_guesses``: random tables, and how often their guessed maps are right."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +21,7 @@ def study(
     """Guess maps for random tables, with and without the vehicle (some minutes)."""
     with share_bars_by_part() as report:
         found = [
-            run(count, seed, told, lambda share, told=told: report(f"vehicle {told}", share))
+            run(count, seed, told, partial(report, f"vehicle {'given' if told else 'not given'}"))
             for told in (False, True)
         ]
     for result in found:

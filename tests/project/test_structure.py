@@ -27,7 +27,9 @@ FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 STOREYS = (
     {"logs"},
     {"motion"},
-    {"logs.conventions", "logs.screening", "findings"},
+    {"logs.conventions", "logs.inertial_screening"},
+    {"logs.screening", "findings"},
+    {"inertial_wrench"},
     {"wrench_series"},
     {"prediction", "inference", "comparison", "rotor_faults", "vehicle_fit"},
     {"diagnosis"},
