@@ -7,6 +7,7 @@ that of torques; what the model reads shows where its wrench changes with an inp
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +96,7 @@ def _read(flights: Flights, setting: Setting, effect: str) -> Iterator[str]:
 
 def _head(s: Signals) -> Signals:
     cut = slice(0, CHANNELS.most_samples)
-    fields = {
+    fields: dict[str, Any] = {
         name: x[cut]
         for name, x in vars(s).items()
         if isinstance(x, np.ndarray) and len(x) == len(s.t)

@@ -208,7 +208,8 @@ class Innovations:
         begun = np.log([DISTURBANCE.strengths[i], DISTURBANCE.times[j]])
 
         def loss(x: Array) -> float:
-            return float(np.log(self._sums(motions, *np.exp(x).tolist(), axis)[0, 0]))
+            strength, time = np.exp(x).tolist()
+            return float(np.log(self._sums(motions, strength, time, axis)[0, 0]))
 
         near = INNOVATIONS.grid_margin * np.array([-1.0, 1.0])
         best = minimize(

@@ -126,10 +126,10 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
-    no_attitude = POSE[3] not in columns
+    turned: Mask = ~lost if POSE[3] in columns else np.zeros_like(lost)
     accelerometer, gyro = (sensor_columns(table, columns, sensor) for sensor in sensors)
     check_times(table, columns["t"])
-    quaternion = unit_quaternions(table, pose[:, 3:], ~lost & ~no_attitude, "qw, qx, qy, qz")
+    quaternion = unit_quaternions(table, pose[:, 3:], turned, "qw, qx, qy, qz")
     rotor_speeds = np.column_stack([columns.get(name, nothing) for name in ROTORS])
     command = np.column_stack([columns[name] for name in COMMANDS]) if commands else None
     _check_commands(table, columns, commands)
@@ -168,7 +168,7 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
             *time_notes(columns["t"]),
             *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),
         ),
-        valid=~lost & (not no_attitude),
+        valid=turned,
         vehicle=_vehicle_name(table),
     )
 
