@@ -10,6 +10,7 @@ is zero, so that what the flights have in common remains for effects to explain.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +125,7 @@ def downsampled(signals: Signals) -> Signals:
     count = len(signals.t)
     at = np.arange(0, count, step)
     smooth = np.maximum(low_pass(signals.rotor_speeds, CUTOFFS.pose_hz, signals.period), 0.0)
-    sampled = {
+    sampled: dict[str, Any] = {
         name: x[at]
         for name, x in {**vars(signals), "rotor_speeds": smooth}.items()
         if isinstance(x, np.ndarray) and len(x) == count

@@ -182,10 +182,10 @@ class Flights:
         self.logs = (*logs, *test)
         # the motion is that of an IMU: no pose, or one that is too slow to tell it
         self.inertial = any(map(reads_imu, self.logs))
-        for log in self.logs if self.inertial else ():
-            if log.gyro is None or log.accelerometer is None:
+        for flown in self.logs if self.inertial else ():
+            if flown.gyro is None or flown.accelerometer is None:
                 raise InputError(
-                    f"{log.source or log.name}: has a pose and no gyro and accelerometer, and "
+                    f"{flown.source or flown.name}: has a pose and no gyro and accelerometer, and "
                     "another log has no pose; expected the IMU in all of them, or the pose"
                 )
         self.commanded = any_commanded(
@@ -474,8 +474,8 @@ class Flights:
         bias.
         """
         own = [p.signals for p in self._first if p.log == flight]
-        largest: Array = np.max([s.bias_std for s in own if isinstance(s, InertialSignals)], axis=0)
-        return largest
+        left = [s.bias_std for s in own if isinstance(s, InertialSignals)]
+        return np.asarray(np.max(left, axis=0))
 
     def amended(self, setting: Setting) -> Vehicle:
         """Return the vehicle with these effects; one that it declares already is replaced."""

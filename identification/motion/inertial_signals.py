@@ -199,9 +199,10 @@ def _fused(
     it.
     """
     quieter = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    with_position: Mask = np.isfinite(log.position).all(axis=1)
-    placed = _measured(log, with_position, t)
-    turned = _measured(log, np.isfinite(log.quaternion).all(axis=1) & log.valid, t)
+    there: Mask = np.asarray(np.isfinite(log.position).all(axis=1))
+    placed = _measured(log, there, t)
+    whole: Mask = np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid)
+    turned = _measured(log, whole, t)
     positions = attitudes = None
     if len(placed) > 3:
         positions = Readings(
@@ -247,8 +248,7 @@ def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:
     if len(rows) < 2:
         return rows
     values = np.column_stack([log.position[rows], np.nan_to_num(log.quaternion[rows])])
-    fresh: NDArray[np.intp] = rows[np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))]
-    return fresh
+    return np.asarray(rows[np.append(True, np.any(np.diff(values, axis=0) != 0.0, axis=1))])
 
 
 def _dense(t: Array, gyro: Array, fused: FusedMotion) -> Array:
