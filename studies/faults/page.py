@@ -50,12 +50,13 @@ def write_page(result: Result, data: Path, page: Path) -> None:
         )
     lines += [
         "",
-        "What is left are faults that no pose shows: rotor speeds that lie make a wrench of a "
-        "whole weight that never acted, and poses that are upside down or turn at random for "
-        "longer than the gate's patience are believed, with the wrench that they mean. Both die "
-        "away with the filter's rise time, to 1 % after two of them, and its standard deviation, "
-        "which knows of the random walk alone, does not say so. An estimated mass takes a part "
-        "of such a wrench and keeps it: with rotor speeds that lie the mass is wrong.",
+        "Rotor speeds that lie make a wrench of a whole weight that never acted, and poses that "
+        "are upside down or turn at random for longer than the gate's patience are believed, with "
+        "the wrench that they mean. Where such a wrench is contradicted, its standard deviation "
+        "becomes as large as itself; where it is not, it dies away with the filter's rise time, to "
+        "1 % after two of them, and its standard deviation, which knows of the random walk alone, "
+        "does not say so. An estimated mass is forgotten with what contradicts it "
+        "([the filter](estimator.md)).",
         "",
         "## A long flight",
         "",
