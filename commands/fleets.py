@@ -22,6 +22,7 @@ def diagnose_fleet(
     logs: Sequence[Path],
     vehicle: str | None,
     reader: str | None,
+    log_map: str | None,
     without: Sequence[str],
     manifest: Path | None,
     cluster: str | None,
@@ -41,6 +42,7 @@ def diagnose_fleet(
     from ..identification.fleet.outcomes import Outcomes
     from ..identification.fleet.page import change_in_words, changes, headline
     from ..identification.fleet.running import LIMIT_S, OUTCOMES, rows, run_fleet
+    from ..identification.logs.log_map import load_map
     from ..identification.logs.readers import find_reader
     from ..runtime.errors import unknown_name
     from ..runtime.extras import need
@@ -50,10 +52,12 @@ def diagnose_fleet(
             raise unknown_name("effect", name, names(), "--without")
     if reader is not None:
         find_reader(reader)
+    if log_map is not None:
+        load_map(log_map)
     if cluster is not None:
         need("ray", "cluster")
     described = None if manifest is None else read_manifest(manifest)
-    found, doubts = find_logs(logs, described, vehicle, reader, out)
+    found, doubts = find_logs(logs, described, vehicle, reader, out, log_map)
     folder = results_folder(out, logs=len(found), jobs=jobs, cluster=cluster)
     for text in doubts:
         note(text)

@@ -279,14 +279,14 @@ def diagnose(
     if rotor_faults:
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
-        return _rotor_faults(logs, reader, vehicle, out)
+        return _rotor_faults(logs, reader, vehicle, out, map)
     if fleet:
         if test or against:
             raise InputError(
                 "--fleet: each log is diagnosed by itself; expected no --test, --against"
             )
         return diagnose_fleet(
-            logs, vehicle, reader, without or (), manifest, cluster, jobs, limit, out
+            logs, vehicle, reader, map, without or (), manifest, cluster, jobs, limit, out
         )
     alone = {"--manifest": manifest, "--cluster": cluster, "--jobs": jobs, "--limit": limit}
     for option, value in alone.items():
@@ -404,7 +404,11 @@ def _with_rotor_faults(
 
 
 def _rotor_faults(
-    logs: Sequence[Path], reader: str | None, vehicle: str | None, out: Path
+    logs: Sequence[Path],
+    reader: str | None,
+    vehicle: str | None,
+    out: Path,
+    log_map: str | None,
 ) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
@@ -414,7 +418,7 @@ def _rotor_faults(
     from ..identification.rotor_faults.words import fault_data, headline, write_faults
 
     model = None if vehicle is None else load_vehicle(vehicle)
-    read = [read_channels(path, reader, model) for path in logs]
+    read = [read_channels(path, reader, model, log_map) for path in logs]
     folder = results_folder(out)
     found = []
     with working("looking for a rotor that lost thrust") as progress:

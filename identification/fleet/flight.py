@@ -18,6 +18,7 @@ from ...runtime.code_digest import code_digest
 from ...runtime.errors import InputError
 from ..diagnosis import diagnose
 from ..logs.flight_log import FlightLog
+from ..logs.log_map import load_map
 from ..logs.reading import read_log
 from ..report.files import report_data
 from .manifest import FleetLog
@@ -50,7 +51,7 @@ class Job:
 
 def key_of(log: FleetLog, without: tuple[str, ...], known: dict[str, str]) -> str:
     """Return what an outcome depends on, as a digest (32 hexadecimal digits): the log's bytes, the
-    vehicle, the reader, the effects that are left out, and the code.
+    vehicle, the reader or map, the effects that are left out, and the code.
 
     Args:
         log: the log.
@@ -66,10 +67,12 @@ def key_of(log: FleetLog, without: tuple[str, ...], known: dict[str, str]) -> st
         known[vehicle] = dump_vehicle(load_vehicle(vehicle))
     reader = log.reader or ""
     option = Path(reader.partition(":")[2])
+    log_map = "" if log.map is None else repr(load_map(log.map))
     for text in (
         known.get(vehicle, ""),
         reader,
         option.read_text(encoding="utf-8", errors="replace") if option.is_file() else "",
+        log_map,
         *sorted(without),
         code_digest(_CODE, (), _NOT_CODE),
     ):
@@ -135,7 +138,7 @@ def _read(log: FleetLog) -> tuple[FlightLog, Vehicle]:
         InputError: it cannot be read, or its vehicle is not known.
     """
     model = None if log.vehicle is None else load_vehicle(log.vehicle)
-    flight = read_log(log.path, log.reader, model)
+    flight = read_log(log.path, log.reader, model, log.map)
     if model is not None:
         return flight, model
     if flight.vehicle not in preset_names():

@@ -9,10 +9,11 @@ log itself. The manifest is YAML::
       - log: "alpha/*.csv"    # pattern of paths below the manifest's folder; * takes / too
         vehicle: racer.yaml   # a preset, or a file beside the manifest
         id: alpha             # the individual; default: the log's folder, else the vehicle's name
-        reader: nanobench
+        reader: nanobench     # or map: map.yaml, for a table of other columns
         time: 2026-03-01T10:00
 
-or CSV with these columns, ``log,vehicle,id,reader,time``. The first entry that fits a log counts.
+or CSV with these columns, ``log,vehicle,id,reader,map,time``. The first entry that fits a log
+counts.
 """
 
 import csv
@@ -31,6 +32,7 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.file_limits import LIMITS
 from ...runtime.regular_files import read_bytes
 from ...runtime.yaml_file import read_yaml
+from ..logs.log_map import load_map
 from ..logs.readers import READERS, find_reader
 from ..logs.readers.recognise import reader_by_content
 
@@ -38,7 +40,7 @@ MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
 VEHICLE_FILE = "vehicle.yaml"
 _TABLES = (".csv", ".csv.gz", ".parquet")
 _BAG_FOLDER = "metadata.yaml"  # marks a ROS 2 bag, a folder that is one log
-_KEYS = ("log", "vehicle", "id", "reader", "time")
+_KEYS = ("log", "vehicle", "id", "reader", "map", "time")
 _ORDERS = ("name", "modified")
 _MOST_BYTES = LIMITS.table_line * 64  # of a manifest in CSV
 
@@ -52,6 +54,7 @@ class FleetLog:
     vehicle: str | None = None  # a preset or a vehicle file; None: the log names it
     id: str = ""  # the individual that flew; empty: the vehicle's name
     reader: str | None = None
+    map: str | None = None  # a map's name or file, in place of a reader
     time: float | None = None  # s; orders the flights of an individual; None: their names do
 
 
@@ -63,6 +66,7 @@ class Entry:
     vehicle: str | None = None
     id: str = ""
     reader: str | None = None
+    map: str | None = None  # a map's name or file, in place of a reader
     time: float | None = None
 
 
@@ -130,11 +134,17 @@ def _entry(given: Any, where: str, folder: Path) -> Entry:
     reader = None if given.get("reader") is None else str(given["reader"])
     if reader is not None:
         find_reader(reader)
+    log_map = None if given.get("map") is None else str(given["map"])
+    if log_map is not None:
+        if log_map.endswith((".yaml", ".yml")):
+            log_map = str(folder / log_map)
+        load_map(log_map)
     return Entry(
         str(given["log"]),
         vehicle,
         str(given.get("id") or ""),
         reader,
+        log_map,
         _seconds(given.get("time"), where),
     )
 
@@ -169,6 +179,7 @@ def find_logs(
     vehicle: str | None = None,
     reader: str | None = None,
     without: Path | None = None,
+    log_map: str | None = None,
 ) -> tuple[list[FleetLog], list[str]]:
     """Return the logs among files and in folders, in the order of their names, and doubts: entries
     of the manifest that fit none.
@@ -179,6 +190,7 @@ def find_logs(
         vehicle: of the logs of which the manifest names none.
         reader: likewise.
         without: a folder that is left out, the results'.
+        log_map: name or file of a map, likewise.
 
     Raises:
         InputError: there is no such file, there is no log, or a vehicle cannot be used.
@@ -198,6 +210,7 @@ def find_logs(
                 vehicle or _vehicle_beside(path, root),
                 below.parts[0] if below is not None and len(below.parts) > 1 else "",
                 reader,
+                log_map,
             )
             logs.setdefault(os.path.realpath(path), _with_manifest(one, manifest, used))
     if not logs:
@@ -279,7 +292,8 @@ def _with_manifest(log: FleetLog, manifest: Manifest | None, used: set[int]) -> 
                 log,
                 vehicle=entry.vehicle or log.vehicle,
                 id=entry.id or log.id,
-                reader=entry.reader or log.reader,
+                reader=entry.reader or (None if entry.map else log.reader),
+                map=entry.map or (None if entry.reader else log.map),
                 time=log.time if entry.time is None else entry.time,
             )
     return log

@@ -111,7 +111,10 @@ def _absolute(log: FleetLog) -> FleetLog:
     if reader is not None and ":" in reader:
         name, _, option = reader.partition(":")
         reader = f"{name}:{os.path.abspath(option)}"
-    return replace(log, path=os.path.abspath(log.path), vehicle=vehicle, reader=reader)
+    log_map = log.map
+    if log_map is not None and log_map.endswith((".yaml", ".yml")):
+        log_map = os.path.abspath(log_map)
+    return replace(log, path=os.path.abspath(log.path), vehicle=vehicle, reader=reader, map=log_map)
 
 
 def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:

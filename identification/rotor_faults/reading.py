@@ -13,16 +13,19 @@ from .channels import Channels, channels_of_log
 
 
 def read_channels(
-    path: Path, reader: str | None = None, vehicle: Vehicle | None = None
+    path: Path,
+    reader: str | None = None,
+    vehicle: Vehicle | None = None,
+    log_map: str | None = None,
 ) -> tuple[Channels, tuple[str, ...]]:
     """Return a log's gyro, accelerometer and commands, and notes on where they came from.
 
     Raises:
         InputError: the file cannot be read, or lacks one of the three.
     """
-    if reader in (None, "px4_ulog") and _is_ulog(path):
+    if log_map is None and reader in (None, "px4_ulog") and _is_ulog(path):
         return _of_ulog(path)
-    log = read_log(path, reader, vehicle)
+    log = read_log(path, reader, vehicle, log_map)
     return channels_of_log(log), log.notes
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from windwrench.dynamics import InputError, dump_vehicle, load_vehicle
-from windwrench.identification.fleet.manifest import find_logs, natural, read_manifest
+from windwrench.identification.fleet.manifest import MANIFEST, find_logs, natural, read_manifest
 
 
 @pytest.fixture
@@ -135,3 +135,21 @@ def test_no_log_is_named(tmp_path):
 def test_names_are_ordered_as_people_do():
     names = ["b", "flight10", "flight9", "2", "10", "", "flight9b"]
     assert sorted(names, key=natural) == ["", "2", "10", "b", "flight9", "flight9b", "flight10"]
+
+
+def test_a_map_stands_in_place_of_a_reader(folder):
+    (folder / "own.yaml").write_text(
+        "time: {column: t}\n"
+        "position: {columns: [x, y, z]}\n"
+        "attitude: {columns: [q0, q1, q2, q3], order: wxyz}\n"
+        "rotors: {columns: [a, b, c, d], unit: rpm, order: windwrench}\n"
+    )
+    (folder / MANIFEST).write_text('logs: [{log: "alpha/*", map: own.yaml}]')
+    logs, doubts = find_logs([folder], reader="nanobench", without=folder / "out")
+    assert doubts == []
+    found = {log.name: (log.reader, log.map) for log in logs}
+    assert found["alpha/flight9.csv"] == (None, str(folder / "own.yaml"))
+    assert found["loose.parquet"] == ("nanobench", None)
+    (folder / MANIFEST).write_text('logs: [{log: "alpha/*", map: absent.yaml}]')
+    with pytest.raises(InputError, match=r"absent\.yaml"):
+        find_logs([folder], without=folder / "out")
