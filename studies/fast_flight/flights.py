@@ -9,6 +9,7 @@ specific force. The files may be measured with, and are not part of the project.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
         InputError: there is no such file, or it lacks a column.
     """
     try:
-        table = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
+        table: Any = np.genfromtxt(path, delimiter=",", names=True, dtype=np.float64)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as a flight of the racer: {error}") from error
     known = table.dtype.names or ()
@@ -59,7 +60,8 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
             raise InputError(
                 f"{path}: expected the columns of the racer's flights, lacks {', '.join(lacking)}"
             )
-        return np.column_stack([table[name] for name in names])
+        out: Array = np.column_stack([table[name] for name in names])
+        return out
 
     def axes(prefix: str) -> Array:
         return columns(f"{prefix}_{axis}" for axis in "xyz")

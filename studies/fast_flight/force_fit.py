@@ -60,7 +60,8 @@ def _with(declared: Vehicle, coefficients: Mapping[Coefficient, float]) -> Vehic
 
 def _force(flight: Flight, vehicle: Vehicle) -> Array:
     acting, _ = acting_wrench(flight.signals, vehicle)
-    return np.einsum("nji,nj->ni", flight.signals.rotation, acting[:, :3])
+    out: Array = np.einsum("nji,nj->ni", flight.signals.rotation, acting[:, :3])
+    return out
 
 
 def _thrust(flight: Flight, vehicle: Vehicle) -> Array:
