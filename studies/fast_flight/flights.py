@@ -60,7 +60,8 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
             raise InputError(
                 f"{path}: expected the columns of the racer's flights, lacks {', '.join(lacking)}"
             )
-        return np.column_stack([table[name] for name in names])
+        out: Array = np.column_stack([table[name] for name in names])
+        return out
 
     def axes(prefix: str) -> Array:
         return columns(f"{prefix}_{axis}" for axis in "xyz")

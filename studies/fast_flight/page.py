@@ -134,7 +134,7 @@ def _pose(flights: Sequence[Mapping[str, Any]]) -> str:
         [row["flight"], f"{row['seconds']:.0f}", f"{row['fastest']:.1f}", f"{row['rmse']:.3f}"]
         for row in flights
     ]
-    head = ["flight", "s", "fastest, m/s", "force against that of its own pose, N"]
+    head = ["flight", "s", "fastest, m/s", "force against that of its own velocity, N"]
     return _table(head, rows)
 
 

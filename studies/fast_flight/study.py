@@ -242,14 +242,14 @@ def filter_study(
 
 
 def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, Any]]:
-    """Return by how much each flight's force differs from that of its own pose, differentiated
-    twice: what no estimate from the pose can lower. With it how long and fast it flew.
+    """Return by how much each flight's force differs from that of its own velocity, differentiated:
+    what no estimate from the motion can lower. With it how long and fast it flew.
     """
     gravity = np.array([0.0, 0.0, vehicle.gravity])
     rows = []
     for flight in flights:
         s = flight.signals
-        acceleration = derivative(s.position, s.period, 2)
+        acceleration = derivative(s.velocity, s.period)
         needed = vehicle.mass * np.einsum("nji,nj->ni", s.rotation, acceleration + gravity)
         inside = slice(round(0.25 / s.period), -round(0.25 / s.period))
         rows.append(
