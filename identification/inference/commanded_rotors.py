@@ -54,7 +54,8 @@ DEVIATION_SIZES = {
 # an error of measurement, and a mass beside the scale of thrust, which is known to be unknown
 SECOND_CHOICE_EFFECTS = frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"})
 
-# effects that are not identifiable from force alone, or with a thrust curve that is a guess
+# effects that are not identifiable from force alone, or with a thrust curve that is a guess, or
+# that live on small differences between rotors, which commands do not tell
 EXCLUDED_EFFECTS = frozenset(
     {
         "rotor_efficiency",
@@ -64,6 +65,7 @@ EXCLUDED_EFFECTS = frozenset(
         "rate_damping",
         "flapping_moment",
         "rotor_inertia",
+        "rotor_interaction",
     }
 )
 # effects that explain nearly the same of a flight that hardly yaws: one of each kind is enough

@@ -117,6 +117,11 @@ def _first_lines(path: Path) -> tuple[list[str], str]:
         raise InputError(f"{path}: not a text file (it holds zero bytes); expected a table")
     lines = piece.split("\n")
     whole = lines if len(piece) < _PIECE else lines[:-1]
+    if not whole:
+        raise InputError(
+            f"{path}: its first line has more than {_PIECE} characters; expected a header and "
+            "rows of numbers"
+        )
     return whole[:_LINES], encoding
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json
 from windwrench.runtime.workers import workers
 from windwrench.studies.identified_vehicles.flights import VEHICLES, flown
 
@@ -81,11 +81,9 @@ def run(folder: Path, count: int, jobs: int = 1) -> list[dict[str, Any]]:
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the runs as JSON, one a line."""
+    """Write the runs as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = ",\n".join(json.dumps(outcome) for outcome in outcomes)
-    with replaced(path) as partial:
-        partial.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    write_json(list(outcomes), path)
 
 
 def quantities(outcomes: Iterable[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:

@@ -13,7 +13,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
 from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json
 from windwrench.runtime.workers import workers
 from windwrench.studies.imu_logs.sensors import LOGS
 from windwrench.studies.trials.practice_flights import practise, shown_in
@@ -161,8 +161,6 @@ def run(folder: Path, wanted: Sequence[Task], jobs: int = 1) -> list[dict[str, A
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the outcomes as JSON, one a line."""
+    """Write the outcomes as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = ",\n".join(json.dumps(outcome) for outcome in outcomes)
-    with replaced(path) as partial:
-        partial.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    write_json(list(outcomes), path)

@@ -225,7 +225,7 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
         (("benchmark", "--episodes", "many"), "--episodes"),
         (("benchmark", "--seed", "100000"), "--seed"),
         (("estimate", "nowhere.csv"), "nowhere.csv"),
-        (("estimate", "nowhere.txt"), ".csv.gz"),
+        (("estimate", "nowhere.txt"), "nowhere.txt: cannot be read"),
         (("estimate",), "argument"),
         (("estimate", "log.csv", "--gate", "1.5"), "--gate: expected 0, or a probability"),
         (("record", "--out", "out/log.txt"), ".csv.gz"),

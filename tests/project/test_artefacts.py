@@ -20,6 +20,8 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "imu.md",
     "log-estimates.md",
     "faults.md",
+    "fleets.md",
+    "identify.md",
 )
 MADE = re.compile(
     r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "

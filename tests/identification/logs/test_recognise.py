@@ -89,9 +89,9 @@ def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
     ],
 )
 def test_what_no_reader_knows_says_what_was_found_and_looked_for(tmp_path, content, expected):
-    path = tmp_path / "flight.dat"
+    path = tmp_path / "flight.xyz"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"flight.dat: .*{expected}") as refused:
+    with pytest.raises(InputError, match=rf"flight.xyz: .*{expected}") as refused:
         read_log(path)
     if b"\x1f" not in content[:1]:
         for words in ("ULog", "DataFlash", "ROS bag", "SD-card", "blackbox", ".csv, .csv.gz"):

@@ -272,6 +272,7 @@ def test_the_numbers(reports):
         "tentative",
         "indistinguishable_from",
         "evidence",
+        "channels",
     ]
     assert effect["name"] == "rotor_drag"
     assert effect["coefficients"] == pytest.approx(DRAG, rel=0.2)
