@@ -105,6 +105,9 @@ _HOVERING = (
     "thrust_axis_tilt",
 )
 
+# effects of flight faster than these: drawn where they are asked for by name alone
+_FASTER = ("inflow_drag", "rotor_interaction")
+
 
 @dataclass(frozen=True, eq=False)
 class Practice:
@@ -347,5 +350,7 @@ def practice_set(
 
 
 def _in_the_open(effects: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the effects that show away from floor, ceiling and fan."""
-    return tuple(name for name in effects if set(shown_in(name)) & set(_FREE))
+    """Return the effects that show away from floor, ceiling and fan, at these flights' speeds."""
+    return tuple(
+        name for name in effects if set(shown_in(name)) & set(_FREE) and name not in _FASTER
+    )
