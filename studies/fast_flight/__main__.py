@@ -7,7 +7,7 @@ from pathlib import Path
 
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.whole_files import replaced
-from windwrench.studies.fast_flight.page import write_tables
+from windwrench.studies.fast_flight.page import tables
 from windwrench.studies.fast_flight.study import (
     FULL,
     filter_study,
@@ -15,6 +15,7 @@ from windwrench.studies.fast_flight.study import (
     pose_study,
     read_flights,
 )
+from windwrench.studies.page_tables import put_between
 
 
 def main() -> None:
@@ -50,7 +51,8 @@ def main() -> None:
         given.out.mkdir(parents=True, exist_ok=True)
         with replaced(given.out / "fast_flight.json") as partial:
             partial.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        print(write_tables(found, given.page))
+        put_between(tables(found), given.page)
+        print(tables(found))
     except InputError as error:
         sys.exit(f"error: {error}")
 

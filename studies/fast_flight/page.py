@@ -1,15 +1,10 @@
-"""The tables of the study, and the page that holds them between two marks."""
+"""The tables of the study."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
-
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
 
 from .study import FULL, MODELS, PUBLISHED
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 _WAYS = {
     "others": "all other flights",
     "one": "{}",
@@ -141,22 +136,3 @@ def _pose(flights: Sequence[Mapping[str, Any]]) -> str:
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def write_tables(found: Mapping[str, Any], page: Path | None) -> str:
-    """Return the tables, and put them between the marks of a page.
-
-    Raises:
-        InputError: the page lacks the marks.
-    """
-    text = tables(found)
-    if page is not None:
-        old = page.read_text(encoding="utf-8")
-        if old.count(BEGIN) != 1 or old.count(END) != 1:
-            raise InputError(f"{page}: expected one line {BEGIN} and one {END}")
-        before, rest = old.split(BEGIN)
-        with replaced(page) as partial:
-            partial.write_text(
-                f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8"
-            )
-    return text

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 
 from windwrench.studies.filtered_logs.filtered_logs import resume, run, save
-from windwrench.studies.filtered_logs.page import write_table
+from windwrench.studies.filtered_logs.page import tables
+from windwrench.studies.page_tables import put_between
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.filtered_logs")
@@ -24,4 +25,5 @@ if __name__ == "__main__":
         resume(given.out, given.saved)
     outcomes = run(given.out, range(given.seeds), given.jobs, given.flights)
     save(outcomes, given.out / "filtered_logs.json")
-    print(write_table(outcomes, given.page))
+    put_between(tables(outcomes), given.page)
+    print(tables(outcomes))

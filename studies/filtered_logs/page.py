@@ -1,26 +1,12 @@
-"""The tables of the study, and the page that holds them between two marks."""
+"""The tables of the study."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
-from windwrench.studies.filtered_logs.filtered_logs import kind
-
-KINDS = ("wrong, sure", "wrong, tentative", "silent", "refused", "right, tentative", "right, sure")
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
-
-
-def interval(count: int, whole: int) -> str:
-    """Return a count of a whole and its 95 % interval (Wilson) in per cent."""
-    if not whole:
-        return "–"
-    low, high = binomtest(count, whole).proportion_ci(method="wilson")
-    return f"{count} of {whole} ({100 * low:.0f}–{100 * high:.0f} %)"
+from windwrench.studies.page_tables import share, table
+from windwrench.studies.scored_flights import KINDS, kind
 
 
 def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
@@ -33,7 +19,7 @@ def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
         own = [o for o in outcomes if o["filter"] == name]
         kinds = [kind(o) for o in own]
         found = sum(o["detected"] for o in own)
-        rows.append([name, interval(found, len(own)), *(str(kinds.count(k)) for k in KINDS)])
+        rows.append([name, share(found, len(own)), *(str(kinds.count(k)) for k in KINDS)])
         errors = [e for o in own for e in o["errors"].values()]
         relative = np.array([e[0] for e in errors])
         z = np.array([e[1] for e in errors])
@@ -41,15 +27,15 @@ def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
             [
                 name,
                 f"{100 * np.median(relative):.1f} %" if len(z) else "–",
-                interval(int(np.sum(z <= 1.96)), len(z)),
+                share(int(np.sum(z <= 1.96)), len(z)),
                 f"{np.sqrt(np.mean(np.minimum(z, 10.0) ** 2)):.1f}" if len(z) else "–",
                 f"{np.median(z):.2f}" if len(z) else "–",
             ]
         )
     parts = [
         _losses(outcomes),
-        _table(["pose", "recognised as filtered", *KINDS], rows),
-        _table(
+        table(["pose", "recognised as filtered", *KINDS], rows),
+        table(
             ["pose", "median error", "within 1.96 std", "rms of z (at most 10)", "median of z"],
             z_rows,
         ),
@@ -78,27 +64,3 @@ def _losses(outcomes: Sequence[Mapping[str, Any]]) -> str:
         f"Filtered and not recognised, or the reverse: {len(missed)}."
         + "".join(f"\n{line}" for line in missed)
     )
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def write_table(outcomes: Sequence[Mapping[str, Any]], page: Path | None) -> str:
-    """Return the tables, and put them between the marks of a page.
-
-    Raises:
-        InputError: the page lacks the marks.
-    """
-    text = tables(outcomes)
-    if page is not None:
-        old = page.read_text(encoding="utf-8")
-        if old.count(BEGIN) != 1 or old.count(END) != 1:
-            raise InputError(f"{page}: expected one line {BEGIN} and one {END}")
-        before, rest = old.split(BEGIN)
-        with replaced(page) as partial:
-            partial.write_text(
-                f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8"
-            )
-    return text

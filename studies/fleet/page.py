@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, linregress, t
+from scipy.stats import linregress, t
 
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.page_files import write_json, write_text
+from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import made_by
 from windwrench.studies.fleet.flights import EACH, KINDS
+from windwrench.studies.page_tables import put_between, share, table
 
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 _ADDED = {
     "steady": "nothing",
     "draggy": "rotor drag, the same on each flight",
@@ -32,33 +31,17 @@ def write_page(result: Mapping[str, Any], folder: Path, page: Path) -> None:
     Raises:
         InputError: the page is not there or lacks the marks.
     """
-    text = page.read_text(encoding="utf-8") if page.exists() else ""
-    if BEGIN not in text or END not in text:
-        raise InputError(f"{page}: expected a page with the marks {BEGIN} and {END}")
     data = page.with_suffix("") / "study.json"
     data.parent.mkdir(exist_ok=True)
     write_json(result, data)
     shutil.copyfile(folder / "fleet.png", data.with_name("fleet.png"))
-    before, after = text.split(BEGIN)[0], text.split(END)[1]
     made = made_by(
         f"python -m studies.fleet --flights {result['flights']} --page docs/{page.name}",
         [result["commit"]],
         result["version"],
     )
     parts = [_found(result), _cost(result), _refused(result["refused"]), made]
-    write_text(f"{before}{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}{after}", page)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
-    return "\n".join(lines)
-
-
-def _share(count: int, whole: int) -> str:
-    if not whole:
-        return "–"
-    low, high = binomtest(count, whole).proportion_ci(method="wilson")
-    return f"{count} of {whole} ({100 * low:.0f}–{100 * high:.0f} %)"
+    put_between("\n\n".join(parts), page)
 
 
 def _found(result: Mapping[str, Any]) -> str:
@@ -88,9 +71,9 @@ def _found(result: Mapping[str, Any]) -> str:
                 _ADDED[kind],
                 str(len(own)),
                 str(sum(one["diagnosed"] for one in own)),
-                _share(drifting - right, drifting),
-                _share(false, len(own)),
-                _share(held, tried),
+                share(drifting - right, drifting),
+                share(false, len(own)),
+                share(held, tried),
             ]
         )
     flights = sum(one["diagnosed"] for one in result["truth"])
@@ -98,7 +81,7 @@ def _found(result: Mapping[str, Any]) -> str:
         f"### What was found\n\n{result['flights']} flights of {len(result['truth'])} vehicles of "
         f"three models (ardrone2, crazyflie, hummingbird), {result['seconds']:g} s each, at most "
         f"{EACH} a vehicle; {flights} were diagnosed. In brackets: 95 % intervals (Wilson).\n\n"
-        + _table(
+        + table(
             (
                 "vehicles",
                 "what its model lacks",
@@ -149,7 +132,7 @@ def _cost(result: Mapping[str, Any]) -> str:
     )
     return (
         "### What it costs\n\n"
-        + _table(
+        + table(
             (
                 "logs diagnosed",
                 "time of one core, s",
@@ -189,6 +172,5 @@ def _refused(refused: Sequence[Mapping[str, Any]]) -> str:
     rows = [[one["log"], one["reason"].replace("|", "/")] for one in refused]
     return (
         "### Which logs were refused\n\nOne log of 20 was spoiled on purpose: cut off, one second "
-        "long, a rotor speed that is no number, a column missing.\n\n"
-        + _table(("log", "why"), rows)
+        "long, a rotor speed that is no number, a column missing.\n\n" + table(("log", "why"), rows)
     )

@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
-from windwrench.studies.identified_vehicles.page import write_table
+from windwrench.studies.identified_vehicles.page import tables
 from windwrench.studies.identified_vehicles.study import run, save
+from windwrench.studies.page_tables import put_between
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.identified_vehicles")
@@ -15,4 +16,5 @@ if __name__ == "__main__":
     given = parser.parse_args()
     outcomes = run(given.out, given.runs, given.jobs)
     save(outcomes, given.out / "identified_vehicles.json")
-    print(write_table(outcomes, given.page))
+    put_between(tables(outcomes), given.page)
+    print(tables(outcomes))

@@ -1,25 +1,23 @@
 """The study's table: what was lost, errors, and how often the intervals hold the truth."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
 from windwrench.studies.identified_vehicles.study import quantities
+from windwrench.studies.page_tables import share, table
 
-BEGIN, END = "<!-- runs: begin -->", "<!-- runs: end -->"
 _WORST = {"motor_lag": 0.10}  # share of the truth; of the others:
 _WITHIN = 0.05
-
-
-def covered(holding: int, count: int) -> str:
-    """Return a share with its 95 % interval (Wilson)."""
-    low, high = binomtest(holding, count).proportion_ci(method="wilson")
-    return f"{holding} of {count}: {100 * holding / count:.0f} % ({100 * low:.0f}–{100 * high:.0f})"
+_HEAD = (
+    "quantity",
+    "runs",
+    "median error",
+    "worst",
+    "within 5 % (lag: 10 %)",
+    "truth in the 95 % interval",
+)
 
 
 def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
@@ -53,40 +51,18 @@ def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
             limit = _WORST.get(name, _WITHIN)
             error = f"{100 * np.median(errors):.2f} %"
             most = f"{100 * errors.max():.1f} %"
-            inside = covered(int(np.sum(errors <= limit)), len(told))
+            inside = share(int(np.sum(errors <= limit)), len(told))
         else:
             size = np.abs([1e3 * e["value"] for e in told])
             error, most, inside = f"{np.median(size):.2f} mm", f"{size.max():.1f} mm", "–"
-        rows.append([name, str(len(found)), error, most, inside, covered(holding, len(told))])
+        rows.append([name, str(len(found)), error, most, inside, share(holding, len(told))])
     lines = [
         f"{len(outcomes)} vehicles. Lost: {len(losses)}.",
         *losses,
         "",
-        "| quantity | runs | median error | worst | within 5 % (lag: 10 %) | truth in the 95 % "
-        "interval |",
-        "| --- | --- | --- | --- | --- | --- |",
-        *(f"| {' | '.join(row)} |" for row in rows),
+        table(_HEAD, rows),
         "",
-        f"All quantities together: {covered(*whole)}. Median time of an identification: "
+        f"All quantities together: {share(*whole)}. Median time of an identification: "
         f"{np.median([o['cpu_s'] for o in outcomes]):.1f} s of one core.",
     ]
     return "\n".join(lines)
-
-
-def write_table(outcomes: Sequence[Mapping[str, Any]], page: Path | None) -> str:
-    """Return the tables, and put them between the marks of a page.
-
-    Raises:
-        InputError: the page lacks the marks.
-    """
-    text = tables(outcomes)
-    if page is not None:
-        old = page.read_text(encoding="utf-8")
-        if old.count(BEGIN) != 1 or old.count(END) != 1:
-            raise InputError(f"{page}: expected one line {BEGIN} and one {END}")
-        before, rest = old.split(BEGIN)
-        with replaced(page) as partial:
-            partial.write_text(
-                f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8"
-            )
-    return text

@@ -1,17 +1,15 @@
 """The study: vehicles drawn, flown, identified from their logs alone, compared with the truth."""
 
-import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import as_completed
 from pathlib import Path
 from typing import Any
 
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
 from windwrench.runtime.page_files import write_json
-from windwrench.runtime.workers import workers
 from windwrench.studies.identified_vehicles.flights import VEHICLES, flown
+from windwrench.studies.resumed_tasks import run_tasks
 
 
 def runs(count: int) -> list[tuple[str, int, bool]]:
@@ -60,24 +58,8 @@ def fly_and_identify(name: str, seed: int, commanded: bool) -> dict[str, Any]:
 
 def run(folder: Path, count: int, jobs: int = 1) -> list[dict[str, Any]]:
     """Make the runs that are not yet in the folder's ``runs.jsonl``; return all of them."""
-    path = folder / "runs.jsonl"
-    folder.mkdir(parents=True, exist_ok=True)
-    done: dict[tuple[Any, ...], dict[str, Any]] = {}
-    if path.exists():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            kept = json.loads(line)
-            done[kept["vehicle"], kept["seed"], kept["commanded"]] = kept
-    wanted = runs(count)
-    pending = [r for r in wanted if r not in done]
-    if pending:
-        with workers(jobs) as pool:
-            running = {pool.submit(fly_and_identify, *r): r for r in pending}
-            for future in as_completed(running):
-                outcome = done[running[future]] = future.result()
-                with path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(outcome) + "\n")
-                print(f"{len(done)} of {len(wanted)} runs", flush=True)
-    return [done[r] for r in wanted if r in done]
+    done = run_tasks(fly_and_identify, runs(count), folder / "runs.jsonl", jobs)
+    return list(done.values())
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:

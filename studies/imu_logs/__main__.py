@@ -4,8 +4,9 @@ import argparse
 from pathlib import Path
 
 from windwrench.studies.imu_logs.imu_logs import run, save, tasks
-from windwrench.studies.imu_logs.page import write_table
+from windwrench.studies.imu_logs.page import tables
 from windwrench.studies.imu_logs.sensors import LOGS
+from windwrench.studies.page_tables import put_between
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.imu_logs")
@@ -18,4 +19,5 @@ if __name__ == "__main__":
     wanted = tasks(range(given.seeds), given.log or tuple(LOGS))
     outcomes = run(given.out, wanted, given.jobs)
     save(outcomes, given.out / "imu_logs.json")
-    print(write_table(outcomes, given.page))
+    put_between(tables(outcomes), given.page)
+    print(tables(outcomes))

@@ -1,17 +1,13 @@
-"""The tables of the study, and the page that holds them between two marks."""
+"""The tables of the study."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from windwrench.runtime.errors import InputError
-from windwrench.runtime.whole_files import replaced
-from windwrench.studies.filtered_logs.page import BEGIN, END, interval
-from windwrench.studies.imu_logs.imu_logs import can_show, kind, named
-
-KINDS = ("wrong, sure", "wrong, tentative", "silent", "refused", "right, tentative", "right, sure")
+from windwrench.studies.imu_logs.imu_logs import can_show, named
+from windwrench.studies.page_tables import share, table
+from windwrench.studies.scored_flights import KINDS, kind
 
 
 def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
@@ -29,8 +25,8 @@ def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for title, own in groups:
         kinds = [kind(o) for o in own]
-        found = interval(sum(map(named, own)), len(own)) if "nothing" not in title else "–"
-        wrong = interval(kinds.count("wrong, sure"), len(own))
+        found = share(sum(map(named, own)), len(own)) if "nothing" not in title else "–"
+        wrong = share(kinds.count("wrong, sure"), len(own))
         rows.append([title, found, wrong, *(str(kinds.count(k)) for k in KINDS[1:])])
     errors = []
     for name in logs:
@@ -41,14 +37,14 @@ def tables(outcomes: Sequence[Mapping[str, Any]]) -> str:
             [
                 name,
                 f"{100 * np.median(relative):.1f} %" if len(z) else "–",
-                interval(int(np.sum(z <= 1.96)), len(z)),
+                share(int(np.sum(z <= 1.96)), len(z)),
             ]
         )
     return "\n\n".join(
         [
             _losses(outcomes),
-            _table(["log", "named", *KINDS], rows),
-            _table(["log", "median error of a coefficient", "within 1.96 std"], errors),
+            table(["log", "named", *KINDS], rows),
+            table(["log", "median error of a coefficient", "within 1.96 std"], errors),
             _effects(outcomes, logs),
         ]
     )
@@ -97,28 +93,4 @@ def _effects(outcomes: Sequence[Mapping[str, Any]], logs: Sequence[str]) -> str:
             for c in e["channels"]
         }
         rows.append([*row, ", ".join(sorted(carried))])
-    return _table(["added", *logs, "carried by"], rows)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def write_table(outcomes: Sequence[Mapping[str, Any]], page: Path | None) -> str:
-    """Return the tables, and put them between the marks of a page.
-
-    Raises:
-        InputError: the page lacks the marks.
-    """
-    text = tables(outcomes)
-    if page is not None:
-        old = page.read_text(encoding="utf-8")
-        if old.count(BEGIN) != 1 or old.count(END) != 1:
-            raise InputError(f"{page}: expected one line {BEGIN} and one {END}")
-        before, rest = old.split(BEGIN)
-        with replaced(page) as partial:
-            partial.write_text(
-                f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", encoding="utf-8"
-            )
-    return text
+    return table(["added", *logs, "carried by"], rows)

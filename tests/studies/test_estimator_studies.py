@@ -12,12 +12,14 @@ from windwrench.dynamics import load_vehicle
 from windwrench.studies.faults import page as faults_page
 from windwrench.studies.faults import study as faults_study
 from windwrench.studies.filtered_logs import filtered_logs, filters
-from windwrench.studies.filtered_logs.page import write_table
+from windwrench.studies.filtered_logs.page import tables
 from windwrench.studies.inertial import page as inertial_page
 from windwrench.studies.inertial import study as inertial_study
 from windwrench.studies.log_estimates import flights as log_flights
 from windwrench.studies.log_estimates import page as log_page
 from windwrench.studies.log_estimates import study as log_study
+from windwrench.studies.page_tables import put_between
+from windwrench.studies.scored_flights import kind as kind_of
 
 DOCS = ROOT / "docs"
 
@@ -66,7 +68,7 @@ def test_filtered_logs_tables_are_those_of_the_page(tmp_path):
     page = tmp_path / "filtered-logs.md"
     committed = (DOCS / "filtered-logs.md").read_text(encoding="utf-8")
     page.write_text(committed, encoding="utf-8")
-    write_table(outcomes, page)
+    put_between(tables(outcomes), page)
     assert page.read_text(encoding="utf-8") == committed
     filtered_logs.save(outcomes, tmp_path / "again.json")
     assert json.loads((tmp_path / "again.json").read_text("utf-8")) == outcomes
@@ -90,7 +92,7 @@ def test_an_outcome_behind_a_filter_has_its_word(effects, truth, word):
         {"name": name, "tentative": tentative, "indistinguishable_from": list(others)}
         for name, tentative, others in effects
     ]
-    assert filtered_logs.kind({"effects": named, "effect": truth}) == word
+    assert kind_of({"effects": named, "effect": truth}) == word
 
 
 def test_filters_take_the_noise_at_high_frequencies_alone():
