@@ -3,13 +3,23 @@
 import subprocess
 import sys
 
-COMPILED = "from tests.support.compiled_estimates import compile_estimates; compile_estimates()"
+COMPILED = (
+    "from tests.support.compiled_estimates import compile_estimates; compile_estimates()",
+    "from tests.support.compiled_environments import compile_environments; compile_environments()",
+)
 
 
 def pytest_configure(config):
     """Compile what most files need before workers start, or each of them compiles it."""
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
-        # a failure is no answer here: the tests that need it will give theirs
-        subprocess.run(
-            [sys.executable, "-c", COMPILED], cwd=config.rootpath, capture_output=True, check=False
-        )
+        running = [
+            subprocess.Popen(
+                [sys.executable, "-c", source],
+                cwd=config.rootpath,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+            for source in COMPILED
+        ]
+        for process in running:
+            process.wait()  # a failure is no answer here: the tests that need it give theirs

@@ -1,5 +1,6 @@
 """The vehicle that estimates make, and what to fly where they say too little."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -155,7 +156,11 @@ def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
     if unknown("(p/k)/Jzz"):
         out.append("Turn quickly to the left and to the right: it shows p/k over Jzz.")
     if unknown("motor_lag"):
-        out.append("Log the motor commands beside the rotor speeds: together they show the lag.")
+        out.append(
+            "Log the motor commands beside the rotor speeds: together they show the lag."
+            if math.isnan(estimates["motor_lag"].value)
+            else "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset."
+        )
     if unknown("thrust(0.75)") or unknown("thrust(0.25)"):
         out.append("Climb hard and let the vehicle sink: the thrust curve is known where it flew.")
     if unknown("com x") or unknown("com y"):

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from .channels import Piece, Sources
 from .geometry import Geometry
-from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate
+from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
 from .solve import Fit
 from .spectra import SPECTRUM
 from .usual import USUAL
@@ -95,7 +95,10 @@ def estimates_of(
     def say(
         name: str, of: Function, unit: str, how: str, status: str = IDENTIFIED, log: bool = True
     ) -> None:
-        out.append(Estimate(name, *read.interval(of, log), unit, status, how))
+        known = read.interval(of, log)
+        if log and status == IDENTIFIED and not told(known):
+            status, how = NOTHING, f"{how}: the interval is wider than half the value"
+        out.append(Estimate(name, *known, unit, status, how))
 
     vertical = f"{sources.force} along body z against {sources.rotors}, with the mass given"
     if fit.drive.commands:
@@ -260,7 +263,7 @@ def _yaw(
     gain = read.interval(lambda v: v["reach"] / v["Jz"])
     name = "(p/k)/Jzz"
     doubtful = read.fit.drive.band < SPECTRUM.band
-    if doubtful or gain[2] > 2.5 * gain[0]:
+    if doubtful or not told(gain):
         reason = (
             "quick motion contradicts slow motion in these logs"
             if doubtful
@@ -302,7 +305,11 @@ def _lag(out: list[Estimate], read: Reading, sources: Sources) -> None:
         how = f"force and turning against {sources.rotors}" + (
             "" if read.fit.drive.commands else ", which therefore are commanded, not measured"
         )
-        out.append(Estimate("motor_lag", *read.interval(lambda v: v["lag"]), "s", IDENTIFIED, how))
+        known = read.interval(lambda v: v["lag"])
+        status = IDENTIFIED
+        if not told(known):
+            status, how = NOTHING, "a time offset of the motion does nearly the same here"
+        out.append(Estimate("motor_lag", *known, "s", status, how))
     else:
         out.append(
             Estimate(

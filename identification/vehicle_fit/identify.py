@@ -23,7 +23,7 @@ from .estimates import Reading, estimates_of, thrust_of
 from .geometry import SPIN, Geometry
 from .motors import MotorResponse, motor_response
 from .parameters import DELAY, FORCE_BIAS, OPTIONAL, POSITIVE, first_model, with_more
-from .result import IDENTIFIED, Estimate, Identified
+from .result import ESTIMATES, IDENTIFIED, NOTHING, Estimate, Identified, told
 from .rounding import rounding_step
 from .solve import Fit, fall_with, solve, step_with
 from .spectra import SPECTRUM
@@ -37,9 +37,6 @@ Report = Callable[[float, str], None]
 class IdentifySettings:
     """What is asked of a fit before it is believed."""
 
-    # half-width of a 95 % interval as a share of the value, beyond which a quantity is not
-    # identifiable: a factor of 2 either way is what one would guess of a vehicle by its looks
-    widest: float = 0.5
     # fall of twice the negative log-likelihood for each further parameter, in units of ln of the
     # count of frequencies: Schwarz's criterion, doubled since the noise's spectrum is fitted too
     penalty: float = 2.0
@@ -148,7 +145,7 @@ def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
     alone = solve(pieces, drive, fit.model, fit.theta[: len(fit.model.free)], nonlinear)
     known = Reading(alone).interval(lambda v: v["lag"])
     how = "of a model without a time offset: what other tools call the lag"
-    return Estimate("lag without offset", *known, "s", IDENTIFIED, how)
+    return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
 
 
 def _voltage(pieces: Sequence[Piece]) -> float:
@@ -296,7 +293,7 @@ def _not_told(fit: Fit, geometry: Geometry) -> tuple[dict[str, str], dict[str, f
         if doubtful:  # turning is quick, and quick motion contradicts itself here
             reasons[axis] = f"quick {motion} contradicts slow motion in these logs"
             instead[axis] = usual
-        elif 1.96 * fit.deviation(axis) > IDENTIFY.widest:
+        elif 1.96 * fit.deviation(axis) > ESTIMATES.widest:
             reasons[axis] = f"the flight hardly shows {motion}"
             instead[axis] = usual
     if reasons and not geometry.known:
@@ -305,7 +302,7 @@ def _not_told(fit: Fit, geometry: Geometry) -> tuple[dict[str, str], dict[str, f
             "with quick roll and pitch"
         )
     both = values["Jx"] + values["Jy"]
-    wide = 1.96 * fit.deviation("Jz") > IDENTIFY.widest
+    wide = 1.96 * fit.deviation("Jz") > ESTIMATES.widest
     if doubtful or wide or not 0.3 < values["Jz"] / both < 1.3:
         reasons["Jz"] = (
             "quick motion contradicts slow motion in these logs"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.parameters import mostly_slow
 from windwrench.runtime.printable import printable
 
 pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's devices")
@@ -93,12 +94,12 @@ def test_hostile_names_are_shown_and_never_sent(tmp_path):
     "arguments",
     [
         ["estimate", "LONG.csv"],
-        ["estimate", "x.bag", "--reader", "rosbag:LONG.yaml"],
-        ["estimate", "LONG", "--reader", "rosbag"],
+        pytest.param(["estimate", "x.bag", "--reader", "rosbag:LONG.yaml"], marks=pytest.mark.slow),
+        pytest.param(["estimate", "LONG", "--reader", "rosbag"], marks=pytest.mark.slow),
         ["estimate", "x.csv", "--vehicle", "LONG.yaml"],
-        ["record", "--seconds", "1", "--out", "LONG.csv"],
-        ["fly", "--controller", "LONG.npz"],
-        ["fly", "--controller", "LONG.py:A"],
+        pytest.param(["record", "--seconds", "1", "--out", "LONG.csv"], marks=pytest.mark.slow),
+        pytest.param(["fly", "--controller", "LONG.npz"], marks=pytest.mark.slow),
+        pytest.param(["fly", "--controller", "LONG.py:A"], marks=pytest.mark.slow),
         ["fly", "--out", "LONG/LONG"],
     ],
 )
@@ -108,7 +109,10 @@ def test_a_name_that_is_too_long_is_refused(arguments, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("display", [{}, {"DISPLAY": ":4711"}, {"WAYLAND_DISPLAY": "none"}])
+@pytest.mark.parametrize(
+    "display",
+    mostly_slow([{}, {"DISPLAY": ":4711"}, {"WAYLAND_DISPLAY": "none"}], {}.__eq__),
+)
 def test_a_window_without_a_display_is_an_error(display, tmp_path):
     done = run("fly", "--view", folder=tmp_path, environment=display)
     assert_one_line(done, b"render: no window without a display", b"rgb_array")
@@ -120,7 +124,7 @@ def test_an_unknown_way_to_draw_is_named(tmp_path):
     assert_one_line(done, b"MUJOCO_GL=bogus", b"expected egl, osmesa, glfw or disable")
 
 
-@pytest.mark.parametrize("delay", [0.25, 0.4, 0.7, 1.1, 1.6])
+@pytest.mark.parametrize("delay", mostly_slow([0.25, 0.4, 0.7, 1.1, 1.6], {0.4, 1.1}.__contains__))
 def test_an_interrupt_ends_in_one_word_at_any_time(delay, tmp_path):
     child = subprocess.Popen(
         [*COMMAND, "benchmark", "--controllers", "hover", "--episodes", "500"],

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, Mocap, load_vehicle
 from windwrench.dynamics.effects import check_setting, compile_effects, get, names, parse_setting
 from windwrench.envs.closed_loop import ClosedLoop
@@ -26,6 +27,8 @@ QUIET = PlantSettings(
 VEHICLE = replace(load_vehicle("ardrone2"), omega_lsb=0.0, mocap=Mocap(200.0, 1e-4, 5e-4))
 # where an effect shows; "excite" shows most of them
 FLIGHTS = {"ground_effect": "ground"}
+# one effect of each kind
+SHOWN = ("motor_lag", "rotor_drag", "ground_effect", "slung_payload", "com_offset", "marker_offset")
 CEILING = replace(VEHICLE, ceiling_z=2.1)  # "excite" comes near it
 LEAST_GAIN = 3.0  # by how much declaring an effect lowers the RMS of the wrench that is left
 
@@ -103,7 +106,7 @@ def test_the_plant_flies_an_effect(name):
     assert not np.allclose(with_effect.rotor_speeds, without.rotor_speeds, rtol=1e-4, atol=0)
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", mostly_slow(names(), SHOWN.__contains__))
 def test_the_estimator_explains_an_effect_once_it_is_declared(name):
     log = flight(name)
     unexplained = remaining(log, vehicle_for(name))

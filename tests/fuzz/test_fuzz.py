@@ -29,7 +29,7 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.yaml_file import LARGEST, parse_yaml, read_yaml
 
 FORMS = forms()
-INPUTS = 60  # of each form, here; the command spoils 20,000
+INPUTS = 30  # of each form, here; the command spoils 20,000
 
 plain = st.recursive(
     st.none()
@@ -130,6 +130,7 @@ def test_the_fuzzer_sees_faults(tmp_path):
     assert "exit code 0" in run_command(good, path).replace("None", "0")  # a good log is no refusal
 
 
+@pytest.mark.slow
 def test_the_outcome_does_not_depend_on_processes():
     one, two = (fuzz(30, 3, jobs, only=("effect settings", "names")) for jobs in (1, 2))
     for a, b in zip(one, two, strict=True):

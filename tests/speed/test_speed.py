@@ -67,6 +67,7 @@ def test_the_profile_s_parts_sum_to_the_whole_or_less_than_rounding_above(estima
     assert f"filter ({estimator})" in [row[0] for row in section.rows]
 
 
+@pytest.mark.slow
 def test_growth_is_measured_for_each_count_and_part():
     section = over_vehicles(1, (1, 8), (1, 2))
     assert [row[0] for row in section.rows] == ["1", "2", "8"]

@@ -144,6 +144,7 @@ def test_the_filter_with_an_imu_is_consistent_and_its_gate_pays(monkeypatch):
     assert both["accelerometer_bias_std"] < 0.1 * alone["accelerometer_bias_std"]
 
 
+@pytest.mark.slow
 def test_a_fitted_tuning_is_near_the_best_and_bad_poses_are_refused(monkeypatch):
     flown = [log_flights.plant_flight("ardrone2", 8.0, 1)]
     monkeypatch.setattr(log_study, "rotorpy_flights", lambda *_: iter(flown))

@@ -148,6 +148,7 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         notes=(*notes, *time_notes(columns["t"])),
         valid=valid,
         commanded=True,
+        command=pwm / _FULL_COUNT,
         vehicle="crazyflie",
     )
 

@@ -397,6 +397,7 @@ def test_nanobench_conventions(path):
     np.testing.assert_array_equal(low.rotor_speeds, log.rotor_speeds)
     np.testing.assert_allclose(low.voltage, 3.3)
     assert log.commanded
+    np.testing.assert_allclose(log.command[0], np.array([4e4, 0.0, 0.0, 1e4]) / 65535.0)
     assert any("thrust model" in note for note in log.notes)
 
 

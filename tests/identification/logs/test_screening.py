@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.data_paths import NANOBENCH, crazyswarm2_file, data_file
+from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.envs.recording import record_flight
@@ -24,6 +25,8 @@ from windwrench.studies.trials.held_back_outsiders import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")
+# one effect of each kind
+SHOWN = ("motor_lag", "rotor_drag", "slung_payload", "marker_offset", "clock_offset")
 EXCITED = [CLEAN[0], *(pytest.param(name, marks=pytest.mark.slow) for name in CLEAN[1:])]
 DOWN = np.diag([1.0, -1.0, -1.0])  # forward, left, up to forward, right, down
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up
@@ -233,10 +236,13 @@ def test_another_convention_is_named(kind, trajectory):
         screen_log(make(flight(trajectory)), VEHICLE)
 
 
-@pytest.mark.parametrize("trajectory", EXCITED)
-def test_every_order_of_rotors_is_told_apart(trajectory):
+@pytest.mark.parametrize(
+    ("trajectory", "step"),
+    [(CLEAN[0], 5), *(pytest.param(name, 1, marks=pytest.mark.slow) for name in CLEAN)],
+)
+def test_every_order_of_rotors_is_told_apart(trajectory, step):
     log = flight(trajectory)
-    for order in permutations(range(4)):
+    for order in list(permutations(range(4)))[::step]:
         for mirrored in (False, True):
             vehicle = replace(VEHICLE, spin=-VEHICLE.spin) if mirrored else VEHICLE
             found = recognise(
@@ -264,7 +270,7 @@ def test_a_negated_height_is_named():
         screen_log(turned(flight("excite"), np.diag([1.0, 1.0, -1.0])), VEHICLE)
 
 
-@pytest.mark.parametrize("effect", names())
+@pytest.mark.parametrize("effect", mostly_slow(names(), SHOWN.__contains__))
 def test_an_undeclared_effect_is_no_wrong_convention(effect):
     # twice a typical delay in the loop is more than it can fly
     size = 1.0 if effect in ("latency", "clock_offset") else 2.0
@@ -314,7 +320,10 @@ def test_measured_flights_pass(name):
 
 @pytest.mark.measured
 @pytest.mark.parametrize(
-    "number", [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204]
+    "number",
+    mostly_slow(
+        [100, 130, 140, 146, 160, 165, 170, 172, 176, 178, 201, 202, 204], {100, 176}.__contains__
+    ),
 )
 def test_short_measured_flights_pass_where_short_is_enough(number):
     vehicle = load_vehicle("crazyflie")

@@ -12,6 +12,7 @@ from windwrench.identification.vehicle_fit.columns import (
 )
 from windwrench.identification.vehicle_fit.geometry import SPIN, parse_geometry
 from windwrench.identification.vehicle_fit.model import coefficients
+from windwrench.identification.vehicle_fit.result import told
 from windwrench.runtime.errors import InputError
 
 
@@ -89,3 +90,11 @@ def test_the_lag_is_that_of_the_effect():
 def test_a_geometry_that_is_none_is_refused(text, says):
     with pytest.raises(InputError, match=says):
         parse_geometry(text)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "known"),
+    [(0.03, 0.05, True), (0.004, 0.33, False), (0.0, 1.0, False), (-0.1, 0.2, False)],
+)
+def test_an_interval_wider_than_half_the_value_tells_nothing(low, high, known):
+    assert told((0.04, low, high)) is known
