@@ -36,8 +36,9 @@ def run_tasks(
             running = {pool.submit(work, *task): task for task in pending}
             for future in as_completed(running):
                 task = running[future]
-                done[task] = future.result()
+                line = json.dumps({"task": task, "result": future.result()})
+                done[task] = json.loads(line)["result"]  # as a later run reads it
                 with path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps({"task": task, "result": done[task]}) + "\n")
+                    file.write(line + "\n")
                 print(f"{sum(t in done for t in wanted)} of {len(wanted)}", flush=True)
     return {task: done[task] for task in wanted}

@@ -9,16 +9,20 @@ import pytest
 
 from tests.support.paths import ROOT
 from windwrench.dynamics import load_vehicle
+from windwrench.runtime.errors import InputError
 from windwrench.studies.faults import page as faults_page
 from windwrench.studies.faults import study as faults_study
-from windwrench.studies.filtered_logs import filtered_logs, filters
-from windwrench.studies.filtered_logs.page import tables
+from windwrench.studies.filtered_logs import filters
+from windwrench.studies.filtered_logs import page as filtered_logs_page
+from windwrench.studies.identified_vehicles import page as identified_page
+from windwrench.studies.imu_logs import page as imu_logs_page
 from windwrench.studies.inertial import page as inertial_page
 from windwrench.studies.inertial import study as inertial_study
 from windwrench.studies.log_estimates import flights as log_flights
 from windwrench.studies.log_estimates import page as log_page
 from windwrench.studies.log_estimates import study as log_study
 from windwrench.studies.page_tables import put_between
+from windwrench.studies.resumed_tasks import run_tasks
 from windwrench.studies.scored_flights import kind as kind_of
 
 DOCS = ROOT / "docs"
@@ -63,15 +67,32 @@ def test_a_picture_shows_every_row(draw, name, panels):
     assert all(axes.lines or axes.patches for axes in figure.axes)
 
 
-def test_filtered_logs_tables_are_those_of_the_page(tmp_path):
-    outcomes = json.loads((DOCS / "filtered-logs" / "filtered_logs.json").read_text("utf-8"))
-    page = tmp_path / "filtered-logs.md"
-    committed = (DOCS / "filtered-logs.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    ("study", "name", "data"),
+    [
+        (filtered_logs_page, "filtered-logs", "filtered_logs.json"),
+        (imu_logs_page, "imu-logs", "imu_logs.json"),
+        (identified_page, "identify", "identified_vehicles.json"),
+    ],
+)
+def test_a_pages_tables_are_made_from_its_data(study, name, data, tmp_path):
+    outcomes = json.loads((DOCS / name / data).read_text(encoding="utf-8"))
+    page = tmp_path / "page.md"
+    committed = (DOCS / f"{name}.md").read_text(encoding="utf-8")
     page.write_text(committed, encoding="utf-8")
-    put_between(tables(outcomes), page)
+    put_between(study.tables(outcomes), page)
     assert page.read_text(encoding="utf-8") == committed
-    filtered_logs.save(outcomes, tmp_path / "again.json")
-    assert json.loads((tmp_path / "again.json").read_text("utf-8")) == outcomes
+
+
+def test_a_page_without_marks_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"page\.md: expected a page with one line"):
+        put_between("text", tmp_path / "page.md")
+
+
+def test_tasks_that_are_done_are_not_done_again(tmp_path):
+    path = tmp_path / "tasks.jsonl"
+    assert run_tasks(pow, [(2, 3), (3, 2)], path) == {(2, 3): 8, (3, 2): 9}
+    assert run_tasks(divmod, [(3, 2), (7, 4)], path) == {(3, 2): 9, (7, 4): [1, 3]}
 
 
 @pytest.mark.parametrize(
