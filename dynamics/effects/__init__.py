@@ -7,6 +7,7 @@ given to ``add_folder``.
 """
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -19,11 +20,15 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
+from .declaration import Family, Need, Role
 
 __all__ = [
     "Bundle",
     "Coefficient",
     "Effect",
+    "Family",
+    "Need",
+    "Role",
     "add_folder",
     "check_setting",
     "compile_effects",
@@ -31,11 +36,14 @@ __all__ = [
     "law_in_words",
     "model_in_words",
     "names",
+    "needing",
+    "of_family",
     "parse_setting",
+    "playing",
 ]
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "base", "call", "parts"}
+_NOT_EFFECTS = {"__init__", "base", "call", "declaration", "parts", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
@@ -114,6 +122,29 @@ def get(name: str) -> Effect:
             f"{getattr(effect, 'name', effect)!r}"
         )
     return effect
+
+
+def playing(*roles: Role, among: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Return the effects that play any of some roles, role by role; by default of the whole
+    library, the kit's own before a user's.
+    """
+    if among is None:
+        own = Path(__file__).parent
+        among = sorted(names(), key=lambda name: _files()[name].parent != own)
+    given = tuple(among)
+    return tuple(name for role in roles for name in given if get(name).role == role)
+
+
+def of_family(*families: Family, among: Iterable[str] | None = None) -> frozenset[str]:
+    """Return the effects of any of some families; by default of the whole library."""
+    return frozenset(
+        name for name in (names() if among is None else among) if get(name).family in families
+    )
+
+
+def needing(*needs: Need) -> frozenset[str]:
+    """Return the effects of the library that cannot be told where logs lack any of these."""
+    return frozenset(name for name in names() if set(needs) & set(get(name).needs))
 
 
 def model_in_words(name: str) -> str:
