@@ -327,8 +327,8 @@ class Innovations:
         """Return for each piece (2, n, 6) the pose as measured, and the model's acceleration,
         linear (world) and angular (body). Of an IMU it is its acceleration and angular velocity.
 
-        The pose's angle (rad) is the sum of its rotations. The attitude is always the same: an
-        attitude_gain would make the innovations small by removing their own noise.
+        The pose's angle (rad) is the sum of its rotations. The attitude is always the same: a
+        gain of the attitude would make the innovations small by removing their own noise.
         """
         out = []
         pieces = self._flights.pieces(setting)

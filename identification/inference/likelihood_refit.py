@@ -186,7 +186,7 @@ def delay_doubts(search: Search, fit: FittedEffects, kind: DelayKind | None) -> 
 
 
 def _total_delay(fit: FittedEffects) -> float:
-    """Return the whole delay (s) of the rotors in a fit: of lag, latency, clock and time offset."""
+    """Return the whole delay (s) of the rotors in a fit: of lag, delay, clock and time offset."""
     return sum(
         fit.setting.get(effect, {}).get(name, 0.0)
         for effect, name in (

@@ -83,7 +83,7 @@ class StructureSettings:
     least_reduction_of_large_exponent: float = 4.0
     least_speed: float = 0.05  # m/s, below which speed is noise
     thrust_bends: tuple[float, ...] = (0.9, 1.0, 1.1, 1.2, 1.3)  # times the thrust of hover
-    # deviance of one question, whether thrust bends: 36 true thrust_curvatures had up to 4, rotors
+    # deviance of one question, whether thrust bends: 36 true curved thrusts had up to 4, rotors
     # that stall 29 to 680; where no curvature is named, 93 flights without a bend had up to 17 that
     # innovations confirmed, a rotor that stalls 56
     least_reduction_of_bend: float = 12.0
@@ -280,9 +280,9 @@ def bending_thrust(
         base: these columns (rows, 6) each.
 
     A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few
-    blocks, and a thrust_curvature explains most of it: it is asked in all rows together. Where a
-    thrust_curvature is named it is also asked whether thrust bends at hover alone; innovations need
-    not confirm that.
+    blocks, and a curved thrust explains most of it: it is asked in all rows together. Where a
+    curve of the thrust is named it is also asked whether thrust bends at hover alone; innovations
+    need not confirm that.
     """
     flights = search.flights
     curved = bool(playing(Role.THRUST_CURVE, among=fit.effects))
