@@ -1,6 +1,6 @@
 """The effect library as a page of documentation, made from the library itself."""
 
-from ..dynamics.effects import get, model_in_words, names
+from ..dynamics.effects import Effect, get, model_in_words, names
 
 _HEAD = """# The effects
 
@@ -15,6 +15,10 @@ A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coeff
 zero. Kinds: *rotor input* changes what the rotors deliver, *wrench* adds force and torque, *body* changes the rigid
 body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
 
+An effect declares what it is, and a diagnosis goes by that, not by its name: its *family*, the *role* in which other effects know it, what
+logs must hold to show it, and which others leave much the same *trace* in slow flight. What can be confused in given flights is computed
+from them: `indistinguishable_from` in a report.
+
 """
 
 
@@ -24,20 +28,19 @@ def effects_page() -> str:
     """
     parts = [
         _HEAD,
-        "| effect | kind | coefficients | easily confused with |\n| --- | --- | --- | --- |\n",
+        "| effect | kind | family | coefficients |\n| --- | --- | --- | --- |\n",
     ]
     for name in names():
         effect = get(name)
         parts.append(
-            f"| [{name}](#{name}) | {effect.kind} | "
-            f"{', '.join(c.name for c in effect.coefficients)} | "
-            f"{', '.join(effect.confused_with)} |\n"
+            f"| [{name}](#{name}) | {effect.kind} | {effect.family} | "
+            f"{', '.join(c.name for c in effect.coefficients)} |\n"
         )
     for name in names():
         effect = get(name)
         model = model_in_words(name).replace("``", "`")
         parts.append(
-            f"\n## {name}\n\n{model}\n\nKind: {effect.kind}.\n\n"
+            f"\n## {name}\n\n{model}\n\n{_declarations(effect)}\n\n"
             "| coefficient | unit | typical, 0.45 kg | typical, 0.03 kg | range | meaning |\n"
             "| --- | --- | --- | --- | --- | --- |\n"
         )
@@ -47,12 +50,23 @@ def effects_page() -> str:
                 f"{_span(c.minimum, c.maximum)} | "
                 f"{c.meaning} |\n"
             )
-        parts.append(
-            f"\nSource: {effect.source}.\n\nEasily confused with: "
-            f"{', '.join(effect.confused_with)}.\n\n"
-            f"Distinguished by: {effect.excitation}.\n"
-        )
+        parts.append(f"\nSource: {effect.source}.\n\nDistinguished by: {effect.excitation}.\n")
     return "".join(parts)
+
+
+def _declarations(effect: Effect) -> str:
+    """Return what an effect declares, as one line."""
+    parts = [f"Kind: {effect.kind}", f"Family: {effect.family}"]
+    if effect.role is not None:
+        parts.append(f"Role: {effect.role}")
+    if effect.needs:
+        parts.append(f"Needs: {', '.join(effect.needs)}")
+    alike = [name for name in names() if get(name).trace == effect.trace and name != effect.name]
+    if effect.trace and alike:
+        parts.append(f"Trace: {effect.trace}, as {', '.join(alike)}")
+    if effect.starting_points is not None:
+        parts.append("A fit starts from several points")
+    return ". ".join(parts) + "."
 
 
 def _span(minimum: float, maximum: float) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.effects import get, names
+from ..dynamics.effects import Role, get, names, playing
 from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .findings import (
@@ -53,18 +53,18 @@ from .inference.likelihood_refit import (
 )
 from .inference.regression import (
     CENTRAL,
-    FILTER_LIKE_EFFECTS,
     ROTOR_TIME_OFFSET,
     Flights,
     coefficient,
+    lost_behind_a_filter,
     typical_size,
+    unit_of_change,
 )
 from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.sensor_bias import biases
 from .inference.stepwise_search import find_effects
 from .inference.transient_disturbances import transient_disturbances
-from .inference.turning_delay import LATENCY_COEFFICIENT
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.inertial_signals import pose_rate
@@ -290,10 +290,10 @@ def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:
         else f"the log has {min(rates):.3g} positions a second: fast motion is read from gyro and "
         "accelerometer, slow motion from the positions"
     ]
-    if "thrust_axis_tilt" in effects:
-        notes.append(
-            "thrust_axis_tilt: an IMU that is mounted tilted by as much leaves the same log"
-        )
+    notes += [
+        f"{effect}: an IMU that is mounted tilted by as much leaves the same log"
+        for effect in playing(Role.THRUST_AXIS, among=effects)
+    ]
     return notes
 
 
@@ -316,7 +316,8 @@ def _named(
     gain = search.error_without(fit, effect) - error
     std = {k: fit.std.get((effect, k), 0.0) for k in fit.setting[effect]}
     if search.delay is not None and search.is_fixed(effect):
-        gain, std = search.delay.log_likelihood_ratio, {LATENCY_COEFFICIENT: search.delay.std}
+        gain = search.delay.log_likelihood_ratio
+        std = dict.fromkeys(search.delay.setting(effect)[effect], search.delay.std)
     # that an effect acts at the rotors, as it is written, is nothing to report
     values = {
         k: v
@@ -348,16 +349,26 @@ def _with_assumed_thrust(effect: NamedEffect, vehicle: Vehicle) -> NamedEffect:
     """Return an effect as it is where nobody knows how much thrust a command makes: a factor on
     thrust and a mass are tentative, may be each other, and are no better known than that thrust.
     """
-    if effect.name not in THRUST_FACTORS:
+    if get(effect.name).role not in THRUST_FACTORS:
         return effect
-    size = COMMANDED.unstated_thrust_std * (vehicle.mass if effect.name == "mass" else 1.0)
     return replace(
         effect,
         tentative=True,
-        std={name: float(np.hypot(std, size)) for name, std in effect.std.items()},
+        std={
+            name: float(
+                np.hypot(
+                    std,
+                    COMMANDED.unstated_thrust_std * unit_of_change((effect.name, name), vehicle),
+                )
+            )
+            for name, std in effect.std.items()
+        },
         indistinguishable_from=tuple(
             dict.fromkeys(
-                (*effect.indistinguishable_from, *(x for x in THRUST_FACTORS if x != effect.name))
+                (
+                    *effect.indistinguishable_from,
+                    *(x for x in playing(*THRUST_FACTORS) if x != effect.name),
+                )
             )
         ),
     )
@@ -460,10 +471,11 @@ def _advice(
     if filtered:
         out.append(
             "Log the pose as it was measured, before any filter or estimator. Behind one, no "
-            f"flight identifies {', '.join(sorted(FILTER_LIKE_EFFECTS))}, and no name is more than "
+            f"flight identifies {', '.join(sorted(lost_behind_a_filter()))}, and no name is more "
+            "than "
             "tentative."
         )
-        not_identifiable = [x for x in not_identifiable if x not in FILTER_LIKE_EFFECTS]
+        not_identifiable = [x for x in not_identifiable if x not in lost_behind_a_filter()]
     for effect in effects:
         if effect.indistinguishable_from:
             group = (effect.name, *effect.indistinguishable_from)

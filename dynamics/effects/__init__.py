@@ -7,6 +7,7 @@ given to ``add_folder``.
 """
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -19,11 +20,16 @@ from ...runtime.errors import InputError, unknown_name
 from ...runtime.python_file import import_file
 from ..vehicle import EffectSetting, Vehicle
 from .base import PARAMETERS, ROW_SIZE, VEHICLE_SIZE, Array, Coefficient, Effect
+from .declaration import Family, Need, Role
+from .vanishing import does_nothing_alone
 
 __all__ = [
     "Bundle",
     "Coefficient",
     "Effect",
+    "Family",
+    "Need",
+    "Role",
     "add_folder",
     "check_setting",
     "compile_effects",
@@ -31,11 +37,14 @@ __all__ = [
     "law_in_words",
     "model_in_words",
     "names",
+    "needing",
+    "of_family",
     "parse_setting",
+    "playing",
 ]
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "base", "call", "parts"}
+_NOT_EFFECTS = {"__init__", "base", "call", "declaration", "parts", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:
@@ -103,7 +112,8 @@ def get(name: str) -> Effect:
     """Return an effect by its name.
 
     Raises:
-        InputError: no effect has this name, or a user's own file holds none.
+        InputError: no effect has this name, a user's own file holds none, or its law does nothing
+            but with several coefficients at once and says not where a fit starts.
     """
     if name not in names():
         raise unknown_name("effect", name, names())
@@ -113,7 +123,36 @@ def get(name: str) -> Effect:
             f"{_files()[name]}: expected EFFECT = Effect(name={name!r}, ...), got "
             f"{getattr(effect, 'name', effect)!r}"
         )
+    # tests ask the kit's own
+    if not _is_own(name) and effect.starting_points is None and does_nothing_alone(effect):
+        raise InputError(
+            f"{_files()[name]}: effect {name}: no coefficient does anything while the others are "
+            "zero, so no diagnosis could ever find it; add starting_points=..., a function that "
+            "returns sets of coefficients from which a fit may start"
+        )
     return effect
+
+
+def playing(*roles: Role, among: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Return the effects that play any of some roles, role by role; by default of the whole
+    library, the kit's own before a user's.
+    """
+    if among is None:
+        among = sorted(names(), key=lambda name: not _is_own(name))
+    given = tuple(among)
+    return tuple(name for role in roles for name in given if get(name).role == role)
+
+
+def of_family(*families: Family, among: Iterable[str] | None = None) -> frozenset[str]:
+    """Return the effects of any of some families; by default of the whole library."""
+    return frozenset(
+        name for name in (names() if among is None else among) if get(name).family in families
+    )
+
+
+def needing(*needs: Need) -> frozenset[str]:
+    """Return the effects of the library that cannot be told where logs lack any of these."""
+    return frozenset(name for name in names() if set(needs) & set(get(name).needs))
 
 
 def model_in_words(name: str) -> str:
@@ -125,9 +164,14 @@ law_in_words = model_in_words  # its older name
 
 
 def _module(name: str) -> ModuleType:
-    path = _files()[name]
-    own = path.parent == Path(__file__).parent
-    return import_module(f".{name}", __name__) if own else import_file(path, "an effect")
+    if _is_own(name):
+        return import_module(f".{name}", __name__)
+    return import_file(_files()[name], "an effect")
+
+
+def _is_own(name: str) -> bool:
+    """Return whether an effect is the kit's own, and none of a user's."""
+    return _files()[name].parent == Path(__file__).parent
 
 
 def check_setting(setting: EffectSetting, where: str = "effect") -> EffectSetting:

@@ -10,6 +10,7 @@ import math
 from numba import cfunc
 
 from .base import DIRECTION, EFFECT_MODEL, HAS_QUATERNION, SAMPLE_QUATERNION, Coefficient, Effect
+from .declaration import Family
 from .parts import turn_attitude
 
 
@@ -38,8 +39,9 @@ EFFECT = Effect(
     source="definition; attitude from an onboard filter that trusts an accelerometer in flight "
     "reads tilt by a few per cent "
     "wrong",
-    confused_with=("rotor_drag", "body_drag", "thrust_scale", "mass"),
     excitation="horizontal accelerations of 2 m/s2 and more: its force goes with the tilt, that of "
     "drag with the velocity",
     model=effect_model,
+    family=Family.ALIGNMENT,
+    scales_noise=True,
 )

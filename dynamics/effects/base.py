@@ -28,12 +28,22 @@ none of them. There are four kinds:
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
+
+from .declaration import (
+    Family,
+    Implausible,
+    Need,
+    Role,
+    StartingPoints,
+    check_role,
+    check_words,
+)
 
 if TYPE_CHECKING:
     from ..vehicle import Vehicle
@@ -99,6 +109,11 @@ CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the 
 class Coefficient:
     """One coefficient of an effect, with its typical size for a 0.45 kg and for a
     0.03 kg vehicle.
+
+    Before any flight is seen a coefficient is as likely positive as negative within its range, zero
+    on average, and of the order of its typical size: that is the scale by which a diagnosis
+    measures it. ``minimum`` and ``maximum`` are what a vehicle's file may state; beyond
+    ``plausible`` it is no physics of this effect, but the trace of another.
     """
 
     name: str
@@ -107,22 +122,25 @@ class Coefficient:
     meaning: str
     minimum: float = -np.inf
     maximum: float = np.inf
+    plausible: float = np.inf
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A physical effect: its model, coefficients and source. The docstring of its file states the
-    equation.
+    """A physical effect: its model, coefficients and source, and what it declares itself to be. The
+    docstring of its file states the equation.
 
-    ``confused_with`` names the effects that can leave much the same traces in a log, and
-    ``excitation`` says what flight tells them apart.
+    ``excitation`` says what flight tells it from the effects that can leave much the same traces in
+    a log. The words of ``family``, ``role`` and ``needs`` are explained in ``declaration``.
+
+    Raises:
+        InputError: a word that there is not, or coefficients that the role does not have.
     """
 
     name: str
     kind: str
     coefficients: tuple[Coefficient, ...]
     source: str
-    confused_with: tuple[str, ...]
     excitation: str
     model: Any = None  # compiled C function, for rotor input, wrench and sensing
     advance: Any = None  # compiled C function, for a wrench that has a state of its own
@@ -132,13 +150,39 @@ class Effect:
         False  # a wrench effect that changes the wind in ``state``: asked before all others
     )
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
+    family: Family = Family.OTHER
+    role: Role | None = None
+    needs: tuple[Need, ...] = ()
+    # effects with the same word leave nearly the same force in slow flight that hardly yaws; it may
+    # be any word. ``usual``: it is as likely the cause as others of that trace
+    trace: str = ""
+    usual: bool = True
+    # what it changes may be of any size: a load, a fault of assembly. Others are of the order of
+    # their typical sizes
+    any_size: bool = False
+    # a sensing effect that multiplies what is measured, and with it the measurement's noise
+    scales_noise: bool = False
+    # of a law whose coefficients do nothing one by one: sets of coefficients of which one is near
+    # enough to whatever a flight may hold
+    starting_points: StartingPoints | None = None
+    # joint bounds: whether a vehicle can have these coefficients together
+    possible: "Callable[[Mapping[str, float], Vehicle], bool] | None" = None
+    # why found coefficients are no physics of this effect, as the rest of a sentence that begins
+    # with its name; empty where they are
+    implausible: Implausible | None = None
     law: Any = None  # the older name of ``model``, in effects that users have written
+    # which effects leave much the same traces: flights decide that now; in effects that users have
+    # written
+    confused_with: InitVar[tuple[str, ...]] = ()
 
-    def __post_init__(self) -> None:
-        """Let ``model`` and ``law`` be the same, whichever was given."""
+    def __post_init__(self, confused_with: tuple[str, ...]) -> None:
+        """Let ``model`` and ``law`` be the same, whichever was given, and check the words."""
         model = self.law if self.model is None else self.model
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "law", model)
+        check_words(self.name, self.family, self.role, self.needs)
+        if self.role is not None:
+            check_role(self.name, self.role, [c.unit for c in self.coefficients])
 
     def vector(self, coefficients: Mapping[str, float]) -> Array:
         """Return the coefficients in the model's order; those not given are zero."""

@@ -8,6 +8,7 @@ the reference voltage. Nothing changes where the voltage is not known.
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_VOLTAGE, VOLTAGE_REF, Coefficient, Effect
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -28,7 +29,8 @@ EFFECT = Effect(
     ),
     source="thrust goes with the square of the voltage at constant duty cycle (n = 2), less behind "
     "a regulated drive",
-    confused_with=("thrust_scale", "thrust_fade", "mass"),
     excitation="a whole battery, with loads that come and go, and the voltage in the log",
     model=effect_model,
+    family=Family.THRUST,
+    role=Role.THRUST_OVER_VOLTAGE,
 )

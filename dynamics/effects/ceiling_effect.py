@@ -20,6 +20,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family
 from .parts import add_force_at
 
 
@@ -59,7 +60,7 @@ EFFECT = Effect(
     "ceiling raises thrust too: "
     "Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Eng. 2017; size assumed as near the "
     "ground",
-    confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several distances from the ceiling, the nearest of one to two rotor diameters",
     model=effect_model,
+    family=Family.SURROUNDINGS,
 )

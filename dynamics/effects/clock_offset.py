@@ -20,6 +20,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family, Need, Role
 from .parts import delay
 
 _POSES = 13  # kept, 0.06 s at 200 Hz
@@ -63,9 +64,13 @@ EFFECT = Effect(
         ),
     ),
     source="definition; motion capture reaches the vehicle's clock 5 to 30 ms late",
-    confused_with=("latency", "motor_lag"),
     excitation="quick manoeuvres tell it from a motor lag, which smooths; dt > 0 and a latency "
     "leave the same log",
     model=effect_model,
     memory=2 + max(8 * _POSES, 5 * _SPEEDS),
+    family=Family.ALIGNMENT,
+    role=Role.DELAY,
+    needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
+    trace="late rotors",
+    usual=False,
 )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .base import Coefficient, Effect
+from .declaration import Family, Need, Role
 
 if TYPE_CHECKING:
     from ..vehicle import Vehicle
@@ -33,9 +34,12 @@ EFFECT = Effect(
         for axis in "xyz"
     ),
     source="rigid-body mechanics",
-    confused_with=("constant_torque", "rotor_efficiency", "marker_offset"),
     excitation="climbs and drops for cx and cy, since their torque grows with thrust; quick roll "
     "and pitch (trajectory shake) "
     "for cz",
     amend=amend,
+    family=Family.RIGID_BODY,
+    role=Role.CENTRE_OF_MASS,
+    needs=(Need.MOMENTS,),
+    any_size=True,
 )

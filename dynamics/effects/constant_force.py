@@ -3,6 +3,7 @@
 from numba import cfunc
 
 from .base import EFFECT_MODEL, Coefficient, Effect
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -18,9 +19,13 @@ EFFECT = Effect(
         Coefficient(f"f{axis}", "N", (0.2, 0.015), f"along world {axis}") for axis in "xyz"
     ),
     source="definition",
-    confused_with=("mass", "thrust_scale", "world_tilt", "wind", "thrust_axis_tilt"),
     excitation="yaw through half a turn and more, and vertical accelerations of 1 m/s2 and more; "
     "in hover fz is a mass or a "
     "thrust scale",
     model=effect_model,
+    family=Family.STEADY,
+    role=Role.STEADY_FORCE,
+    trace="sideways force",
+    usual=False,
+    any_size=True,
 )

@@ -5,6 +5,7 @@ propellers).
 from numba import cfunc
 
 from .base import EFFECT_MODEL, Coefficient, Effect
+from .declaration import Family, Need
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -20,8 +21,10 @@ EFFECT = Effect(
         Coefficient(f"t{axis}", "Nm", (0.01, 1e-4), f"about body {axis}") for axis in "xyz"
     ),
     source="definition",
-    confused_with=("com_offset", "rotor_efficiency"),
     excitation="climbs and drops: the torque of an offset centre of mass or a weak rotor grows "
     "with thrust",
     model=effect_model,
+    family=Family.STEADY,
+    needs=(Need.MOMENTS,),
+    any_size=True,
 )

@@ -8,7 +8,9 @@ a symmetric vehicle feels a torque: F = kd u in its plane at each rotor, and F =
 is the jet of the fan-tracking environment without its gusts.
 """
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numba import cfunc
@@ -24,12 +26,18 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Coefficients, Family, Unexplained
 from .parts import add_force_at
 
 _AXIAL, _RADIAL = jet_table(0.45, 0.10)
 _ROWS, _COLUMNS = _AXIAL.shape
 _ANGLES = np.arange(HULL_STATIONS) * math.pi / 4
 _RING_X, _RING_Y = HULL_RADIUS * np.cos(_ANGLES), HULL_RADIUS * np.sin(_ANGLES)
+
+# where a fan may stand as a fit starts: the way it blows (rad), m from the flight against that
+# way, and m across
+_HEADINGS = tuple(2 * math.pi * k / 8 for k in range(8))
+_DISTANCES, _ACROSS = (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -76,6 +84,26 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
             add_force_at(vehicle, state, wrench, sx, sy, sz, scale * bx, scale * by, scale * bz)
 
 
+def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
+    """Return fans all around the flight: from far beside its jet a fit does not find it."""
+    centre, found = flights.centre, []
+    for heading, distance, across in itertools.product(_HEADINGS, _DISTANCES, _ACROSS):
+        along = np.array([math.cos(heading), math.sin(heading)])
+        x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
+        found.append(
+            {
+                "u0": flights.typical["u0"],
+                "x": float(x),
+                "y": float(y),
+                "z": float(centre[2]),
+                "heading": heading,
+                "kd": flights.typical["kd"],
+                "area": flights.typical["area"],
+            }
+        )
+    return found
+
+
 EFFECT = Effect(
     name="fan_jet",
     kind="wrench",
@@ -100,9 +128,10 @@ EFFECT = Effect(
     source="momentum of a jet still in its shear layer, Pope, Turbulent Flows, 2000; sizes: the "
     "wrench that McKinnon and "
     "Schoellig, IROS 2016, measured in the jet of a drum fan",
-    confused_with=("wind", "constant_force", "body_drag", "rotor_drag"),
     excitation="flight across the jet and out of it: force and torque depend on the place; its "
     "still-air drag is like "
     "rotor and body drag",
     model=effect_model,
+    family=Family.SURROUNDINGS,
+    starting_points=starting_points,
 )

@@ -8,6 +8,7 @@ body axes. It is the k_flap of RotorPy. The force that goes with flapping is ``r
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .declaration import Family, Need
 from .parts import air_velocity
 
 
@@ -29,8 +30,9 @@ EFFECT = Effect(
     source="Hoffmann, Huang, Waslander and Tomlin, AIAA GNC 2007; form as in Folk, Paulos and "
     "Kumar, RotorPy, 2023; "
     "sizes: a thirtieth of the typical rotor drag times the arm's length",
-    confused_with=("com_offset", "rotor_drag"),
     excitation="speeds of 1 m/s and more along both body axes: its torque follows the velocity and "
     "changes sign with it",
     model=effect_model,
+    family=Family.AERODYNAMICS,
+    needs=(Need.MOMENTS,),
 )

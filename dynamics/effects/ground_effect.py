@@ -21,6 +21,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -61,7 +62,7 @@ EFFECT = Effect(
     ),
     source="Cheeseman and Bennett, ARC R&M 3021, 1955; Sanchez-Cuevas, Heredia and Ollero, Int. J. "
     "Aerospace Eng. 2017",
-    confused_with=("thrust_scale", "mass", "constant_force"),
     excitation="several heights, the lowest of one to two rotor diameters",
     model=effect_model,
+    family=Family.SURROUNDINGS,
 )

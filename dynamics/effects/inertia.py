@@ -10,6 +10,7 @@ import numpy as np
 
 from ...runtime.errors import InputError
 from .base import Coefficient, Effect
+from .declaration import Family, Need, Role
 
 if TYPE_CHECKING:
     from ..vehicle import Vehicle
@@ -41,8 +42,10 @@ EFFECT = Effect(
         for axis in "xyz"
     ),
     source="definition; moments from a CAD model or a bifilar pendulum are off by a tenth or two",
-    confused_with=("rotor_inertia", "rotor_efficiency", "thrust_curvature", "rate_damping"),
     excitation="quick roll, pitch and yaw: its torque follows the angular acceleration; in slow "
     "flight it does nothing",
     amend=amend,
+    family=Family.RIGID_BODY,
+    role=Role.INERTIA,
+    needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS, Need.MOMENTS),
 )

@@ -8,6 +8,7 @@ in proportion to the rotor speed is ``rotor_drag``.
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_POSITION, Coefficient, Effect
+from .declaration import Family
 from .parts import add_force_at, air_velocity
 
 
@@ -29,7 +30,7 @@ EFFECT = Effect(
     source="blade-element theory, the rotor's H-force with inflow: Bramwell, Done and Balmford, "
     "Bramwell's Helicopter Dynamics, 2001; size: least squares on a 0.77 kg racer at 3 to 14 m/s "
     "(docs/fast-flight.md), in proportion to the disc area",
-    confused_with=("rotor_drag", "body_drag"),
     excitation="climbs and descents of 3 m/s and more together with 5 m/s and more across the disc",
     model=effect_model,
+    family=Family.FAST_FLIGHT,
 )

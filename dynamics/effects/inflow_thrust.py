@@ -8,6 +8,7 @@ applied at the rotor. Roll and pitch so feel a damping torque. It is the k_z of 
 from numba import cfunc
 
 from .base import CENTRAL, EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .declaration import Family, Role
 from .parts import add_force_at, air_velocity
 
 
@@ -31,8 +32,9 @@ EFFECT = Effect(
     source="blade-element theory; Hoffmann, Huang, Waslander and Tomlin, Quadrotor Helicopter "
     "Flight Dynamics and Control, "
     "AIAA GNC 2007; sizes: Folk, Paulos and Kumar, RotorPy, 2023",
-    confused_with=("body_drag", "rate_damping"),
     excitation="climbs and descents of 0.5 m/s and more; quick roll and pitch for its damping "
     "torque",
     model=effect_model,
+    family=Family.AERODYNAMICS,
+    role=Role.INFLOW_THRUST,
 )

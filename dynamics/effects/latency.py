@@ -7,6 +7,7 @@ of the first sample the first one holds.
 from numba import cfunc
 
 from .base import EFFECT_MODEL, STEP, Coefficient, Effect
+from .declaration import Family, Need, Role
 from .parts import delay
 
 _KEPT = 22  # samples, 0.105 s at 200 Hz
@@ -23,10 +24,13 @@ EFFECT = Effect(
     kind="rotor input",
     coefficients=(Coefficient("d", "s", (0.03, 0.02), "delay", minimum=0.0, maximum=0.1),),
     source="definition; radio link and electronic speed controllers take 5 to 30 ms",
-    confused_with=("motor_lag", "clock_offset"),
     excitation="quick manoeuvres: a lag smooths what a latency only moves. A log of rotor speeds "
     "and poses cannot tell it from poses that are stamped late (clock_offset): that takes a "
     "second clock",
     model=effect_model,
     memory=2 + 5 * _KEPT,
+    family=Family.ROTOR_DYNAMICS,
+    role=Role.DELAY,
+    needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
+    trace="late rotors",
 )

@@ -16,6 +16,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -39,9 +40,9 @@ EFFECT = Effect(
         for axis in "xyz"
     ),
     source="definition; the centroid of the markers on a vehicle is seldom its centre",
-    confused_with=("com_offset", "attitude_gain"),
     excitation="quick roll and pitch (trajectory shake) for mz and fast yaw for mx and my: the "
     "point swings about "
     "the centre. An offset centre of mass also makes a torque in hover; this does not",
     model=effect_model,
+    family=Family.RIGID_BODY,
 )

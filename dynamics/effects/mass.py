@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...runtime.errors import InputError
 from .base import Coefficient, Effect
+from .declaration import Family, Role
 
 if TYPE_CHECKING:
     from ..vehicle import Vehicle
@@ -29,8 +30,12 @@ EFFECT = Effect(
     kind="body",
     coefficients=(Coefficient("dm", "kg", (0.04, 0.003), "added to the declared mass"),),
     source="definition",
-    confused_with=("thrust_scale", "constant_force", "slung_payload", "battery_sag"),
     excitation="vertical accelerations of 1 m/s2 and more: in hover a mass, a thrust scale and a "
     "vertical force are the same",
     amend=amend,
+    family=Family.RIGID_BODY,
+    role=Role.MASS,
+    trace="upward force",
+    usual=False,
+    any_size=True,
 )

@@ -9,6 +9,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, STEP, Coefficient, Effect
+from .declaration import Family, Need, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -29,9 +30,12 @@ EFFECT = Effect(
     ),
     source="Foerster, System Identification of the Crazyflie 2.0, ETH Zurich 2015; "
     "Faessler et al., Thrust Mixing, Saturation, and Body-Rate Control, RA-L 2017",
-    confused_with=("latency", "clock_offset", "rotor_inertia"),
     excitation="quick roll, pitch and climbs: a lag smooths what a latency only moves; slow flight "
     "shows neither",
     model=effect_model,
     memory=5,
+    family=Family.ROTOR_DYNAMICS,
+    role=Role.LAG,
+    needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS),
+    trace="late rotors",
 )

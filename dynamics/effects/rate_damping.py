@@ -3,12 +3,25 @@
 from numba import cfunc
 
 from .base import EFFECT_MODEL, RATE, Coefficient, Effect
+from .declaration import Family, Found, Need, Role
+
+# share of the damping about z that must act about x and y: rotors at the arms, which climb and
+# sink, damp these axes more
+_LEAST_SHARE_OF_YAW = 0.3
 
 
 @cfunc(EFFECT_MODEL, cache=True)
 def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
     for i in range(3):
         wrench[3 + i] -= c[i] * state[RATE + i]
+
+
+def implausible(found: Found) -> str:
+    """Return why a found damping is none: it acts about z alone."""
+    dx, dy, dz = (found.coefficients.get(f"d{axis}", 0.0) for axis in "xyz")
+    if 0.5 * (dx + dy) >= _LEAST_SHARE_OF_YAW * dz:
+        return ""
+    return "acts about z alone, but rotors damp the other axes more"
 
 
 EFFECT = Effect(
@@ -19,8 +32,11 @@ EFFECT = Effect(
         for axis in "xyz"
     ),
     source="linear damping; sizes: what typical rotor drag and inflow make at the rotors' arms",
-    confused_with=("inflow_thrust", "rotor_drag", "inertia", "motor_lag"),
     excitation="steady yaw rates of 1 rad/s and more, and quick roll and pitch, with little "
     "translation",
     model=effect_model,
+    family=Family.AERODYNAMICS,
+    role=Role.RATE_DAMPING,
+    implausible=implausible,
+    needs=(Need.MOMENTS,),
 )

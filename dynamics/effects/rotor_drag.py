@@ -20,6 +20,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -65,9 +66,11 @@ EFFECT = Effect(
     source="Martin and Salaun, The True Role of Accelerometer Feedback in Quadrotor Control, ICRA "
     "2010; "
     "sizes: Svacha et al., ICUAS 2017 (0.5 kg), Foerster, ETH Zurich 2015 (0.03 kg)",
-    confused_with=("body_drag", "attitude_gain", "flapping_moment", "wind"),
     excitation="horizontal flight at 1 m/s and more along both body axes, at several loads "
     "(climbs, hard turns): rotor drag "
     "grows with the rotor speeds, body drag does not",
     model=effect_model,
+    family=Family.DRAG,
+    role=Role.ROTOR_DRAG,
+    trace="drag",
 )

@@ -9,6 +9,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, Coefficient, Effect
+from .declaration import Family, Need, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -28,13 +29,17 @@ EFFECT = Effect(
             f"relative change of rotor {i}",
             minimum=-1.0,
             maximum=2.0,
+            # no propeller delivers far more than declared; all four together may
+            plausible=0.05,
         )
         for i in (1, 2, 3, 4)
     ),
     source="definition; a chipped or badly seated propeller loses several per cent",
-    confused_with=("com_offset", "constant_torque", "thrust_scale", "mass"),
     excitation="climbs and hard manoeuvres: its torque grows with that rotor's thrust, a steady "
     "torque stays, and an offset "
     "centre of mass makes no yaw torque",
     model=effect_model,
+    family=Family.THRUST,
+    role=Role.ROTOR_THRUSTS,
+    needs=(Need.SINGLE_ROTORS,),
 )

@@ -7,6 +7,7 @@ body axes, W being delivered rotor speeds and dW/dt their mean over the step.
 from numba import cfunc
 
 from .base import EFFECT_MODEL, RATE, ROTOR_ACCELERATION, ROTOR_SPEED, SPIN, Coefficient, Effect
+from .declaration import Family, Need
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -28,8 +29,9 @@ EFFECT = Effect(
     source="rigid-body mechanics; sizes: a thin rod of the propeller's mass and span (4 g, 0.2 m "
     "and a geared drive; 0.4 g, "
     "0.046 m)",
-    confused_with=("motor_lag", "inertia", "latency"),
     excitation="quick changes of yaw rate: rotors that speed up turn the body at once, before "
     "their drag does",
     model=effect_model,
+    family=Family.ROTOR_DYNAMICS,
+    needs=(Need.FAST_MOTION, Need.FINE_ROTOR_SPEEDS, Need.MOMENTS),
 )

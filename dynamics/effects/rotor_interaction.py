@@ -13,6 +13,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_POSITION, ROTOR_SPEED, Coefficient, Effect
+from .declaration import Family, Need
 from .parts import add_force_at, air_velocity
 
 
@@ -40,8 +41,9 @@ EFFECT = Effect(
     source="form: rotors in tandem, Leishman, Principles of Helicopter Aerodynamics, 2006, and "
     "moments in trim; size: least squares on a 0.77 kg racer at 3 to 14 m/s (docs/fast-flight.md), "
     "as a share of thrust at airspeed over induced velocity",
-    confused_with=("translational_lift", "flapping_moment"),
     excitation="flight at 5 m/s and more along both body axes, with turns that set the rotors "
     "apart; in hover it does nothing",
     model=effect_model,
+    family=Family.FAST_FLIGHT,
+    needs=(Need.SINGLE_ROTORS,),
 )

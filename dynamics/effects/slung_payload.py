@@ -14,6 +14,8 @@ drifts out of phase with the equation, which then may explain less than ``mass``
 """
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from numba import cfunc
 
@@ -29,8 +31,15 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Coefficients, Family, Role, Unexplained
 from .parts import add_force_at
 
+if TYPE_CHECKING:
+    from ..vehicle import Vehicle
+
+_LENGTHS = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m, of cables from which a fit starts
+_DAMPINGS = (0.3, 2.0)  # 1/s, the same
+_MOST_DAMPING_RATIO = 0.2  # of a load that swings in air
 # the effect's own state, from HIDDEN on: 0 whether it has started, 1-3 n, 4-6 n'
 _N, _RATE = HIDDEN + 1, HIDDEN + 4
 
@@ -91,6 +100,32 @@ def advance(c, vehicle, state, rotors):  # type: ignore[no-untyped-def]
         c[_RATE + i] -= turning * c[_N + i]
 
 
+def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
+    """Return loads of typical mass on cables of several lengths, or of the length that is fixed:
+    without a length there is no load, and the swing's frequency is not found from far away.
+    """
+    lengths = (flights.fixed["l"],) if "l" in flights.fixed else _LENGTHS
+    return [
+        {
+            "m": flights.typical["m"],
+            "l": length,
+            "damping": flights.fixed.get("damping", damping),
+        }
+        for length in lengths
+        for damping in (_DAMPINGS if "damping" not in flights.fixed else (0.0,))
+    ]
+
+
+def possible(coefficients: Coefficients, vehicle: "Vehicle") -> bool:
+    """Return whether air damps a load so much: one that is damped more imitates a drag."""
+    length = coefficients["l"]
+    return not (
+        length > 0.0
+        and coefficients["damping"]
+        > 2.0 * _MOST_DAMPING_RATIO * math.sqrt(vehicle.gravity / length)
+    )
+
+
 EFFECT = Effect(
     name="slung_payload",
     kind="wrench",
@@ -109,10 +144,13 @@ EFFECT = Effect(
     source="Sreenath, Michael and Kumar, Trajectory Generation and Control of a Quadrotor with a "
     "Cable-Suspended Load, "
     "ICRA 2013; sizes: a tenth of the vehicle's mass",
-    confused_with=("mass", "constant_force", "thrust_scale"),
     excitation="horizontal starts and stops, then hover: the load goes on swinging at its own "
     "frequency, which gives the "
     "cable's length",
     model=effect_model,
     advance=advance,
+    family=Family.LOAD,
+    role=Role.SUSPENDED_LOAD,
+    starting_points=starting_points,
+    possible=possible,
 )

@@ -19,6 +19,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family, Role
 from .parts import add_force_at
 
 
@@ -55,9 +56,12 @@ EFFECT = Effect(
         for axis in "xy"
     ),
     source="definition; also markers put on the body at a small angle",
-    confused_with=("world_tilt", "constant_force", "com_offset"),
     excitation="yaw through half a turn and more: this force turns with the body, that of a tilted "
     "world or a steady force "
     "stays; vertical accelerations, with which it grows",
     model=effect_model,
+    family=Family.ALIGNMENT,
+    role=Role.THRUST_AXIS,
+    trace="sideways force",
+    usual=False,
 )

@@ -10,6 +10,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, HOVER_RATE, Coefficient, Effect
+from .declaration import Family, Need, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -35,7 +36,9 @@ EFFECT = Effect(
     source="a fit to second order about hover, as thrust stands of small propellers show: "
     "Foerster, System Identification of "
     "the Crazyflie 2.0, ETH Zurich 2015",
-    confused_with=("thrust_scale", "inertia", "mass"),
     excitation="thrusts from half to one and a half times hover: fast climbs, drops and turns",
     model=effect_model,
+    family=Family.THRUST,
+    role=Role.THRUST_CURVE,
+    needs=(Need.FINE_ROTOR_SPEEDS, Need.THRUST_CURVE),
 )

@@ -11,6 +11,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, ROTOR_TIME, Coefficient, Effect
+from .declaration import Family, Need, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -29,9 +30,11 @@ EFFECT = Effect(
         ),
     ),
     source="definition; size: 6 % in a minute where the logged rates are commands",
-    confused_with=("battery_sag", "thrust_scale", "mass"),
     excitation="a minute and more of flight with the battery voltage logged: loads that come and "
     "go move the voltage, and "
     "with it sag, but not time",
     model=effect_model,
+    family=Family.THRUST,
+    role=Role.THRUST_OVER_TIME,
+    needs=(Need.THRUST_CURVE,),
 )

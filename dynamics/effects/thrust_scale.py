@@ -8,6 +8,7 @@ import math
 from numba import cfunc
 
 from .base import EFFECT_MODEL, Coefficient, Effect
+from .declaration import Family, Role
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -24,9 +25,12 @@ EFFECT = Effect(
         Coefficient("s", "1", (-0.05, -0.05), "relative change", minimum=-0.9, maximum=2.0),
     ),
     source="definition; air density and propeller wear change thrust by several per cent",
-    confused_with=("mass", "battery_sag", "thrust_curvature", "constant_force", "thrust_fade"),
     excitation="vertical accelerations of 1 m/s2 and more tell it from a mass (both cancel at "
     "hover) and a steady force; "
     "a whole battery tells it from sag",
     model=effect_model,
+    family=Family.THRUST,
+    role=Role.THRUST,
+    trace="upward force",
+    any_size=True,
 )

@@ -7,6 +7,7 @@ z, applied at the rotor. It is the k_h of RotorPy.
 from numba import cfunc
 
 from .base import CENTRAL, EFFECT_MODEL, ROTOR_POSITION, Coefficient, Effect
+from .declaration import Family, Role
 from .parts import add_force_at, air_velocity
 
 
@@ -30,7 +31,8 @@ EFFECT = Effect(
     source="Leishman, Principles of Helicopter Aerodynamics, 2006; size: Folk, Paulos and Kumar, "
     "RotorPy, 2023 (0.5 kg), "
     "in proportion to the disc area for 0.03 kg",
-    confused_with=("thrust_scale", "mass"),
     excitation="level flight at several speeds up to 2 m/s and more; in hover it does nothing",
     model=effect_model,
+    family=Family.AERODYNAMICS,
+    role=Role.TRANSLATIONAL_LIFT,
 )

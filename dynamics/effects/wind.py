@@ -8,10 +8,18 @@ the velocity.
 """
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 from numba import cfunc
 
 from .base import EFFECT_MODEL, VELOCITY, WIND, Coefficient, Effect
+from .declaration import Coefficients, Family, Found, Unexplained
+
+_LEAST_SPEED = 1e-9  # m/s, against a division by zero
+# typical sizes of the wind's own drag, where no other drag feels it: true winds had 0.98 to 1.3,
+# tilted frames 0.01 to 0.04
+_LEAST_DRAG = 0.1
 
 
 @cfunc(EFFECT_MODEL, cache=True)
@@ -26,6 +34,43 @@ def effect_model(c, vehicle, state, wrench):  # type: ignore[no-untyped-def]
         wrench[i] += air * (c[i] - state[VELOCITY + i]) + ground * state[VELOCITY + i]
 
 
+def starting_points(flights: Unexplained) -> Sequence[Coefficients]:
+    """Return winds along the mean force, and along the part of the force that goes like a slow
+    wind's part of a drag: a wind does nothing without a drag, nor this drag without a wind.
+
+    That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
+    """
+    speed, drag = flights.typical["wx"], flights.typical["cd"]
+    force, velocity = flights.force[:, :2], flights.velocity
+    v = np.linalg.norm(velocity, axis=1) + _LEAST_SPEED
+    steady = np.tile(np.eye(2), (len(v), 1))
+    with_wind = (
+        v[:, None, None] * np.eye(2)
+        + velocity[:, :2, None] * velocity[:, None, :2] / v[:, None, None]
+    )
+    slope = np.linalg.lstsq(
+        np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
+    )[0][:2]
+    return [
+        {
+            "wx": scale * speed * math.cos(heading),
+            "wy": scale * speed * math.sin(heading),
+            "wz": 0.0,
+            "cd": drag,
+        }
+        for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope))
+        for scale in (0.5, 1.0, 2.0)
+    ]
+
+
+def implausible(found: Found) -> str:
+    """Return why a found wind is none: it acts on no drag."""
+    on_drag = found.coefficients["cd"] >= _LEAST_DRAG * found.typical["cd"]
+    if on_drag or Family.DRAG in found.beside:
+        return ""
+    return "acts on hardly any drag, like a constant force"
+
+
 EFFECT = Effect(
     name="wind",
     kind="wrench",
@@ -37,10 +82,12 @@ EFFECT = Effect(
     ),
     source="quadratic drag, 0.5 * 1.2 kg/m3 * C_d A with C_d A = 0.06 m2, 16 cm2; wind of an open "
     "hangar door",
-    confused_with=("constant_force", "body_drag", "world_tilt"),
     excitation="flight with and against the wind at 1 m/s and more; in hover it is a constant "
     "force. Declared drag makes it "
     "identifiable",
     model=effect_model,
     sets_wind=True,
+    family=Family.SURROUNDINGS,
+    starting_points=starting_points,
+    implausible=implausible,
 )

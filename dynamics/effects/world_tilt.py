@@ -17,6 +17,7 @@ from .base import (
     Coefficient,
     Effect,
 )
+from .declaration import Family
 from .parts import turn_attitude
 
 
@@ -48,9 +49,10 @@ EFFECT = Effect(
     ),
     source="definition; the ground plane of a motion capture is set with a square on a floor that "
     "is level to some mrad",
-    confused_with=("constant_force", "thrust_axis_tilt", "wind"),
     excitation="yaw through half a turn and more tells it from a tilted thrust axis; from a steady "
     "force nothing does: a level "
     "frame that is tilted leaves just a constant force, of the weight times the tilt",
     model=effect_model,
+    family=Family.ALIGNMENT,
+    trace="sideways force",
 )

@@ -41,7 +41,6 @@ EFFECT = Effect(
     kind="wrench",
     coefficients=(Coefficient("k", "N/m", (0.1, 0.006), "stiffness", minimum=0.0),),
     source="Hooke's law; size: a thread that pulls with 5 % of the weight at 2 m",
-    confused_with=("constant_force", "wind"),
     excitation="flight over a metre and more along every axis; in one place it is a constant force",
     model=effect_model,
 )

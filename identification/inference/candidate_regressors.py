@@ -107,15 +107,12 @@ def explanatory_variables(flights: Flights, setting: Setting) -> list[Variable]:
 
 
 def _is_excited(flights: Flights, axis: int) -> bool:
-    """Return whether an angular velocity is more than the sensors' noise; it is also the column of
-    rate_damping.
+    """Return whether an angular velocity is more than the sensors' noise, which is in the torque as
+    well; where no torque is balanced it does no harm.
     """
-    column = "rate_damping", f"d{'xyz'[axis]}"
-    noise, whole = (
-        x[:, 3 + axis].var()
-        for x in (flights.column_noise[column], flights.columns({}, [column])[column])
+    return flights.commanded or bool(
+        flights.angular_velocity_noise[axis] <= REGRESSORS.most_noise_share
     )
-    return bool(noise <= REGRESSORS.most_noise_share * whole)
 
 
 def standardised(found: list[Variable]) -> dict[str, Array]:

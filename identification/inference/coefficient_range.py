@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .regression import CENTRAL, DRAG_EFFECTS, typical_size
+from ...dynamics.effects import get
+from ...dynamics.effects.declaration import Found
+from .regression import CENTRAL, typical_size
 from .search import FittedEffects, Search
 
 
@@ -22,23 +24,9 @@ class RangeSettings:
     # share of the effect's own size by which it must exceed a bound: effect models are true to that
     least_excess_share: float = 0.05
     most_typical_sizes: float = 10.0
-    # share of the damping about z that must act about x and y: rotors at the arms, which climb and
-    # sink, damp these axes more
-    least_share_of_yaw_damping: float = 0.3
-    # typical sizes of a wind's own drag: true winds had 0.98 to 1.3, tilted frames 0.01 to 0.04
-    least_wind_drag: float = 0.1
-    # share of a body's drag along its most exposed axis, that another axis must have: true ones, as
-    # found on six seeds, had 0.78 and more, RotorPy's 0.34 and more, and what was named body_drag
-    # where the library lacked the rotors' inflow 0.00 to 0.02
-    least_share_of_largest_drag: float = 0.15
-    significance: float = 2.0  # standard deviations
 
 
 RANGES = RangeSettings()
-# effects of which any size is plausible
-ANY_SIZE_EFFECTS = frozenset(
-    {"mass", "thrust_scale", "com_offset", "constant_force", "constant_torque"}
-)
 
 
 def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
@@ -59,36 +47,16 @@ def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
         for effect in fit.effects
     }
     for effect in fit.effects:
-        if size[effect] > RANGES.most_typical_sizes and effect not in ANY_SIZE_EFFECTS:
+        if size[effect] > RANGES.most_typical_sizes and not get(effect).any_size:
             found.append(
                 f"{effect} is {size[effect]:.0f} times its typical size: another effect may be the "
                 "cause"
             )
-    wind = fit.setting.get("wind", {})
-    named = {*fit.effects, *(e.name for e in vehicle.effects)}
-    if (
-        wind
-        and not DRAG_EFFECTS & named
-        and wind["cd"] < RANGES.least_wind_drag * typical_size(("wind", "cd"), vehicle)
-    ):  # drags feel a wind too
-        found.append(
-            "wind acts on hardly any drag, like a constant force: another effect may be the cause"
-        )
-    damping = fit.setting.get("rate_damping", {})
-    if (
-        damping
-        and 0.5 * (damping["dx"] + damping["dy"])
-        < RANGES.least_share_of_yaw_damping * damping["dz"]
-    ):
-        found.append(
-            "rate_damping acts about z alone, but rotors damp the other axes more: another effect "
-            "may be the cause"
-        )
-    if "body_drag" in fit.effects and _leaves_out_an_axis(search, fit):
-        found.append(
-            "body_drag acts along some axes alone, but air drags a body along every axis: another "
-            "effect may be the cause"
-        )
+    found += [
+        f"{effect} {reason}: another effect may be the cause"
+        for effect in fit.effects
+        if (reason := _implausible(search, fit, effect))
+    ]
     g = search.gram_at(fit)
     total, k = g.blocks.sum(axis=0), len(g.columns)
     normal = total[:k, :k] + np.diag(g.precision)
@@ -117,22 +85,22 @@ def implausible_coefficients(search: Search, fit: FittedEffects) -> list[str]:
     return found
 
 
-def _leaves_out_an_axis(search: Search, fit: FittedEffects) -> bool:
-    """Return whether a named body_drag, at the flights' RMS speed, is significantly small along one
-    axis beside another.
+def _implausible(search: Search, fit: FittedEffects, effect: str) -> str:
+    """Return why an effect says that these coefficients are none of its own; empty where they may
+    be.
     """
+    asked = get(effect).implausible
+    if asked is None:
+        return ""
+    vehicle = search.flights.vehicle
     velocity = np.concatenate([p.signals.velocity[p.rows] for p in search.flights.pieces({})])
-    speed = float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1))))
-    drag = fit.setting["body_drag"]
-    size = [drag.get(f"d{axis}", 0.0) + speed * drag.get(f"c{axis}", 0.0) for axis in "xyz"]
-    std = [
-        np.hypot(
-            fit.std.get(("body_drag", f"d{axis}"), 0.0),
-            speed * fit.std.get(("body_drag", f"c{axis}"), 0.0),
+    named = {*fit.effects, *(e.name for e in vehicle.effects)} - {effect}
+    return asked(
+        Found(
+            fit.setting[effect],
+            {name: fit.std.get((effect, name), 0.0) for name in fit.setting[effect]},
+            {c.name: typical_size((effect, c.name), vehicle) for c in get(effect).coefficients},
+            float(np.sqrt(np.mean(np.sum(np.square(velocity), axis=1)))),
+            frozenset(get(name).family for name in named),
         )
-        for axis in "xyz"
-    ]
-    return any(
-        one + RANGES.significance * s < RANGES.least_share_of_largest_drag * max(size)
-        for one, s in zip(size, std, strict=True)
     )

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import Role, get, names, playing
 from ...dynamics.vehicle import Vehicle
 from ..logs.flight_log import FlightLog, with_rows
 from ..logs.flight_phases import FLIGHT, flight_phases
@@ -33,7 +34,8 @@ class CommandedSettings:
     # landing last beyond: where no height shows them
     carrying_share: float = 0.7
     take_off: float = 1.0
-    # factor on what an effect of ``SECOND_CHOICE_EFFECTS`` explains, where it is compared
+    # factor on what an effect explains that is not the usual cause of its trace: a force beside an
+    # error of measurement, a mass beside the scale of thrust, which is known to be unknown
     second_choice_factor: float = 0.8
     # typical size and range of a flight's deviation from the others: relative, and rad
     thrust_scale_size: tuple[float, float] = (0.02, 0.5)
@@ -50,36 +52,8 @@ DEVIATION_SIZES = {
     TILT_X: COMMANDED.tilt_size,
     TILT_Y: COMMANDED.tilt_size,
 }
-# of effects that are alike, those that must explain a little more than the others: a force beside
-# an error of measurement, and a mass beside the scale of thrust, which is known to be unknown
-SECOND_CHOICE_EFFECTS = frozenset({"constant_force", "thrust_axis_tilt", "mass", "clock_offset"})
-
-# effects that are not identifiable from force alone, or with a thrust curve that is a guess, or
-# that live on small differences between rotors, which commands do not tell
-EXCLUDED_EFFECTS = frozenset(
-    {
-        "rotor_efficiency",
-        "com_offset",
-        "inertia",
-        "constant_torque",
-        "rate_damping",
-        "flapping_moment",
-        "rotor_inertia",
-        "rotor_interaction",
-    }
-)
-# effects that explain nearly the same of a flight that hardly yaws: one of each kind is enough
-SIMILAR_EFFECTS = (
-    frozenset({"world_tilt", "thrust_axis_tilt", "constant_force"}),
-    frozenset({"motor_lag", "latency", "clock_offset"}),
-    frozenset({"rotor_drag", "body_drag"}),
-    frozenset({"thrust_scale", "mass"}),
-)
-# effects that an error of the assumed thrust makes exactly
-THRUST_FACTORS = ("thrust_scale", "mass")
-# effects that change the thrust curve further, once it follows the battery's voltage: without that
-# they would explain whatever thrust lacks
-AFTER_SAG_EFFECTS = frozenset({"thrust_curvature", "thrust_fade"})
+# what an error of the assumed thrust makes exactly
+THRUST_FACTORS = (Role.THRUST, Role.MASS)
 
 
 def in_flight(log: FlightLog, vehicle: Vehicle) -> FlightLog:
@@ -136,18 +110,28 @@ def downsampled(signals: Signals) -> Signals:
 
 
 def similar_effects(effect: str) -> frozenset[str]:
-    """Return the effects that explain nearly the same as this one."""
-    return next((group - {effect} for group in SIMILAR_EFFECTS if effect in group), frozenset())
+    """Return the effects that explain nearly the same as this one of a flight that hardly yaws: one
+    of each kind is enough.
+    """
+    trace = get(effect).trace
+    if not trace:
+        return frozenset()
+    return frozenset(name for name in names() if get(name).trace == trace) - {effect}
 
 
 def cancels_thrust_scale(setting: Mapping[str, Mapping[str, float]], weight: float) -> bool:
-    """Return whether a constant force cancels half of the thrust scale or more: neither is known
+    """Return whether a steady force cancels half of the scale of thrust or more: neither is known
     well.
     """
-    force, scale = (
-        setting.get("constant_force", {}).get("fz", 0.0),
-        setting.get("thrust_scale", {}).get("s", 0.0),
-    )
+    named = [effect for effect in setting if effect]
+
+    def coefficient_of(role: Role, index: int) -> float:
+        return sum(
+            float(get(effect).vector(setting[effect])[index])
+            for effect in playing(role, among=named)
+        )
+
+    force, scale = coefficient_of(Role.STEADY_FORCE, 2), coefficient_of(Role.THRUST, 0)
     return force * scale < 0.0 and abs(force) > 0.5 * abs(scale) * weight
 
 
@@ -197,7 +181,7 @@ def thrust_is_assumed(logs: Sequence[FlightLog], vehicle: Vehicle) -> bool:
 
 def assumed_thrust_doubts(effects: Sequence[str]) -> list[str]:
     """Return, as sentences, which effects rest on a thrust that nobody measured."""
-    found = [effect for effect in effects if effect in THRUST_FACTORS]
+    found = [effect for effect in effects if get(effect).role in THRUST_FACTORS]
     return [
         f"{effect}: the log holds motor commands and the vehicle file states no motor curve, so "
         "how much thrust a command makes is an assumption, and this effect may be its error alone. "

@@ -11,10 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import Family, Role, get, of_family, playing
 from .gram_matrix import GRAM, gram
-from .regression import CENTRAL, REGRESSION, ROTOR_TIME_OFFSET, Flights, coefficient
+from .regression import (
+    CENTRAL,
+    REGRESSION,
+    ROTOR_TIME_OFFSET,
+    Flights,
+    coefficient,
+    unit_of_change,
+)
 from .search import SEARCH, FittedEffects, Search, coefficient_count
-from .turning_delay import SAME_DELAY_EFFECTS
+from .turning_delay import same_delays
 
 Array = NDArray[np.float64]
 
@@ -54,19 +62,11 @@ class EquivalenceSettings:
 
 EQUIVALENCE = EquivalenceSettings()
 # a vehicle that is declared without aerodynamics lacks all of these together
-AERODYNAMIC_EFFECTS = frozenset(
-    {
-        "rotor_drag",
-        "body_drag",
-        "inflow_thrust",
-        "translational_lift",
-        "rate_damping",
-        "flapping_moment",
-    }
-)
+ONE_CAUSE = (Family.DRAG, Family.AERODYNAMICS)
 # one with as much inertia is the other: thrust and moments scale alike, or neither does
-COUNTERPARTS = {"mass": "thrust_scale", "thrust_scale": "mass"}
-INERTIA_AXES = ("jx", "jy", "jz")
+COUNTERPARTS = {Role.MASS: Role.THRUST, Role.THRUST: Role.MASS}
+# what scales thrust: all of it, or by way of each rotor
+THRUSTS = (Role.THRUST, Role.ROTOR_THRUSTS)
 
 
 def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
@@ -75,7 +75,7 @@ def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     """
     flights = search.flights
     if search.is_fixed(effect):
-        return [other for other in SAME_DELAY_EFFECTS if other in search.library]
+        return same_delays(effect, search.library)
     less = fit.without(effect)
     regression = search.linearise(less)
     whole = flights.residual(fit.setting)
@@ -145,28 +145,36 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
     """Return, as sentences, which named effects may stand for an exact equivalent outside the
     library.
 
-    Mass and thrust_scale differ only in the moments. A load on a cable is a mass that does not
-    rotate with the body.
+    Mass and the scale of thrust differ only in the moments. A load on a cable is a mass that does
+    not rotate with the body.
     """
     flights = search.flights
     found = []
-    for effect, mate in COUNTERPARTS.items():
+    named = [
+        (e, mate) for role, mate in COUNTERPARTS.items() for e in playing(role, among=fit.effects)
+    ]
+    for effect, mate in named:
+        inertias = playing(Role.INERTIA)
         if (
-            effect not in fit.effects
-            or mate in search.library
-            or "inertia" in fit.effects
+            playing(mate, among=search.library)
+            or playing(Role.INERTIA, among=fit.effects)
+            or not inertias
             or flights.commanded
         ):
             continue
-        value = next(iter(fit.setting[effect].values()))
-        jx = coefficient(("inertia", "jx"))
+        name, value = next(iter(fit.setting[effect].items()))
+        axes = get(inertias[0]).coefficients[:3]
         share = float(
             np.clip(
-                value / flights.vehicle.mass if effect == "mass" else value, jx.minimum, jx.maximum
+                value / unit_of_change((effect, name), flights.vehicle),
+                axes[0].minimum,
+                axes[0].maximum,
             )
         )
         whole = flights.residual(fit.setting)
-        turned = flights.residual({**fit.setting, "inertia": dict.fromkeys(INERTIA_AXES, share)})
+        turned = flights.residual(
+            {**fit.setting, inertias[0]: dict.fromkeys((c.name for c in axes), share)}
+        )
         columns = flights.columns(fit.setting, search.model_columns(fit.effects), 0.1)
         g = gram(flights, fit.setting, search.whiten, columns, turned - whole)
         if g.error(np.arange(len(g.columns))) < _limit(
@@ -181,12 +189,11 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
                 f"{effect}: moments other than those of this effect fit better. An effect outside "
                 "the library may be the cause"
             )
-    heavier = fit.setting.get("mass", {}).get("dm", 0.0) > 0.0
-    if heavier and "com_offset" in fit.effects and "slung_payload" not in search.library:
-        centre = fit.setting["com_offset"]
-        if abs(centre["cz"]) > EQUIVALENCE.least_hanging_ratio * max(
-            abs(centre["cx"]), abs(centre["cy"])
-        ):
+    heavier = _changes(flights, fit, Role.MASS) > 0.0
+    centres = playing(Role.CENTRE_OF_MASS, among=fit.effects)
+    if heavier and centres and not playing(Role.SUSPENDED_LOAD, among=search.library):
+        x, y, z = (abs(get(centres[0]).vector(fit.setting[centres[0]])[i]) for i in range(3))
+        if z > EQUIVALENCE.least_hanging_ratio * max(x, y):
             found.append(
                 "a larger mass and a centre of mass that is off along z alone were found: a "
                 "suspended load may be the cause"
@@ -203,19 +210,31 @@ def _limit(search: Search, part: Array) -> float:
     )
 
 
+def _changes(flights: Flights, fit: FittedEffects, role: Role) -> float:
+    """Return by how much, relatively, the effects of a role change what they change."""
+    return sum(
+        float(get(effect).vector(fit.setting[effect])[0])
+        / unit_of_change((effect, get(effect).coefficients[0].name), flights.vehicle)
+        for effect in playing(role, among=fit.effects)
+    )
+
+
+def _said(*roles: Role) -> str:
+    """Return the effects of the library that play some roles, as they are said in a sentence."""
+    return " or a ".join(playing(*roles)) or "another effect"
+
+
 def _relative(flights: Flights, fit: FittedEffects) -> tuple[Array, Array]:
     """Return the relative changes of inertia (three), mass and thrust in a fit, and their standard
     deviations.
     """
     parts = [
         (effect, name)
-        for effect in ("inertia", "mass", "thrust_scale", "rotor_efficiency")
-        for name in fit.setting.get(effect, {})
+        for effect in playing(Role.INERTIA, Role.MASS, *THRUSTS, among=fit.effects)
+        for name in fit.setting[effect]
         if name != CENTRAL
     ]
-    scale = np.array(
-        [1.0 / flights.vehicle.mass if effect == "mass" else 1.0 for effect, _ in parts]
-    )
+    scale = np.array([1.0 / unit_of_change(part, flights.vehicle) for part in parts])
     return (
         scale * np.array([fit.setting[effect][name] for effect, name in parts]),
         scale * np.array([fit.std.get(part, 0.0) for part in parts]),
@@ -229,11 +248,13 @@ def _weighted(values: Array, std: Array) -> float:
     return float(np.average(values, weights=None if np.any(std == 0.0) else std**-2.0))
 
 
-def _three_alike(fit: FittedEffects) -> bool:
-    """Return whether the efficiencies of just three rotors are the same, and not zero."""
-    rotors = [f"e{i + 1}" for i in range(4)]
-    off = np.array([fit.setting["rotor_efficiency"].get(name, 0.0) for name in rotors])
-    std = max(fit.std.get(("rotor_efficiency", name), 0.0) for name in rotors)
+def _three_alike(fit: FittedEffects, effect: str) -> bool:
+    """Return whether an effect changes the thrust of just three rotors alike, and by more than
+    nothing.
+    """
+    rotors = [c.name for c in get(effect).coefficients[:4]]
+    off = np.array([fit.setting[effect].get(name, 0.0) for name in rotors])
+    std = max(fit.std.get((effect, name), 0.0) for name in rotors)
     middle = float(np.median(off))
     same = np.abs(off - middle) < max(
         EQUIVALENCE.most_std_apart * std, EQUIVALENCE.most_share_apart * abs(middle)
@@ -247,16 +268,18 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
     """Return, as sentences, which single effect may be the cause of several named ones that are
     together its exact equivalent.
 
-    Mass is thrust_scale with inertia, thrust_scale is mass with inertia, and inertia is mass with
-    thrust_scale (their coefficients coincide then); a battery that falls evenly is a thrust that is
-    off and fades.
+    Mass is a scale of thrust with inertia, a scale of thrust is mass with inertia, and inertia is
+    mass with a scale of thrust (their coefficients coincide then); a battery that falls evenly is a
+    thrust that is off and fades.
     """
     found = []
     names = set(fit.effects)
-    if (
-        len(names - AERODYNAMIC_EFFECTS) + bool(names & AERODYNAMIC_EFFECTS)
-        > EQUIVALENCE.most_reliable_effects
-    ):
+    air = of_family(*ONE_CAUSE, among=names)
+
+    def named(*roles: Role) -> tuple[str, ...]:
+        return playing(*roles, among=fit.effects)
+
+    if len(names - air) + bool(air) > EQUIVALENCE.most_reliable_effects:
         found.append(
             f"{len(names)} effects were needed: together they may stand for one effect outside the "
             "library"
@@ -267,43 +290,36 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             f"the fitted rotor speeds act at least {-1000.0 * offset:.1f} ms earlier than they are "
             "logged: an effect outside the library may be the cause"
         )
-    if (
-        max(fit.setting.get("rotor_efficiency", {"": 0.0}).values())
-        > EQUIVALENCE.share_of_bound * GRAM.plausible_maxima["rotor_efficiency"]
-    ):
+    found += [
+        f"{effect} reaches the largest plausible value of {name} "
+        f"({coefficient((effect, name)).meaning}): it may stand for another effect"
+        for effect in fit.effects
+        for name, value in fit.setting[effect].items()
+        if value > EQUIVALENCE.share_of_bound * coefficient((effect, name)).plausible
+    ]
+    if any(_three_alike(fit, effect) for effect in named(Role.ROTOR_THRUSTS)):
         found.append(
-            "a rotor reaches the largest plausible thrust: rotor_efficiency may stand for another "
-            "effect"
+            f"three rotors have the same efficiency: a {_said(Role.MASS, Role.THRUST)}, and one "
+            "weak rotor, may be the cause"
         )
-    if "rotor_efficiency" in names and _three_alike(fit):
-        found.append(
-            "three rotors have the same efficiency: a mass or a thrust_scale, and one weak rotor, "
-            "may be the cause"
-        )
-    if "inertia" in names and names & {"mass", "thrust_scale", "rotor_efficiency"}:
+    if named(Role.INERTIA) and named(Role.MASS, *THRUSTS):
         values, std = _relative(flights, fit)
         off = (values - _weighted(values, std)) / np.maximum(std, EQUIVALENCE.least_std)
-        whole = values[: len(INERTIA_AXES)] / np.maximum(
-            std[: len(INERTIA_AXES)], EQUIVALENCE.least_std
-        )
+        axes = sum(len(fit.setting[effect]) for effect in named(Role.INERTIA))
+        whole = values[:axes] / np.maximum(std[:axes], EQUIVALENCE.least_std)
         if off @ off < EQUIVALENCE.least_deviance + EQUIVALENCE.most_share_apart * whole @ whole:
             found.append(
                 "the relative changes of inertia and of thrust or mass coincide: a single other "
                 "effect may be the cause"
             )
-    if {"mass", "thrust_scale"} <= names:
-        weight = 1.0 + fit.setting["mass"].get("dm", 0.0) / flights.vehicle.mass
-        thrust = 1.0 + fit.setting["thrust_scale"].get("s", 0.0)
+    if named(Role.MASS) and named(Role.THRUST):
+        weight, thrust = (1.0 + _changes(flights, fit, x) for x in (Role.MASS, Role.THRUST))
         if abs(thrust / weight - 1.0) < EQUIVALENCE.most_share_uncancelled * abs(thrust - 1.0):
             found.append(
-                "mass and thrust_scale cancel, but for the moments: inertia may be the cause"
+                f"{' and '.join(named(Role.MASS, Role.THRUST))} cancel, but for the moments: "
+                f"{_said(Role.INERTIA)} may be the cause"
             )
-    if "thrust_fade" in names and names & {
-        "mass",
-        "thrust_scale",
-        "rotor_efficiency",
-        "constant_force",
-    }:
+    if named(Role.THRUST_OVER_TIME) and named(Role.MASS, *THRUSTS, Role.STEADY_FORCE):
         drop = [
             (p.signals.t, p.signals.voltage)
             for p in flights.pieces({})
@@ -317,6 +333,6 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
         if drop and even:
             found.append(
                 "the battery's voltage falls evenly: a thrust that is off and fades may be "
-                "battery_sag"
+                f"{_said(Role.THRUST_OVER_VOLTAGE)}"
             )
     return found

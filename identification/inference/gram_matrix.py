@@ -4,13 +4,13 @@ At one setting of coefficients everything is linear: each column is whitened, an
 and comparison of effects need the Gram matrices of the blocks alone.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get
 from .regression import (
     CENTRAL,
     MOMENT_PREFIX,
@@ -23,6 +23,7 @@ from .regression import (
     coefficient,
     range_of,
     typical_size,
+    unit_of_change,
 )
 from .sensor_bias import BIAS, flight_and_axis, is_bias
 from .whitening import Whitener
@@ -34,11 +35,6 @@ Array = NDArray[np.float64]
 class GramSettings:
     """Priors and bounds of coefficients, and the limits of the bounded least squares."""
 
-    # upper bounds below those of the effect: a rotor that delivers far more than declared is not
-    # plausible (all four together are thrust_scale)
-    plausible_maxima: Mapping[str, float] = field(
-        default_factory=lambda: {"rotor_efficiency": 0.05}
-    )
     most_missing_mass: float = 0.9  # share of the declared mass
     iterations_per_column: int = 4  # of the search for the bounds that hold
     least_gradient: float = 1e-6  # in standard deviations; a smaller one is none
@@ -201,10 +197,11 @@ def priors_and_ranges(
         else:
             low[i], high[i] = (
                 coefficient(c).minimum,
-                min(coefficient(c).maximum, GRAM.plausible_maxima.get(c[0], np.inf)),
+                min(coefficient(c).maximum, coefficient(c).plausible),
             )
-            if c[0] == "mass":
-                low[i] = max(low[i], -GRAM.most_missing_mass * flights.vehicle.mass)
+            if get(c[0]).role == Role.MASS:
+                declared = unit_of_change(c, flights.vehicle)
+                low[i] = max(low[i], -GRAM.most_missing_mass * declared)
     prior = 1.0 / np.square(GRAM.prior_std * np.maximum(size, 1e-300))
     prior[size == 0] = 1e30
     return prior, value, low - value, high - value

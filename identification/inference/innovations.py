@@ -39,6 +39,7 @@ from .regression import (
     Piece,
     Setting,
     coefficient,
+    is_delay,
     typical_size,
 )
 
@@ -65,8 +66,6 @@ class InnovationSettings:
 
 
 INNOVATIONS = InnovationSettings()
-
-CLOCK_COEFFICIENT = "clock_offset", "dt"
 
 
 class Innovations:
@@ -310,26 +309,26 @@ class Innovations:
         """Return ``after`` with a change of the clock made by a rotor time offset: moving the poses
         would move their noise as well.
         """
-        effect, name = CLOCK_COEFFICIENT
-        if effect not in after:
-            return after
-        own = self._flights.coefficients(self._setting, effect)
-        offsets = dict(after.get(ROTOR_TIME_OFFSET[0], {}))
-        offsets[ROTOR_TIME_OFFSET[1]] = (
-            offsets.get(ROTOR_TIME_OFFSET[1], 0.0) + after[effect][name] - own.get(name, 0.0)
-        )
-        return {
-            **{k: v for k, v in after.items() if k != effect},
-            ROTOR_TIME_OFFSET[0]: offsets,
-            **({effect: own} if own else {}),
-        }
+        for effect in [e for e in after if e and is_delay(e) and get(e).kind == "sensing"]:
+            name = get(effect).coefficients[0].name
+            own = self._flights.coefficients(self._setting, effect)
+            offsets = dict(after.get(ROTOR_TIME_OFFSET[0], {}))
+            offsets[ROTOR_TIME_OFFSET[1]] = (
+                offsets.get(ROTOR_TIME_OFFSET[1], 0.0) + after[effect][name] - own.get(name, 0.0)
+            )
+            after = {
+                **{k: v for k, v in after.items() if k != effect},
+                ROTOR_TIME_OFFSET[0]: offsets,
+                **({effect: own} if own else {}),
+            }
+        return after
 
     def _motions_of(self, setting: Setting) -> list[Array]:
         """Return for each piece (2, n, 6) the pose as measured, and the model's acceleration,
         linear (world) and angular (body). Of an IMU it is its acceleration and angular velocity.
 
-        The pose's angle (rad) is the sum of its rotations. The attitude is always the same: an
-        attitude_gain would make the innovations small by removing their own noise.
+        The pose's angle (rad) is the sum of its rotations. The attitude is always the same: a
+        gain of the attitude would make the innovations small by removing their own noise.
         """
         out = []
         pieces = self._flights.pieces(setting)

@@ -3,26 +3,21 @@ is biased.
 
 The noise of the pose passes through the flight loop into the rotors, so the residual's noise is
 correlated with the rotor speeds. Coefficients that act like a small delay, or scale the attitude
-with its noise, are biased: a motor_lag of 13 ms was found as 4 to 11 ms with a rotor time offset of
-2 to 6 ms, an attitude_gain up to a fifth too large on fast flights and three times too large on
+with its noise, are biased: a lag of 13 ms was found as 4 to 11 ms with a rotor time offset of 2 to
+6 ms, a gain of the attitude up to a fifth too large on fast flights and three times too large on
 gentle ones. Innovations are free of it, since past poses do not predict them. (They are less
 robust: rounded rotor speeds look like fast disturbances.)
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from ...dynamics.effects import Role, get, playing
 from .innovations import Innovations
-from .regression import (
-    DELAY_EFFECTS,
-    LATE_ROTOR_EFFECTS,
-    REGRESSION,
-    ROTOR_TIME_OFFSET,
-    Column,
-    coefficient,
-)
+from .regression import REGRESSION, ROTOR_TIME_OFFSET, Column, coefficient, is_delay, moves_time
 from .search import SEARCH, FittedEffects, Search, with_changes
 
 
@@ -33,7 +28,7 @@ class RefitSettings:
     iterations: int = 3  # of Gauss-Newton; the second changes little
     # times the residual's deviance; a refit that leaves more of the residual is not used
     most_deviance_ratio: float = 1.05
-    largest_delay: float = 0.1  # s, of the rotors where a latency or a clock_offset is named
+    largest_delay: float = 0.1  # s, of the rotors where a delay is named
     first_lag_share: float = 0.3  # share of the whole delay that is taken for a lag at the start
     delay_iterations: int = 5  # of Gauss-Newton, where a lag is told from a delay
     # standard deviations of a lag, which do not include the rounding of rotor speeds: a delay of
@@ -46,13 +41,35 @@ class RefitSettings:
 
 
 REFIT = RefitSettings()
-# effects that least squares of the residual gets wrong
-BIASED_EFFECTS = frozenset({"attitude_gain", "motor_lag"})
-
-LAG_COEFFICIENT = "motor_lag", "tau"
-DELAY_COEFFICIENTS = ("latency", "d"), ("clock_offset", "dt")
-
 DelayKind = Literal["lag", "delay", "either"]
+
+
+def is_biased(effect: str) -> bool:
+    """Return whether least squares of the residual gets an effect wrong."""
+    return get(effect).scales_noise or get(effect).role == Role.LAG
+
+
+def _first_coefficients(role: Role, among: Iterable[str] | None = None) -> list[Column]:
+    """Return the effects of a role, each with the coefficient that the role states."""
+    return [(effect, get(effect).coefficients[0].name) for effect in playing(role, among=among)]
+
+
+def _lag_coefficient(search: Search, fit: FittedEffects) -> Column | None:
+    """Return the lag that a fit has, or that it may have; None where the whole library has none."""
+    found = (
+        _first_coefficients(Role.LAG, fit.effects)
+        or _first_coefficients(Role.LAG, search.library)
+        or _first_coefficients(Role.LAG)
+    )
+    return found[0] if found else None
+
+
+def _delays(fit: FittedEffects) -> list[str]:
+    return [effect for effect in fit.effects if is_delay(effect)]
+
+
+def _late_rotor_effects(fit: FittedEffects) -> list[str]:
+    return [effect for effect in fit.effects if moves_time(effect)]
 
 
 def refitted_by_likelihood(search: Search, fit: FittedEffects) -> FittedEffects:
@@ -61,8 +78,8 @@ def refitted_by_likelihood(search: Search, fit: FittedEffects) -> FittedEffects:
 
     Standard deviations are no smaller than those of the residual.
     """
-    late = [(effect, name) for effect, name in DELAY_COEFFICIENTS if effect in fit.effects]
-    if search.flights.commanded or not BIASED_EFFECTS & set(fit.effects) or len(late) > 1:
+    late = _first_coefficients(Role.DELAY, fit.effects)
+    if search.flights.commanded or not any(map(is_biased, fit.effects)) or len(late) > 1:
         return fit
     # a delay is fitted as a rotor time offset: moving the pose would move its noise as well
     found = _maximum_likelihood(
@@ -96,37 +113,42 @@ def delay_kind(search: Search, fit: FittedEffects) -> DelayKind | None:
     """Return whether the rotors follow like behind a lag or behind a delay, with a free rotor time
     offset; None where no late rotors are named.
     """
-    late = LATE_ROTOR_EFFECTS & set(fit.effects)
-    if search.flights.commanded or len(late) != 1 or (behind := _total_delay(fit)) <= 0.0:
+    late, of_lag = _late_rotor_effects(fit), _lag_coefficient(search, fit)
+    if (
+        search.flights.commanded
+        or len(late) != 1
+        or of_lag is None
+        or (behind := _total_delay(fit)) <= 0.0
+    ):
         return None
     begun = _with_rotor_time_offset(fit)
-    begun.setting[LAG_COEFFICIENT[0]] = {LAG_COEFFICIENT[1]: REFIT.first_lag_share * behind}
+    begun.setting[of_lag[0]] = {of_lag[1]: REFIT.first_lag_share * behind}
     begun.setting[ROTOR_TIME_OFFSET[0]][ROTOR_TIME_OFFSET[1]] = (
         1.0 - REFIT.first_lag_share
     ) * behind
     found = _maximum_likelihood(search, begun, REFIT.largest_delay, REFIT.delay_iterations)
     lag, delay = (
-        found.setting[LAG_COEFFICIENT[0]][LAG_COEFFICIENT[1]],
+        found.setting[of_lag[0]][of_lag[1]],
         abs(found.setting[ROTOR_TIME_OFFSET[0]][ROTOR_TIME_OFFSET[1]]),
     )
-    if lag > REFIT.least_lag_in_std * found.std[
-        LAG_COEFFICIENT
-    ] and lag > REFIT.least_share_of_lag * (lag + delay):
+    if lag > REFIT.least_lag_in_std * found.std[of_lag] and lag > REFIT.least_share_of_lag * (
+        lag + delay
+    ):
         return "lag"
     return "either" if lag > REFIT.least_share_of_possible_lag * (lag + delay) else "delay"
 
 
 def with_lag(search: Search, fit: FittedEffects) -> FittedEffects:
-    """Return the fit with a motor_lag in place of a latency or a clock_offset, if the library and
-    the residual allow it.
-    """
-    if LAG_COEFFICIENT[0] not in search.library or LAG_COEFFICIENT[0] in fit.effects:
+    """Return the fit with a lag in place of a delay, if the library and the residual allow it."""
+    lags = _first_coefficients(Role.LAG, search.library)
+    if not lags or playing(Role.LAG, among=fit.effects):
         return fit
+    effect, name = lags[0]
     found = search.refit(
         FittedEffects(
             {
-                **fit.without(*DELAY_EFFECTS).setting,
-                LAG_COEFFICIENT[0]: {LAG_COEFFICIENT[1]: _total_delay(fit)},
+                **fit.without(*_delays(fit)).setting,
+                effect: {name: _total_delay(fit)},
             }
         )
     )
@@ -142,48 +164,49 @@ def delay_alternatives(
     if kind != "either":
         return {}
     return {
-        e: [
-            x
-            for x in search.library
-            if x in LATE_ROTOR_EFFECTS - ({e} if e == LAG_COEFFICIENT[0] else DELAY_EFFECTS)
-        ]
-        for e in LATE_ROTOR_EFFECTS & set(fit.effects)
+        e: [x for x in search.library if get(x).role == (Role.LAG if is_delay(e) else Role.DELAY)]
+        for e in _late_rotor_effects(fit)
     }
 
 
 def delay_doubts(search: Search, fit: FittedEffects, kind: DelayKind | None) -> list[str]:
-    """Return, as sentences, doubts about a motor_lag that follows like a latency, or the other way
-    round.
-    """
-    for effect in LATE_ROTOR_EFFECTS & set(fit.effects) if kind else ():
-        is_it = kind == ("lag" if effect == LAG_COEFFICIENT[0] else "delay")
+    """Return, as sentences, doubts about a lag that follows like a delay, or the reverse."""
+    for effect in _late_rotor_effects(fit) if kind else ():
+        is_it = kind == ("delay" if is_delay(effect) else "lag")
         if not is_it and not any(delay_alternatives(search, fit, kind).values()):
-            if effect == LAG_COEFFICIENT[0]:
-                return ["motor_lag may be a latency: the rotors follow like behind a delay"]
-            return [
-                f"{effect} may be a motor_lag: the rotors follow fast changes less than behind a "
-                "delay"
-            ]
+            delays = [x for x in playing(Role.DELAY) if get(x).kind == "rotor input"]
+            other = next(iter(playing(Role.LAG) if is_delay(effect) else delays), "another effect")
+            follow = (
+                "follow fast changes less than behind a delay"
+                if is_delay(effect)
+                else "follow like behind a delay"
+            )
+            return [f"{effect} may be a {other}: the rotors {follow}"]
     return []
 
 
 def _total_delay(fit: FittedEffects) -> float:
-    """Return the whole delay (s) of the rotors in a fit: of lag, latency, clock and time offset."""
+    """Return the whole delay (s) of the rotors in a fit: of lag, delay, clock and time offset."""
     return sum(
         fit.setting.get(effect, {}).get(name, 0.0)
-        for effect, name in (LAG_COEFFICIENT, ROTOR_TIME_OFFSET, *DELAY_COEFFICIENTS)
+        for effect, name in (
+            *_first_coefficients(Role.LAG, fit.effects),
+            ROTOR_TIME_OFFSET,
+            *_first_coefficients(Role.DELAY, fit.effects),
+        )
     )
 
 
 def _with_rotor_time_offset(fit: FittedEffects) -> FittedEffects:
-    """Return the fit with a rotor time offset in place of a latency or a clock_offset."""
+    """Return the fit with a rotor time offset in place of a delay."""
     setting = {
-        effect: dict(values) for effect, values in fit.without(*DELAY_EFFECTS).setting.items()
+        effect: dict(values) for effect, values in fit.without(*_delays(fit)).setting.items()
     }
     time_offsets = setting.setdefault(ROTOR_TIME_OFFSET[0], {})
-    time_offsets[ROTOR_TIME_OFFSET[1]] = _total_delay(fit) - fit.setting.get(
-        LAG_COEFFICIENT[0], {}
-    ).get(LAG_COEFFICIENT[1], 0.0)
+    time_offsets[ROTOR_TIME_OFFSET[1]] = _total_delay(fit) - sum(
+        fit.setting[effect].get(name, 0.0)
+        for effect, name in _first_coefficients(Role.LAG, fit.effects)
+    )
     return FittedEffects(setting)
 
 

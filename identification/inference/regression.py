@@ -8,13 +8,13 @@ through the same filter.
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...dynamics.effects import get, names
+from ...dynamics.effects import Need, Role, get, names, needing
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
@@ -28,7 +28,6 @@ from ..motion.sensor_noise import noisy_logs
 from ..motion.signals import Signals, log_signals
 from ..motion.smoothing import CUTOFFS, low_pass
 from .commanded_rotors import (
-    EXCLUDED_EFFECTS,
     THRUST_SCALE,
     TILT_X,
     TILT_Y,
@@ -53,10 +52,10 @@ class RegressionSettings:
 
     row_rate_hz: float = 25.0  # of the samples that are rows: five times the cut-off
     margin: float = 0.6  # s at either end of a piece, where the filters lack half of what they need
-    # share of sensor noise in an effect's column, from which the effect is not identifiable. An
-    # attitude_gain could cancel the attitude's own noise
+    # share of sensor noise in an effect's column, from which the effect is not identifiable; of one
+    # that scales a measurement, it could cancel the measurement's own noise
     most_noise_share: float = 0.1
-    most_noise_shares: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.01})
+    most_noise_share_of_scale: float = 0.01
     # rounding steps by which rotor speeds must vary; with less, the rounding is no noise but looks
     # like an effect
     least_steps_of_rotor_speed: float = 1.4
@@ -78,21 +77,9 @@ class RegressionSettings:
 
 
 REGRESSION = RegressionSettings()
-# effects of fast motion; where rotor speeds hardly leave their rounding steps, these would explain
-# the rounding
-FAST_MOTION_EFFECTS = frozenset(
-    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset", "thrust_curvature"}
-)
-# effects that a low-pass of the pose makes or hides: it delays, and weakens fast turns
-FILTER_LIKE_EFFECTS = frozenset(
-    {"inertia", "rotor_inertia", "motor_lag", "latency", "clock_offset"}
-)
-DELAY_EFFECTS = frozenset({"latency", "clock_offset"})  # each contains the rotors' time offset
-LATE_ROTOR_EFFECTS = DELAY_EFFECTS | {"motor_lag"}
-DRAG_EFFECTS = frozenset({"rotor_drag", "body_drag"})
-# effects whose force is no sum over their coefficients
-NONLINEAR_EFFECTS = frozenset({"slung_payload", "wind", "fan_jet"})
-
+# what logs lack whose rotor speeds are worked out from commands: torque is left out, the thrust
+# curve is a guess, and commands do not tell small differences between rotors
+NOT_COMMANDED = (Need.MOMENTS, Need.SINGLE_ROTORS)
 
 # Coefficients by effect: what is added to the declared vehicle
 Setting = Mapping[str, Mapping[str, float]]
@@ -111,11 +98,42 @@ VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
 TIME_OFFSETS = (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
 
 
+def is_delay(effect: str) -> bool:
+    """Return whether an effect moves rotor speeds against the pose in time: it contains the rotors'
+    time offset.
+    """
+    return get(effect).role == Role.DELAY
+
+
+def moves_time(effect: str) -> bool:
+    """Return whether rotors act late by an effect: behind a delay, or behind a lag."""
+    return get(effect).role in (Role.DELAY, Role.LAG)
+
+
+def is_nonlinear(effect: str) -> bool:
+    """Return whether an effect's force is no sum over its coefficients."""
+    return get(effect).starting_points is not None
+
+
+def lost_behind_a_filter() -> frozenset[str]:
+    """Return the effects that a low-pass of the pose makes or hides: it delays, and weakens fast
+    turns.
+    """
+    return needing(Need.FAST_MOTION)
+
+
 def coefficient(column: Column) -> Coefficient:
     """Return the declaration of a column's coefficient."""
     return next(
         c for c in get(column[0]).coefficients if c.name == column[1].removeprefix(MOMENT_PREFIX)
     )
+
+
+def unit_of_change(column: Column, vehicle: Vehicle) -> float:
+    """Return how much of a coefficient changes what it changes by as much as is declared: the
+    vehicle's mass for one in kg, 1 for a relative one.
+    """
+    return vehicle.mass if coefficient(column).unit == "kg" else 1.0
 
 
 def typical_size(column: Column, vehicle: Vehicle) -> float:
@@ -256,6 +274,7 @@ class Flights:
         self.rotor_noise: (
             Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
         )
+        self.angular_velocity_noise: Array  # (3,) its share of the variance of angular velocities
         self.sensor_noise, self.not_identifiable, self.column_noise, self.rotor_noise = (
             self._repeat_sensor_noise()
         )
@@ -289,7 +308,7 @@ class Flights:
         own: list[Column] = [
             (e, c.name)
             for e in names()
-            if e not in NONLINEAR_EFFECTS
+            if not is_nonlinear(e)
             for c in get(e).coefficients
             if c.name != CENTRAL
         ]
@@ -313,12 +332,17 @@ class Flights:
             not_identifiable |= self._lost_in_drift(noisy, weight)
             self.needs_pose = frozenset(not_identifiable - (quietly - self.without_trace))
         if self.commanded:
-            not_identifiable |= EXCLUDED_EFFECTS
+            not_identifiable |= needing(*NOT_COMMANDED)
         if self.filtered:
-            not_identifiable |= FILTER_LIKE_EFFECTS
+            not_identifiable |= lost_behind_a_filter()
         not_identifiable |= self.explained_by_rounding
         rotors, more = self.rotor_wrench({}), noisy.rotor_wrench({})
         rounded = np.var(more - rotors, axis=0) / np.maximum(np.var(rotors, axis=0), 1e-30)
+        rates = self._angular_velocities()
+        noise = noisy._angular_velocities() - rates
+        self.angular_velocity_noise = np.var(noise, axis=0) / np.maximum(
+            np.var(rates, axis=0), 1e-30
+        )
         return floor, frozenset(not_identifiable), {c: loud[c] - quiet[c] for c in smooth}, rounded
 
     def _noise_shares(
@@ -364,7 +388,7 @@ class Flights:
         of the IMU errs otherwise.
         """
         lost = set()
-        for effect in NONLINEAR_EFFECTS & set(names()):
+        for effect in filter(is_nonlinear, names()):
             setting = {
                 effect: {
                     c.name: abs(typical_size((effect, c.name), self.vehicle))
@@ -396,6 +420,15 @@ class Flights:
             ]
         )
 
+    def _angular_velocities(self) -> Array:
+        """Return the angular velocities (rows, 3) at the rows, low-passed."""
+        return np.concatenate(
+            [
+                low_pass(p.signals.angular_velocity, CUTOFFS.residual_hz, p.signals.period)[p.rows]
+                for p in self.pieces({})
+            ]
+        )
+
     @property
     def rotor_speeds_vary(self) -> bool:
         """Whether the rotor speeds vary by enough of their rounding steps."""
@@ -410,7 +443,7 @@ class Flights:
         """The effects that would explain the rounding, where rotor speeds hardly leave their
         rounding steps.
         """
-        return frozenset() if self.rotor_speeds_vary else FAST_MOTION_EFFECTS
+        return frozenset() if self.rotor_speeds_vary else needing(Need.FINE_ROTOR_SPEEDS)
 
     def pieces(self, setting: Setting) -> list[Piece]:
         """Return the pieces, with what the vehicle's sensing effects did to the logs undone."""
@@ -581,7 +614,7 @@ class Flights:
         key = tuple(
             (name, c, round(value / (0.05 * typical_size((name, c), self.vehicle))))
             for name, values in sorted(setting.items())
-            if name == "wind" or (name and get(name).kind != "wrench")
+            if name and (get(name).sets_wind or get(name).kind != "wrench")
             for c, value in sorted(values.items())
         )
         if key not in self._columns:
@@ -611,7 +644,7 @@ class Flights:
             # moving signals in time moves their noise as well: the difference is taken to both
             # sides, as a step to one side would seem to reduce the noise
             if (
-                effect in LATE_ROTOR_EFFECTS
+                moves_time(effect)
                 and abs(value) > abs(delta)
                 and c.minimum <= value - delta
                 and value + delta <= c.maximum
@@ -655,7 +688,11 @@ class Flights:
 
 
 def _most_noise_share(effect: str) -> float:
-    return REGRESSION.most_noise_shares.get(effect, REGRESSION.most_noise_share)
+    return (
+        REGRESSION.most_noise_share_of_scale
+        if get(effect).scales_noise
+        else REGRESSION.most_noise_share
+    )
 
 
 def held_out(number: Index) -> Index:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Family, Role, get, of_family, playing
 from ..findings import CHANNELS, Structure
 from ..motion.smoothing import CUTOFFS, low_pass
 from .candidate_regressors import (
@@ -30,12 +30,11 @@ from .gram_matrix import Gram
 from .innovations import Innovations, confirms_addition
 from .regression import (
     CENTRAL,
-    DRAG_EFFECTS,
-    LATE_ROTOR_EFFECTS,
     REGRESSION,
     Column,
     Flights,
     Setting,
+    moves_time,
 )
 from .search import SEARCH, FittedEffects, Search
 
@@ -84,7 +83,7 @@ class StructureSettings:
     least_reduction_of_large_exponent: float = 4.0
     least_speed: float = 0.05  # m/s, below which speed is noise
     thrust_bends: tuple[float, ...] = (0.9, 1.0, 1.1, 1.2, 1.3)  # times the thrust of hover
-    # deviance of one question, whether thrust bends: 36 true thrust_curvatures had up to 4, rotors
+    # deviance of one question, whether thrust bends: 36 true curved thrusts had up to 4, rotors
     # that stall 29 to 680; where no curvature is named, 93 flights without a bend had up to 17 that
     # innovations confirmed, a rotor that stalls 56
     least_reduction_of_bend: float = 12.0
@@ -100,8 +99,6 @@ class StructureSettings:
 
 
 STRUCTURE = StructureSettings()
-# effects of what is bolted on: it moves along, however fast
-RIGID_EFFECTS = frozenset({"mass", "inertia", "com_offset", "marker_offset"})
 
 
 def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure], bool]:
@@ -248,7 +245,8 @@ def drag_exponents(
     """
     flights = search.flights
     whole = regression.blocks[:, -1, -1].sum()
-    for effect in filter(DRAG_EFFECTS.__contains__, shares):
+    drags = of_family(Family.DRAG)
+    for effect in filter(drags.__contains__, shares):
         speed = np.concatenate(
             [np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})]
         )
@@ -282,11 +280,12 @@ def bending_thrust(
         base: these columns (rows, 6) each.
 
     A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few
-    blocks, and a thrust_curvature explains most of it: it is asked in all rows together. Where a
-    thrust_curvature is named it is also asked whether thrust bends at hover alone; innovations need
-    not confirm that.
+    blocks, and a curved thrust explains most of it: it is asked in all rows together. Where a
+    curve of the thrust is named it is also asked whether thrust bends at hover alone; innovations
+    need not confirm that.
     """
-    flights, curved = search.flights, "thrust_curvature" in fit.effects
+    flights = search.flights
+    curved = bool(playing(Role.THRUST_CURVE, among=fit.effects))
     if not flights.rotor_speeds_vary:
         return
     asked = [
@@ -355,7 +354,8 @@ def loose_mounts(
     flights = search.flights
     whole = float(regression.blocks[:, -1, -1].sum())
     least = STRUCTURE.least_deviance_reduction * max(1.0, whole / regression.design[..., 0].size)
-    for effect in filter(RIGID_EFFECTS.__contains__, shares):
+    rigid = of_family(Family.RIGID_BODY)
+    for effect in filter(rigid.__contains__, shares):
         pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
         slow = np.concatenate(
             [low_pass(piece, CUTOFFS.slow_motion_hz, flights.period) for piece in pieces]
@@ -406,7 +406,7 @@ def _explained_part(flights: Flights, fit: FittedEffects, effect: str, residual:
     Moving signals in time also moves their noise, which is in the residual as well: for such an
     effect it is the linear change with its coefficients.
     """
-    if effect not in LATE_ROTOR_EFFECTS:
+    if not moves_time(effect):
         return flights.residual(fit.without(effect).setting) - residual
     own = fit.setting[effect]
     columns = flights.columns(fit.setting, [(effect, name) for name in own], 0.1)

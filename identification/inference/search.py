@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Need, Role, get, playing
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .commanded_rotors import AFTER_SAG_EFFECTS, COMMANDED, SECOND_CHOICE_EFFECTS, similar_effects
+from .commanded_rotors import COMMANDED, similar_effects
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
     ATTITUDE_TIME_OFFSET,
     CENTRAL,
-    DELAY_EFFECTS,
     MOMENT_PREFIX,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
@@ -26,11 +26,13 @@ from .regression import (
     Flights,
     Setting,
     coefficient,
+    is_delay,
+    is_nonlinear,
     range_of,
     typical_size,
 )
-from .starting_points import STARTING_POINTS
-from .turning_delay import LATENCY, turning_delay
+from .starting_points import starting_points
+from .turning_delay import rotor_delay, turning_delay
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -110,7 +112,7 @@ class Search:
             e
             for e in library
             if e not in flights.not_identifiable
-            and (e not in STARTING_POINTS or e in declared or not flights.commanded)
+            and (not is_nonlinear(e) or e in declared or not flights.commanded)
         )
         # effects that are not identifiable are not searched for, but may be the cause of another
         self.dominated_by_noise = (
@@ -121,7 +123,7 @@ class Search:
                 for e in library
                 if e
                 in flights.not_identifiable - flights.explained_by_rounding - flights.without_trace
-                and not (flights.inertial and e in STARTING_POINTS)
+                and not (flights.inertial and is_nonlinear(e))
             )
         )
         self.report = report
@@ -133,15 +135,18 @@ class Search:
             if {c.name for c in get(e.name).coefficients} - {CENTRAL} - set(e.coefficients)
         }
         # effects that are searched for from several starting points; a declared one is such a point
-        self.nonlinear_effects = frozenset(STARTING_POINTS) - (
-            declared - self._fixed_coefficients.keys()
+        self.nonlinear_effects = frozenset(
+            e
+            for e in (*library, *declared)
+            if is_nonlinear(e) and (e not in declared or e in self._fixed_coefficients)
         )
         # the delay of commands is known from the vehicle's rotation: it is fixed in the search
         delay = turning_delay(
             [p.signals for p in flights.pieces({}) if p.log < flights.deviating_flights],
             flights.vehicle,
         )
-        self.delay = delay if flights.commanded and LATENCY in self.library else None
+        self.rotor_delay = rotor_delay(self.library)
+        self.delay = delay if flights.commanded and self.rotor_delay else None
         self.noise: Array = np.zeros((0, 6))
         self.whiten: Whitener
 
@@ -160,7 +165,7 @@ class Search:
         """Return whether an effect is fixed: known from another source than the residual, neither
         fitted nor removed.
         """
-        return self.delay is not None and effect == LATENCY
+        return self.delay is not None and effect == self.rotor_delay
 
     def model_columns(self, effects: Sequence[str], tried: Sequence[str] = ()) -> list[Column]:
         """Return the columns of a model: of its effects, of effects that are tried, and the time
@@ -168,7 +173,7 @@ class Search:
         """
         rotor_offset = (
             []
-            if self.flights.commanded or DELAY_EFFECTS & {*effects, *tried}
+            if self.flights.commanded or any(map(is_delay, (*effects, *tried)))
             else [ROTOR_TIME_OFFSET]
         )
         velocity_offset = (
@@ -207,7 +212,8 @@ class Search:
         for effect in self.library:
             if effect in self.nonlinear_effects and effect not in fit.effects:
                 stated = self._fixed_coefficients.get(effect, {})
-                for i, start in enumerate(STARTING_POINTS[effect](self.flights, residual, stated)):
+                starting = starting_points(effect, self.flights, residual, stated)
+                for i, start in enumerate(starting):
                     column = (effect, f"{START_PREFIX}{i}")
                     starts[column] = {**start, **stated}
                     changed = {**fit.setting, effect: starts[column]}
@@ -365,7 +371,7 @@ class Search:
                 - x.deviance_reduction
                 * (
                     COMMANDED.second_choice_factor
-                    if self.flights.commanded and x.effect in SECOND_CHOICE_EFFECTS
+                    if self.flights.commanded and not get(x.effect).usual
                     else 1.0
                 )
             ),
@@ -506,9 +512,22 @@ def _unexplained_deviance(
 
 
 def _may_join(effect: str, named: Sequence[str]) -> bool:
-    """Return whether an effect may be added to the named effects of commanded flights."""
+    """Return whether an effect may be added to the named effects of commanded flights.
+
+    One that changes the thrust curve further may once thrust follows the battery's voltage: without
+    that it would explain whatever thrust lacks.
+    """
     return not similar_effects(effect) & set(named) and (
-        effect not in AFTER_SAG_EFFECTS or "battery_sag" in named
+        Need.THRUST_CURVE not in get(effect).needs
+        or bool(playing(Role.THRUST_OVER_VOLTAGE, among=named))
+    )
+
+
+def is_possible(fit: FittedEffects, vehicle: Vehicle) -> bool:
+    """Return whether a vehicle can have the coefficients of each effect of a fit together."""
+    return all(
+        (possible := get(effect).possible) is None or possible(fit.setting[effect], vehicle)
+        for effect in fit.effects
     )
 
 
@@ -547,11 +566,7 @@ def coefficient_count(effect: str) -> float:
 
     A delay replaces the rotor time offset. Of exact equivalents a change of the log comes last.
     """
-    return (
-        len(get(effect).coefficients)
-        - (effect in DELAY_EFFECTS)
-        + 0.1 * (get(effect).kind == "sensing")
-    )
+    return len(get(effect).coefficients) - is_delay(effect) + 0.1 * (get(effect).kind == "sensing")
 
 
 def _central(columns: Sequence[Column], change: Array, effect: str) -> float:

@@ -1,15 +1,19 @@
-"""Starting points of effects with nonlinear coefficients; each is tried as a column of fixed
-shape.
+"""Starting points of effects whose coefficients do nothing one by one; each is tried as a column of
+fixed shape.
+
+The effects themselves say where to start. Of many starts, those are tried whose wrench, along the
+flights, resembles the residual most.
 """
 
-import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import get
+from ...dynamics.effects.declaration import Unexplained
 from ...dynamics.vehicle import EffectSetting
 from ..motion.residual import residual_wrench
 from ..motion.signals import Signals
@@ -20,147 +24,114 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StartingSettings:
-    """The grids of starting points of effects with nonlinear coefficients."""
+    """How many starting points of an effect are tried."""
 
-    cable_lengths: tuple[float, ...] = (0.15, 0.25, 0.4, 0.65, 1.0, 1.5)  # m
-    fan_headings: tuple[float, ...] = tuple(2 * math.pi * k / 8 for k in range(8))  # rad
-    fan_sample_step: int = 20  # every so many samples are enough for a map of the jet
-    most_fan_starts: int = 4
-    least_speed: float = 1e-9  # m/s, against a division by zero
-    most_damping_ratio: float = 0.2  # of a load that swings in air
+    most_tried: int = 12  # all of them, if there are no more
+    kept_of_more: int = 4  # of more, those that resemble the residual most
+    sample_step: int = 20  # every so many samples are enough to see the resemblance
+    least_size: float = 1e-12  # of a channel of the residual, against a division by zero
 
 
 STARTING = StartingSettings()
 
 
-def slung_payload(
-    flights: Flights, residual: Array, stated: Mapping[str, float]
+def starting_points(
+    effect: str, flights: Flights, residual: Array, stated: Mapping[str, float]
 ) -> list[dict[str, float]]:
-    """Return loads of typical mass on cables of several lengths, or of the length that is fixed."""
-    mass = typical_size(("slung_payload", "m"), flights.vehicle)
-    lengths = (stated["l"],) if "l" in stated else STARTING.cable_lengths
-    return [
-        {"m": mass, "l": length, "damping": stated.get("damping", damping)}
-        for length in lengths
-        for damping in ((0.3, 2.0) if "damping" not in stated else (0.0,))
-    ]
+    """Return the coefficients from which a fit of an effect starts.
 
-
-def overdamped_load(setting: Mapping[str, Mapping[str, float]], gravity: float) -> bool:
-    """Return whether a fitted load is damped more than any load in air: it imitates a drag then."""
-    load = setting.get("slung_payload")
-    return (
-        load is not None
-        and load["l"] > 0
-        and load["damping"] > 2.0 * STARTING.most_damping_ratio * math.sqrt(gravity / load["l"])
-    )
-
-
-def wind(flights: Flights, residual: Array, stated: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return winds along the mean force, and along the part of the force that goes like a slow
-    wind's part of a drag.
-
-    That is, for the wind w, |v| w + v (v . w) / |v|, beside which a steady force may act.
+    Args:
+        effect: that declares starting points.
+        flights: where it is looked for.
+        residual: that they leave (rows, 6).
+        stated: coefficients that the vehicle's file fixes.
     """
-    speed = typical_size(("wind", "wx"), flights.vehicle)
-    drag = typical_size(("wind", "cd"), flights.vehicle)
-    force = residual[flights.fit_rows, :2]
-    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces({})])[
-        flights.fit_rows
-    ]
-    v = np.linalg.norm(velocity, axis=1) + STARTING.least_speed
-    steady = np.tile(np.eye(2), (len(v), 1))
-    with_wind = (
-        v[:, None, None] * np.eye(2)
-        + velocity[:, :2, None] * velocity[:, None, :2] / v[:, None, None]
-    )
-    slope = np.linalg.lstsq(
-        np.column_stack([with_wind.reshape(-1, 2), steady]), force.ravel(), rcond=None
-    )[0][:2]
-    return [
-        {
-            "wx": scale * speed * math.cos(heading),
-            "wy": scale * speed * math.sin(heading),
-            "wz": 0.0,
-            "cd": drag,
-        }
-        for heading in (math.atan2(y, x) for x, y in (force.mean(axis=0), slope))
-        for scale in (0.5, 1.0, 2.0)
-    ]
-
-
-def fan_jet(
-    flights: Flights, residual: Array, stated: Mapping[str, float]
-) -> list[dict[str, float]]:
-    """Return the fans around the flight whose force maps resemble the residual most."""
-    thin, wanted = [], []
-    row = 0
-    for piece in flights.pieces({}):
-        s = piece.signals
-        at = piece.rows[
-            :: max(1, STARTING.fan_sample_step // max(1, int(piece.rows[1] - piece.rows[0])))
-        ]
-        wanted.append(row + np.searchsorted(piece.rows, at))
-        row += len(piece.rows)
-        thin.append(
-            Signals(
-                s.t[at],
-                s.period,
-                s.position[at],
-                s.rotation[at],
-                s.velocity[at],
-                s.acceleration[at],
-                s.angular_velocity[at],
-                s.angular_acceleration[at],
-                s.rotor_speeds[at],
-                None if s.voltage is None else s.voltage[at],
+    declared = get(effect).starting_points
+    if declared is None:
+        return []
+    thin = [_thinned(piece.signals, _every(piece.rows)) for piece in flights.pieces({})]
+    seen = flights.fit_rows
+    pieces = flights.pieces({})
+    found = [
+        dict(start)
+        for start in declared(
+            Unexplained(
+                flights.vehicle,
+                {
+                    c.name: typical_size((effect, c.name), flights.vehicle)
+                    for c in get(effect).coefficients
+                },
+                stated,
+                np.concatenate([s.position for s in thin]).mean(axis=0),
+                np.concatenate([p.signals.position[p.rows] for p in pieces])[seen],
+                np.concatenate([p.signals.velocity[p.rows] for p in pieces])[seen],
+                residual[seen, :3],
+                residual[seen, 3:],
             )
         )
-    rows = np.concatenate(wanted)
-    seen = flights.fit_rows[rows]
-    target = residual[rows][seen]
-    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), 1e-12)
+    ]
+    if len(found) <= STARTING.most_tried:
+        return found
+    likeness = _likeness(effect, found, flights, residual)
+    # of those that are alike the later one, and none that does nothing
+    order = sorted(range(len(found)), key=lambda i: (likeness[i], i), reverse=True)
+    return [found[i] for i in order[: STARTING.kept_of_more] if likeness[i] > -math.inf]
+
+
+def _likeness(
+    effect: str, starts: list[dict[str, float]], flights: Flights, residual: Array
+) -> list[float]:
+    """Return how much of the residual goes like each start's wrench; minus infinity where it has
+    none.
+    """
+    # an effect with a state of its own must see every sample
+    whole = get(effect).advance is not None or get(effect).memory > 0
+    looked_at, rows, picked = [], [], []
+    row = 0
+    for piece in flights.pieces({}):
+        at = _every(piece.rows)
+        rows.append(row + np.searchsorted(piece.rows, at))
+        row += len(piece.rows)
+        looked_at.append(piece.signals if whole else _thinned(piece.signals, at))
+        picked.append(at if whole else np.arange(len(at)))
+    every = np.concatenate(rows)
+    seen = flights.fit_rows[every]
+    target = residual[every][seen]
+    scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), STARTING.least_size)
     bare = replace(flights.vehicle, effects=())
-    base = [residual_wrench(s, bare) for s in thin]
-    centre = np.concatenate([s.position for s in thin]).mean(axis=0)
-    speed, kd, area = (
-        typical_size(("fan_jet", name), flights.vehicle) for name in ("u0", "kd", "area")
-    )
-    found: list[tuple[float, int, dict[str, float]]] = []
-    for heading, distance, across in itertools.product(
-        STARTING.fan_headings, (1.5, 2.5, 3.5), (-0.6, 0.0, 0.6)
-    ):
-        along = np.array([math.cos(heading), math.sin(heading)])
-        x, y = centre[:2] - distance * along + across * np.array([-along[1], along[0]])
-        start = {
-            "u0": speed,
-            "x": float(x),
-            "y": float(y),
-            "z": float(centre[2]),
-            "heading": heading,
-            "kd": kd,
-            "area": area,
-        }
-        vehicle = bare.with_effects(EffectSetting("fan_jet", start))
+    base = [residual_wrench(s, bare) for s in looked_at]
+    out = []
+    for start in starts:
+        vehicle = bare.with_effects(EffectSetting(effect, start))
+        parts = zip(base, looked_at, picked, strict=True)
         shape = (
-            np.concatenate(
-                [b - residual_wrench(s, vehicle) for b, s in zip(base, thin, strict=True)]
-            )[seen]
+            np.concatenate([(b - residual_wrench(s, vehicle))[at] for b, s, at in parts])[seen]
             * scale
         )
         size = float(np.sum(shape * shape))
-        if size > 0:
-            found.append(
-                (float(np.sum(shape * target * scale)) / math.sqrt(size), len(found), start)
-            )
-    found.sort(reverse=True)
-    return [start for _, _, start in found[: STARTING.most_fan_starts]]
+        out.append(
+            float(np.sum(shape * target * scale)) / math.sqrt(size) if size > 0.0 else -math.inf
+        )
+    return out
 
 
-STARTING_POINTS: dict[
-    str, Callable[[Flights, Array, Mapping[str, float]], list[dict[str, float]]]
-] = {
-    "slung_payload": slung_payload,
-    "wind": wind,
-    "fan_jet": fan_jet,
-}
+def _every(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return every so many-th row of a piece."""
+    return rows[:: max(1, STARTING.sample_step // max(1, int(rows[1] - rows[0])))]
+
+
+def _thinned(signals: Signals, at: NDArray[np.int64]) -> Signals:
+    """Return the signals at some samples, with the period as it was."""
+    s = signals
+    return Signals(
+        s.t[at],
+        s.period,
+        s.position[at],
+        s.rotation[at],
+        s.velocity[at],
+        s.acceleration[at],
+        s.angular_velocity[at],
+        s.angular_acceleration[at],
+        s.rotor_speeds[at],
+        None if s.voltage is None else s.voltage[at],
+    )

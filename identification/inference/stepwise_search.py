@@ -6,16 +6,26 @@ rows.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from ...dynamics.effects import get
 from .commanded_rotors import cancels_thrust_scale
 from .gram_matrix import Gram
 from .innovations import Innovations, confirms_addition
-from .search import SEARCH, FittedEffects, Gain, Regression, Search, coefficient_count, with_changes
-from .starting_points import STARTING_POINTS, overdamped_load
+from .regression import is_nonlinear
+from .search import (
+    SEARCH,
+    FittedEffects,
+    Gain,
+    Regression,
+    Search,
+    coefficient_count,
+    is_possible,
+    with_changes,
+)
 
 
 @dataclass(frozen=True)
@@ -31,9 +41,9 @@ class StepwiseSettings:
     least_share_of_deviance: float = 0.01
     # times the least reduction; an effect that explains so much may have half the least size
     large_reduction_ratio: float = 4.0
-    # typical sizes, for effects whose least size is another one: attitude_gain is wrong by the
-    # share of noise in the tilt
-    least_sizes: Mapping[str, float] = field(default_factory=lambda: {"attitude_gain": 0.25})
+    # typical sizes, the least size of an effect that scales a measurement: it is wrong by the share
+    # of noise in what is measured
+    least_size_of_scale: float = 0.25
     swap_reduction: float = 12.0  # deviance by which one effect in place of another must be better
     most_effects: int = 4
     # the same for commanded flights; effects that cannot be there explain up to 25, and a share of
@@ -63,7 +73,7 @@ def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
     """Return the effects that are needed, and what each effect of the library explained alone at
     first.
     """
-    needed = FittedEffects(search.delay.setting if search.delay else {})
+    needed = FittedEffects(search.delay.setting(search.rotor_delay) if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
     for _ in range(STEPWISE.rounds):
@@ -130,7 +140,8 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
             if commanded:
-                taken = not overdamped_load(more.setting, search.flights.vehicle.gravity)
+                # where rotors are measured, innovations contradict what cannot be
+                taken = is_possible(more, search.flights.vehicle)
             else:
                 taken = confirms_addition(search.flights, fit.setting, more.setting)
             if taken:
@@ -148,8 +159,7 @@ def _plausible(search: Search, gain: Gain, count: int) -> bool:
     if cancels_thrust_scale(gain.fit.setting, search.flights.vehicle.weight):
         return False
     return (gain.size < STEPWISE.commanded_largest_size or count == 0) and (
-        gain.effect not in STARTING_POINTS
-        or gain.share > STEPWISE.commanded_least_share_of_nonlinear
+        not is_nonlinear(gain.effect) or gain.share > STEPWISE.commanded_least_share_of_nonlinear
     )
 
 
@@ -326,7 +336,7 @@ def _least(search: Search, error: float) -> float:
 
 def _least_size(effect: str) -> float:
     """Return the size, in typical ones, above which an effect is worth a name."""
-    return STEPWISE.least_sizes.get(effect, SEARCH.least_size)
+    return STEPWISE.least_size_of_scale if get(effect).scales_noise else SEARCH.least_size
 
 
 def _is_worth_naming(gain: Gain, least: float) -> bool:

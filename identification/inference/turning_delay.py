@@ -7,8 +7,8 @@ is the delay. How much of them shows (inertia, the thrust curve) is left free fo
 flight; it may not be negative. What else moves the vehicle, and the pose's noise, may have any
 spectrum: the likelihood is Whittle's with an unknown noise at each frequency.
 
-It is a latency that is fitted. A lag also takes gain away at high frequencies, but so does a loop
-that is closed over a noisy pose: a lag of that delay is always as good.
+It is a pure delay that is fitted. A lag also takes gain away at high frequencies, but so does a
+loop that is closed over a noisy pose: a lag of that delay is always as good.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import csd, welch
 
+from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ..motion.signals import Signals
 
@@ -39,24 +40,18 @@ class DelaySettings:
 
 DELAY = DelaySettings()
 
-LATENCY, LATENCY_COEFFICIENT = "latency", "d"
-# a lag delays slow changes as much, and a log whose clock is off looks like one whose commands are
-# late
-SAME_DELAY_EFFECTS = ("motor_lag", "clock_offset")
-
 
 @dataclass(frozen=True)
 class Delay:
-    """A latency, its standard deviation and its log-likelihood ratio."""
+    """A delay of the rotors, its standard deviation and its log-likelihood ratio."""
 
     seconds: float
     std: float  # s
     log_likelihood_ratio: float  # over moments that do not show at all
 
-    @property
-    def setting(self) -> dict[str, dict[str, float]]:
-        """The effect with its coefficient."""
-        return {LATENCY: {LATENCY_COEFFICIENT: self.seconds}}
+    def setting(self, effect: str) -> dict[str, dict[str, float]]:
+        """Return an effect that delays the rotors, with its coefficient."""
+        return {effect: {get(effect).coefficients[0].name: self.seconds}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +79,19 @@ class _Spectra:
             gain = max(float(np.sum(along / noise) / np.sum(power / noise)), 0.0)
         noise = self.turning - 2.0 * gain * along + gain**2 * power
         return 2.0 * self.count * float(np.sum(np.log(noise / self.turning)))
+
+
+def rotor_delay(library: Sequence[str]) -> str:
+    """Return the effect of a library that delays the rotors; empty where it has none."""
+    delays = playing(Role.DELAY, among=library)
+    return next((effect for effect in delays if get(effect).kind == "rotor input"), "")
+
+
+def same_delays(effect: str, library: Sequence[str]) -> list[str]:
+    """Return the effects of a library that show the same delay: a lag delays slow changes as much,
+    and a log whose clock is off looks like one whose commands are late.
+    """
+    return [x for x in playing(Role.LAG, Role.DELAY, among=library) if x != effect]
 
 
 def turning_delay(pieces: Sequence[Signals], vehicle: Vehicle) -> Delay | None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get
 from ...dynamics.model import MODEL_FIELDS, load_model, rewrite_sample
 from ...dynamics.vehicle import Array, Vehicle
 from ...runtime.compiled import Record, compiled
@@ -50,10 +50,10 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     """Return the log with the vehicle's declared sensing effects taken out of its poses and rotor
     speeds.
 
-    It is the log itself where the vehicle declares none. With a ``clock_offset`` of dt the rows
-    tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s after a
-    break of more than 0.1 s have no pose; the voltage, which is of the row's own instant, is that
-    of then, and the truth stays as it is.
+    It is the log itself where the vehicle declares none. With a delay of dt between the clocks the
+    rows tell the flight of abs(dt) ago, as the filter's estimate does, and the first abs(dt) s
+    after a break of more than 0.1 s have no pose; the voltage, which is of the row's own instant,
+    is that of then, and the truth stays as it is.
     """
     if not any(get(setting.name).kind == "sensing" for setting in vehicle.effects):
         return log
@@ -62,7 +62,9 @@ def undo_log_sensing(log: FlightLog, vehicle: Vehicle) -> FlightLog:
     samples = np.column_stack([log.rotor_speeds, log.position, log.quaternion])
     _undo(models, np.ascontiguousarray(log.t), np.ascontiguousarray(log.valid), samples)
     delay = sum(
-        abs(s.coefficients.get("dt", 0.0)) for s in vehicle.effects if s.name == "clock_offset"
+        abs(get(s.name).vector(s.coefficients)[0])
+        for s in vehicle.effects
+        if get(s.name).kind == "sensing" and get(s.name).role == Role.DELAY
     )
     valid = log.valid & _settled(log, delay)
     samples[~valid, 4:] = np.nan

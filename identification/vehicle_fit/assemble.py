@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import Role, get
 from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Vehicle
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
+from .effect_settings import effect_of, estimate_name
 from .geometry import Geometry
 from .motors import MotorResponse
 from .result import IDENTIFIED, Estimate
@@ -18,15 +20,14 @@ from .usual import USUAL
 
 Array = NDArray[np.float64]
 
-# of the library's effects, the coefficients that a vehicle file takes
+# how many coefficients of these roles a vehicle file takes
 _EFFECTS = {
-    "rotor_drag": ("kdx", "kdy"),
-    "body_drag": ("dx", "dy", "dz", "cx", "cy"),
-    "inflow_thrust": ("kz",),
-    "translational_lift": ("kh",),
-    "rate_damping": ("dx", "dy", "dz"),
+    Role.ROTOR_DRAG: 2,
+    Role.BODY_DRAG: 5,
+    Role.INFLOW_THRUST: 1,
+    Role.TRANSLATIONAL_LIFT: 1,
+    Role.RATE_DAMPING: 3,
 }
-_EITHER_SIGN = ("translational_lift",)
 
 
 def vehicle_of(
@@ -57,9 +58,10 @@ def vehicle_of(
             steady = np.polynomial.polynomial.polypow(motors.speed, 2)
             curve = MotorCurve(tuple(k * steady))
     late = "lag" in fit.names
-    lag = estimates["motor_lag"]
+    of_lag = effect_of(Role.LAG)
     if late:
-        effects.append(EffectSetting("motor_lag", {"tau": lag.value}))
+        value = estimates[of_lag].value
+        effects.append(EffectSetting(of_lag, {get(of_lag).coefficients[0].name: value}))
     inertia = np.diag([estimates[f"J{a}{a}"].value for a in "xyz"])
     for i, j, product in ((0, 1, "Jxy"), (0, 2, "Jxz"), (1, 2, "Jyz")):
         if product in estimates:
@@ -112,18 +114,18 @@ def _shown(estimate: Estimate | None) -> float:
 
 def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     out = []
-    for effect, letters in _EFFECTS.items():
-        found = {
-            letter: _shown(estimates.get(f"{effect} {letter}"))
-            for letter in letters
-            if f"{effect} {letter}" in estimates
-        }
-        if effect not in _EITHER_SIGN:
-            found = {letter: value for letter, value in found.items() if value > 0.0}
+    for role, count in _EFFECTS.items():
+        effect = effect_of(role)
+        found = {}
+        for i, c in enumerate(get(effect).coefficients[:count]):
+            known = estimates.get(estimate_name(role, i))
+            if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
+                found[c.name] = value
         if any(found.values()):
             out.append(EffectSetting(effect, found))
-    if any(e.name == "rotor_drag" for e in out):  # which damps by itself, rotor by rotor
-        out = [e for e in out if e.name != "rate_damping"]
+    # a drag at the rotors damps by itself
+    if any(get(e.name).role == Role.ROTOR_DRAG for e in out):
+        out = [e for e in out if get(e.name).role != Role.RATE_DAMPING]
     return out
 
 
@@ -155,10 +157,10 @@ def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
             )
     if unknown("(p/k)/Jzz"):
         out.append("Turn quickly to the left and to the right: it shows p/k over Jzz.")
-    if unknown("motor_lag"):
+    if unknown(effect_of(Role.LAG)):
         out.append(
             "Log the motor commands beside the rotor speeds: together they show the lag."
-            if math.isnan(estimates["motor_lag"].value)
+            if math.isnan(estimates[effect_of(Role.LAG)].value)
             else "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset."
         )
     if unknown("thrust(0.75)") or unknown("thrust(0.25)"):

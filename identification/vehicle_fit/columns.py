@@ -53,7 +53,7 @@ class Balance:
 
 def lagged(x: Array, lag: float, period: float) -> Array:
     """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
-    effect ``motor_lag`` has it, each sample held over the step that ends there.
+    effect of the library has it, each sample held over the step that ends there.
     """
     if lag <= 1e-9:
         return x

@@ -1,8 +1,31 @@
-"""Coefficients of a vehicle's own effects."""
+"""The library's effects as a vehicle's own: which is known in which role, what its coefficients are
+called, and what a vehicle has of it.
+"""
 
+from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
 
 
-def coefficient_of(vehicle: Vehicle, effect: str, coefficient: str) -> float:
-    """Return a coefficient of a vehicle's effect; 0 where it has none."""
-    return sum(e.coefficients.get(coefficient, 0.0) for e in vehicle.effects if e.name == effect)
+def effect_of(role: Role) -> str:
+    """Return the effect of the library that plays a role.
+
+    Raises:
+        InputError: it has none.
+    """
+    found = playing(role)
+    if not found:
+        raise InputError(f"the library of effects: expected one of role {role!s}, found none")
+    return found[0]
+
+
+def estimate_name(role: Role, index: int) -> str:
+    """Return what the estimate of a role's coefficient is called: effect and coefficient."""
+    effect = effect_of(role)
+    return f"{effect} {get(effect).coefficients[index].name}"
+
+
+def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
+    """Return a coefficient of a vehicle's effects of a role; 0 where it has none."""
+    own = [e for e in vehicle.effects if get(e.name).role == role]
+    return sum(float(get(e.name).vector(e.coefficients)[index]) for e in own)

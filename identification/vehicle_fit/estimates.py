@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from ...dynamics.effects import Role, get
 from .channels import Piece, Sources
+from .effect_settings import effect_of, estimate_name
 from .geometry import Geometry
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
 from .solve import Fit
@@ -301,6 +303,7 @@ def _yaw(
 
 
 def _lag(out: list[Estimate], read: Reading, sources: Sources) -> None:
+    name = effect_of(Role.LAG)
     if "lag" in read.fit.names:
         how = f"force and turning against {sources.rotors}" + (
             "" if read.fit.drive.commands else ", which therefore are commanded, not measured"
@@ -309,11 +312,11 @@ def _lag(out: list[Estimate], read: Reading, sources: Sources) -> None:
         status = IDENTIFIED
         if not told(known):
             status, how = NOTHING, "a time offset of the motion does nearly the same here"
-        out.append(Estimate("motor_lag", *known, "s", status, how))
+        out.append(Estimate(name, *known, "s", status, how))
     else:
         out.append(
             Estimate(
-                "motor_lag",
+                name,
                 math.nan,
                 math.nan,
                 math.nan,
@@ -372,44 +375,34 @@ def _drag(
         )
         return
     how = f"{sources.force} along body x and y against velocity"
+    # the role that holds it, and where its coefficient along x is
     kinds = {
-        "rotor_drag": ("rotor drag", "kd", "N/(rad/s m/s)"),
-        "body_drag": ("linear drag", "d", "N/(m/s)"),
-        "quadratic drag": ("quadratic drag", "c", "N/(m/s)^2"),
+        "rotor drag": (Role.ROTOR_DRAG, 0),
+        "linear drag": (Role.BODY_DRAG, 0),
+        "quadratic drag": (Role.BODY_DRAG, 3),
     }
+
+    def say(role: Role, index: int, known: tuple[float, float, float], how: str) -> None:
+        unit = get(effect_of(role)).coefficients[index].unit
+        out.append(Estimate(estimate_name(role, index), *known, unit, IDENTIFIED, how))
+
     any_of = [k for k in kinds if k in kept]
     for kind in any_of:
-        parameter, letter, unit = kinds[kind]
-        effect = "body_drag" if kind == "quadratic drag" else kind
-        for axis in "xy":
-            name = f"{parameter} {axis}"
-            known = read.interval(_value(name), False)
-            out.append(Estimate(f"{effect} {letter}{axis}", *known, unit, IDENTIFIED, how))
+        role, first = kinds[kind]
+        for i, axis in enumerate("xy"):
+            say(role, first + i, read.interval(_value(f"{kind} {axis}"), False), how)
     if "vertical drag" in kept:
-        known = read.interval(lambda v: v["linear drag z"], False)
-        out.append(Estimate("body_drag dz", *known, "N/(m/s)", IDENTIFIED, how))
+        say(Role.BODY_DRAG, 2, read.interval(lambda v: v["linear drag z"], False), how)
     if "inflow" in kept:
         known = read.interval(lambda v: v["rotor drag z"], False)
-        out.append(
-            Estimate("inflow_thrust kz", *known, "N/(rad/s m/s)", IDENTIFIED, "force along body z")
-        )
+        say(Role.INFLOW_THRUST, 0, known, "force along body z")
     if "lift" in kept:
         known = read.interval(lambda v: v["lift"] / 4.0, False)
-        out.append(
-            Estimate("translational_lift kh", *known, "N/(m/s)^2", IDENTIFIED, "force along body z")
-        )
-    for axis in "xyz":
+        say(Role.TRANSLATIONAL_LIFT, 0, known, "force along body z")
+    for i, axis in enumerate("xyz"):
         if f"damping {axis}" in kept:
             known = read.interval(_value(f"damping {axis}", arm))
-            out.append(
-                Estimate(
-                    f"rate_damping d{axis}",
-                    *known,
-                    "Nm/(rad/s)",
-                    IDENTIFIED,
-                    f"{sources.rate} against its own derivative",
-                )
-            )
+            say(Role.RATE_DAMPING, i, known, f"{sources.rate} against its own derivative")
     if not any_of:
         out.append(
             Estimate(

@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...dynamics.effects import Role
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
 from .channels import Piece, Sources, pieces_of
 from .columns import Drive
+from .effect_settings import effect_of
 from .estimates import Reading, estimates_of, thrust_of
 from .geometry import SPIN, Geometry
 from .motors import MotorResponse, motor_response
@@ -116,7 +118,7 @@ def identify(
         estimates.append(_lag_alone(pieces, fit))
     motors = None if commands or "lag" in fit.names else motor_response(pieces)
     if motors is not None:
-        estimates = [_lag_of(motors) if e.name == "motor_lag" else e for e in estimates]
+        estimates = [_lag_of(motors) if e.name == effect_of(Role.LAG) else e for e in estimates]
     named = {e.name: e for e in estimates}
     vehicle = vehicle_of(name, fit, named, geometry, logs, gravity, voltage, step, motors)
     return Identified(
@@ -135,7 +137,8 @@ def identify(
 
 def _lag_of(motors: MotorResponse) -> Estimate:
     how = f"rotor speeds against commands, {100 * motors.left:.0f} % of their swing left over"
-    return Estimate("motor_lag", motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
+    name = effect_of(Role.LAG)
+    return Estimate(name, motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
 
 
 def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
@@ -260,7 +263,7 @@ def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, li
     for name, parameters in OPTIONAL.items():
         if not _has_columns(fit, parameters):
             continue
-        if fit.drive.commands and name in ("rotor_drag", "inflow"):
+        if fit.drive.commands and name in ("rotor drag", "inflow"):
             continue  # of speeds
         model, start = with_more(fit.model, fit.theta[: len(fit.model.free)], parameters)
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .channels import Piece, Sources
 from .columns import Drive
 from .model import Model
-from .starting import check_order, first_gains, thrust_scale
+from .starting import check_order, first_gains, first_thrust
 
 Array = NDArray[np.float64]
 
@@ -41,8 +41,8 @@ BIASES = ("force bias x", "force bias y", "force bias z")
 POSITIVE = tuple(f"{kind} {a}" for kind in ("rotor drag", "linear drag", "damping") for a in "xyz")
 # each is added where it makes the logs much likelier
 OPTIONAL: dict[str, tuple[str, ...]] = {
-    "rotor_drag": ("rotor drag x", "rotor drag y"),
-    "body_drag": ("linear drag x", "linear drag y"),
+    "rotor drag": ("rotor drag x", "rotor drag y"),
+    "linear drag": ("linear drag x", "linear drag y"),
     "quadratic drag": ("quadratic drag x", "quadratic drag y"),
     "vertical drag": ("linear drag z",),
     "inflow": ("rotor drag z",),
@@ -63,7 +63,7 @@ def first_model(
     Raises:
         InputError: roll or pitch turn against their rotors.
     """
-    each = thrust_scale(pieces, drive, mass * gravity)
+    each = first_thrust(pieces, drive, mass * gravity)
     share = 1.0 / len(each)
     thrust = [share * a for a in each]
     gains = first_gains(pieces, drive, thrust)

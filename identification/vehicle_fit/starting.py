@@ -10,7 +10,7 @@ from .columns import Drive, rotor_columns
 Array = NDArray[np.float64]
 
 
-def thrust_scale(pieces: list[Piece], drive: Drive, weight: float) -> list[float]:
+def first_thrust(pieces: list[Piece], drive: Drive, weight: float) -> list[float]:
     """Return the size of each basis coefficient at which it alone would carry the weight."""
     totals = [rotor_columns(piece, drive) for piece in pieces]
     return [

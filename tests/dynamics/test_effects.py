@@ -65,8 +65,6 @@ def test_an_effect_says_what_it_is(name):
     assert effect.kind in ("rotor input", "wrench", "body", "sensing")
     assert effect.source.strip()
     assert effect.excitation.strip()
-    assert effect.confused_with
-    assert set(effect.confused_with) < set(names()) - {name}
     assert len((sys.modules[f"windwrench.dynamics.effects.{name}"].__doc__ or "").strip()) > 40
     assert 0 < len(effect.coefficients) <= 8
     assert len({c.name for c in effect.coefficients}) == len(effect.coefficients)

@@ -10,7 +10,7 @@ import pytest
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import COMMANDED, thrust_is_assumed
-from windwrench.identification.inference.regression import FILTER_LIKE_EFFECTS
+from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.report.words import headline
 from windwrench.studies.filtered_logs.filters import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
@@ -64,7 +64,7 @@ def test_names_behind_a_filter_are_the_same_but_tentative(name, filtered, coeffi
     assert found.floor_is_bound
     assert name in {e.name for e in found.effects}
     assert all(e.tentative for e in found.effects)
-    assert not FILTER_LIKE_EFFECTS & {e.name for e in found.effects}
+    assert not lost_behind_a_filter() & {e.name for e in found.effects}
     assert found.verdict == "partly explained"
     assert "perhaps" in headline(found)
     assert found.advice[0].startswith("Log the pose as it was measured")
@@ -79,7 +79,7 @@ def test_a_filters_delay_is_no_late_motor():
         [FILTERS["causal 10 Hz"](fly_practice(VEHICLE, (), "excite", 20.0, 4), VEHICLE)], VEHICLE
     )
     assert not [e for e in found.effects if not e.tentative]
-    assert not FILTER_LIKE_EFFECTS & {e.name for e in found.effects}
+    assert not lost_behind_a_filter() & {e.name for e in found.effects}
     assert any(
         "later than they are logged, or the filter of the pose delays it" in n for n in found.notes
     )

@@ -7,7 +7,7 @@ the battery's voltage.
 **Thrust model.** The counts logged are those after the firmware's battery compensation, so the voltage that a motor
 gets is duty times battery voltage, and at the same counts a full battery lifts more than an empty one. The reader does
 not apply the voltage: rotor speeds are those that the counts would give at the vehicle's ``voltage_ref`` (4.2 V where it
-states none), and the voltage is passed on, so that ``battery_sag`` can be declared, or named by a diagnosis, with an
+states none), and the voltage is passed on, so that an effect of the voltage can be declared, or named by a diagnosis, with an
 exponent of its own. Without it the wrench of a flight holds what the battery lacked.
 
 The polynomial is Foerster's (System Identification of the Crazyflie 2.0 Nano Quadrocopter, ETH Zurich 2015),
@@ -49,6 +49,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ....dynamics.effects import Role, playing
 from ....dynamics.vehicle import Vehicle
 from ....dynamics.vehicle_file import load_vehicle
 from ....runtime.errors import InputError
@@ -124,7 +125,8 @@ def read(path: Path, vehicle: Vehicle | None = None) -> FlightLog:
         f"rotor speeds are sqrt(thrust / k) with the k of {vehicle.name}. The PWM logged is after "
         f"battery compensation, so "
         f"thrust falls with the voltage: these are rotor speeds at {reference:g} V; declare "
-        "battery_sag or let the diagnosis find it. A constant factor on thrust remains unknown",
+        f"{' or '.join(playing(Role.THRUST_OVER_VOLTAGE))} or let the diagnosis find it. A "
+        "constant factor on thrust remains unknown",
         f"battery voltage put {_VOLTAGE_LATE:g} s sooner, by which it is logged late",
     ]
     outside = (pwm < 0) | (pwm > _FULL_COUNT)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....dynamics.effects import Role
 from ..effect_settings import coefficient_of
 from ..result import IDENTIFIED, Identified
 
@@ -34,10 +35,10 @@ def autopilot_of(found: Identified) -> Autopilot:
     """Return drag and thrust as autopilots define them."""
     vehicle = found.vehicle
     linear, quadratic = [], []
-    for axis in "xy":
-        turning = 4.0 * vehicle.hover_rate * coefficient_of(vehicle, "rotor_drag", f"kd{axis}")
-        linear.append((turning + coefficient_of(vehicle, "body_drag", f"d{axis}")) / vehicle.mass)
-        quadratic.append(coefficient_of(vehicle, "body_drag", f"c{axis}"))
+    for i in range(2):  # along x and y
+        turning = 4.0 * vehicle.hover_rate * coefficient_of(vehicle, Role.ROTOR_DRAG, i)
+        linear.append((turning + coefficient_of(vehicle, Role.BODY_DRAG, i)) / vehicle.mass)
+        quadratic.append(coefficient_of(vehicle, Role.BODY_DRAG, 3 + i))
     momentum = float(np.mean(linear)) if max(linear) > 0.0 else None
     ballistic = None
     if min(quadratic) > 0.0:

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ..effect_settings import coefficient_of
+from ....dynamics.effects import Role
+from ..effect_settings import coefficient_of, effect_of
 from ..result import IDENTIFIED, Identified
 
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
@@ -33,12 +34,12 @@ def rotorpy(found: Identified) -> str:
     """
     v = found.vehicle
 
-    def effect(name: str, coefficient: str) -> float:
-        return coefficient_of(v, name, coefficient)
+    def effect(role: Role, index: int) -> float:
+        return coefficient_of(v, role, index)
 
-    drag = 0.5 * (effect("rotor_drag", "kdx") + effect("rotor_drag", "kdy"))
+    drag = 0.5 * (effect(Role.ROTOR_DRAG, 0) + effect(Role.ROTOR_DRAG, 1))
     positions = v.positions - v.com
-    lag = found["motor_lag"]
+    lag = found[effect_of(Role.LAG)]
     lines = [
         *_no_speeds(found),
         *_assumed(found),
@@ -65,12 +66,12 @@ def rotorpy(found: Identified) -> str:
         "    },",
         f"    'rotor_directions': np.array({[int(-s) for s in v.spin]}),",
         "    'rI': np.array([0, 0, 0]),",
-        *(f"    'c_D{a}': {effect('body_drag', f'c{a}'):.6g}," for a in "xyz"),
+        *(f"    'c_D{a}': {effect(Role.BODY_DRAG, 3 + i):.6g}," for i, a in enumerate("xyz")),
         f"    'k_eta': {v.k[0]:.6g},",
         f"    'k_m': {v.p[0]:.6g},",
         f"    'k_d': {drag:.6g},",
-        f"    'k_z': {effect('inflow_thrust', 'kz'):.6g},",
-        f"    'k_h': {effect('translational_lift', 'kh'):.6g},",
+        f"    'k_z': {effect(Role.INFLOW_THRUST, 0):.6g},",
+        f"    'k_h': {effect(Role.TRANSLATIONAL_LIFT, 0):.6g},",
         "    'k_flap': 0.0,",
         *([f"    'tau_m': {lag.value:.6g},"] if lag.status == IDENTIFIED else []),
         "}",
@@ -93,7 +94,7 @@ def drone_models(found: Identified) -> str:
             -v.spin[order],
         ]
     )
-    lag = found["motor_lag"]
+    lag = found[effect_of(Role.LAG)]
     lines = [
         *_no_speeds(found),
         *_assumed(found),
@@ -122,8 +123,8 @@ def gazebo(found: Identified) -> str:
     ``rotorDragCoefficient W v`` across the rotor's axis (gz-sim, MulticopterMotorModel).
     """
     v = found.vehicle
-    drag = 0.5 * sum(coefficient_of(v, "rotor_drag", f"kd{a}") for a in "xy")
-    lag = found["motor_lag"]
+    drag = 0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2))
+    lag = found[effect_of(Role.LAG)]
     common = [
         f"  <motorConstant>{v.k[0]:.6g}</motorConstant>",
         f"  <momentConstant>{v.p[0] / v.k[0]:.6g}</momentConstant>",

@@ -4,7 +4,7 @@ import math
 
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.starting_points import wind
+from windwrench.identification.inference.starting_points import starting_points
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
@@ -16,7 +16,7 @@ def test_a_wind_starts_along_itself_beside_a_steady_force_across_it():
         EffectSetting("constant_force", {"fx": 0.2, "fy": -0.4, "fz": 0.0}),
     )
     flights = Flights([fly_practice(VEHICLE, effects, "excite", 30.0, seed=1)], VEHICLE)
-    starts = wind(flights, flights.residual({}), {})
+    starts = starting_points("wind", flights, flights.residual({}), {})
     off = [
         abs(
             math.degrees(

@@ -1,0 +1,171 @@
+"""A diagnosis knows effects by what they declare: their names may be any."""
+
+import ast
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import windwrench.identification as room
+from tests.support.imu_flights import imu_flight, pose_removed
+from tests.support.own_effects import copied, joined, renamed
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.effects import names
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.report.files import report_data
+from windwrench.studies.trials.practice_flights import fly_practice
+
+VEHICLE = load_vehicle("ardrone2")
+MODULES = sorted(Path(room.__file__).parent.rglob("*.py"))
+
+
+def named_in(source: str) -> list[str]:
+    """Return the effects' names in the code and the strings of a source, docstrings left out.
+
+    A name that is an English word as well (mass, wind) counts where a string is that word alone.
+    """
+    tree = ast.parse(source)
+    docstrings = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    word = re.compile(rf"\b(?:{'|'.join(n for n in names() if '_' in n)})\b")
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if id(node) not in docstrings:
+                found += [node.value] if node.value in names() else word.findall(node.value)
+        else:
+            text = (
+                getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", "")
+            )
+            found += word.findall(text) if isinstance(text, str) else []
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                found += word.findall(node.name)
+    return found
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(MODULES[0].parent).as_posix())
+def test_no_effect_is_known_by_its_name(path):
+    assert named_in(path.read_text(encoding="utf-8")) == []
+
+
+def test_a_name_is_found():
+    assert named_in('x = {"mass": 1}') == ["mass"]
+    assert named_in('x = f"{a} may be a motor_lag"') == ["motor_lag"]
+    assert named_in("def thrust_scale(mass): return mass") == ["thrust_scale"]
+    assert named_in('"""The wind and a motor_lag."""\nx = "the mass of a vehicle"') == []
+
+
+FLIGHTS = {
+    "late": ("excite", {"latency": {"d": 0.03}}),
+    "lag": ("excite", {"motor_lag": {"tau": 0.035}}),
+    "wind": ("excite", {"wind": {"wx": 2.0, "wy": 1.0, "wz": 0.0, "cd": 0.04}}),
+    "load": ("excite", {"slung_payload": {"m": 0.03, "l": 0.3, "damping": 1.0}}),
+    "heavier": (
+        "shake",
+        {"mass": {"dm": 0.05}, "inertia": dict.fromkeys(("jx", "jy", "jz"), 0.12)},
+    ),
+    "clock": ("excite", {"attitude_gain": {"g": 0.08}, "clock_offset": {"dt": 0.02}}),
+    "commanded": ("excite", {"latency": {"d": 0.03}, "battery_sag": {"n": 1.0}}),
+    "imu": ("excite", {"thrust_axis_tilt": {"ax": 0.03, "ay": -0.02}}),
+}
+
+
+@cache
+def flight(name):
+    trajectory, truth = FLIGHTS[name]
+    effects = tuple(EffectSetting(k, v) for k, v in truth.items())
+    if name == "imu":
+        return pose_removed(imu_flight(VEHICLE, effects, 20.0))
+    log = fly_practice(VEHICLE, effects, trajectory, 20.0, seed=3)
+    return replace(log, commanded=True) if name == "commanded" else log
+
+
+def report(log, without=()):
+    """Return report.json's dictionary as text."""
+    return json.dumps(report_data(diagnose([log], VEHICLE, without=without)))
+
+
+def called_back(text, new):
+    """Return the text of a report with the names as they were."""
+    for old, name in new.items():
+        text = re.sub(rf"\b{name}\b", old, text)
+    return json.loads(text)
+
+
+def assert_alike(one, other):
+    """Assert that two reports are the same, their numbers to rounding."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for key in one:
+            assert_alike(one[key], other[key])
+    elif isinstance(one, list):
+        assert len(one) == len(other)
+        for a, b in zip(one, other, strict=True):
+            assert_alike(a, b)
+    elif isinstance(one, float):
+        assert other == pytest.approx(one, rel=1e-4, abs=1e-9, nan_ok=True)
+    else:
+        assert one == other
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in ("late", "commanded") else pytest.param(name, marks=pytest.mark.slow)
+        for name in FLIGHTS
+    ],
+)
+def test_a_library_under_other_names_explains_the_same(name):
+    log = flight(name)
+    own = json.loads(report(log))
+    assert own["effects"]
+    order = {effect: i for i, effect in enumerate(names())}
+    with renamed(lambda effect: f"law{order[effect]:02d}") as new:
+        assert_alike(own, called_back(report(log), new))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["late", "heavier", "wind"])
+def test_an_alphabet_the_other_way_round_explains_the_same(name):
+    """Which effect comes first in the library makes no difference to what is named."""
+    log = flight(name)
+    order = {effect: i for i, effect in enumerate(names())}
+    own = json.loads(report(log))
+    with renamed(lambda effect: f"law{99 - order[effect]}") as new:
+        turned = called_back(report(log), new)
+    assert turned["verdict"] == own["verdict"]
+    for a, b in zip(own["effects"], turned["effects"], strict=True):
+        assert a["name"] == b["name"]
+        assert a["tentative"] == b["tentative"]
+        assert set(a["indistinguishable_from"]) == set(b["indistinguishable_from"])
+        assert b["coefficients"] == pytest.approx(a["coefficients"], rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("original", "own", "name"),
+    [
+        ("wind", "breeze", "wind"),
+        ("latency", "radio_delay", "late"),
+        pytest.param("slung_payload", "hanging_load", "load", marks=pytest.mark.slow),
+    ],
+)
+def test_a_users_own_law_is_found_as_the_kits_is(original, own, name, tmp_path):
+    copied(original, own, tmp_path)
+    log = flight(name)
+    with joined(tmp_path):
+        found = diagnose([log], VEHICLE, without=[original])
+    (effect,) = found.effects
+    assert effect.name == own
+    assert not effect.tentative
+    for key, value in FLIGHTS[name][1][original].items():
+        assert effect.coefficients[key] == pytest.approx(value, rel=0.1, abs=0.02)
+    # as of the kit's, no log of pose and rotor speeds tells a delay from a clock that is off
+    assert effect.indistinguishable_from == (("clock_offset",) if name == "late" else ())

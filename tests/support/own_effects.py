@@ -1,0 +1,52 @@
+"""Effects of a user's own, and the library under other names."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from windwrench.dynamics import effects
+
+
+def copied(name: str, new: str, folder: Path) -> Path:
+    """Write the kit's own file of an effect as a user would have written it, under a new name."""
+    source = (Path(effects.__file__).parent / f"{name}.py").read_text(encoding="utf-8")
+    source = re.sub(r"from \.(\w+) import", r"from windwrench.dynamics.effects.\1 import", source)
+    path = folder / f"{new}.py"
+    path.write_text(source.replace(f'name="{name}"', f'name="{new}"'), encoding="utf-8")
+    return path
+
+
+def forget() -> None:
+    """Let the library be read anew."""
+    for known in (effects._files, effects.names, effects.get):
+        if hasattr(known, "cache_clear"):
+            known.cache_clear()
+
+
+@contextmanager
+def joined(folder: Path) -> Iterator[None]:
+    """A library that a folder of a user's has joined."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WINDWRENCH_EFFECTS", str(folder))
+        forget()
+        yield
+    forget()
+
+
+@contextmanager
+def renamed(new: Callable[[str], str]) -> Iterator[dict[str, str]]:
+    """A library in which every effect has another name, and no other; yields the new names."""
+    own = {name: effects.get(name) for name in effects.names()}
+    held = {new(name): replace(effect, name=new(name)) for name, effect in own.items()}
+    folder = Path(effects.__file__).parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "_files", lambda: {name: folder / f"{name}.py" for name in held})
+        patch.setattr(effects, "_module", lambda name: SimpleNamespace(EFFECT=held[name]))
+        forget()
+        yield {name: new(name) for name in own}
+    forget()
