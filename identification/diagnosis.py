@@ -7,7 +7,7 @@ chosen on the fitted blocks of flight; the errors before and after are those of 
 that the fit never saw.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -261,7 +261,7 @@ def diagnose(
         ),
         notes=tuple(dict.fromkeys(notes)),
         candidates=_candidates(first, fit, search),
-        traces=tuple(_traces(flights, before, after)),
+        traces=tuple(_traces(flights, before, after, _parts(flights, fit, after))),
         signatures=tuple(_signature(flights, fit, effect, after) for effect in fit.effects),
         structure=tuple(signs),
         gusts=disturbances,
@@ -423,7 +423,17 @@ def _candidates(first: Sequence[Gain], fit: FittedEffects, search: Search) -> tu
     return tuple(Candidate(x.effect, x.share, x.effect in fit.effects) for x in first)
 
 
-def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
+def _parts(flights: Flights, fit: FittedEffects, after: Array) -> dict[str, Array]:
+    """Return by how much the residual (rows, 6) grows where one named effect is left out."""
+    return {
+        effect: flights.residual(without_deviations(fit.without(effect).setting)) - after
+        for effect in fit.effects
+    }
+
+
+def _traces(
+    flights: Flights, before: Array, after: Array, parts: Mapping[str, Array]
+) -> list[Trace]:
     begins = np.flatnonzero(flights.start)
     out = []
     for a, b in zip(begins, [*begins[1:], len(flights.t)], strict=True):
@@ -435,6 +445,7 @@ def _traces(flights: Flights, before: Array, after: Array) -> list[Trace]:
                 before[a:b],
                 after[a:b],
                 ~flights.fit_rows[a:b],
+                {effect: part[a:b] for effect, part in parts.items()},
             )
         )
     return out

@@ -6,7 +6,7 @@ the world frame, torque about the centre of mass in the body frame.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -66,6 +66,8 @@ class Trace:
     before: Array  # (n, 6) N and Nm, by the declared vehicle
     after: Array  # (n, 6) with the named effects
     held_out: Mask  # (n,) the fit never saw it
+    # (n, 6) of each named effect: by how much ``after`` grows where this effect alone is left out
+    parts: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,25 +1,43 @@
-"""The page of a diagnosis's report: one HTML file that needs nothing else, without a script."""
+"""The page of a diagnosis's report: one HTML file that needs nothing else.
 
+Its plots are drawings (SVG), which a script of its own and a small library (``uplot/``) replace by
+plots with zoom and cursor where a browser runs scripts. Its policy allows no other script, and
+nothing from elsewhere.
+"""
+
+import base64
+import hashlib
+import json
 import math
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
 from ..findings import Diagnosis, NamedEffect
+from .first_screen import next_step, sureness_sentences
+from .interactive import plot_data, scripted
 from .pictures import (
+    Picture,
     draw_candidates,
     draw_over_frequency,
     draw_over_time,
     draw_signatures,
     shown_candidates,
 )
+from .tables import (
+    Table,
+    table_of_candidates,
+    tables_of_signatures,
+    tables_over_frequency,
+    tables_over_time,
+)
 from .words import (
     MISSING,
     carried_by,
     coefficient_meaning,
     confusion,
-    doubt_sentences,
     duration,
     effect_summary,
     error_sentences,
@@ -49,11 +67,20 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     come from users.
     """
     shown = shown_candidates(diagnosis)
+    data = plot_data(diagnosis)
+    library, script = _library(), _file("page.js")
     return _template().render(
         headline=headline(diagnosis),
         errors=error_sentences(diagnosis),
         remainder=remainder_sentence(diagnosis),
-        doubts=doubt_sentences(diagnosis),
+        sureness=sureness_sentences(diagnosis),
+        next_step=next_step(diagnosis),
+        policy=_policy((library, script) if data else ()),
+        data=scripted(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
+        library=library,
+        library_style=_file("uplot/uPlot.min.css"),
+        script=script,
+        toggles=data["time"]["effects"] if "time" in data else [],
         verdict=diagnosis.verdict,
         tone=_TONES.get(diagnosis.verdict, "warn"),
         vehicle=diagnosis.declared.name,
@@ -66,13 +93,13 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         missing=any(MISSING in (row["before"], row["after"]) for row in error_table(diagnosis)),
         held_out=_held_out(diagnosis),
         held_out_sum=_held_out_sum(diagnosis),
-        over_time=draw_over_time(diagnosis),
-        over_frequency=draw_over_frequency(diagnosis),
+        over_time=_plots(draw_over_time(diagnosis), tables_over_time(diagnosis)),
+        over_frequency=_plots(draw_over_frequency(diagnosis), tables_over_frequency(diagnosis)),
         pieces=[
             f"{trace.log}, {trace.t[0]:.1f} to {trace.t[-1]:.1f} s" for trace in diagnosis.traces
         ],
-        signatures=draw_signatures(diagnosis),
-        candidates=draw_candidates(diagnosis),
+        signatures=_plots(draw_signatures(diagnosis), tables_of_signatures(diagnosis.signatures)),
+        candidates=_candidates(draw_candidates(diagnosis), table_of_candidates(shown)),
         ranking=ranking_sentences(diagnosis),
         floor_is_bound=diagnosis.floor_is_bound,
         more_candidates=[
@@ -89,14 +116,43 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     )
 
 
+def _plots(pictures: list[Picture], tables: list[Table]) -> list[dict[str, Any]]:
+    return [{"picture": p, "table": t} for p, t in zip(pictures, tables, strict=True)]
+
+
+def _candidates(picture: Picture | None, table: Table) -> dict[str, Any] | None:
+    return {"picture": picture, "table": table} if picture else None
+
+
+@cache
+def _file(name: str) -> str:
+    """Return a text that stands beside this module."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _library() -> str:
+    """Return the plotting library with the licence that must go with it."""
+    return f"/*\n{_file('uplot/LICENSE').strip()}\n*/\n{_file('uplot/uPlot.iife.min.js').strip()}"
+
+
+def _policy(scripts: Iterable[str]) -> str:
+    """Return the page's content security policy: these scripts, and nothing that is not in it."""
+    hashes = (
+        f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
+        for s in scripts
+    )
+    allowed = " ".join(hashes) or "'none'"
+    return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"
+
+
 @cache
 def _template() -> "Template":
     from jinja2 import Environment, StrictUndefined
 
-    source = resources.files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
     return Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string(source)
+    ).from_string(_file("page.html.j2"))
 
 
 def evidence_words(key: str) -> str:

@@ -16,10 +16,18 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from ..findings import CHANNELS, Candidate, Diagnosis, Signature, Trace
-from .words import percent, rounded, scale_of
+from .plot_numbers import (
+    SYMBOLS,
+    amplitude_spectra,
+    axis_limits,
+    binned,
+    first_times,
+    held_out_runs,
+    signature_points,
+)
+from .words import percent, rounded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,8 +35,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SYMBOLS = dict(zip(CHANNELS, ("Fx", "Fy", "Fz", "τx", "τy", "τz"), strict=True))
-_UNITS = ("N", "N", "N", "Nm", "Nm", "Nm")
 # drawn in these, written as the variables
 _COLOURS = {
     "ink": "#1c2430",
@@ -39,8 +45,7 @@ _COLOURS = {
     "after": "#0072b2",
     "held": "#e6edda",
 }
-_BINS = 320  # columns that a line over time is thinned to: its lowest and highest point in each
-_POINTS = 600  # of a signature
+_BINS = 220  # columns that a line over time is thinned to: its lowest and highest point in each
 _LABEL = 46  # letters in a line below a signature
 _FEW_DECADES = (
     100.0  # between the ends of an axis, whose powers of ten are too few to read a number off
@@ -52,11 +57,14 @@ _XLINK = "http://www.w3.org/1999/xlink"
 
 @dataclass(frozen=True)
 class Picture:
-    """An SVG element with the words that stand for it and below it."""
+    """An SVG element with the words that stand for it and around it."""
 
     svg: str
     alt: str
     caption: str = ""
+    key: str = ""  # its name in the page
+    title: str = ""  # what is drawn, with its unit
+    axis: str = ""  # what it is drawn over, where that differs from plot to plot
 
 
 @contextmanager
@@ -91,16 +99,10 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
     traces = diagnosis.traces
     if not traces:
         return []
-    starts = _starts(traces)
+    starts = first_times(traces)
     pictures = []
     for i, channel in enumerate(CHANNELS):
-        group = slice(0, 3) if i < 3 else slice(3, 6)
-        largest = max(
-            float(np.abs(x[:, group]).max(initial=0.0))
-            for trace in traces
-            for x in (trace.before, trace.after)
-        )
-        factor, unit = scale_of([largest], _UNITS[i])
+        factor, unit, limit = axis_limits(traces, i)
         figure, panel = _panel(3.4, 1.75)
         for number, (trace, start) in enumerate(zip(traces, starts, strict=True), 1):
             t = trace.t - trace.t[0] + start
@@ -124,7 +126,7 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
             for side in ([t.before for t in traces], [t.after for t in traces])
         )
         change = f"rms {rounded(factor * before, 2)} → {rounded(factor * after, 2)}"
-        panel.set_ylim(-1.08 * factor * largest or -1.0, 1.08 * factor * largest or 1.0)
+        panel.set_ylim(-factor * limit, factor * limit)
         panel.set_xlim(starts[0], starts[-1] + traces[-1].t[-1] - traces[-1].t[0])
         _title(panel, f"{SYMBOLS[channel]} ({unit})", change)
         panel.set_xlabel("time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)")
@@ -134,6 +136,7 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
                 f"time-{channel}",
                 f"Residual {SYMBOLS[channel]} in {unit} over time, before and "
                 f"after: {change}. Held-out blocks are shaded.",
+                title=f"{SYMBOLS[channel]} ({unit})",
             )
         )
     return pictures
@@ -146,17 +149,16 @@ def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
     """
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-    traces = [trace for trace in diagnosis.traces if len(trace.t) >= 16]
-    if not traces:
-        return []
-    longest = max(len(trace.t) * trace.period for trace in traces)
-    grid = np.linspace(1.0 / min(longest, 8.0), max(diagnosis.cutoff_hz, 1.0), 160)
     pictures = []
-    for what, group, unit in (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm")):
-        sides = [_spectrum(traces, side, group, grid) for side in ("before", "after")]
-        factor, unit = scale_of([float(np.max(sides[0]))], unit)
+    for spectrum in amplitude_spectra(diagnosis):
+        grid, factor, unit, what = (
+            spectrum.frequency,
+            spectrum.factor,
+            spectrum.unit,
+            spectrum.what,
+        )
         figure, panel = _panel(3.4, 2.0)
-        for amplitude, colour in zip(sides, ("before", "after"), strict=True):
+        for amplitude, colour in ((spectrum.before, "before"), (spectrum.after, "after")):
             panel.plot(grid, factor * np.maximum(amplitude, 1e-12), color=_COLOURS[colour], lw=1.3)
         panel.set_yscale("log")
         panel.yaxis.set_major_formatter("{x:g}")
@@ -168,13 +170,15 @@ def draw_over_frequency(diagnosis: Diagnosis) -> list[Picture]:
         panel.set_xlim(0.0, grid[-1])
         _title(panel, f"{what} ({unit}/√Hz)")
         panel.set_xlabel("frequency (Hz)")
-        peak = grid[int(np.argmax(sides[0]))]
+        peak = grid[int(np.argmax(spectrum.before))]
         pictures.append(
             _picture(
                 figure,
                 f"frequency-{what}",
                 f"Amplitude spectrum of the residual {what} in {unit} per root "
                 f"hertz, before and after; before, it is largest at {rounded(peak, 2)} Hz.",
+                title=f"{what} ({unit}/√Hz)",
+                axis="frequency (Hz)",
             )
         )
     return pictures
@@ -191,22 +195,14 @@ def draw_signatures(diagnosis: Diagnosis) -> list[Picture]:
 
 
 def _draw_signature(signature: Signature, number: int) -> Picture:
-    channel = CHANNELS.index(signature.channel)
-    good = (
-        np.isfinite(signature.x) & np.isfinite(signature.residual) & np.isfinite(signature.fitted)
-    )
-    x, residual, fitted = signature.x[good], signature.residual[good], signature.fitted[good]
-    factor, unit = scale_of(np.abs(np.concatenate([residual, fitted])), _UNITS[channel])
-    keep = (
-        np.unique(np.linspace(0, len(x) - 1, min(len(x), _POINTS)).astype(int))
-        if len(x)
-        else np.zeros(0, dtype=int)
-    )
+    points = signature_points(signature)
+    x, keep, factor, unit = points.x, points.kept, points.factor, points.unit
+    residual, fitted = points.residual, points.fitted
     label = textwrap.wrap(signature.regressor, _LABEL) or [""]
     figure, panel = _panel(3.4, 2.4, lines=len(label))
     _dots(panel, x[keep], factor * residual[keep], "before", 2.5, 0.6)
     _dots(panel, x[keep], factor * fitted[keep], "after", 1.3, 1.0)
-    middle, mean = _binned(x, factor * residual)
+    middle, mean = binned(x, factor * residual)
     panel.plot(middle, mean, color=_COLOURS["ink"], lw=1.4)
     _title(panel, f"{SYMBOLS[signature.channel]} ({unit})")
     panel.set_xlabel("\n".join(label))
@@ -223,6 +219,8 @@ def _draw_signature(signature: Signature, number: int) -> Picture:
         f"Residual {symbol} in {unit} without {signature.effect} against "
         f" {signature.regressor}, its mean, and the fitted values of {signature.effect}{alike}.",
         signature.effect,
+        title=f"{symbol} ({unit})",
+        axis=signature.regressor,
     )
 
 
@@ -322,21 +320,9 @@ def _title(panel: "Axes", left: str, right: str = "") -> None:
     panel.set_title(right, loc="right", fontsize=8.0, pad=4.0, color=_COLOURS["muted"])
 
 
-def _starts(traces: Sequence[Trace]) -> list[float]:
-    """Return where each piece begins on a common axis: its own time if there is one, side by side
-    if there are several.
-    """
-    if len(traces) == 1:
-        return [float(traces[0].t[0])]
-    lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
-    gap = 0.01 * sum(lengths)
-    return [sum(lengths[:i]) + gap * i for i in range(len(traces))]
-
-
 def _shade(panel: "Axes", t: Array, trace: Trace) -> None:
     """Shade the runs of samples that were held out."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], trace.held_out, [False]]).astype(int)))
-    runs = [(t[a], t[min(b, len(t) - 1)] - t[a]) for a, b in edges.reshape(-1, 2)]
+    runs = [(a, b - a) for a, b in held_out_runs(trace, t)]
     if runs:
         panel.broken_barh(
             runs,
@@ -360,14 +346,6 @@ def _thin(t: Array, x: Array) -> tuple[Array, Array]:
     return t[keep], x[keep]
 
 
-def _binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
-    """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
-    if len(x) < 4 * count:
-        return np.empty(0), np.empty(0)
-    parts = np.array_split(np.argsort(x, kind="stable"), count)
-    return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
-
-
 def _dots(panel: "Axes", x: Array, y: Array, colour: str, size: float, alpha: float) -> None:
     """Draw points as one path of zero length strokes: a fifth of the text that a marker each would
     take.
@@ -387,22 +365,9 @@ def _rms(parts: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.square(np.concatenate(parts)))))
 
 
-def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> Array:
-    """Return the amplitude (f,) per root hertz of all pieces together, the longer counting for
-    more.
-    """
-    total, weight = np.zeros(len(grid)), 0.0
-    for trace in traces:
-        x = getattr(trace, side)[:, group]
-        f, power = welch(
-            x, 1.0 / trace.period, nperseg=min(len(x), round(8.0 / trace.period)), axis=0
-        )
-        total += len(x) * trace.period * np.interp(grid, f, power.sum(axis=1))
-        weight += len(x) * trace.period
-    return np.asarray(np.sqrt(total / weight), dtype=np.float64)
-
-
-def _picture(figure: "Figure", key: str, alt: str, caption: str = "") -> Picture:
+def _picture(
+    figure: "Figure", key: str, alt: str, caption: str = "", title: str = "", axis: str = ""
+) -> Picture:
     """Return a figure as an SVG element for the page, small and with names of its own (``key``)."""
     buffer = io.BytesIO()
     figure.savefig(
@@ -441,4 +406,4 @@ def _picture(figure: "Figure", key: str, alt: str, caption: str = "") -> Picture
         root.attrib.pop(name, None)
     root.set("role", "img")
     root.set("aria-label", alt)
-    return Picture(ElementTree.tostring(root, encoding="unicode"), alt, caption)
+    return Picture(ElementTree.tostring(root, encoding="unicode"), alt, caption, key, title, axis)

@@ -64,6 +64,9 @@ def test_one_effect_is_named_with_its_coefficients(name, trajectory, coefficient
     assert found.before.force_rms > 1.5 * found.after.force_rms
     assert found.after.rollout_1s_position_rms < ratio * found.before.rollout_1s_position_rms
     assert [e.name for e in found.amended.effects] == [name]
+    for trace in found.traces:  # the only effect's part is the difference, but for time offsets
+        change = trace.before - trace.after
+        assert np.std(trace.parts[name] - change) < 0.05 * np.std(change)
 
 
 @pytest.mark.parametrize(

@@ -21,36 +21,49 @@ needs_browser = pytest.mark.skipif(
 # A window cannot be as narrow as a telephone, a frame in it can. Whatever goes wrong before it is
 # looked at is kept.
 _FRAME = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
-<iframe id="page" style="border:0;width:{width}px;height:1000px" srcdoc="{page}"></iframe><pre id="found"></pre>
+<iframe id="page" {sandbox} style="border:0;width:{width}px;height:1000px" srcdoc="{page}"></iframe><pre id="found"></pre>
 <script>{script}</script>"""
 _LOOK = """
-addEventListener("load", () => {
+addEventListener("load", async () => {
   const page = document.getElementById("page").contentDocument, root = page.documentElement;
   const box = element => element.getBoundingClientRect();
   const name = element => element.tagName + " " + element.textContent.trim().slice(0, 40);
-  const svgs = [...page.querySelectorAll("svg")];
+  const svgs = [...page.querySelectorAll("svg")], canvases = [...page.querySelectorAll("canvas")];
+  const label = element => element.closest("[aria-label]")?.getAttribute("aria-label");
   document.getElementById("found").textContent = JSON.stringify({
     width: root.clientWidth, scroll_width: root.scrollWidth, height: root.scrollHeight,
     wide: [...page.body.querySelectorAll("*")].filter(e => box(e).right > root.clientWidth + 1).map(name),
     missing: [...page.images].filter(i => !i.naturalWidth).map(i => i.src),
-    pictures: svgs.map(s => ({alt: s.getAttribute("aria-label"), width: box(s).width, height: box(s).height})),
+    pictures: [...svgs, ...canvases].map(s => ({alt: label(s), width: box(s).width, height: box(s).height})),
+    canvases: canvases.length,
     cut: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).width > 0 && (box(t).left < box(s).left - 1 ||
       box(t).right > box(s).right + 1 || box(t).top < box(s).top - 1 || box(t).bottom > box(s).bottom + 1)).map(name)),
     small: svgs.flatMap(s => [...s.querySelectorAll("text")].filter(t => box(t).height < 8).map(name)),
     background: getComputedStyle(page.body).backgroundColor, ink: getComputedStyle(page.body).color,
     text: page.body.innerText,
+    done: await (async (page, view) => { ACT })(page, document.getElementById("page").contentWindow),
   });
 });
 """
 
 
-def look(page, width, folder, dark=False):
+def look(page, width, folder, dark=False, act="", scripts=True):
     """Show a page (HTML text) ``width`` pixels wide; return what was found in it, with the
     browser's ``complaints``.
+
+    ``act`` is the body of an asynchronous JavaScript function of the page's document (``page``) and
+    window (``view``), called last; what it returns is ``done``. Without ``scripts`` the page's own
+    do not run.
     """
     path = Path(folder) / "frame.html"
     path.write_text(
-        _FRAME.format(width=width, page=html.escape(page), script=_LOOK), encoding="utf-8"
+        _FRAME.format(
+            width=width,
+            page=html.escape(page),
+            script=_LOOK.replace("ACT", act),
+            sandbox="" if scripts else 'sandbox="allow-same-origin"',
+        ),
+        encoding="utf-8",
     )
     for attempt in range(3):  # on a busy machine a browser may die before it has shown anything
         shown = subprocess.run(
@@ -66,6 +79,7 @@ def look(page, width, folder, dark=False):
                 "--enable-logging=stderr",
                 f"--blink-settings=preferredColorScheme={0 if dark else 1}",
                 f"--window-size={max(width, 500)},1000",
+                "--virtual-time-budget=5000",
                 "--dump-dom",
                 path.resolve().as_uri(),
             ],
@@ -78,5 +92,9 @@ def look(page, width, folder, dark=False):
             break
     assert dumped, f"{BROWSER} ended with {shown.returncode}: {shown.stderr[-2000:]}"
     found = json.loads(html.unescape(dumped[1]))
-    found["complaints"] = [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
+    found["complaints"] = [
+        line
+        for line in shown.stderr.splitlines()
+        if "CONSOLE" in line and (scripts or "Blocked script execution" not in line)
+    ]
     return found

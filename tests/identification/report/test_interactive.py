@@ -1,0 +1,238 @@
+"""The plots that a report's script draws: their numbers, their library, and what they do in a
+browser.
+"""
+
+import base64
+import hashlib
+import html
+import json
+import re
+from dataclasses import replace
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from tests.support.browser import look, needs_browser
+from tests.support.diagnoses import made_diagnosis, made_trace
+from windwrench.identification.findings import CHANNELS
+from windwrench.identification.report.files import write_report
+from windwrench.identification.report.first_screen import next_step, sureness_sentences
+from windwrench.identification.report.interactive import plot_data, telling_samples
+from windwrench.identification.report.page import report_page
+from windwrench.identification.report.tables import tables_over_time
+from windwrench.identification.report.words import rounded
+
+UPLOT = {
+    "uPlot.iife.min.js": "19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f",
+    "uPlot.min.css": "df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04",
+    "LICENSE": "8f989229699b4fe2f1a0432d0e9edc338a8a911e250e2d1b01ecd770a5f5b1bd",
+}
+
+
+def unpacked(series):
+    integers = np.frombuffer(base64.b64decode(series["data"]), "<i2")
+    return series["scale"] * integers
+
+
+def times(channel, pieces):
+    steps = np.frombuffer(base64.b64decode(channel["steps"]), "<u2")
+    each = np.split(steps, np.cumsum(channel["counts"])[:-1])
+    return np.concatenate(
+        [p["x"] + channel["tick"] * np.cumsum(s) for p, s in zip(pieces, each, strict=True)]
+    )
+
+
+def test_a_flight_of_a_minute_is_carried_whole():
+    trace = made_trace(effects=("rotor_drag", "wind"))
+    time = plot_data(made_diagnosis(trace))["time"]
+    assert time["effects"] == ["rotor_drag", "wind"]
+    for i, channel in enumerate(time["channels"]):
+        factor = {"N": 1.0, "Nm": 1.0, "mN": 1e3, "mNm": 1e3}[channel["unit"]]
+        assert np.abs(times(channel, time["pieces"]) - trace.t).max() < 1e-4
+        for name, x in (("before", trace.before), ("after", trace.after)):
+            x = factor * x[:, i]
+            assert np.abs(unpacked(channel[name]) - x).max() <= 1e-4 * np.abs(x).max()
+        for name, part in zip(time["effects"], channel["parts"], strict=True):
+            x = factor * trace.parts[name][:, i]
+            assert (part is None) == (not x.any())
+            assert part is None or np.abs(unpacked(part) - x).max() <= 1e-4 * np.abs(x).max()
+
+
+def test_a_spike_of_any_channel_stays():
+    trace = made_trace(seconds=900.0, rate=200.0)
+    before, after = trace.before.copy(), trace.after.copy()
+    before[12_345, 0], before[100_001, 4], after[170_000, 2] = 7.0, -8.0, 9.0
+    trace = replace(trace, before=before, after=after)
+    channels = plot_data(made_diagnosis(trace))["time"]["channels"]
+    assert unpacked(channels[0]["before"]).max() == pytest.approx(7.0, rel=1e-4)
+    assert unpacked(channels[4]["before"]).min() * {"Nm": 1, "mNm": 1e-3}[
+        channels[4]["unit"]
+    ] == pytest.approx(-8.0, rel=1e-4)
+    assert unpacked(channels[2]["after"]).max() == pytest.approx(9.0, rel=1e-4)
+    kept = telling_samples(trace, 0, 150)
+    assert 12_345 in kept
+    assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
+    assert len(kept) <= 4 * 150 + 2
+
+
+def test_the_rms_of_any_choice_of_effects_is_exact():
+    trace = made_trace(effects=("rotor_drag", "wind", "mass"))
+    channel = plot_data(made_diagnosis(trace))["time"]["channels"][1]
+    for chosen in ((), ("wind",), ("rotor_drag", "mass"), ("rotor_drag", "wind", "mass")):
+        weight = np.array([1.0, *(name in chosen for name in trace.parts)])
+        rms = np.sqrt(weight @ np.array(channel["products"]) @ weight)
+        x = trace.after[:, 1] + sum((trace.parts[name][:, 1] for name in chosen), 0.0)
+        assert rms == pytest.approx(np.sqrt(np.mean(x**2)), rel=1e-3)
+
+
+@pytest.mark.parametrize("effects", [("rotor_drag",), tuple("abcdef")])
+def test_a_page_of_a_minute_is_below_600_kb(effects, tmp_path):
+    """Of noise, which nothing makes smaller, at four times the rate of a residual."""
+    made = made_diagnosis(made_trace(effects=effects, rate=100.0))
+    assert write_report(made, tmp_path)[1].stat().st_size < 600_000
+
+
+def test_pieces_of_several_logs_stand_side_by_side():
+    traces = [made_trace(20.0, seed=i, log=f"log {i}") for i in range(3)]
+    time = plot_data(made_diagnosis(*traces))["time"]
+    assert [p["log"] for p in time["pieces"]] == ["log 0", "log 1", "log 2"]
+    x = times(time["channels"][0], time["pieces"])
+    assert np.all(np.diff(x) > 0)
+    assert x[-1] == pytest.approx(time["end"], abs=1e-3)
+    assert len(time["held"]) == 2 * 3
+    (table, *_) = tables_over_time(made_diagnosis(*traces))
+    assert table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
+
+
+def test_the_table_behind_a_plot_has_its_numbers():
+    trace = made_trace()
+    table = tables_over_time(made_diagnosis(trace))[0]
+    assert len(table.rows) == 16
+    rows = np.array_split(np.arange(len(trace.t)), 16)[5]
+    rms = [rounded(np.sqrt(np.mean(x[rows, 0] ** 2)), 2) for x in (trace.before, trace.after)]
+    assert list(table.rows[5][-2:]) == rms
+    held = [trace.held_out[rows].mean() for rows in np.array_split(np.arange(len(trace.t)), 16)]
+    words = ["no" if share == 0 else "yes" if share == 1 else "in part" for share in held]
+    assert [row[1] for row in table.rows] == words
+
+
+def test_only_the_pages_own_scripts_may_run():
+    rude = "</script><script>alert(1)</script>\u2028"
+    made = made_diagnosis(replace(made_trace(), log=rude))
+    page = report_page(made, "command")
+    scripts = re.findall(r"<script[^>]*>(.*?)</script>", page, re.S)
+    assert len(scripts) == 3
+    assert json.loads(scripts[0])["time"]["pieces"][0]["log"] == rude
+    (policy,) = map(html.unescape, re.findall(r'Policy" content="([^"]*)"', page))
+    hashes = {
+        f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'"
+        for s in scripts[1:]
+    }
+    assert set(re.findall(r"script-src ([^;]*)", policy)[0].split()) == hashes
+    assert "default-src 'none'" in policy
+    assert "http" not in policy
+
+
+def test_the_library_is_as_it_was_published():
+    folder = resources.files("windwrench.identification.report").joinpath("uplot")
+    found = {name: hashlib.sha256(folder.joinpath(name).read_bytes()).hexdigest() for name in UPLOT}
+    assert found == UPLOT
+    page = report_page(made_diagnosis(), "command")
+    assert "Copyright (c) 2022 Leon Sorokin" in page
+    assert "uPlot (v1.6.32)" in page
+
+
+def test_the_first_screen_says_how_sure_and_what_next():
+    made = made_diagnosis()
+    (effect,) = made.effects
+    assert sureness_sentences(made)[0] == (
+        "rotor_drag: no other effect of the library explains the flight as well "
+        "(kdx ± 1.2\N{NO-BREAK SPACE}%, standard deviations)."
+    )
+    assert "1 block, 3\N{NO-BREAK SPACE}s, that no fit used" in sureness_sentences(made)[-1]
+    assert next_step(made).startswith("Use vehicle.yaml")
+    doubtful = replace(made, effects=(replace(effect, indistinguishable_from=("body_drag",)),))
+    assert next_step(doubtful).startswith("To tell rotor_drag from body_drag, fly: ")
+    assert "cannot distinguish rotor_drag" in sureness_sentences(doubtful)[0]
+    advised = replace(made, verdict="partly explained", advice=("Fly higher. " * 40,))
+    assert next_step(advised).endswith("Fly higher.")
+    assert len(next_step(advised)) < 200
+    bare = replace(made, verdict="nothing to explain", effects=())
+    assert next_step(bare).startswith("Keep the model as it is")
+
+
+ACT = """
+  const rest = () => new Promise(done => view.setTimeout(done, 50));
+  const key = async (id, ...keys) => {
+    page.getElementById("plot-" + id).focus();
+    for (const k of keys)
+      page.activeElement.dispatchEvent(new view.KeyboardEvent("keydown", {key: k, bubbles: true}));
+    await rest();
+  };
+  const said = id => page.getElementById("readout-" + id).textContent;
+  const all = () => [...page.querySelectorAll("#time .readout")].map(e => e.textContent);
+  const out = {idle: all()};
+  await key("time-Fx", "ArrowRight");
+  out.linked = all();
+  out.heard = page.getElementById("heard").textContent;
+  await key("time-Fx", "+", "+", "Home");
+  out.zoomed = all();
+  await key("time-Fx", "Escape", "Home");
+  out.whole = said("time-tau_x");
+  page.getElementById("plot-time-Fx").blur();
+  page.querySelectorAll("#controls input[name=effect]")[0].click();
+  await rest();
+  out.without = said("time-Fx");
+  await key("signature-0", "ArrowRight");
+  out.signature = said("signature-0");
+  await key("frequency-force", "Home");
+  out.frequency = said("frequency-force");
+  const stops = [...page.querySelectorAll("a[href], button, input, summary, [tabindex='0']")];
+  const name = e => e.ariaLabel || e.textContent.trim() || e.labels?.[0]?.textContent;
+  out.unnamed = stops.filter(e => !name(e)).map(e => e.outerHTML.slice(0, 80));
+  out.plots = stops.filter(e => e.matches(".plot")).length;
+  out.tables = page.querySelectorAll("figure details table caption").length;
+  out.first = page.getElementById("verdict").getBoundingClientRect().bottom;
+  return out;
+"""
+
+
+@needs_browser
+def test_keys_zoom_and_switches_in_a_browser(tmp_path):
+    trace = made_trace(effects=("rotor_drag", "wind"))
+    made = made_diagnosis(trace)
+    found = look(report_page(made, "command"), 390, tmp_path, dark=True, act=ACT)
+    assert found["complaints"] == []
+    assert found["wide"] == []
+    assert sum(map(int, re.findall(r"\d+", found["background"])[:3])) < 200
+    done = found["done"]
+    rms = [np.sqrt(np.mean(x[:, 0] ** 2)) for x in (trace.before, trace.after)]
+    old, new = (rounded(x, 2) for x in rms)
+    assert done["idle"][0] == f"rms {old} → {new} N"
+    # one cursor: a key on one plot, the values of all six at the same time
+    seconds = {re.search(r"t = ([\d.]+) s", text)[1] for text in done["linked"]}
+    assert len(seconds) == 1
+    i = int(np.argmin(np.abs(trace.t - float(seconds.pop()))))
+    for k, text in enumerate(done["linked"]):
+        told = re.findall(r"(?:before|after) (−?[\d.]+)", text)
+        values = [float(value.replace("−", "-")) for value in told]
+        scale = 1e3 if text.split()[-1].startswith("mN") else 1.0
+        truth = [scale * trace.before[i, k], scale * trace.after[i, k]]
+        assert values == pytest.approx(truth, rel=6e-3, abs=scale * 1e-5), CHANNELS[k]
+    assert done["heard"].startswith("Fx: t = ")
+    # zoomed twice about the cursor, all plots begin later; Escape shows the whole flight again
+    begins = {float(re.search(r"t = ([\d.]+) s", text)[1]) for text in done["zoomed"]}
+    assert len(begins) == 1
+    assert begins.pop() > trace.t[0] + 10.0
+    assert f"t = {trace.t[0]:.2f} s" in done["whole"]
+    # without rotor_drag, "after" grows by its share
+    left = np.sqrt(np.mean((trace.after + trace.parts["rotor_drag"])[:, 0] ** 2))
+    assert done["without"].split(" → ")[1] == f"{rounded(left, 2)} N"
+    assert re.search(r"residual|effect|mean", done["signature"])
+    assert " Hz: before " in done["frequency"]
+    # every stop of the keyboard has a name, and every plot a table
+    assert done["unnamed"] == []
+    assert done["plots"] == 6 + 2 + 2
+    assert done["tables"] == 6 + 2 + 2 + 1
+    assert done["first"] < 900  # pixels: the answers fit a telephone's first screen
