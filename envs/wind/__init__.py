@@ -6,7 +6,7 @@ second; they add up with ``+``. Any other wind flies as a grid that it was sampl
 """
 
 from .adapters import PyFlytWind, RotorPyWind, pyflyt_wind_type
-from .field import CompiledWind, Sum, Wind
+from .field import CompiledWind, Sum, Wind, winds_of
 from .grid import GridWind, on_grid, read_wind, write_wind
 from .jets import FanWall, VehicleWash, switching
 from .steady import Gust, Shear, Uniform
@@ -31,5 +31,6 @@ __all__ = [
     "read_wind",
     "spectrum",
     "switching",
+    "winds_of",
     "write_wind",
 ]

@@ -129,7 +129,8 @@ class _Jets(CompiledWind):
         w["wave_count"] = len(table)
         # gusts travel with the shear layer's eddies, at half the speed of the jet
         w["advection"] = 0.5 * float(speeds.max()) * w["rotation"][0]
-        self.places, self.speeds = places, speeds
+        self.places, self.speeds, self.radius = places, speeds, radius
+        self.axes: Array = w["rotation"]  # rows: along the jet, and two across
         super().__init__(_jets, record, tuple(arrays.values()))
 
 

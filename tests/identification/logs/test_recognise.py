@@ -85,7 +85,10 @@ def test_the_folder_of_a_bag_is_known_by_what_is_in_it(tmp_path, entry):
         (b"", r"begins with nothing \(it is empty\)"),
         (b"PK\x03\x04" + bytes(30), "begins with 50 4b 03 04 00 00 00 00"),
         (b"<html><body>not found</body>", "begins with '<html><body>not '"),
-        (gzip.compress(b"ULog\x01\x12\x35", mtime=0), "packed .gzip.; expected a table, .csv.gz by name"),
+        (
+            gzip.compress(b"ULog\x01\x12\x35", mtime=0),
+            "packed .gzip.; expected a table, .csv.gz by name",
+        ),
     ],
 )
 def test_what_no_reader_knows_says_what_was_found_and_looked_for(tmp_path, content, expected):
