@@ -7,6 +7,8 @@ import typer
 from rich import box
 from rich.table import Table
 
+from ..runtime.errors import InputError
+from ..runtime.whole_files import replaced
 from .running import expensive
 from .terminal import (
     Out,
@@ -18,7 +20,10 @@ from .terminal import (
     results_folder,
     say,
     scenario_names,
+    task_names,
 )
+
+_CONTROLLERS, _SCENARIOS = "hover,admittance,ratio,oracle", "static,base"
 
 
 @expensive
@@ -30,13 +35,13 @@ def benchmark(
             "FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
-    ] = "hover,admittance,ratio,oracle",
+    ] = _CONTROLLERS,
     scenarios: Annotated[
         str,
         typer.Option(
             help="Scenario names, comma-separated.", autocompletion=offering(scenario_names)
         ),
-    ] = "static,base",
+    ] = _SCENARIOS,
     episodes: Annotated[
         int, typer.Option(min=1, help="Number of paired episodes per scenario.")
     ] = 40,
@@ -47,6 +52,14 @@ def benchmark(
     cluster: Annotated[
         str | None, typer.Option(help="Address of a Ray cluster to fly on, or local.")
     ] = None,
+    task: Annotated[
+        str,
+        typer.Option(
+            help="Task: FanTracking, FanTracking2D, WindHover or WindTrajectory; each has "
+            "controllers and scenarios of its own, all of them where none is named.",
+            autocompletion=offering(task_names),
+        ),
+    ] = "FanTracking",
     out: Out = Path("results/benchmark"),
 ) -> dict[str, Any]:
     """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
@@ -54,6 +67,17 @@ def benchmark(
     Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast
     --episodes 40
     """
+    if task != "FanTracking":
+        return _task_benchmark(
+            task,
+            None if controllers == _CONTROLLERS else controllers,
+            None if scenarios == _SCENARIOS else scenarios,
+            episodes,
+            seed,
+            jobs,
+            cluster,
+            out,
+        )
     from ..evaluation.benchmark import (
         check_request,
         count_flights,
@@ -116,6 +140,85 @@ def benchmark(
         highlight=False,
     )
     say(path, folder / "leaderboard.png")
+    return {"leaderboard": rows}
+
+
+def _task_benchmark(
+    task: str,
+    controllers: str | None,
+    scenarios: str | None,
+    episodes: int,
+    seed: int,
+    jobs: int | None,
+    cluster: str | None,
+    out: Path,
+) -> dict[str, Any]:
+    """Fly the laws of another task; what is not named is all that the task has."""
+    from ..controllers.task_laws import TASK_LAWS
+    from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..evaluation.task_benchmark import (
+        check_task_request,
+        draw_task_leaderboard,
+        fly_task,
+        markdown,
+        task_leaderboard,
+        task_of,
+        wanted_laws,
+        write_task_leaderboard,
+    )
+
+    known = task_of(task)
+    if cluster is not None:
+        raise InputError(f"benchmark: --cluster flies FanTracking alone; leave it out for {task}")
+    names = list(TASK_LAWS[task]) if controllers is None else names_in(controllers, "--controllers")
+    worlds = list(known.defaults) if scenarios is None else names_in(scenarios, "--scenarios")
+    check_task_request(task, names, worlds, episodes, seed)
+    flights = len(wanted_laws(task, names)) * len(worlds) * episodes
+    folder = results_folder(
+        out, task=task, controllers=names, scenarios=worlds, flights=flights, jobs=jobs
+    )
+    with progress_bar() as progress:
+        bar = progress.add_task("flying episodes", total=flights)
+        results = fly_task(
+            task, names, worlds, episodes, seed, jobs, lambda count: progress.advance(bar, count)
+        )
+    rows = task_leaderboard(task, results, names, seed)
+    path = write_task_leaderboard(rows, folder)
+    period = EPISODE_SECONDS / known.decisions
+    draw_task_leaderboard(rows, results, folder / "leaderboard.png", period)
+    with replaced(folder / "leaderboard.md") as partial:
+        partial.write_text(markdown(rows), encoding="utf-8")
+    table = Table(
+        "scenario",
+        "controller",
+        "RMSE (m), 95 %",
+        "median",
+        "lost",
+        "score",
+        f"against {known.rival}, 95 %",
+        "wins",
+        box=box.SIMPLE_HEAD,
+    )
+    for i, row in enumerate(rows):
+        low, high = row.rmse_ci95_m
+        table.add_row(
+            row.scenario,
+            row.controller,
+            f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
+            f"{row.median_rmse_m:.3f}",
+            f"{row.lost_fraction:.1%}",
+            f"{row.score:.2f}",
+            f"{row.change_over_rival:+.0%} ({row.change_ci95[0]:+.0%}, {row.change_ci95[1]:+.0%})",
+            f"{row.wins_over_rival:.0%}",
+            end_section=i + 1 == len(rows) or rows[i + 1].scenario != row.scenario,
+        )
+    console.print(table)
+    console.print(
+        f"{task}: {episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = "
+        f"oracle",
+        highlight=False,
+    )
+    say(path, folder / "leaderboard.md", folder / "leaderboard.png")
     return {"leaderboard": rows}
 
 

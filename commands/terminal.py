@@ -114,6 +114,13 @@ def controller_names() -> Iterable[str]:
     return CONTROLLERS
 
 
+def task_names() -> Iterable[str]:
+    """Return the tasks that have a leaderboard."""
+    from ..controllers.task_laws import TASK_LAWS
+
+    return ["FanTracking", *TASK_LAWS]
+
+
 def reader_names() -> Iterable[str]:
     """Return the readers of other log formats."""
     from ..identification.logs.readers import READERS

@@ -3,8 +3,20 @@
 import os
 import sys
 import warnings
+from collections.abc import Mapping
+from typing import Any
 
 from ..runtime.errors import InputError
+
+_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def modes_shown(metadata: Mapping[str, Any]) -> list[str]:
+    """Return those of the render modes of an environment's ``metadata`` that this machine can show:
+    no ``human`` where nothing names a display.
+    """
+    windows = not sys.platform.startswith("linux") or any(os.environ.get(v) for v in _VARIABLES)
+    return [mode for mode in metadata["render_modes"] if mode != "human" or windows]
 
 
 def need_display() -> None:
@@ -13,8 +25,7 @@ def need_display() -> None:
     Raises:
         InputError: there is no display, or the library for windows does not find it.
     """
-    variables = ("DISPLAY", "WAYLAND_DISPLAY")
-    named = [f"{name}={os.environ[name]}" for name in variables if os.environ.get(name)]
+    named = [f"{name}={os.environ[name]}" for name in _VARIABLES if os.environ.get(name)]
     if not sys.platform.startswith("linux"):
         return  # elsewhere there is a display, and windows belong to the main thread
     if not named:

@@ -97,6 +97,15 @@ class Viewer:
         window.
         """
         self.open_world(loop.model, loop.data)
+        self.begin_frame(loop)
+        fan = loop.record[0]["fan"]
+        loop.data.mocap_pos[0] = (0.0, fan_y, float(fan["height"]) or 1.2)
+        mujoco.mj_kinematics(loop.model, loop.data)
+        self._drift(loop, fan_y)
+        return self.show(loop.data, lambda scene: self._mark(scene, loop, fan_y), "chase")
+
+    def begin_frame(self, loop: ClosedLoop) -> None:
+        """Wait for the loop's time where a window shows it, and remember where the vehicle is."""
         if loop.time < self._last:  # another episode
             self._path.clear()
             self._begun = time.perf_counter() - loop.time
@@ -104,11 +113,6 @@ class Viewer:
         if self.mode == "human":  # not faster than life
             time.sleep(max(self._begun + loop.time - time.perf_counter(), 0.0))
         self._path.append(loop.position.copy())
-        fan = loop.record[0]["fan"]
-        loop.data.mocap_pos[0] = (0.0, fan_y, float(fan["height"]) or 1.2)
-        mujoco.mj_kinematics(loop.model, loop.data)
-        self._drift(loop, fan_y)
-        return self.show(loop.data, lambda scene: self._mark(scene, loop, fan_y), "chase")
 
     def show(self, data: Any, mark: Callable[[Any], None], camera: Any) -> NDArray[np.uint8] | None:
         """Draw a world with the marks that ``mark`` adds; return the picture unless it went to a

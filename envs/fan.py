@@ -43,6 +43,9 @@ class Fan:
     gust_time: float = 0.10  # s, over which they last
     rotor_drag: float = 0.020  # N/(m/s), each rotor, in its plane
     hull_area: float = 0.060  # m2, drag area of the whole hull
+    # rad, by which the hull's stations lie in turn above and below the rotors' plane, as seen from
+    # the centre: 0 is a ring, which no jet beside it in height can pitch, 0.6 a spherical cage
+    hull_elevation: float = 0.0
 
 
 FAN = np.dtype(
@@ -57,6 +60,8 @@ FAN = np.dtype(
         ("stations", "f8", (STATIONS, 3)),  # m, body frame, from the geometric centre
         ("gusts", "f8", (STATIONS, 3)),  # unit variance
         ("y", "f8"),  # m, where the fan is
+        ("blown", "i8"),  # whether other winds blow: ``air`` (m/s) at the stations, world
+        ("air", "f8", (STATIONS, 3)),
     ]
 )
 
@@ -71,12 +76,12 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
         f[name] = getattr(fan, name)
     f["keep"] = math.exp(-period / fan.gust_time)
     angle = np.arange(8) * math.pi / 4
-    stations = np.concatenate(
-        [
-            rotor_positions,
-            HULL_RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1),
-        ]
-    )
+    ring = HULL_RADIUS * np.stack([np.cos(angle), np.sin(angle), np.zeros(8)], axis=1)
+    if fan.hull_elevation != 0.0:
+        above = fan.hull_elevation * (-1.0) ** np.arange(8)
+        ring[:, :2] *= np.cos(above)[:, None]
+        ring[:, 2] = HULL_RADIUS * np.sin(above)
+    stations = np.concatenate([rotor_positions, ring])
     f["stations"] = stations
     distance = np.linalg.norm(stations[:, None] - stations[None], axis=2)
     f["mixing"] = np.linalg.cholesky(np.exp(-distance / fan.gust_length) + 1e-9 * np.eye(STATIONS))
@@ -88,6 +93,9 @@ def jet_at(
     f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array
 ) -> None:
     """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
+    if f.speed == 0.0:
+        wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
+        return
     dy, dz = y - f.y, z - f.height
     r = math.sqrt(dy * dy + dz * dz)
     row, column = (x - FIRST_X) / STEP_X, r / STEP_R
@@ -156,9 +164,9 @@ def jet_wrench(
         z = R[2, 0] * s[0] + R[2, 1] * s[1] + R[2, 2] * s[2]
         jet_at(f, axial, radial, position[0] + x, position[1] + y, position[2] + z, wind)
         strength = f.turbulence * wind[0]
-        ux = wind[0] + strength * f.gusts[i, 0] - velocity[0] - (oy * z - oz * y)
-        uy = wind[1] + strength * f.gusts[i, 1] - velocity[1] - (oz * x - ox * z)
-        uz = wind[2] + strength * f.gusts[i, 2] - velocity[2] - (ox * y - oy * x)
+        ux = wind[0] + strength * f.gusts[i, 0] + f.air[i, 0] - velocity[0] - (oy * z - oz * y)
+        uy = wind[1] + strength * f.gusts[i, 1] + f.air[i, 1] - velocity[1] - (oz * x - ox * z)
+        uz = wind[2] + strength * f.gusts[i, 2] + f.air[i, 2] - velocity[2] - (ox * y - oy * x)
         if i < 4:
             along = R[0, 2] * ux + R[1, 2] * uy + R[2, 2] * uz
             fx = f.rotor_drag * (ux - along * R[0, 2])

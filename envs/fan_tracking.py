@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controllers.observation import MAX_COMMAND, OBSERVATION_SIZE
+from ..controllers.observation import MAX_COMMAND
 from ..dynamics.effects import check_setting
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
@@ -17,9 +17,10 @@ from ..estimator.tuning import UKFTuning
 from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, run_address
-from .decision import DECISION_TICKS, EPISODE, INFO, LIMITS, LOST_OFFSET, decide
-from .display import need_display
+from .decision import DECISION_TICKS, EPISODE, INFO, LOST_OFFSET, decide
+from .display import modes_shown, need_display
 from .fan import Fan
+from .observing import View
 from .plain_steps import normals_of
 from .plant import NOISE, TICK, PlantSettings
 from .scenarios import Scenario, draw_fan_path, get_scenario
@@ -64,6 +65,19 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     Where the fan is, is not observed: ``info`` has it.
 
+    ``observe`` takes another view of the same flight, for ablations:
+
+    | `observe`             | Size | What is seen                                                       |
+    | --------------------- | ---- | ------------------------------------------------------------------ |
+    | `"wrench"`            | 8    | the table above                                                    |
+    | `"wrench-without-fx"` | 7    | the table above without the force x                                |
+    | `"pose"`              | 8    | no wrench: position since the start x, y, z (m), velocity along y (m/s), the x and y of the body's z axis (its tilt), yaw less 180 degrees (rad), last command; all as the filter estimates them |
+    | `"history"`           | 200  | the table above at the last 25 decisions (2 s), oldest first; before the start: as at the start |
+
+    With ``normalize=True`` each number is divided by a fixed scale, so that it is about 1 in flight:
+    force 0.5 N, torque 0.03 Nm, velocity 0.5 m/s, command 1 m/s, position 1 m, tilt 0.1, yaw 0.2 rad.
+    The action needs no scale: it lies between -1 and 1 as it is.
+
     ## Rewards
 
     ``reward = reward_tracking + reward_change``, each of them in ``info``:
@@ -97,7 +111,12 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts             |
     | `fan_path`    | `None`       | function from times (n,) s to the fan's y (n,) m, in place of the scenario's |
     | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain, for faster training |
+    | `observe`     | `"wrench"`   | what is seen: `"wrench"`, `"wrench-without-fx"`, `"pose"` or `"history"`    |
+    | `normalize`   | `False`      | whether observations are divided by fixed scales (see above)              |
     | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                               |
+
+    ``metadata["render_modes"]`` of an environment names what this machine can show: without a display, no
+    `"human"`. ``reset`` knows no ``options`` and refuses any.
 
     ## Version history
 
@@ -119,6 +138,8 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         height: int = 480,
         truth: str | Vehicle | None = None,
         estimator: str = "ukf",
+        observe: str = "wrench",
+        normalize: bool = False,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -145,9 +166,10 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.estimator = estimator
         self.fan_path = fan_path
         self.render_mode, self.width, self.height = render_mode, width, height
+        self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
         self.action_space = gym.spaces.Box(-MAX_COMMAND, MAX_COMMAND, (1,), np.float32)
-        limits = np.array(LIMITS, dtype=np.float32)
-        self.observation_space = gym.spaces.Box(-limits, limits, (OBSERVATION_SIZE,), np.float32)
+        self.view = View(observe, normalize)
+        self.observation_space = self.view.space()
         self._viewer: Any = None
         self.loop: ClosedLoop | None = None
         self.fan_motion = ""
@@ -195,17 +217,18 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         rng = self.np_random
         scenario, distance = self.scenario, DISTANCE
         if scenario.varied:
-            distance = float(rng.uniform(2.0, 2.7))
+            drawn = scenario.variation.draw(rng)
+            distance = drawn["distance"]
             fan = replace(
                 self.fan,
-                speed=self.fan.speed * float(rng.uniform(0.85, 1.25)),
-                rotor_drag=self.fan.rotor_drag * float(rng.uniform(0.8, 1.2)),
-                hull_area=self.fan.hull_area * float(rng.uniform(0.8, 1.2)),
+                speed=self.fan.speed * drawn["fan_speed"],
+                rotor_drag=self.fan.rotor_drag * drawn["rotor_drag"],
+                hull_area=self.fan.hull_area * drawn["hull_area"],
             )
             vehicle = replace(
                 self.truth,
-                mass=self.truth.mass * float(rng.uniform(0.93, 1.07)),
-                inertia=self.truth.inertia * float(rng.uniform(0.9, 1.1)),
+                mass=self.truth.mass * drawn["mass"],
+                inertia=self.truth.inertia * drawn["inertia"],
             )
             self.loop = self._make_loop(vehicle, fan)
         elif self.loop is None:
@@ -229,7 +252,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._begin(distance)
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._info()
+        return self.observation(), self._info()
 
     def step(
         self, action: NDArray[np.float32]
@@ -245,7 +268,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.render()
         info = self._info()
         return (
-            self._observation(),
+            self.observation(),
             info["reward_tracking"] + info["reward_change"],
             info["lost"],
             False,
@@ -278,6 +301,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._draw_from(self.np_random)
         e["ticks"], e["distance"], e["height"], e["command"] = 0, distance, self.fan.height, 0.0
         e["power"] = 2.0
+        self.view.restart(loop.state)
         self._command[0] = 0.0
         self._decide(0)
         out = e["outcome"]
@@ -307,9 +331,14 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         tasks[0] = 0
         self._call(self.episode, self._command, _FLYING, ticks, tasks, 0)
 
-    def _observation(self) -> NDArray[np.float32]:
-        observation: NDArray[np.float32] = self.episode["outcome"]["observation"][0].copy()
-        return observation
+    def observation(self) -> NDArray[np.float32]:
+        """Return what the agent sees now, as ``step`` did."""
+        e = self.episode[0]
+        if self.view.is_plain:
+            observation: NDArray[np.float32] = e["outcome"]["observation"].copy()
+            return observation
+        assert self.loop is not None
+        return self.view.of(e["outcome"]["observation"], self.loop.state, int(e["ticks"]))
 
     def _info(self) -> dict[str, Any]:
         """Return the reward's terms and the truth that the agent does not see."""

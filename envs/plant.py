@@ -274,6 +274,7 @@ def actuate(
     apply_effects(p, qpos[0:3], R, qvel[0:3], qvel[3:6])
     if fan.speed > 0.0:
         gust(fan, noise[_GUSTS:_DROPOUT])
+    if fan.speed > 0.0 or fan.blown > 0:
         jet_wrench(
             fan, axial, radial, qpos[0:3], R, qvel[0:3], qvel[3:6], p.body.com, p.scratch, p.jet
         )

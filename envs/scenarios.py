@@ -1,7 +1,7 @@
 """The scenarios of the fan-tracking task, as data."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,29 @@ from numpy.typing import NDArray
 from ..runtime.errors import unknown_name
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Domain randomisation: each value is uniform between two bounds, drawn anew each episode.
+
+    All are drawn independently, in the order of the fields. A user's own distribution is a
+    ``Scenario(..., varied=True, variation=Variation(mass=(0.8, 1.2)))``.
+    """
+
+    distance: tuple[float, float] = (2.0, 2.7)  # m, from the fan
+    # factors on what fan, plant and vehicle state
+    fan_speed: tuple[float, float] = (0.85, 1.25)
+    rotor_drag: tuple[float, float] = (0.8, 1.2)
+    hull_area: tuple[float, float] = (0.8, 1.2)
+    mass: tuple[float, float] = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
+    inertia: tuple[float, float] = (0.9, 1.1)
+
+    def draw(self, rng: np.random.Generator) -> dict[str, float]:
+        """Return one value of each field, by its name."""
+        return {
+            field.name: float(rng.uniform(*getattr(self, field.name))) for field in fields(self)
+        }
 
 
 @dataclass(frozen=True)
@@ -26,7 +49,8 @@ class Scenario:
     sigma_position: float = 0.001  # m
     sigma_attitude: float = 0.005  # rad
     turbulence: float = 0.10
-    varied: bool = False  # fan strength, distance and vehicle drawn anew each episode
+    varied: bool = False  # fan strength, distance and vehicle drawn anew each episode,
+    variation: Variation = Variation()  # from this distribution
 
 
 SCENARIOS: dict[str, Scenario] = {

@@ -26,21 +26,31 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
     episode has ended starts its next one at the following step, whose action it ignores
-    (``AutoresetMode.NEXT_STEP``). Each entry of ``infos`` is an array with a row for each
-    environment; all environments have all of them.
+    (``AutoresetMode.NEXT_STEP``, the default), or within the step that ended it
+    (``AutoresetMode.SAME_STEP``): then ``infos["final_obs"]`` and ``infos["final_info"]`` hold what
+    ended it, as in Gymnasium's own vector environments. Each entry of ``infos`` is an array with a
+    row for each environment; all environments have all of them.
 
     Args:
         num_envs: how many.
         max_episode_steps: decisions after which an episode is truncated.
         threads: over which the environments are spread; the results do not depend on it.
+        autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
+            value as text.
         **kwargs: of ``FanTrackingEnv``.
 
     Raises:
-        InputError: ``num_envs`` or ``threads`` is not positive, or what ``FanTrackingEnv`` refuses.
+        InputError: ``num_envs`` or ``threads`` is not positive, another mode, or what
+            ``FanTrackingEnv`` refuses.
     """
 
     def __init__(
-        self, num_envs: int = 1, max_episode_steps: int = 250, threads: int = 1, **kwargs: Any
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int = 250,
+        threads: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        **kwargs: Any,
     ) -> None:
         for name, value in (
             ("num_envs", num_envs),
@@ -49,6 +59,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         ):
             if value < 1:
                 raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
+        self.autoreset_mode = _mode(autoreset_mode)
         self.envs = [FanTrackingEnv(**kwargs) for _ in range(num_envs)]
         self.num_envs, self.max_episode_steps, self.threads = (
             num_envs,
@@ -56,7 +67,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             min(threads, num_envs),
         )
         first = self.envs[0]
-        self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
         self.single_action_space, self.single_observation_space = (
             first.action_space,
@@ -130,15 +141,20 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._spread(lambda first, last: self._start(first, last, self._resting))
         self._decisions = np.where(self._over, 0, self._decisions + 1)
         out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
-        lost = out["lost"].copy()
-        self._over = lost | truncated
-        return (
-            self._frames(),
-            out["reward_tracking"] + out["reward_change"],
-            lost,
-            truncated,
-            self._infos(),
-        )
+        lost, rewards = out["lost"].copy(), out["reward_tracking"] + out["reward_change"]
+        over = lost | truncated
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP or not over.any():
+            self._over = over
+            return self._frames(), rewards, lost, truncated, self._infos()
+        ended, last = self._final_infos(over), self._frames()
+        final = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(over):
+            final[i] = last[i]
+        self._spread(lambda first, end: self._start(first, end, over))
+        self._decisions[over] = 0
+        masks = {"_final_obs": over.copy(), "_final_info": over.copy()}
+        infos = self._infos() | {"final_obs": final, "final_info": ended} | masks
+        return self._frames(), rewards, lost, truncated, infos
 
     def _fly(self) -> None:
         """Fly a decision of all environments that do not rest."""
@@ -204,8 +220,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             other.result()
 
     def _frames(self) -> Frames:
-        frames: Frames = self._outcomes["observation"].copy()
-        return frames
+        view = self.envs[0].view
+        if view.is_plain:
+            frames: Frames = self._outcomes["observation"].copy()
+            return frames
+        if view.is_of_a_frame:
+            return view.of_frames(self._outcomes["observation"])
+        return np.stack([env.observation() for env in self.envs])
 
     def _infos(self) -> Infos:
         """Return what the environments say as Gymnasium's vector environments do: an array and a
@@ -214,6 +235,16 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         infos: Infos = {name: self._outcomes[name].copy() for name in INFO}
         infos["fan_motion"] = self._motions.copy()
         return infos | {f"_{name}": self._all.copy() for name in infos}
+
+    def _final_infos(self, over: Flags) -> Infos:
+        """Return the infos of the episodes that ended: zeros, and a mask, where none did."""
+        infos: Infos = {}
+        for name, values in self._infos().items():
+            if not name.startswith("_"):
+                kept = values.copy()
+                kept[~over] = None if kept.dtype == object else 0
+                infos[name], infos[f"_{name}"] = kept, over.copy()
+        return infos
 
     def render(self) -> tuple[Any, ...]:
         """Return a picture (height, width, 3) of each environment."""
@@ -225,3 +256,14 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._pool.shutdown()
         for env in self.envs:
             env.close()
+
+
+def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    known = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+    for mode in known:
+        if given is mode or given in (mode.value, mode.name):
+            return mode
+    raise InputError(
+        f"FanTracking: autoreset_mode must be {' or '.join(m.name for m in known)} of "
+        f"gymnasium.vector.AutoresetMode, got {given!r}"
+    )

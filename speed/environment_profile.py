@@ -114,7 +114,7 @@ def profile(rounds: int = 5, estimator: str = "ukf") -> Section:
     def look_on() -> None:
         for _ in range(100):
             env._decide(0)
-            env._observation()
+            env.observation()
             env._info()
 
     def fly_on() -> None:

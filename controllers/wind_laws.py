@@ -1,0 +1,272 @@
+"""Control laws of the tasks in the wind: from an observation (27,) to an acceleration (3,) m/s2
+beside the flight loop's own.
+
+All of them are what their papers state for the position loop alone: attitude and rates stay with
+the flight loop. They add to its proportional, derivative and weak integral action.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.errors import InputError
+from .wind_observation import (
+    FORCE,
+    MAX_ACCELERATION,
+    POSITION_ERROR,
+    REFERENCE_VELOCITY,
+    ROTOR_FORCE,
+    SPECIFIC_FORCE,
+    VELOCITY,
+    WIND_PERIOD,
+)
+
+Array = NDArray[np.floating[Any]]
+Wide = NDArray[np.float64]
+_GRAVITY = 9.81  # m/s2
+_MASS = 0.465  # kg, declared, of the tasks' standard vehicle
+
+
+class WindLaw:
+    """What the laws share: proportional, derivative and integral action on the position error.
+
+    ``a = kp e + kd de/dt + ki (integral of e)``, beside the flight loop's own; the integral stops
+    where the action is limited.
+
+    Args:
+        kp: 1/s2.
+        kd: 1/s.
+        ki: 1/s3.
+    """
+
+    def __init__(self, kp: float = 0.0, kd: float = 0.0, ki: float = 0.0) -> None:
+        self.kp, self.kd, self.ki = kp, kd, ki
+        self._sum: Wide = np.zeros(3)
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._sum = np.zeros(3)
+
+    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+        """Return the action (3,) m/s2 for an observation (27,)."""
+        o = np.asarray(observation, dtype=np.float64)
+        error = o[POSITION_ERROR]
+        free = (
+            self.kp * error
+            + self.kd * (o[REFERENCE_VELOCITY] - o[VELOCITY])
+            + self.against_the_wind(o, info)
+        )
+        grown = self._sum + WIND_PERIOD * error
+        action = free + self.ki * grown
+        within = np.abs(action) < MAX_ACCELERATION
+        self._sum = np.where(within, grown, self._sum)
+        action = free + self.ki * self._sum
+        return np.minimum(np.maximum(action, -MAX_ACCELERATION), MAX_ACCELERATION).astype(
+            np.float32
+        )
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Return the part (3,) m/s2 that cancels the wind; none in this one."""
+        return np.zeros(3)
+
+
+class FlightLoopAlone(WindLaw):
+    """Adds nothing to the flight loop: the lower end of the score, 0."""
+
+
+class PID(WindLaw):
+    """A PID position controller, which has to wait for the error."""
+
+
+class PIDWithForce(WindLaw):
+    """A PID controller with the estimated force fed forward: ``- gain f / m``.
+
+    ``f`` is the external force as the unscented Kalman filter estimates it (McKinnon and
+    Schoellig, IROS 2016).
+
+    Args:
+        gain: share of the force that is cancelled.
+        lead: s; the force's change over a decision, times this, is added, against the filter's lag.
+    """
+
+    def __init__(
+        self,
+        kp: float = 0.0,
+        kd: float = 0.0,
+        ki: float = 0.0,
+        gain: float = 1.0,
+        lead: float = 0.0,
+        mass: float = _MASS,
+    ) -> None:
+        super().__init__(kp, kd, ki)
+        self.gain, self.lead, self.mass = gain, lead, mass
+        self._last: Wide | None = None
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._last = None
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Return ``- gain (f + lead df/dt) / m``."""
+        force = o[FORCE]
+        rate = 0.0 * force if self._last is None else (force - self._last) / WIND_PERIOD
+        self._last = force
+        against: Wide = -self.gain / self.mass * (force + self.lead * rate)
+        return against
+
+
+class INDI(WindLaw):
+    """Incremental nonlinear dynamic inversion of the position loop.
+
+    Tal and Karaman, *Accurate tracking of aggressive quadrotor trajectories using incremental
+    nonlinear dynamic inversion and differential flatness*, IEEE TCST 29(3), 2021, the incremental
+    law of linear acceleration: ``(tau b_z)_c = (tau b_z)_f + a_c - a_f``. The specific thrust that
+    is commanded is the one now, plus what the acceleration lacks, both behind the same low-pass (a
+    Butterworth of second order; so in Smeur, Chu and de Croon, JGCD 39(3), 2016). With the flight
+    loop's command as ``a_c`` this adds ``-(a_f - (tau b_z)_f + g)``, which is the low-passed
+    difference of accelerometer and rotor model. Unlike there, the attitude loop is the flight
+    loop's, not an INDI of angular acceleration, and measurements come as means over 40 ms.
+
+    Args:
+        cutoff: Hz, of the second-order Butterworth low-pass.
+        gain: share of the increment that is taken; 1 in the paper.
+    """
+
+    def __init__(
+        self,
+        kp: float = 0.0,
+        kd: float = 0.0,
+        ki: float = 0.0,
+        cutoff: float = 5.0,
+        gain: float = 1.0,
+    ) -> None:
+        super().__init__(kp, kd, ki)
+        if not 0.0 < cutoff < 0.5 / WIND_PERIOD:
+            raise InputError(
+                f"INDI: cutoff must lie between 0 and {0.5 / WIND_PERIOD:g} Hz, got {cutoff:g}"
+            )
+        self.cutoff, self.gain = cutoff, gain
+        # bilinear transform, warped to the cut-off
+        w = math.tan(math.pi * cutoff * WIND_PERIOD)
+        scale = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)
+        self._b = w * w * scale
+        self._a1 = 2.0 * (w * w - 1.0) * scale
+        self._a2 = (1.0 - math.sqrt(2.0) * w + w * w) * scale
+        self._states: tuple[Wide, Wide] | None = None
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._states = None
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Return the low-passed difference of rotor model and accelerometer."""
+        x = o[ROTOR_FORCE] - o[SPECIFIC_FORCE]
+        if self._states is None:  # as if it had always been so
+            self._states = x * (1.0 - self._b), x * (self._b - self._a2)
+        one, two = self._states
+        y: Wide = self._b * x + one
+        self._states = 2.0 * self._b * x - self._a1 * y + two, self._b * x - self._a2 * y
+        return self.gain * y
+
+
+class L1Adaptive(WindLaw):
+    """L1 adaptive augmentation of the position loop.
+
+    Wu, Cheng, Ackerman, Gahlawat, Lakshmanan, Zhao and Hovakimyan, *L1 adaptive augmentation for
+    geometric tracking control of quadrotors*, ICRA 2022 (and L1Quad, arXiv 2302.07208): a state
+    predictor ``dv^/dt = f/m - g + sigma^ + A_s (v^ - v)``, the piecewise constant adaptation law
+    ``sigma^ = -Phi^-1 exp(A_s T) (v^ - v)`` with ``Phi = A_s^-1 (exp(A_s T) - I)``, and the control
+    ``-C(s) sigma^`` with a first-order low-pass. Here on the translational part alone, with the
+    rotors' specific force by the declared model as its input; all three axes count as matched,
+    since the flight loop turns the thrust to where it is wanted.
+
+    Args:
+        pole: -A_s, 1/s.
+        bandwidth: of C(s), rad/s.
+    """
+
+    def __init__(
+        self,
+        kp: float = 0.0,
+        kd: float = 0.0,
+        ki: float = 0.0,
+        pole: float = 5.0,
+        bandwidth: float = 5.0,
+    ) -> None:
+        super().__init__(kp, kd, ki)
+        for name, value in (("pole", pole), ("bandwidth", bandwidth)):
+            if not value > 0.0:
+                raise InputError(f"L1: {name} must be above 0, got {value!r}")
+        self.pole, self.bandwidth = pole, bandwidth
+        decay = math.exp(-pole * WIND_PERIOD)
+        self._adapt = pole * decay / (1.0 - decay)  # Phi^-1 exp(A_s T), but for its sign
+        self._decay, self._phi = decay, (1.0 - decay) / pole
+        self._keep = math.exp(-bandwidth * WIND_PERIOD)
+        self._gap: Wide | None = None  # v^ - v
+        self._sigma = self._filtered = self._velocity = np.zeros(3)
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._gap = None
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Advance predictor and adaptation by a decision; return ``-C(s) sigma^``."""
+        v, pushed = o[VELOCITY], o[ROTOR_FORCE] - np.array([0.0, 0.0, _GRAVITY])
+        if self._gap is None:  # hovering: the wind is what the rotors balance
+            self._gap, self._sigma, self._filtered = np.zeros(3), -pushed, -pushed
+        else:
+            # the predictor over the interval that ends now, with its input and estimate
+            risen = (v - self._velocity) / WIND_PERIOD
+            self._gap = self._decay * self._gap + self._phi * (pushed + self._sigma - risen)
+            self._sigma = -self._adapt * self._gap
+            self._filtered = self._sigma + self._keep * (self._filtered - self._sigma)
+        self._velocity = v.copy()
+        return -self._filtered
+
+
+class WindOracle(WindLaw):
+    """Knows the true external force: cancels it, with a lead against the lag of motors and tilt.
+    The upper end of the score, 1.
+
+    Args:
+        gain: share of the force that is cancelled.
+        lead: s.
+    """
+
+    def __init__(
+        self,
+        kp: float = 0.0,
+        kd: float = 0.0,
+        ki: float = 0.0,
+        gain: float = 1.0,
+        lead: float = 0.0,
+        mass: float = _MASS,
+    ) -> None:
+        super().__init__(kp, kd, ki)
+        self.gain, self.lead, self.mass = gain, lead, mass
+        self._last: Wide | None = None
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        super().reset()
+        self._last = None
+
+    def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
+        """Return ``- gain (f + lead df/dt) / m`` of the true force.
+
+        Raises:
+            InputError: no ``info``.
+        """
+        if info is None:
+            raise InputError("oracle: needs the environment's info (force), which only it has")
+        force = np.asarray(info["force"], dtype=np.float64)
+        rate = 0.0 * force if self._last is None else (force - self._last) / WIND_PERIOD
+        self._last = force
+        against: Wide = -self.gain / self.mass * (force + self.lead * rate)
+        return against

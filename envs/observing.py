@@ -1,0 +1,122 @@
+"""What an agent of the fan-tracking task sees: the whole frame, parts of it, its history, or the
+pose alone; in SI units or divided by fixed scales.
+"""
+
+import math
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from ..controllers.observation import FORCE_X, LAST_COMMAND, MAX_COMMAND, OBSERVATION_SIZE
+from ..controllers.observation import VELOCITY_Y as _VELOCITY_Y
+from ..runtime.errors import InputError, unknown_name
+from .decision import DECISION_TICKS, LIMITS
+
+Frame = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+FRAMES = 25  # decisions of a history, 2 s
+# sizes that become 1: N, Nm, m/s and m/s; what the jet does to the standard vehicle
+SCALES = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 1.0)
+# of the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
+_POSE_LIMITS = (5.0, 5.0, 5.0, 5.0, 1.0, 1.0, math.pi, MAX_COMMAND)
+_POSE_SCALES = (1.0, 1.0, 1.0, 0.5, 0.1, 0.1, 0.2, 1.0)
+_KEPT = {
+    "wrench": tuple(range(OBSERVATION_SIZE)),
+    "wrench-without-fx": tuple(i for i in range(OBSERVATION_SIZE) if i != FORCE_X),
+    "history": tuple(range(OBSERVATION_SIZE)),
+}
+OBSERVE = (*_KEPT, "pose")
+
+
+class View:
+    """From the frame (8,) of the environment to what its agent sees.
+
+    Args:
+        observe: one of ``OBSERVE``.
+        normalize: whether each number is divided by its scale.
+
+    Raises:
+        InputError: an unknown view, or ``normalize`` is no boolean.
+    """
+
+    def __init__(self, observe: str = "wrench", normalize: bool = False) -> None:
+        if observe not in OBSERVE:
+            raise unknown_name("view", str(observe), OBSERVE, "FanTracking: observe")
+        if not isinstance(normalize, bool | np.bool_):
+            raise InputError(f"FanTracking: normalize must be True or False, got {normalize!r}")
+        self.observe, self.normalize = observe, bool(normalize)
+        limits, scales = (_POSE_LIMITS, _POSE_SCALES) if observe == "pose" else (LIMITS, SCALES)
+        kept = list(_KEPT.get(observe, range(len(limits))))
+        self._kept = kept
+        self._limits = np.array(limits, dtype=np.float32)[kept]
+        self._scales = (
+            np.array(scales, dtype=np.float32)[kept]
+            if self.normalize
+            else np.ones(len(kept), dtype=np.float32)
+        )
+        self.size = len(kept) * (FRAMES if observe == "history" else 1)
+        self._past = np.zeros((FRAMES, len(kept)), dtype=np.float32)
+        self._seen = -1  # ticks at which the history ends
+        self._start = np.zeros(3)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the frame is seen as it is."""
+        return self.observe == "wrench" and not self.normalize
+
+    @property
+    def is_of_a_frame(self) -> bool:
+        """Whether a frame alone says what is seen, so that many can be turned at once."""
+        return self.observe in ("wrench", "wrench-without-fx")
+
+    def space(self) -> gym.spaces.Box:
+        """Return the space of what is seen."""
+        bound = np.tile(self._limits / self._scales, self.size // len(self._kept))
+        return gym.spaces.Box(-bound, bound, (self.size,), np.float32)
+
+    def restart(self, state: Array) -> None:
+        """Begin an episode at an estimated state (20,)."""
+        self._seen, self._start = -1, state[:3].copy()
+
+    def of_frames(self, frames: Frame) -> Frame:
+        """Return what is seen of frames (n, 8), where a frame alone says so."""
+        seen: Frame = frames[:, self._kept] / self._scales
+        return seen
+
+    def of(self, frame: Frame, state: Array, ticks: int) -> Frame:
+        """Return what is seen of a frame (8,) and the estimated state (20,), ``ticks`` after the
+        episode's start; the same ticks twice are one frame of the history.
+        """
+        if self.observe == "pose":
+            pose = np.clip(self._pose(frame, state), -self._limits, self._limits)
+            return (np.nan_to_num(pose).astype(np.float32) / self._scales).astype(np.float32)
+        one: Frame = frame[self._kept] / self._scales
+        if self.observe != "history":
+            return one
+        if self._seen < 0 or ticks < self._seen:
+            self._past[:] = one
+        elif ticks > self._seen:
+            steps = min(-(-(ticks - self._seen) // DECISION_TICKS), FRAMES)
+            self._past[:-steps] = self._past[steps:]
+            self._past[-steps:] = one
+        self._seen = ticks
+        return self._past.ravel().copy()
+
+    def _pose(self, frame: Frame, x: Array) -> Array:
+        w, i, j, k = x[3:7]
+        yaw = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k)) - math.pi
+        return np.array(
+            [
+                *(x[:3] - self._start),
+                frame[_VELOCITY_Y],
+                2.0 * (i * k + w * j),
+                2.0 * (j * k - w * i),
+                math.atan2(math.sin(yaw), math.cos(yaw)),
+                frame[LAST_COMMAND],
+            ]
+        )
+
+
+__all__ = ["FRAMES", "OBSERVE", "SCALES", "View"]

@@ -1,0 +1,66 @@
+"""References to fly: a point held, figures of eight, and random splines, a row a tick."""
+
+import math
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..dynamics.motion import Array
+from .plant import TICK
+
+_FADE = 1.5  # s, over which a moving reference gets up to speed
+
+
+def hold(position: Array, yaw: float, seconds: float) -> Array:
+    """Return a reference (n, 10) that stays at ``position`` (3,) m."""
+    rows = np.zeros((round(seconds / TICK) + 1, 10))
+    rows[:, :3], rows[:, 9] = position, yaw
+    return rows
+
+
+def _rows(position: Array, yaw: float) -> Array:
+    """Return a reference from places (n, 3) m a tick apart, with velocity and acceleration by
+    central differences.
+    """
+    rows = np.zeros((len(position), 10))
+    rows[:, :3], rows[:, 9] = position, yaw
+    rows[:, 3:6] = np.gradient(position, TICK, axis=0)
+    rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
+    return rows
+
+
+def _warp(t: Array) -> Array:
+    """Return times that run slow at first and then as ``t`` less half the fade; twice smooth."""
+    u = np.clip(t / _FADE, 0.0, 1.0)
+    # integral of the smooth step 10 u^3 - 15 u^4 + 6 u^5
+    return _FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - _FADE, 0.0)
+
+
+def figure_of_eight(
+    centre: Array, yaw: float, seconds: float, size: tuple[float, float], period: float, turn: float
+) -> Array:
+    """Return a lying figure of eight (n, 10): ``size`` m along and across, in ``period`` s, turned
+    by ``turn`` rad about the vertical.
+
+    ``along = a sin(w t)``, ``across = b sin(2 w t)``.
+    """
+    t = _warp(TICK * np.arange(round(seconds / TICK) + 1))
+    phase = 2.0 * math.pi / period * t
+    along, across = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
+    c, s = math.cos(turn), math.sin(turn)
+    position = centre + np.column_stack([c * along - s * across, s * along + c * across, 0.0 * t])
+    return _rows(position, yaw)
+
+
+def random_spline(
+    rng: np.random.Generator, centre: Array, yaw: float, seconds: float, size: Array, every: float
+) -> Array:
+    """Return a cubic spline (n, 10) through points drawn from a box of half ``size`` (3,) m about
+    ``centre``, one ``every`` s, which begins at the centre at rest.
+    """
+    count = math.ceil(seconds / every) + 2
+    points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
+    points[0] = centre
+    spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
+    t = _warp(TICK * np.arange(round(seconds / TICK) + 1))
+    return _rows(np.asarray(spline(t)), yaw)

@@ -1,0 +1,36 @@
+"""Winds: velocity fields of the air, evaluated at points of the world and in time.
+
+A wind is anything with ``velocity(points (n, 3) m, time s) -> (n, 3) m/s``, world frame. The winds
+of this room are compiled, so that a flight evaluates them at the stations of a vehicle 200 times a
+second; they add up with ``+``. Any other wind flies as a grid that it was sampled on (``on_grid``).
+"""
+
+from .adapters import PyFlytWind, RotorPyWind, pyflyt_wind_type
+from .field import CompiledWind, Sum, Wind, winds_of
+from .grid import GridWind, on_grid, read_wind, write_wind
+from .jets import FanWall, VehicleWash, switching
+from .steady import Gust, Shear, Uniform
+from .turbulence import Turbulence, low_altitude, spectrum
+
+__all__ = [
+    "CompiledWind",
+    "FanWall",
+    "GridWind",
+    "Gust",
+    "PyFlytWind",
+    "RotorPyWind",
+    "Shear",
+    "Sum",
+    "Turbulence",
+    "Uniform",
+    "VehicleWash",
+    "Wind",
+    "low_altitude",
+    "on_grid",
+    "pyflyt_wind_type",
+    "read_wind",
+    "spectrum",
+    "switching",
+    "winds_of",
+    "write_wind",
+]

@@ -1,0 +1,237 @@
+"""Winds on a grid in time and space: from a file, or sampled from any other wind.
+
+Files: ``.npz`` with ``t`` (s), ``x``, ``y``, ``z`` (m), each (n,) and evenly spaced, and ``wind``
+(t, x, y, z, 3) m/s; or netCDF (``.nc``) with the coordinates ``time``, ``x``, ``y``, ``z`` in the
+same units and the variables ``u``, ``v``, ``w`` in any order of dimensions (needs xarray). A file
+without a time is steady.
+"""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import carray
+from numpy.typing import ArrayLike
+
+from ...runtime.addresses import numbers_at, pointer_to
+from ...runtime.archives import check_archive
+from ...runtime.errors import InputError
+from ...runtime.regular_files import read_bytes
+from ...runtime.whole_files import replaced
+from .field import CompiledWind, Wind
+
+AXES = ("t", "x", "y", "z")
+_LARGEST = 400_000_000  # bytes of a grid in memory
+
+GRID = np.dtype(
+    [
+        ("wind", "i8"),  # address of (t, x, y, z, 3) m/s
+        ("count", "i8", (4,)),
+        ("first", "f8", (4,)),  # s and m
+        ("step", "f8", (4,)),
+    ]
+)
+
+
+def _grid(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(record), 1, GRID)[0]
+    field = numbers_at(w.wind, (w.count[0], w.count[1], w.count[2], w.count[3], 3))
+    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
+    now = numbers_at(time, (1,))[0]
+    low, part = np.zeros(4, dtype=np.int64), np.zeros(4)
+    for j in range(count):
+        for a in range(4):
+            value = now if a == 0 else p[a - 1, j]
+            at = min(max((value - w.first[a]) / w.step[a], 0.0), float(w.count[a] - 1))
+            low[a] = min(int(at), max(w.count[a] - 2, 0))
+            part[a] = at - low[a]
+        for corner in range(16):
+            weight, i0, i1, i2, i3 = 1.0, low[0], low[1], low[2], low[3]
+            for a in range(4):
+                far = (corner >> a) & 1
+                weight *= part[a] if far else 1.0 - part[a]
+            if weight == 0.0:
+                continue
+            i0 += corner & 1
+            i1 += (corner >> 1) & 1
+            i2 += (corner >> 2) & 1
+            i3 += (corner >> 3) & 1
+            for i in range(3):
+                out[i, j] += weight * field[i0, i1, i2, i3, i]
+
+
+class GridWind(CompiledWind):
+    """A wind on a grid, interpolated linearly; beyond its ends it is as at the end.
+
+    Args:
+        axes: times (s) and places (m) of the grid along x, y and z, each (n,), evenly spaced.
+        wind: (t, x, y, z, 3) m/s.
+        where: named in errors.
+
+    Raises:
+        InputError: shapes that do not fit, axes that are not even, numbers that are not finite.
+    """
+
+    def __init__(
+        self,
+        axes: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        wind: ArrayLike,
+        where: str = "GridWind",
+    ) -> None:
+        self.axes = tuple(np.asarray(axis, dtype=np.float64) for axis in axes)
+        self.wind = np.ascontiguousarray(wind, dtype=np.float64)
+        for name, axis in zip(AXES, self.axes, strict=True):
+            if axis.ndim != 1 or len(axis) == 0 or not np.all(np.isfinite(axis)):
+                raise InputError(f"{where}: {name} must be finite numbers, shape (n,)")
+            steps = np.diff(axis)
+            if len(steps) and (steps.min() <= 0.0 or np.ptp(steps) > 1e-6 * steps.mean()):
+                raise InputError(f"{where}: {name} must grow in even steps")
+        shape = (*[len(axis) for axis in self.axes], 3)
+        if self.wind.shape != shape:
+            raise InputError(
+                f"{where}: wind must have the shape {shape} (t, x, y, z, 3), got {self.wind.shape}"
+            )
+        if not np.all(np.isfinite(self.wind)):
+            raise InputError(f"{where}: wind must be finite numbers in m/s")
+        record = np.zeros(1, dtype=GRID)
+        w = record[0]
+        w["wind"] = self.wind.ctypes.data
+        for a, axis in enumerate(self.axes):
+            w["count"][a], w["first"][a] = len(axis), axis[0]
+            w["step"][a] = (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0
+        super().__init__(_grid, record, (self.wind,))
+
+
+def on_grid(
+    wind: Wind, low: ArrayLike, high: ArrayLike, step: float, times: ArrayLike = (0.0,)
+) -> GridWind:
+    """Return any wind as it is on a grid, so that it can fly.
+
+    Args:
+        wind: with ``velocity(points (n, 3), time) -> (n, 3)``.
+        low: (3,) m, a corner of the box.
+        high: (3,) m, the opposite corner.
+        step: at most so far from point to point, m.
+        times: (n,) s, evenly spaced.
+
+    Raises:
+        InputError: no box, a grid that would be too large, or a wind that returns another shape.
+    """
+    a, b = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    when = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    if a.shape != (3,) or b.shape != (3,) or not np.all(b > a) or not step > 0.0:
+        raise InputError(
+            f"on_grid: expected a box from low (3,) to high (3,) and a step above 0, got {low!r}, "
+            f"{high!r} and {step!r}"
+        )
+    counts = np.ceil((b - a) / step - 1e-9).astype(int) + 1
+    if 24 * float(np.prod(counts, dtype=np.float64)) * len(when) > _LARGEST:
+        raise InputError(
+            f"on_grid: {len(when)} times {' x '.join(map(str, counts))} points are too many; take "
+            f"a larger step, a smaller box or fewer times"
+        )
+    x, y, z = (np.linspace(a[i], b[i], counts[i]) for i in range(3))
+    points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = []
+    for t in when:
+        row = np.asarray(wind.velocity(points, float(t)), dtype=np.float64)
+        if row.shape != points.shape:
+            raise InputError(
+                f"on_grid: velocity must return {points.shape} for points {points.shape}, got "
+                f"{row.shape}"
+            )
+        rows.append(row.reshape(*counts, 3))
+    return GridWind((when, x, y, z), np.array(rows), "on_grid")
+
+
+def read_wind(path: str | Path) -> GridWind:
+    """Read a wind from ``.npz`` or netCDF (``.nc``).
+
+    Raises:
+        InputError: no such file, another form, a missing field, or no xarray for netCDF.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"{file}: no such file; expected a wind on a grid, .npz or .nc")
+    if file.suffix == ".npz":
+        return _read_npz(file)
+    if file.suffix in (".nc", ".nc4", ".cdf"):
+        return _read_netcdf(file)
+    raise InputError(f"{file}: expected .npz or .nc")
+
+
+def _read_npz(file: Path) -> GridWind:
+    try:
+        data = io.BytesIO(read_bytes(file, "a wind", _LARGEST))
+        check_archive(file, data, _LARGEST, "a wind")
+        with np.load(data, allow_pickle=False) as arrays:
+            given = {name: np.asarray(arrays[name], dtype=np.float64) for name in arrays.files}
+    except InputError:
+        raise
+    except Exception as error:  # whatever a parser makes of bytes that are no archive of arrays
+        raise InputError(f"{file}: cannot be read as arrays: {error}") from error
+    given.setdefault("t", np.zeros(1))
+    for name in (*AXES, "wind"):
+        if name not in given:
+            raise InputError(
+                f"{file}: lacks {name!r}; expected t (s), x, y, z (m) and wind (t, x, y, z, 3) m/s"
+            )
+    wind = given["wind"][None] if given["wind"].ndim == 4 else given["wind"]
+    return GridWind((given["t"], given["x"], given["y"], given["z"]), wind, str(file))
+
+
+def _xarray() -> Any:
+    try:
+        import xarray
+    except ImportError as error:
+        raise InputError(
+            "wind: netCDF needs xarray: pip install 'windwrench[wind]'; .npz files need nothing"
+        ) from error
+    return xarray
+
+
+def _read_netcdf(file: Path) -> GridWind:
+    xarray = _xarray()
+    try:
+        with xarray.open_dataset(file, decode_times=False) as data:
+            if missing := [n for n in ("u", "v", "w", "x", "y", "z") if n not in data.variables]:
+                raise InputError(
+                    f"{file}: lacks {missing[0]!r}; expected u, v, w (m/s) over time (s), x, y, z "
+                    f"(m)"
+                )
+            names = [n for n in ("time", "x", "y", "z") if n in data.dims]
+            axes = [np.asarray(data[n].values, dtype=np.float64) for n in names]
+            parts = [data[n].transpose(*names).values for n in ("u", "v", "w")]
+    except InputError:
+        raise
+    except Exception as error:  # of xarray, or of what reads the file for it
+        raise InputError(f"{file}: cannot be read as netCDF: {error}") from error
+    wind = np.stack(parts, axis=-1)
+    if "time" not in names:
+        axes, wind = [np.zeros(1), *axes], wind[None]
+    return GridWind((axes[0], axes[1], axes[2], axes[3]), wind, str(file))
+
+
+def write_wind(wind: GridWind, path: str | Path) -> Path:
+    """Write a wind as ``.npz`` or netCDF, at once or not at all; return the path.
+
+    Raises:
+        InputError: another ending, or no xarray for netCDF.
+    """
+    file = Path(path)
+    if file.suffix not in (".npz", ".nc"):
+        raise InputError(f"{file}: expected .npz or .nc")
+    t, x, y, z = wind.axes
+    with replaced(file) as partial:
+        if file.suffix == ".npz":
+            with partial.open("wb") as out:
+                np.savez_compressed(out, t=t, x=x, y=y, z=z, wind=wind.wind)
+        else:
+            dims = ("time", "x", "y", "z")
+            data = _xarray().Dataset(
+                {name: (dims, wind.wind[..., i]) for i, name in enumerate("uvw")},
+                coords={"time": t, "x": x, "y": y, "z": z},
+            )
+            data.to_netcdf(partial)
+    return file

@@ -1,0 +1,312 @@
+"""Winds of rotors: walls of fans whose speeds change, and the wash of another vehicle.
+
+Each rotor blows the mean jet of ``dynamics.mean_jet``. Where jets overlap, their momentum fluxes
+add (Reichardt's hypothesis, which that jet follows, too): ``u^2 = sum u_i^2``; the air that they
+draw in adds as velocity.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numba import carray
+from numpy.typing import ArrayLike
+
+from ...dynamics.mean_jet import (
+    AIR_DENSITY,
+    COUNT_R,
+    COUNT_X,
+    FIRST_X,
+    STEP_R,
+    STEP_X,
+    jet_table,
+)
+from ...runtime.addresses import numbers_at, pointer_to
+from ...runtime.errors import InputError
+from .field import Array, CompiledWind, number, vector
+from .turbulence import add_modes, waves
+
+_PERIOD = 0.02  # s, of the tables of places and speeds
+_SLOWEST = 1e-3  # m/s, at which a jet counts as off
+
+JETS = np.dtype(
+    [
+        # addresses of the jet's tables, of the places (steps, jets, 3) m, of the speeds (steps,
+        # jets) m/s, and of plane waves (waves, 7)
+        *[(name, "i8") for name in ("axial", "radial", "places", "speeds", "waves")],
+        *[(name, "i8") for name in ("jets", "place_steps", "steps", "wave_count")],
+        ("rotation", "f8", (3, 3)),  # rows: the jet's axes, along it first, in the world
+        ("advection", "f8", (3,)),  # m/s, of the gusts
+    ]
+)
+
+
+def _jets(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(record), 1, JETS)[0]
+    axial = numbers_at(w.axial, (COUNT_X, COUNT_R))
+    radial = numbers_at(w.radial, (COUNT_X, COUNT_R))
+    places = numbers_at(w.places, (w.place_steps, w.jets, 3))
+    speeds = numbers_at(w.speeds, (w.steps, w.jets))
+    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
+    now, R = numbers_at(time, (1,))[0], w.rotation
+    gusts = np.zeros((3, count))
+    if w.wave_count > 0:
+        add_modes(numbers_at(w.waves, (w.wave_count, 7)), w.advection, now, p, gusts)
+    at = min(max(now / _PERIOD, 0.0), 1e9)
+    share = at - int(at)
+    k, kp = min(int(at), w.steps - 1), min(int(at), w.place_steps - 1)
+    after, after_p = min(k + 1, w.steps - 1), min(kp + 1, w.place_steps - 1)
+    for j in range(count):
+        momentum, in_y, in_z = 0.0, 0.0, 0.0
+        for n in range(w.jets):
+            speed = (1.0 - share) * speeds[k, n] + share * speeds[after, n]
+            if speed < _SLOWEST:
+                continue
+            a0 = p[0, j] - (1.0 - share) * places[kp, n, 0] - share * places[after_p, n, 0]
+            a1 = p[1, j] - (1.0 - share) * places[kp, n, 1] - share * places[after_p, n, 1]
+            a2 = p[2, j] - (1.0 - share) * places[kp, n, 2] - share * places[after_p, n, 2]
+            x = R[0, 0] * a0 + R[0, 1] * a1 + R[0, 2] * a2
+            y = R[1, 0] * a0 + R[1, 1] * a1 + R[1, 2] * a2
+            z = R[2, 0] * a0 + R[2, 1] * a1 + R[2, 2] * a2
+            r = math.sqrt(y * y + z * z)
+            row, column = (x - FIRST_X) / STEP_X, r / STEP_R
+            if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
+                continue
+            i, c = int(row), int(column)
+            a, b = row - i, column - c
+            u = (1 - a) * ((1 - b) * axial[i, c] + b * axial[i, c + 1]) + a * (
+                (1 - b) * axial[i + 1, c] + b * axial[i + 1, c + 1]
+            )
+            v = (1 - a) * ((1 - b) * radial[i, c] + b * radial[i, c + 1]) + a * (
+                (1 - b) * radial[i + 1, c] + b * radial[i + 1, c + 1]
+            )
+            momentum += speed * speed * u * u
+            if r > 1e-9:
+                in_y += speed * v * y / r
+                in_z += speed * v * z / r
+        along = math.sqrt(momentum)
+        for i in range(3):
+            out[i, j] += R[0, i] * along + R[1, i] * in_y + R[2, i] * in_z + along * gusts[i, j]
+
+
+def _axes(direction: Array) -> Array:
+    """Return axes (3, 3), rows, of which the first is ``direction``."""
+    along = direction / np.linalg.norm(direction)
+    helper = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    side = np.cross(helper, along)
+    side /= np.linalg.norm(side)
+    return np.stack([along, side, np.cross(along, side)])
+
+
+class _Jets(CompiledWind):
+    def __init__(
+        self,
+        direction: Array,
+        places: Array,
+        speeds: Array,
+        radius: float,
+        hub_radius: float,
+        turbulence: float,
+        gust_length: float,
+        seed: int | np.random.Generator,
+    ) -> None:
+        axial, radial = jet_table(radius, hub_radius)
+        record = np.zeros(1, dtype=JETS)
+        w = record[0]
+        w["rotation"] = _axes(direction)
+        table = np.zeros((0, 7))
+        if turbulence > 0.0:
+            rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
+            sizes = np.full(3, turbulence), np.full(3, gust_length)
+            table = waves(rng, "dryden", *sizes, 24, 0.4 * gust_length)
+        places, speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
+        arrays = {
+            "axial": axial, "radial": radial, "places": places, "speeds": speeds, "waves": table,
+        }  # fmt: skip
+        for name, array in arrays.items():
+            w[name] = array.ctypes.data
+        w["jets"], w["place_steps"], w["steps"] = speeds.shape[1], len(places), len(speeds)
+        w["wave_count"] = len(table)
+        # gusts travel with the shear layer's eddies, at half the speed of the jet
+        w["advection"] = 0.5 * float(speeds.max()) * w["rotation"][0]
+        self.places, self.speeds, self.radius = places, speeds, radius
+        self.axes: Array = w["rotation"]  # rows: along the jet, and two across
+        super().__init__(_jets, record, tuple(arrays.values()))
+
+
+class FanWall(_Jets):
+    """A wall of fans side by side, each with a speed of its own that may change with time.
+
+    Args:
+        speeds: U0 of each fan's jet, m/s: (rows * columns,), or (steps, rows * columns) at times
+            that are 0.02 s apart (``switching`` makes them), after which the last holds. Fans are
+            counted row by row from the bottom, each row from left to right as seen by the wind.
+        rows: how many fans stand above each other.
+        columns: and side by side.
+        pitch: m, from fan to fan.
+        centre: (3,) m, of the wall.
+        direction: (3,), into which it blows.
+        radius: m, of a fan; its hub has ``hub_radius``.
+        hub_radius: m.
+        turbulence: standard deviation of the gusts as a share of the local speed along the jet.
+        gust_length: m, over which gusts at two points are alike.
+        seed: of the gusts.
+
+    Raises:
+        InputError: a shape or a number that cannot be.
+    """
+
+    def __init__(
+        self,
+        speeds: ArrayLike,
+        rows: int = 3,
+        columns: int = 3,
+        pitch: float = 0.6,
+        centre: ArrayLike = (0.0, 0.0, 1.2),
+        direction: ArrayLike = (1.0, 0.0, 0.0),
+        radius: float = 0.28,
+        hub_radius: float = 0.06,
+        turbulence: float = 0.10,
+        gust_length: float = 0.25,
+        seed: int | np.random.Generator = 0,
+    ) -> None:
+        if rows < 1 or columns < 1:
+            raise InputError(f"wind: FanWall: expected rows and columns, got {rows} and {columns}")
+        heading = vector(direction, "direction")
+        if not np.any(heading):
+            raise InputError("wind: FanWall: direction must not be zero")
+        table = np.atleast_2d(np.asarray(speeds, dtype=np.float64))
+        if (
+            table.ndim != 2
+            or table.shape[1] != rows * columns
+            or not np.all(np.isfinite(table))
+            or table.min() < 0.0
+        ):
+            raise InputError(
+                f"wind: FanWall: speeds must be numbers from 0 on, shape ({rows * columns},) or "
+                f"(steps, {rows * columns}), got shape {table.shape}"
+            )
+        for name, value in (("turbulence", turbulence), ("hub_radius", hub_radius)):
+            if number(value, name) < 0.0:
+                raise InputError(f"wind: FanWall: {name} must be at least 0, got {value:g}")
+        if number(radius, "radius", 0.0) <= hub_radius:
+            raise InputError("wind: FanWall: radius must be above hub_radius")
+        number(gust_length, "gust_length", 0.0)
+        number(pitch, "pitch", 0.0)
+        axes = _axes(heading)
+        right = pitch * (np.arange(columns) - 0.5 * (columns - 1))
+        up = pitch * (np.arange(rows) - 0.5 * (rows - 1))
+        places = (
+            vector(centre, "centre") - right[None, :, None] * axes[1] + up[:, None, None] * axes[2]
+        )
+        super().__init__(
+            heading,
+            places.reshape(1, rows * columns, 3),
+            table,
+            radius,
+            hub_radius,
+            turbulence,
+            gust_length,
+            seed,
+        )
+
+
+def switching(
+    rng: np.random.Generator,
+    fans: int,
+    seconds: float,
+    speed: tuple[float, float] = (2.0, 6.0),
+    every: tuple[float, float] = (1.5, 4.0),
+    on: float = 0.6,
+    lag: float = 0.3,
+) -> Array:
+    """Return speeds (steps, fans) m/s of fans that are switched at random, for ``FanWall``.
+
+    Each fan by itself is on with probability ``on``, at a speed drawn from ``speed``, until it is
+    drawn anew after a time drawn from ``every`` (s); it follows with a first-order ``lag`` (s).
+    """
+    steps = math.ceil(seconds / _PERIOD) + 1
+    table = np.zeros((steps, fans))
+    keep = math.exp(-_PERIOD / lag) if lag > 0 else 0.0
+    for fan in range(fans):
+        k = 0
+        while k < steps:
+            value = float(rng.uniform(*speed)) if rng.random() < on else 0.0
+            end = k + max(1, round(float(rng.uniform(*every)) / _PERIOD))
+            table[k:end, fan] = value
+            k = end
+    for k in range(1, steps):
+        table[k] = table[k] + keep * (table[k - 1] - table[k])
+    return table
+
+
+class VehicleWash(_Jets):
+    """The wash of another multirotor that flies above: one jet straight down.
+
+    Momentum theory: rotors of the disc area A that carry the thrust T draw air through with
+    ``v = sqrt(T / (2 rho A))``; the wake below has contracted to A / 2 and sinks with 2 v. From
+    there on it spreads as the mean jet does.
+
+    Args:
+        path: places (steps, 3) m of that vehicle at times 0.02 s apart, after which it stays; or
+            (3,), where it hovers.
+        thrust: N.
+        rotor_radius: m.
+        rotors: how many.
+        turbulence: of the wash, as a share of its local speed.
+        gust_length: m.
+        seed: of the gusts.
+
+    Raises:
+        InputError: a shape or a number that cannot be.
+    """
+
+    def __init__(
+        self,
+        path: ArrayLike,
+        thrust: float = 4.56,
+        rotor_radius: float = 0.1,
+        rotors: int = 4,
+        turbulence: float = 0.15,
+        gust_length: float = 0.15,
+        seed: int | np.random.Generator = 0,
+    ) -> None:
+        places = np.atleast_2d(np.asarray(path, dtype=np.float64))
+        if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
+            raise InputError(
+                f"wind: VehicleWash: path must be finite numbers in m, shape (3,) or (steps, 3), "
+                f"got shape {places.shape}"
+            )
+        if rotors < 1 or number(turbulence, "turbulence") < 0.0:
+            raise InputError("wind: VehicleWash: expected rotors, and a turbulence of at least 0")
+        number(gust_length, "gust_length", 0.0)
+        radius = number(rotor_radius, "rotor_radius", 0.0)
+        area = rotors * math.pi * radius**2
+        drawn = math.sqrt(number(thrust, "thrust", 0.0) / (2.0 * AIR_DENSITY * area))
+        super().__init__(
+            np.array([0.0, 0.0, -1.0]),
+            places[:, None, :],
+            np.array([[2.0 * drawn]]),
+            math.sqrt(0.5 * rotors) * radius,
+            0.0,
+            turbulence,
+            gust_length,
+            seed,
+        )
+
+
+def sampled(path: Sequence[ArrayLike] | Array, times: ArrayLike, seconds: float) -> Array:
+    """Return places (steps, 3) m at the times of these winds' tables, from places (n, 3) at
+    ``times`` (n,) s.
+
+    Raises:
+        InputError: other shapes, or times that do not grow.
+    """
+    given, t = np.asarray(path, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    if given.shape != (len(t), 3) or t.ndim != 1 or np.any(np.diff(t) <= 0.0):
+        raise InputError(
+            f"wind: expected places (n, 3) at growing times (n,), got shapes {given.shape} and "
+            f"{t.shape}"
+        )
+    when = _PERIOD * np.arange(math.ceil(seconds / _PERIOD) + 1)
+    return np.column_stack([np.interp(when, t, given[:, i]) for i in range(3)])

@@ -1,0 +1,162 @@
+"""Winds that have a formula: uniform, sheared with height, and single gusts."""
+
+import math
+
+import numpy as np
+from numba import carray
+from numpy.typing import ArrayLike
+
+from ...runtime.addresses import numbers_at, pointer_to
+from ...runtime.errors import InputError, unknown_name
+from .field import CompiledWind, number, vector
+
+_FOOT = 0.3048  # m
+# MIL-F-8785C 3.7.3.4: roughness length, ft, of flight phases near the ground (category C), and else
+ROUGHNESS = {"terminal": 0.15 * _FOOT, "open": 2.0 * _FOOT}
+_LAWS = {"none": 0, "log": 1, "power": 2}
+
+STEADY = np.dtype(
+    [
+        ("velocity", "f8", (3,)),  # m/s, at the height ``reference``; of a gust, its largest
+        ("law", "i8"),
+        ("reference", "f8"),  # m
+        ("roughness", "f8"),  # m, or the exponent of the power law
+        ("floor", "f8"),  # m, below which the height counts as this
+        # of a gust: direction of travel (3,), its speed (m/s), where its front is at ``start``
+        ("travel", "f8", (3,)),
+        ("front", "f8", (3,)),
+        ("speed", "f8"),
+        ("start", "f8"),
+        ("length", "f8"),  # m, in which it grows; 0: no gust
+        ("falls", "i8"),
+    ]
+)
+
+
+def _steady(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(record), 1, STEADY)[0]
+    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
+    now = numbers_at(time, (1,))[0]
+    for j in range(count):
+        scale = 1.0
+        if w.law > 0:
+            height = max(p[2, j], w.floor)
+            if w.law == 1:
+                scale = max(math.log(height / w.roughness), 0.0) / math.log(
+                    w.reference / w.roughness
+                )
+            else:
+                scale = (height / w.reference) ** w.roughness
+        if w.length > 0.0:
+            ahead = 0.0
+            for i in range(3):
+                ahead += w.travel[i] * (p[i, j] - w.front[i])
+            inside = (w.speed * (now - w.start) - ahead) / w.length
+            if inside <= 0.0:
+                scale = 0.0
+            elif inside < 1.0 or (w.falls > 0 and inside < 2.0):
+                scale = 0.5 * (1.0 - math.cos(math.pi * inside))
+            else:
+                scale = 0.0 if w.falls > 0 else 1.0
+        for i in range(3):
+            out[i, j] += scale * w.velocity[i]
+
+
+class Uniform(CompiledWind):
+    """The same wind everywhere and always.
+
+    Args:
+        velocity: (3,) m/s, world.
+    """
+
+    def __init__(self, velocity: ArrayLike) -> None:
+        record = np.zeros(1, dtype=STEADY)
+        record["velocity"] = vector(velocity, "velocity")
+        super().__init__(_steady, record)
+
+
+class Shear(CompiledWind):
+    """A wind that grows with height.
+
+    ``log``: ``u(h) = u_ref ln(h / z0) / ln(h_ref / z0)``, MIL-F-8785C 3.7.3.4, which states
+    ``h_ref`` = 20 ft; zero below ``z0``. ``power``: ``u(h) = u_ref (h / h_ref)^exponent``.
+
+    Args:
+        velocity: (3,) m/s, world, at ``reference``.
+        reference: height in m.
+        law: ``log`` or ``power``.
+        roughness: z0 in m, of the log law; MIL-F-8785C: 0.0457 near the ground (category C), 0.61
+            else.
+        exponent: of the power law; 1/7 over open, flat land.
+
+    Raises:
+        InputError: an unknown law, or a number out of range.
+    """
+
+    def __init__(
+        self,
+        velocity: ArrayLike,
+        reference: float = 20 * _FOOT,
+        law: str = "log",
+        roughness: float = ROUGHNESS["terminal"],
+        exponent: float = 1.0 / 7.0,
+    ) -> None:
+        if law not in ("log", "power"):
+            raise unknown_name("law", law, ("log", "power"), "wind: Shear")
+        record = np.zeros(1, dtype=STEADY)
+        w = record[0]
+        w["velocity"], w["law"] = vector(velocity, "velocity"), _LAWS[law]
+        w["reference"] = number(reference, "reference", 0.0)
+        if law == "log":
+            w["roughness"] = w["floor"] = number(roughness, "roughness", 0.0)
+            if roughness >= reference:
+                raise InputError(
+                    f"wind: Shear: roughness must be below reference, got {roughness:g} and "
+                    f"{reference:g} m"
+                )
+        else:
+            w["roughness"] = number(exponent, "exponent", 0.0)
+        super().__init__(_steady, record)
+
+
+class Gust(CompiledWind):
+    """A single gust of the form 1 - cos, which travels.
+
+    ``v = v_m / 2 (1 - cos(pi s / d))`` where its front is ``0 < s < d`` ahead of the point. Behind
+    ``d`` the wind stays at ``v_m`` (MIL-F-8785C 3.7.2.3), or, where it ``falls``, comes down again
+    by the same law until ``2 d`` (14 CFR 25.341).
+
+    Args:
+        velocity: v_m, (3,) m/s, world.
+        length: d in m.
+        start: s, when the front is at ``front``.
+        speed: of travel, m/s.
+        direction: of travel, (3,); default: that of ``velocity``.
+        front: (3,) m.
+        falls: whether it comes down again.
+
+    Raises:
+        InputError: a number out of range, or no direction.
+    """
+
+    def __init__(
+        self,
+        velocity: ArrayLike,
+        length: float,
+        start: float = 0.0,
+        speed: float = 3.0,
+        direction: ArrayLike | None = None,
+        front: ArrayLike = (0.0, 0.0, 0.0),
+        falls: bool = True,
+    ) -> None:
+        record = np.zeros(1, dtype=STEADY)
+        w = record[0]
+        w["velocity"] = vector(velocity, "velocity")
+        travel = vector(velocity if direction is None else direction, "direction")
+        size = float(np.linalg.norm(travel))
+        if size == 0.0:
+            raise InputError("wind: Gust: direction must not be zero")
+        w["travel"], w["front"] = travel / size, vector(front, "front")
+        w["speed"], w["length"] = number(speed, "speed", 0.0), number(length, "length", 0.0)
+        w["start"], w["falls"] = number(start, "start"), bool(falls)
+        super().__init__(_steady, record)

@@ -1,0 +1,246 @@
+"""Turbulence with the spectra of Dryden and von Karman, as a field in space that the mean wind
+carries along.
+
+A field is a sum of plane waves with random directions, each normal to its own direction (so that
+the air keeps its volume), whose energies follow the three-dimensional spectrum E(k) that belongs to
+the one-dimensional ones of MIL-F-8785C. Where lengths and strengths are the same on all axes, the
+spectrum along any line is then the stated one, of the component along the line and of those across
+it, and gusts at two points of a vehicle are as alike as the theory says. Near the ground
+MIL-F-8785C states other lengths and strengths on each axis, which no isotropic field has: there
+each component is drawn from a field of its own, whose spectrum along the mean wind is the stated
+one. It is frozen (Taylor's hypothesis): a point sees ``u(x - U t)``.
+"""
+
+import math
+
+import numpy as np
+from numba import carray
+from numpy.typing import ArrayLike, NDArray
+
+from ...runtime.addresses import numbers_at, pointer_to
+from ...runtime.compiled import compiled_for_vectors
+from ...runtime.errors import InputError, unknown_name
+from .field import Array, CompiledWind, number, vector
+
+_FOOT = 0.3048  # m
+_KARMAN = 1.339
+# cos(2 pi s) of -1/2 <= s <= 1/2 by powers of s^2, right to 1e-10
+_COS = tuple((-1.0) ** n * (2.0 * math.pi) ** (2 * n) / math.factorial(2 * n) for n in range(12))
+
+MODES = np.dtype(
+    [
+        ("table", "i8"),  # address of (count, 7): wave number (3) 1/m, phase (turns), amplitude (3)
+        ("count", "i8"),
+        ("advection", "f8", (3,)),  # m/s
+    ]
+)
+
+
+@compiled_for_vectors
+def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array) -> None:
+    """Add a field of plane waves at points (3, n) m to velocities (3, n) m/s."""
+    for m in range(len(table)):
+        kx, ky, kz = table[m, 0], table[m, 1], table[m, 2]
+        begin = table[m, 3] - time * (kx * advection[0] + ky * advection[1] + kz * advection[2])
+        begin -= np.floor(begin)
+        ax, ay, az = table[m, 4], table[m, 5], table[m, 6]
+        for j in range(p.shape[1]):
+            s = begin + kx * p[0, j] + ky * p[1, j] + kz * p[2, j]
+            s -= np.floor(s + 0.5)
+            y = s * s
+            c = _COS[11]
+            c = c * y + _COS[10]
+            c = c * y + _COS[9]
+            c = c * y + _COS[8]
+            c = c * y + _COS[7]
+            c = c * y + _COS[6]
+            c = c * y + _COS[5]
+            c = c * y + _COS[4]
+            c = c * y + _COS[3]
+            c = c * y + _COS[2]
+            c = c * y + _COS[1]
+            c = c * y + _COS[0]
+            out[0, j] += ax * c
+            out[1, j] += ay * c
+            out[2, j] += az * c
+
+
+def _modes(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(record), 1, MODES)[0]
+    add_modes(
+        numbers_at(w.table, (w.count, 7)),
+        w.advection,
+        numbers_at(time, (1,))[0],
+        numbers_at(points, (3, count)),
+        numbers_at(velocities, (3, count)),
+    )
+
+
+def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
+    """Return the one-dimensional spectrum of MIL-F-8785C 3.7.1, (m/s)^2 per rad/m.
+
+    It is one-sided: its integral over the wave number (rad/m) from zero is ``sigma``^2.
+
+    Args:
+        form: ``dryden`` or ``von-karman``.
+        axis: ``along`` the line on which the wave number is taken, or ``across``.
+        wave_number: Omega, rad/m.
+        sigma: m/s.
+        length: L, m.
+
+    Raises:
+        InputError: an unknown form or axis.
+    """
+    if form not in FORMS:
+        raise unknown_name("form", form, FORMS, "wind: turbulence")
+    if axis not in ("along", "across"):
+        raise unknown_name("axis", axis, ("along", "across"), "wind: turbulence")
+    scale = 1.0 if form == "dryden" else _KARMAN
+    x = (scale * length * np.asarray(wave_number, dtype=np.float64)) ** 2
+    size = sigma**2 * length / math.pi
+    if form == "dryden":
+        return 2.0 * size / (1.0 + x) if axis == "along" else size * (1 + 3 * x) / (1 + x) ** 2
+    if axis == "along":
+        return 2.0 * size / (1.0 + x) ** (5 / 6)
+    return size * (1.0 + 8 / 3 * x) / (1.0 + x) ** (11 / 6)
+
+
+def _energy(form: str, k: Array, length: float) -> Array:
+    """Return E(k), m, of unit variance on each axis: ``1/2 k^3 d/dk(1/k dF/dk)`` of the spectrum F
+    along a line.
+    """
+    if form == "dryden":
+        x = length * k
+        return 8.0 * length / math.pi * x**4 / (1.0 + x * x) ** 3
+    x = _KARMAN * length * k
+    return 55 / 9 * length / math.pi * x**4 / (1.0 + x * x) ** (17 / 6)
+
+
+FORMS = ("dryden", "von-karman")
+
+
+def waves(
+    rng: np.random.Generator, form: str, sigma: Array, length: Array, count: int, smallest: float
+) -> Array:
+    """Return plane waves (m, 7) in axes of which the first is that of the mean wind.
+
+    Wave numbers are drawn one from each of ``count`` strata, even in the logarithm between a
+    tenth of 1 / L and that of eddies of ``smallest`` m.
+    """
+    alike = bool(np.ptp(sigma) == 0.0 and np.ptp(length) == 0.0)
+    parts = []
+    for axis in range(1 if alike else 3):
+        size = float(length[axis])
+        low, high = math.log(0.1 / size), math.log(2.0 * math.pi / smallest)
+        step = (high - low) / count
+        k = np.exp(low + step * (np.arange(count) + rng.random(count)))
+        # variance of the three components together is 2 E dk, half the squared amplitude
+        amplitude = np.sqrt(4.0 * _energy(form, k, size) * k * step)
+        direction = _directions(rng, count)
+        other = _directions(rng, count)
+        normal = np.cross(direction, other)
+        normal *= (amplitude / np.linalg.norm(normal, axis=1))[:, None]
+        kept = sigma if alike else np.where(np.arange(3) == axis, sigma, 0.0)
+        parts.append(
+            np.column_stack(
+                [direction * k[:, None] / (2.0 * math.pi), rng.random(count), normal * kept]
+            )
+        )
+    return np.concatenate(parts)
+
+
+def _directions(rng: np.random.Generator, count: int) -> Array:
+    given = rng.standard_normal((count, 3))
+    directions: Array = given / np.linalg.norm(given, axis=1, keepdims=True)
+    return directions
+
+
+class Turbulence(CompiledWind):
+    """Turbulence in a mean wind; the mean wind itself is another wind to add.
+
+    Args:
+        seed: of the field, or a generator; the same seed gives the same field.
+        sigma: standard deviation, m/s: one number, or (3,) along the mean wind, across, and up.
+        length: L, m, likewise.
+        advection: (3,) m/s, the mean wind that carries the field along.
+        form: ``dryden`` or ``von-karman``.
+        modes: plane waves an axis; variance and spectrum are right on average for any number, a
+            single field is the more even the more there are.
+        smallest: m, of the smallest eddies that are there. What a spectrum has beyond is left out:
+            with L = 3 m and 0.2 m, 2 % of the variance of Dryden's, 6 % of von Karman's.
+
+    Raises:
+        InputError: an unknown form, or a number out of range.
+    """
+
+    def __init__(
+        self,
+        seed: int | np.random.Generator,
+        sigma: ArrayLike,
+        length: ArrayLike,
+        advection: ArrayLike,
+        form: str = "dryden",
+        modes: int = 48,
+        smallest: float = 0.2,
+    ) -> None:
+        if form not in FORMS:
+            raise unknown_name("form", form, FORMS, "wind: turbulence")
+        sizes, lengths = (
+            _three(sigma, "sigma", at_least_zero=True),
+            _three(length, "length", at_least_zero=False),
+        )
+        if modes < 1 or number(smallest, "smallest", 0.0) >= 0.5 * lengths.min():
+            raise InputError(
+                f"wind: turbulence: modes must be at least 1 and smallest less than half of every "
+                f"length, got {modes} and {smallest:g} m"
+            )
+        carried = vector(advection, "advection")
+        rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
+        table = waves(rng, form, sizes, lengths, modes, smallest)
+        heading = math.atan2(carried[1], carried[0])
+        c, s = math.cos(heading), math.sin(heading)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
+        record = np.zeros(1, dtype=MODES)
+        record["table"], record["count"] = table.ctypes.data, len(table)
+        record["advection"] = carried
+        super().__init__(_modes, record, (table,))
+
+
+def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:
+    given = np.asarray(value, dtype=np.float64)
+    whole = np.full(3, float(given)) if given.ndim == 0 else given
+    good = whole.shape == (3,) and np.all(np.isfinite(whole))
+    if not good or whole.min() < 0.0 or (whole.min() == 0.0 and not at_least_zero):
+        raise InputError(
+            f"wind: {name} must be one number or three, "
+            f"{'at least' if at_least_zero else 'above'} zero, got {value!r}"
+        )
+    return whole
+
+
+def low_altitude(height: float, wind_20ft: float) -> tuple[Array, Array]:
+    """Return standard deviations (3,) m/s and lengths (3,) m of MIL-F-8785C 3.7.3 below 1000 ft.
+
+    ``sigma_w = 0.1 W20``, ``sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4``, ``L_w = h``,
+    ``L_u = L_v = h / (0.177 + 0.000823 h)^1.2`` with h in ft.
+
+    Args:
+        height: above ground, m; below 10 ft, where the specification ends, it counts as 10 ft.
+        wind_20ft: W20, the mean wind at 20 ft (6.1 m), m/s.
+
+    Raises:
+        InputError: a height above 1000 ft or not above zero, or a negative wind.
+    """
+    h = number(height, "height", 0.0) / _FOOT
+    wind = number(wind_20ft, "wind_20ft")
+    if h > 1000.0 or wind < 0.0:
+        raise InputError(
+            f"wind: low_altitude: height must be at most 304.8 m (1000 ft) and wind_20ft at least "
+            f"0, got {height:g} m and {wind:g} m/s"
+        )
+    h = max(h, 10.0)
+    part = 0.177 + 0.000823 * h
+    vertical = 0.1 * wind
+    across, along = vertical / part**0.4, h * _FOOT / part**1.2
+    return np.array([across, across, vertical]), np.array([along, along, h * _FOOT])

@@ -1,0 +1,86 @@
+"""Drawing a flight in the wind: drops that drift with the air, a wall of fans, the reference."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from .drawing import Viewer
+from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
+from .wind import CompiledWind, FanWall, Sum
+from .windy_flight import WindyFlight
+
+_DROPS = 300
+_LOW, _HIGH = np.array([0.2, -1.6, 0.2]), np.array([4.4, 1.6, 2.8])  # m, where drops are
+_SCALES = (0.5, 8.0)  # m per N, m per Nm
+_FRAME = 0.04  # s
+_AWAY = (0.0, 0.0, -50.0)  # m, where a fan is that is not there
+
+
+class WindViewer(Viewer):
+    """Draws a flight in winds."""
+
+    def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
+        super().__init__(mode, width, height)
+        self._drops = self._new_drops(_DROPS)
+
+    def _new_drops(self, count: int) -> NDArray[np.float64]:
+        return self._rng.uniform(_LOW, _HIGH, (count, 3))
+
+    def draw_winds(
+        self,
+        flight: WindyFlight,
+        winds: Sequence[CompiledWind],
+        walls: Sequence[FanWall],
+        reference: NDArray[np.float64],
+        time: float,
+    ) -> NDArray[np.uint8] | None:
+        """Draw the flight as it is now; return the picture (height, width, 3) unless it went to a
+        window.
+        """
+        loop = flight.loop
+        self.open_world(loop.model, loop.data)
+        self.begin_frame(loop)
+        loop.data.mocap_pos[0] = _AWAY
+        mujoco.mj_kinematics(loop.model, loop.data)
+        air = Sum(*winds).velocity(self._drops, time)
+        self._drops += _FRAME * air + 0.004 * self._rng.standard_normal(self._drops.shape)
+        gone = np.any((self._drops < _LOW) | (self._drops > _HIGH), axis=1)
+        gone |= self._rng.random(len(gone)) < 0.01
+        self._drops[gone] = self._new_drops(int(gone.sum()))
+
+        def mark(scene: Any) -> None:
+            for drop, speed in zip(self._drops, np.linalg.norm(air, axis=1), strict=True):
+                colour = np.array([0.25, 0.55, 0.95, 0.08 + 0.1 * min(speed, 6.0)])
+                add_shape(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.013), drop, colour)
+            for wall in walls:
+                _add_wall(scene, wall, time)
+            target = np.array([0.95, 0.75, 0.10, 0.6])
+            add_shape(scene, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.035), reference, target)
+            add_shadow(scene, loop.position, 0.22)
+            add_path(scene, self._path[-120:])
+            at = loop.position
+            add_wrench(scene, at, loop.external[:3], loop.external[5], _SCALES, 0.22, true=True)
+            add_wrench(scene, at, loop.state[16:19], loop.state[15], _SCALES, 0.22)
+
+        return self.show(loop.data, mark, "chase")
+
+
+def _add_wall(scene: Any, wall: FanWall, time: float) -> None:
+    """Append the fans of a wall, the brighter the faster they blow."""
+    speeds = wall.speeds[min(int(time / 0.02), len(wall.speeds) - 1)]
+    frame = np.column_stack([wall.axes[1], wall.axes[2], wall.axes[0]])
+    for place, speed in zip(wall.places[0], speeds, strict=True):
+        share = min(speed / 6.0, 1.0)
+        colour = np.array([0.20 + 0.1 * share, 0.30 + 0.4 * share, 0.40 + 0.55 * share, 1.0])
+        shape = add_shape(
+            scene,
+            mujoco.mjtGeom.mjGEOM_CYLINDER,
+            np.array([wall.radius, 0.03, 0.0]),
+            place,
+            colour,
+        )
+        if shape is not None:
+            shape.mat[:] = frame

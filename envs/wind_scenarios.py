@@ -1,0 +1,176 @@
+"""The scenarios of the tasks in the wind, as data, and the winds that are drawn from them."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..dynamics.motion import Array
+from ..runtime.errors import unknown_name
+from .references import figure_of_eight, hold, random_spline
+from .wind import (
+    CompiledWind,
+    FanWall,
+    Gust,
+    Shear,
+    Turbulence,
+    VehicleWash,
+    low_altitude,
+    switching,
+)
+from .wind.jets import sampled
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class WindVariation:
+    """Domain randomisation of the tasks in the wind: factors on what the vehicle file and the drag
+    state, each uniform between two bounds and drawn anew each episode, in the order of the fields.
+    """
+
+    mass: Range = (0.93, 1.07)  # of the true vehicle; filter and flight loop keep the declared
+    inertia: Range = (0.9, 1.1)
+    rotor_drag: Range = (0.8, 1.2)
+    hull_area: Range = (0.8, 1.2)
+
+    def draw(self, rng: np.random.Generator) -> dict[str, float]:
+        """Return one value of each field, by its name."""
+        return {
+            field.name: float(rng.uniform(*getattr(self, field.name))) for field in fields(self)
+        }
+
+
+@dataclass(frozen=True)
+class WindScenario:
+    """What blows, and what is measured with. A range is drawn from evenly, once an episode."""
+
+    summary: str
+    mean: Range = (0.0, 0.0)  # m/s at the vehicle's height, from any side; sheared by the log law
+    # "", or the spectrum of turbulence with the strengths and lengths of MIL-F-8785C near the
+    # ground in the mean wind, times ``strength``
+    turbulence: str = ""
+    strength: float = 1.0
+    gusts: Range = (0.0, 0.0)  # m/s, of gusts 1 - cos of 1-3 m that pass every 3-6 s
+    wall: Range = (0.0, 0.0)  # m/s, jets of a wall of 3 x 3 fans that switch by themselves
+    wash: bool = False  # another vehicle crosses 1.0-1.6 m above, to and fro
+    rise_time: float = 0.45  # s, of the filter
+    sigma_position: float = 0.001  # m
+    sigma_attitude: float = 0.005  # rad
+    varied: bool = False
+    variation: WindVariation = WindVariation()
+
+
+WIND_SCENARIOS: dict[str, WindScenario] = {
+    "calm": WindScenario("still air; only the actuators disturb"),
+    "turbulent": WindScenario(
+        "a mean wind of 3-5 m/s with Dryden's turbulence", mean=(3.0, 5.0), turbulence="dryden"
+    ),
+    "fan-wall": WindScenario("a wall of fans of up to 6 m/s that switch", wall=(2.0, 6.0)),
+    "base": WindScenario(
+        "Dryden's turbulence in 1-2.5 m/s, and a wall of fans of up to 4.5 m/s that switch",
+        mean=(1.0, 2.5),
+        turbulence="dryden",
+        wall=(1.5, 4.5),
+    ),
+    "gusts": WindScenario(
+        "von Karman's turbulence in 2-3 m/s, and gusts of 2-3.5 m/s",
+        mean=(2.0, 3.0),
+        turbulence="von-karman",
+        gusts=(2.0, 3.5),
+    ),
+    "wash": WindScenario("the wash of a vehicle that crosses above", wash=True),
+    "noisy": WindScenario(
+        "base, with a pose noise of 0.01 m and 0.05 rad",
+        mean=(1.0, 2.5),
+        turbulence="dryden",
+        wall=(1.5, 4.5),
+        sigma_position=0.01,
+        sigma_attitude=0.05,
+    ),
+    "varied": WindScenario(
+        "base, with the vehicle drawn anew",
+        mean=(1.0, 2.5),
+        turbulence="dryden",
+        wall=(1.5, 4.5),
+        varied=True,
+    ),
+}
+
+HEIGHT = 1.5  # m, of the vehicle
+DISTANCE = 2.3  # m, from the wall of fans
+START = np.array([DISTANCE, 0.0, HEIGHT])
+
+
+def get_wind_scenario(name: str) -> WindScenario:
+    """Return a scenario by its name.
+
+    Raises:
+        InputError: no scenario has this name.
+    """
+    if name not in WIND_SCENARIOS:
+        raise unknown_name("scenario", name, WIND_SCENARIOS)
+    return WIND_SCENARIOS[name]
+
+
+def draw_winds(
+    scenario: WindScenario, rng: np.random.Generator, seconds: float
+) -> list[CompiledWind]:
+    """Draw what blows in an episode of ``seconds``; the same generator draws the same."""
+    winds: list[CompiledWind] = []
+    heading = float(rng.uniform(-math.pi, math.pi))
+    mean = float(rng.uniform(*scenario.mean))
+    wind = mean * np.array([math.cos(heading), math.sin(heading), 0.0])
+    if mean > 0.0:
+        winds.append(Shear(wind, reference=HEIGHT))
+        if scenario.turbulence:
+            # the log law of the terminal flight phase, from the vehicle's height up to 20 ft
+            rough = 0.0457
+            sigma, length = low_altitude(
+                HEIGHT, mean * math.log(6.096 / rough) / math.log(HEIGHT / rough)
+            )
+            winds.append(
+                Turbulence(
+                    rng, scenario.strength * sigma, length, wind, scenario.turbulence, modes=24
+                )
+            )
+    if scenario.wall[1] > 0.0:
+        speeds = switching(rng, 9, seconds, scenario.wall)
+        winds.append(FanWall(speeds, centre=(0.0, 0.0, HEIGHT), seed=rng))
+    if scenario.gusts[1] > 0.0:
+        at = float(rng.uniform(1.0, 3.0))
+        while at < seconds:
+            turn = float(rng.uniform(-math.pi, math.pi))
+            size, length = float(rng.uniform(*scenario.gusts)), float(rng.uniform(1.0, 3.0))
+            along = np.array([math.cos(turn), math.sin(turn), 0.0])
+            winds.append(Gust(size * along, length, start=at, speed=max(mean, size), front=START))
+            at += float(rng.uniform(3.0, 6.0))
+    if scenario.wash:
+        period, turn = float(rng.uniform(4.0, 8.0)), float(rng.uniform(-math.pi, math.pi))
+        above, phase = float(rng.uniform(1.0, 1.6)), float(rng.uniform(0.0, 2.0 * math.pi))
+        t = 0.02 * np.arange(math.ceil(seconds / 0.02) + 1)
+        swing = 1.5 * np.sin(2.0 * math.pi * t / period + phase)
+        path = START + np.column_stack(
+            [swing * math.cos(turn), swing * math.sin(turn), np.full_like(t, above)]
+        )
+        winds.append(VehicleWash(sampled(path, t, seconds), seed=rng))
+    return winds
+
+
+def draw_reference(
+    rng: np.random.Generator, yaw: float, seconds: float, moving: bool
+) -> tuple[str, Array]:
+    """Draw what is to be flown: its name and its rows (n, 10), one a tick.
+
+    Moving: a figure of eight (1.0-1.4 m along, 0.4-0.6 m across, in 6-9 s, turned by any angle) or
+    a spline through random points of a box of 2.4 x 2.4 x 0.8 m, one every 1.5-2.2 s.
+    """
+    if not moving:
+        return "hold", hold(START, yaw, seconds)
+    if rng.random() < 0.5:
+        size = float(rng.uniform(1.0, 1.4)), float(rng.uniform(0.4, 0.6))
+        period, turn = float(rng.uniform(6.0, 9.0)), float(rng.uniform(-math.pi, math.pi))
+        return "figure of eight", figure_of_eight(START, yaw, seconds, size, period, turn)
+    every = float(rng.uniform(1.5, 2.2))
+    box = np.array([1.2, 1.2, 0.4])
+    return "spline", random_spline(rng, START, yaw, seconds, box, every)

@@ -1,0 +1,181 @@
+"""What an agent sees, how episodes follow each other, and what Gymnasium's checker says of it."""
+
+import ctypes.util
+import os
+import subprocess
+import sys
+from dataclasses import fields, replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+import windwrench  # noqa: F401  registers the environments
+from windwrench.dynamics import InputError
+from windwrench.envs import SCENARIOS, FanTrackingEnv
+from windwrench.envs.observing import FRAMES, SCALES
+from windwrench.envs.scenarios import Variation
+
+NAME = "windwrench/FanTracking-v0"
+ACTIONS = np.random.default_rng(1).uniform(-0.6, 0.6, (12, 1)).astype(np.float32)
+
+
+def seen(**kwargs):
+    env = FanTrackingEnv("fast", **kwargs)
+    rows = [env.reset(seed=3)[0]]
+    for action in ACTIONS:
+        frame, _, lost, *_ = env.step(action)
+        assert not lost
+        assert frame in env.observation_space
+        rows.append(frame)
+    return np.array(rows)
+
+
+def test_a_normalised_observation_is_the_frame_over_fixed_scales():
+    np.testing.assert_array_equal(seen(normalize=True), seen() / np.float32(SCALES))
+    assert 0.05 < np.abs(seen(normalize=True)[:, [0, 5, 6, 7]]).mean() < 2.0
+
+
+def test_a_part_of_the_frame_lacks_the_force_along_the_jet():
+    np.testing.assert_array_equal(seen(observe="wrench-without-fx"), seen()[:, 1:])
+
+
+def test_the_history_holds_the_last_frames_and_begins_full():
+    frames, history = seen(), seen(observe="history")
+    padded = np.concatenate([np.repeat(frames[:1], FRAMES - 1, axis=0), frames])
+    for k, row in enumerate(history):
+        np.testing.assert_array_equal(row.reshape(FRAMES, 8), padded[k : k + FRAMES])
+
+
+def test_the_pose_alone_tells_no_wrench():
+    env = FanTrackingEnv("fast", observe="pose")
+    first, _ = env.reset(seed=3)
+    np.testing.assert_array_equal(first[:3], 0.0)
+    for action in ACTIONS:
+        frame, *_ = env.step(action)
+    state = env.loop.state
+    assert frame[3] == np.float32(state[8])
+    assert frame[7] == ACTIONS[-1]
+    # leans towards the fan, which lies at -x, and looks at it
+    assert -0.3 < frame[4] < -0.05
+    assert abs(frame[6]) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"observe": "wrnech"}, "Did you mean 'wrench'"),
+        ({"normalize": "yes"}, "normalize must be True or False"),
+    ],
+)
+def test_an_unknown_view_is_named(given, words):
+    with pytest.raises(InputError, match=words):
+        FanTrackingEnv(**given)
+
+
+@pytest.mark.parametrize("given", [{"observe": "history"}, {"observe": "pose", "normalize": True}])
+def test_many_see_what_each_alone_would(given):
+    envs = gym.make_vec(
+        NAME, num_envs=2, vectorization_mode="vector_entry_point", scenario="fast", **given
+    )
+    frames = [envs.reset(seed=2)[0][1]]
+    frames += [envs.step(np.stack([a, a]))[0][1] for a in ACTIONS]
+    np.testing.assert_array_equal(frames, seen(**given))
+    # a part that starts anew leaves the others' history alone
+    again, _ = envs.reset(seed=[2, None], options={"reset_mask": np.array([True, False])})
+    np.testing.assert_array_equal(again[1], frames[-1])
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it(mode):
+    given = {"scenario": "fast", "observe": "history"}
+    native = gym.make_vec(
+        NAME,
+        num_envs=2,
+        vectorization_mode="vector_entry_point",
+        autoreset_mode=mode,
+        max_episode_steps=4,
+        **given,
+    )
+    plain = gym.vector.SyncVectorEnv(
+        [lambda: gym.make(NAME, max_episode_steps=4, **given)] * 2, autoreset_mode=mode
+    )
+    assert native.metadata["autoreset_mode"] is mode
+    np.testing.assert_array_equal(native.reset(seed=5)[0], plain.reset(seed=5)[0])
+    for action in ACTIONS[:10]:
+        one, other = (envs.step(np.stack([action, -action])) for envs in (native, plain))
+        for a, b in zip(one[:4], other[:4], strict=True):
+            np.testing.assert_array_equal(a, b)
+        same(one[4], other[4])
+
+
+def same(one, other):
+    assert set(one) == set(other)
+    for key, value in one.items():
+        if isinstance(value, dict):
+            same(value, other[key])
+        elif key == "final_obs":
+            for a, b in zip(value, other[key], strict=True):
+                np.testing.assert_array_equal(a, b)
+        else:
+            np.testing.assert_array_equal(value, other[key], err_msg=key)
+
+
+def test_another_mode_is_refused():
+    with pytest.raises(InputError, match="autoreset_mode must be NEXT_STEP or SAME_STEP"):
+        gym.make_vec(
+            NAME, vectorization_mode="vector_entry_point", autoreset_mode=AutoresetMode.DISABLED
+        )
+
+
+def test_unknown_options_are_refused_in_one_line():
+    single = FanTrackingEnv()
+    many = gym.make_vec(NAME, num_envs=1, vectorization_mode="vector_entry_point")
+    for envs in (single, many):
+        with pytest.raises(InputError, match="unknown option") as refused:
+            envs.reset(seed=0, options={"speed": 2})
+        assert "\n" not in str(refused.value)
+
+
+def test_the_stated_distribution_is_the_one_drawn_from():
+    narrow = Variation(**{f.name: (1.0, 1.0) for f in fields(Variation)})
+    narrow = replace(narrow, mass=(1.3, 1.3), distance=(2.5, 2.5))
+    env = FanTrackingEnv(replace(SCENARIOS["varied"], variation=narrow))
+    env.reset(seed=0)
+    assert env.loop.model.body_mass.sum() == pytest.approx(1.3 * env.vehicle.mass)
+    assert env.loop.position[0] == pytest.approx(2.5, abs=0.3)  # it drifts while the filter settles
+    rng = np.random.default_rng(0)
+    drawn = [Variation().draw(rng)["mass"] for _ in range(200)]
+    assert 0.93 <= min(drawn) < 0.94
+    assert 1.06 < max(drawn) <= 1.07
+
+
+CHECK = """
+import warnings
+import gymnasium as gym
+from gymnasium.utils.env_checker import check_env
+import windwrench
+warnings.simplefilter("error")
+for name in NAMES:
+    check_env(gym.make(name).unwrapped)
+    check_env(gym.make(name, render_mode="rgb_array").unwrapped)
+"""
+
+
+@pytest.mark.skipif(
+    not ctypes.util.find_library("EGL") and not ctypes.util.find_library("OSMesa"),
+    reason="neither libEGL nor libOSMesa is installed: apt-get install libegl1 libgl1-mesa-dri",
+)
+@pytest.mark.parametrize("name", [NAME])
+def test_gymnasium_s_checker_finds_nothing_with_rendering_and_without_a_display(tmp_path, name):
+    without = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", CHECK.replace("NAMES", repr([name]))],
+        cwd=tmp_path,
+        env=without,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

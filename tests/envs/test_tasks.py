@@ -1,0 +1,256 @@
+"""The tasks beside FanTracking: interface, specification, physics, and what their laws reach."""
+
+import json
+import math
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import windwrench  # noqa: F401  registers the environments
+from tests.support.golden_tasks import GOLDEN, SEED, trajectory
+from windwrench.controllers import wind_observation as seen
+from windwrench.dynamics import InputError
+from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
+from windwrench.envs.references import figure_of_eight, hold, random_spline
+from windwrench.envs.wind import Uniform
+from windwrench.envs.wind_hover import WindHoverEnv
+from windwrench.envs.wind_scenarios import START, WIND_SCENARIOS
+from windwrench.envs.wind_trajectory import WindTrajectoryEnv
+from windwrench.envs.windy_flight import WindyFlight
+from windwrench.evaluation.task_benchmark import TASKS
+
+NAMES = ("FanTracking2D", "WindHover", "WindTrajectory")
+KEPT = json.loads(GOLDEN.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gymnasium_s_checker_finds_nothing(name):
+    check_env(gym.make(f"windwrench/{name}-v0").unwrapped, skip_render_check=True)
+    env = gym.make(f"windwrench/{name}-v0", normalize=True)
+    assert env.reset(seed=0)[0] in env.observation_space
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("part", [0, 1, 2])
+def test_trajectories_are_those_of_the_version(name, part):
+    golden = KEPT[name]
+    assert golden["version"] == f"v{gym.spec(f'windwrench/{name}-v0').version}"
+    assert golden["seed"] == SEED
+    assert set(golden["scenarios"]) == set(TASKS[name].scenarios)
+    history = TASKS[name].environment.__doc__.partition("## Version history")[2]
+    assert golden["version"] in re.findall(r"^\s+\* (v\d+):", history, re.M)
+    for scenario in list(golden["scenarios"])[part::3]:
+        now = trajectory(name, scenario)
+        # as tests/envs/test_golden.py: compilers of other processors order sums otherwise
+        for key, tolerance in (("observation", 2e-5), ("wrench", 1e-6), ("error", 1e-8)):
+            np.testing.assert_allclose(
+                now[key],
+                golden["scenarios"][scenario][key],
+                rtol=0,
+                atol=tolerance,
+                err_msg=f"{name}, {scenario}: {key}; is a change of physics meant?",
+            )
+
+
+@pytest.mark.parametrize("cls", [WindHoverEnv, WindTrajectoryEnv, FanTracking2DEnv])
+def test_the_docstring_s_tables_are_the_spaces(cls):
+    rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? +\|.*?\| (\d+(?:\.\d+)?) +\|", cls.__doc__, re.M)
+    env = cls()
+    size = env.observation_space.shape[0]
+    limits = np.zeros(size)
+    table = cls.__doc__.partition("## Observation space")[2].partition("##")[0]
+    for row in re.findall(r"^\s+\| (\d+)(?:-(\d+))? *\|(.*)\|", table, re.M):
+        first, last = int(row[0]), int(row[1] or row[0])
+        limits[first : last + 1] = float(row[2].split("|")[1])
+    assert rows
+    np.testing.assert_array_equal(env.observation_space.high, limits.astype(np.float32))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_seed_repeats_an_episode_and_the_reward_is_its_terms(name):
+    def fly(env):
+        env.reset(seed=3)
+        rng, rows = np.random.default_rng(0), []
+        for _ in range(12):
+            action = rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+            observation, reward, lost, over, info = env.step(action)
+            assert reward == info["reward_tracking"] + info["reward_change"]
+            assert not lost
+            assert not over
+            rows.append([*observation, reward, info["error"], *info["force"], *info["torque"]])
+        return np.array(rows)
+
+    env = TASKS[name].environment()
+    first = fly(env)
+    np.testing.assert_array_equal(fly(env), first)
+    np.testing.assert_array_equal(fly(TASKS[name].environment()), first)
+
+
+def test_the_rewards_are_as_stated():
+    env = WindHoverEnv("calm")
+    env.reset(seed=0)
+    for last, now in ((np.zeros(3), np.array([1.0, 0, -2])), (np.array([1.0, 0, -2]), np.ones(3))):
+        *_, info = env.step(now)
+        assert info["reward_change"] == pytest.approx(-0.002 * np.sum((now - last) ** 2))
+        error = np.linalg.norm(info["position"] - info["reference"])
+        assert info["error"] == pytest.approx(error)
+        assert info["reward_tracking"] == pytest.approx(1 / (1 + (error / 0.1) ** 2))
+    two = FanTracking2DEnv("static")
+    two.reset(seed=0)
+    *_, info = two.step(np.array([0.5, -0.5]))
+    assert info["reward_change"] == pytest.approx(-0.05 * 0.5)
+    assert info["error"] == pytest.approx(np.linalg.norm(info["position"] - info["fan"]))
+    assert info["reward_tracking"] == pytest.approx(1 / (1 + (info["error"] / 0.3) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("name", "action"),
+    [("WindHover", [1.0, 2.0]), ("WindHover", [1.0, np.nan, 0.0]), ("FanTracking2D", [1.0])],
+)
+def test_a_bad_action_and_unknown_options_are_named(name, action):
+    env = TASKS[name].environment()
+    with pytest.raises(InputError, match="call reset"):
+        env.step(np.zeros(env.action_space.shape))
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=f"{name}: action must be"):
+        env.step(np.array(action))
+    with pytest.raises(InputError, match=r"unknown option\(s\) 'speed'"):
+        env.reset(options={"speed": 1})
+
+
+@pytest.mark.parametrize("given", [{"scenario": "bsae"}, {"estimator": "x"}, {"normalize": 2}])
+@pytest.mark.parametrize("name", ["FanTracking2D", "WindTrajectory"])
+def test_bad_arguments_are_named(name, given):
+    with pytest.raises(InputError):
+        TASKS[name].environment(**given)
+
+
+def test_normalised_actions_and_observations_are_the_same_flight():
+    plain, scaled = WindHoverEnv("base"), WindHoverEnv("base", normalize=True)
+    plain.reset(seed=1)
+    scaled.reset(seed=1)
+    for action in np.random.default_rng(0).uniform(-1, 1, (5, 3)).astype(np.float32):
+        a, *_ = plain.step(action * np.float32(seen.MAX_ACCELERATION))
+        b, *_ = scaled.step(action)
+    np.testing.assert_allclose(b, a / np.float32(seen.OBSERVATION_SCALES), rtol=1e-6)
+
+
+def test_a_steady_wind_pushes_as_its_drag_says_and_all_see_it():
+    env = WindHoverEnv("calm", winds=[Uniform((4.0, 0.0, 0.0))])
+    env.reset(seed=0)
+    for _ in range(150):
+        observation, _, lost, _, info = env.step(np.zeros(3))
+    assert not lost
+    np.testing.assert_allclose(info["wind"], [4.0, 0.0, 0.0], atol=1e-9)
+    expected = 4 * 0.020 * 4.0 + 0.5 * 1.2 * 0.060 * 16.0  # rotors, and the hull
+    assert info["force"][0] == pytest.approx(expected, abs=0.15)
+    assert observation[seen.FORCE][0] == pytest.approx(expected, abs=0.2)
+    # accelerometer less rotors is the same force
+    pushed = observation[seen.SPECIFIC_FORCE] - observation[seen.ROTOR_FORCE]
+    assert 0.465 * pushed[0] == pytest.approx(expected, abs=0.2)
+
+
+def test_a_wind_that_differs_across_the_vehicle_turns_it():
+    from windwrench.envs.wind import on_grid
+
+    class Sheared:
+        def velocity(self, points, time):
+            p = np.asarray(points)
+            return np.column_stack([4.0 - 2.0 * p[:, 1], 0 * p[:, 0], 0 * p[:, 0]])
+
+    wind = on_grid(Sheared(), (0, -3, 0), (5, 3, 3), 0.5)
+    env = WindHoverEnv("calm", winds=[wind])
+    torques = []
+    env.reset(seed=0)
+    for _ in range(60):
+        *_, info = env.step(np.zeros(3))
+        torques.append(info["torque"][2])
+    assert np.mean(torques) > 0.02  # the faster side at negative y is pushed along x
+
+
+def test_winds_of_one_s_own_must_be_sampled_first():
+    class Breeze:
+        def velocity(self, points, time):
+            return 0 * np.asarray(points)
+
+    with pytest.raises(InputError, match="on_grid"):
+        WindHoverEnv(winds=[Breeze()])
+
+
+def test_references_are_smooth_and_begin_at_rest():
+    rng = np.random.default_rng(0)
+    box = np.array([1.2, 1.2, 0.4])
+    for rows in (
+        hold(START, math.pi, 20.0),
+        figure_of_eight(START, math.pi, 20.0, (1.4, 0.6), 6.0, 0.3),
+        random_spline(rng, START, math.pi, 20.0, box, 1.5),
+    ):
+        assert rows.shape == (4001, 10)
+        np.testing.assert_allclose(rows[0, :3], START, atol=1e-12)
+        assert np.abs(rows[0, 3:9]).max() < 0.05
+        assert np.abs(np.diff(rows[:, 6:9], axis=0)).max() < 0.5
+        assert np.linalg.norm(rows[:, 6:9], axis=1).max() < 9.0
+        assert rows[:, 2].min() > 0.5
+        # velocity is the derivative of position
+        moved = START + 0.005 * np.cumsum(rows[:, 3:6], axis=0)
+        assert np.abs(moved - rows[:, :3]).max() < 0.02
+
+
+def test_a_lost_vehicle_ends_the_episode():
+    env = WindHoverEnv("calm", winds=[Uniform((14.0, 0.0, 0.0))])
+    env.reset(seed=0)
+    for _ in range(200):
+        *_, lost, _, info = env.step(np.zeros(3))
+        if lost:
+            break
+    assert lost
+    assert info["lost"]
+
+
+def test_the_cage_feels_a_vertical_offset_and_the_ring_does_not():
+    from windwrench.envs import Fan, Scenario
+
+    still = Scenario("still, half a metre off", motions=("still",), offset=(0.0, 0.0))
+    torque = {}
+    for name, elevation in (("cage", 0.6), ("ring", 0.0)):
+        env = FanTracking2DEnv(still, fan=Fan(height=1.5, hull_elevation=elevation))
+        env.reset(seed=0)
+        env.flight.loop.setpoint[2] += 0.45  # above the axis
+        values = []
+        for k in range(60):
+            *_, info = env.step(np.zeros(2))
+            if k > 20:
+                values.append(info["torque"][1])
+        torque[name] = np.mean(values)
+    assert torque["cage"] < -0.008
+    assert abs(torque["ring"]) < 0.5 * abs(torque["cage"])
+
+
+def test_a_sync_vector_environment_flies_them():
+    envs = gym.make_vec(
+        "windwrench/WindHover-v0", num_envs=2, vectorization_mode="sync", scenario="wash"
+    )
+    frames, _ = envs.reset(seed=0)
+    assert frames.shape == (2, 27)
+    single = WindHoverEnv("wash")
+    single.reset(seed=1)
+    action = np.full((2, 3), 0.3, np.float32)
+    np.testing.assert_array_equal(envs.step(action)[0][1], single.step(action[1])[0])
+
+
+def test_every_scenario_of_the_wind_is_said():
+    assert set(KEPT["WindHover"]["scenarios"]) == set(WIND_SCENARIOS)
+    assert all(s.summary for s in WIND_SCENARIOS.values())
+
+
+def test_a_flight_in_wind_refuses_tables_of_another_shape():
+    from windwrench.dynamics import load_vehicle
+
+    flight = WindyFlight(load_vehicle("ardrone2"))
+    with pytest.raises(InputError, match=r"reference must be finite numbers, shape \(n, 10\)"):
+        flight.reset(np.random.default_rng(0), START, reference=np.zeros((5, 3)))
+    with pytest.raises(InputError, match="on_grid"):
+        flight.reset(np.random.default_rng(0), START, winds=["breeze"])

@@ -1,0 +1,380 @@
+"""Winds: spectra against theory, formulas, files, and the same field in other simulators."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import InputError
+from windwrench.dynamics.mean_jet import AIR_DENSITY
+from windwrench.envs.fan import Fan, fan_record, jet_at, jet_table
+from windwrench.envs.wind import (
+    FanWall,
+    GridWind,
+    Gust,
+    PyFlytWind,
+    RotorPyWind,
+    Shear,
+    Turbulence,
+    Uniform,
+    VehicleWash,
+    Wind,
+    low_altitude,
+    on_grid,
+    pyflyt_wind_type,
+    read_wind,
+    spectrum,
+    switching,
+    write_wind,
+)
+
+FOOT = 0.3048
+LINE = 0.25 * np.arange(512)  # m
+
+
+def measured_spectra(fields, heading):
+    """Wave numbers, and the mean one-sided spectrum (n, 3) of the components of fields, in axes of
+    which the first is ``heading``, along a line in that direction.
+    """
+    along = np.array([math.cos(heading), math.sin(heading), 0.0])
+    axes = np.array([along, [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
+    points, window = LINE[:, None] * along, np.hanning(len(LINE))[:, None]
+    power = np.zeros((len(LINE) // 2 + 1, 3))
+    for field in fields:
+        values = field.velocity(points, 0.0) @ axes.T
+        power += np.abs(np.fft.rfft(window * values, axis=0)) ** 2
+    power *= LINE[1] / (math.pi * np.sum(window**2) * len(fields))
+    return 2 * math.pi * np.fft.rfftfreq(len(LINE), LINE[1]), power
+
+
+@pytest.mark.parametrize("form", ["dryden", "von-karman"])
+@pytest.mark.parametrize("case", ["one length", "near the ground"])
+def test_spectra_along_the_mean_wind_are_those_of_the_specification(form, case):
+    heading = 0.6
+    mean = 5.0 * np.array([math.cos(heading), math.sin(heading), 0.0])
+    sigma, length = (
+        (np.full(3, 1.2), np.full(3, 4.0)) if case == "one length" else low_altitude(5.0, 6.0)
+    )
+    fields = [Turbulence(k, sigma, length, mean, form, modes=40, smallest=0.1) for k in range(500)]
+    omega, power = measured_spectra(fields, heading)
+    for axis in range(3):
+        theory = spectrum(
+            form, "along" if axis == 0 else "across", omega, sigma[axis], length[axis]
+        )
+        # bands between what a line of 128 m and points 0.25 m apart show
+        for low, high in ((0.2, 0.5), (0.5, 1.2), (1.2, 3.0), (3.0, 7.0)):
+            band = (omega >= low) & (omega < high)
+            ratio = power[band, axis].mean() / theory[band].mean()
+            assert ratio == pytest.approx(1.0, abs=0.15), (axis, low)
+
+
+@pytest.mark.parametrize("form", ["dryden", "von-karman"])
+@pytest.mark.parametrize("axis", ["along", "across"])
+def test_the_variance_is_the_spectrum_s_integral(form, axis):
+    omega = np.geomspace(1e-6, 1e6, 200_001)
+    whole = np.trapezoid(spectrum(form, axis, omega, 1.7, 3.0), omega)
+    assert whole == pytest.approx(1.7**2, rel=2e-3)
+
+
+def test_gusts_at_two_stations_are_as_alike_as_the_theory_says():
+    # Dryden's correlation: exp(-r/L) along the line, (1 - r / 2L) exp(-r/L) across it
+    points = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 2.0, 0.0]])
+    seen = np.array(
+        [Turbulence(s, 1.0, 2.0, (5, 0, 0), modes=24).velocity(points, 0.0) for s in range(1500)]
+    )
+    for j, r in ((1, 0.5), (2, 2.0)):
+        decay = math.exp(-r / 2.0)
+        for axis, theory in ((1, decay), (0, (1 - r / 4.0) * decay), (2, (1 - r / 4.0) * decay)):
+            assert np.mean(seen[:, 0, axis] * seen[:, j, axis]) == pytest.approx(theory, abs=0.09)
+
+
+def test_low_altitude_is_the_specification_s_worked_out():
+    sigma, length = low_altitude(100 * FOOT, 10.0)
+    part = 0.177 + 0.0823
+    np.testing.assert_allclose(sigma, [1.0 / part**0.4, 1.0 / part**0.4, 1.0])
+    np.testing.assert_allclose(length / FOOT, [100 / part**1.2, 100 / part**1.2, 100.0])
+    np.testing.assert_array_equal(low_altitude(0.5, 3.0)[1], low_altitude(10 * FOOT, 3.0)[1])
+
+
+def test_a_frozen_field_is_carried_along():
+    field = Turbulence(3, 1.0, 2.0, (4.0, -1.0, 0.5))
+    points = np.random.default_rng(0).uniform(-3, 3, (20, 3))
+    np.testing.assert_allclose(
+        field.velocity(points, 0.7),
+        field.velocity(points - 0.7 * np.array([4.0, -1.0, 0.5]), 0.0),
+        atol=1e-8,
+    )
+    assert not np.allclose(field.velocity(points, 0.7), field.velocity(points, 0.0), atol=0.1)
+
+
+def test_the_air_keeps_its_volume():
+    field, step = Turbulence(1, 1.0, 2.0, (4, 0, 0)), 1e-4
+    points = np.random.default_rng(1).uniform(-2, 2, (10, 3))
+    slopes = [
+        (field.velocity(points + d, 0.0) - field.velocity(points - d, 0.0))[:, i] / (2 * step)
+        for i, d in enumerate(step * np.eye(3))
+    ]
+    assert np.abs(np.sum(slopes, axis=0)).max() < 1e-5 * np.abs(slopes).max() + 1e-5
+
+
+def test_a_seed_is_a_field():
+    points = np.random.default_rng(2).uniform(-2, 2, (5, 3))
+
+    def at(seed):
+        return Turbulence(seed, 1.0, 2.0, (4, 0, 0)).velocity(points, 1.0)
+
+    np.testing.assert_array_equal(at(4), at(4))
+    assert not np.allclose(at(4), at(5))
+
+
+def test_shear_grows_with_height():
+    points = np.array([[0, 0, h * FOOT] for h in (0.1, 3.0, 20.0, 200.0)])
+    log = Shear((0, 5.0, 0), law="log").velocity(points, 0.0)
+    expected = [
+        5.0 * math.log(max(h, 0.15) / 0.15) / math.log(20 / 0.15) for h in (0.1, 3, 20, 200)
+    ]
+    np.testing.assert_allclose(log[:, 1], expected, atol=1e-12)
+    power = Shear((5.0, 0, 0), reference=10.0, law="power", exponent=0.2)
+    np.testing.assert_allclose(power.velocity(points, 0.0)[:, 0], 5.0 * (points[:, 2] / 10) ** 0.2)
+
+
+def test_a_gust_comes_and_goes_by_its_cosine():
+    gust = Gust((0, 0, -2.0), length=3.0, start=1.0, speed=4.0, direction=(1, 0, 0))
+    held = Gust((0, 0, -2.0), 3.0, start=1.0, speed=4.0, direction=(1, 0, 0), falls=False)
+    at = np.array([[2.0, 7.0, 1.0]])
+    for time, share, behind in (
+        (1.0, 0, 0),
+        (1.5, 0, 0),
+        (1.875, 0.5, 0.5),
+        (2.25, 1, 1),
+        (3.2, 0, 1),
+    ):
+        assert gust.velocity(at, time)[0, 2] == pytest.approx(-2.0 * share, abs=1e-12)
+        assert held.velocity(at, time)[0, 2] == pytest.approx(-2.0 * behind, abs=1e-12)
+
+
+def test_one_fan_of_a_wall_is_the_fan_of_the_environment():
+    fan = Fan(turbulence=0.0)
+    wall = FanWall([fan.speed], 1, 1, radius=fan.radius, hub_radius=fan.hub_radius, turbulence=0.0)
+    record, tables = fan_record(fan, np.zeros((4, 3)), 0.005), jet_table(fan.radius, fan.hub_radius)
+    points = np.random.default_rng(3).uniform([0.1, -1.5, 0.0], [6.0, 1.5, 2.5], (50, 3))
+    wind = np.empty(3)
+    for point, seen in zip(points, wall.velocity(points, 3.0), strict=True):
+        jet_at(record[0], *tables, *point, wind)
+        np.testing.assert_allclose(seen, wind, atol=1e-12)
+
+
+def test_a_wall_adds_momentum_and_turns_with_its_direction():
+    speeds = np.zeros(6)
+    speeds[[0, 1]] = 4.0, 3.0
+    alone = []
+    for i in (0, 1):
+        one = np.where(np.arange(6) == i, speeds, 0.0)
+        alone.append(FanWall(one, 2, 3, turbulence=0.0).velocity([[2.0, 0.4, 0.9]], 0.0)[0])
+    both = FanWall(speeds, 2, 3, turbulence=0.0).velocity([[2.0, 0.4, 0.9]], 0.0)[0]
+    assert both[0] == pytest.approx(math.hypot(alone[0][0], alone[1][0]))
+    np.testing.assert_allclose(both[1:], alone[0][1:] + alone[1][1:])
+    turned = FanWall(speeds, 2, 3, direction=(0, 1, 0), turbulence=0.0)
+    np.testing.assert_allclose(
+        turned.velocity([[-0.4, 2.0, 0.9]], 0.0)[0], [-both[1], both[0], both[2]], atol=1e-12
+    )
+
+
+def test_fans_switch_and_lag():
+    table = switching(np.random.default_rng(0), 4, 20.0, on=0.5, lag=0.0)
+    assert table.shape == (1001, 4)
+    assert 0.3 < np.mean(table == 0.0) < 0.7
+    assert table[table > 0].min() >= 2.0
+    slow = switching(np.random.default_rng(0), 4, 20.0, on=0.5, lag=0.3)
+    np.testing.assert_array_equal(slow[0], table[0])
+    rises = np.abs(np.diff(slow, axis=0)).max()
+    assert 0 < rises < 0.1 * np.abs(np.diff(table, axis=0)).max()
+    wall = FanWall(table, 2, 2, turbulence=0.0)
+    between = [wall.velocity([[1.5, 0.0, 1.2]], t)[0, 0] for t in (0.0, 100.0)]
+    last = FanWall(table[-1], 2, 2, turbulence=0.0).velocity([[1.5, 0.0, 1.2]], 0.0)[0, 0]
+    assert between[1] == pytest.approx(last)
+
+
+def test_a_wash_carries_its_vehicle():
+    # the momentum flux through a plane below is the thrust
+    wash = VehicleWash((0, 0, 3.0), thrust=5.0, turbulence=0.0)
+    for below in (0.6, 1.5):
+        r = np.linspace(0.0, 2.9, 1000)
+        points = np.column_stack([r, 0 * r, np.full_like(r, 3.0 - below)])
+        down = wash.velocity(points, 0.0)[:, 2]
+        flux = AIR_DENSITY * np.trapezoid(down**2 * 2 * math.pi * r, r)
+        assert flux == pytest.approx(5.0, rel=0.02)
+        assert down.max() <= 0.0
+
+
+def test_a_wash_follows_its_vehicle():
+    path = np.array([[0.02 * k, 0.0, 3.0] for k in range(51)])
+    wash = VehicleWash(path, turbulence=0.0)
+    still = VehicleWash((0.5, 0, 3.0), turbulence=0.0)
+    points = np.array([[0.55, 0.1, 2.0]])
+    np.testing.assert_allclose(wash.velocity(points, 0.5), still.velocity(points, 0.0), atol=1e-9)
+
+
+def test_winds_add_up():
+    parts = Uniform((1, 2, 3)), Shear((4, 0, 0)), Turbulence(0, 1.0, 2.0, (4, 0, 0))
+    points = np.random.default_rng(5).uniform(-2, 2, (4, 3))
+    whole = parts[0] + parts[1] + parts[2]
+    assert isinstance(whole, Wind)
+    np.testing.assert_allclose(
+        whole.velocity(points, 0.3), sum(p.velocity(points, 0.3) for p in parts), atol=1e-12
+    )
+
+
+class Vortex:
+    """A wind of one's own: linear in place and time, so that a grid holds it exactly."""
+
+    def velocity(self, points, time):
+        p = np.asarray(points)
+        return np.column_stack([-p[:, 1] * (1 + time), p[:, 0], 0.5 * p[:, 2] - time])
+
+
+def test_a_wind_of_one_s_own_flies_as_a_grid():
+    grid = on_grid(Vortex(), (-1, -1, 0), (1, 1.1, 2), 0.5, times=[0.0, 1.0, 2.0])
+    points = np.random.default_rng(6).uniform([-1, -1, 0], [1, 1.1, 2], (30, 3))
+    for time in (0.0, 0.3, 1.7):
+        np.testing.assert_allclose(
+            grid.velocity(points, time), Vortex().velocity(points, time), atol=1e-12
+        )
+    np.testing.assert_allclose(
+        grid.velocity([[5.0, 0.0, 1.0]], 9.0), Vortex().velocity([[1.0, 0.0, 1.0]], 2.0), atol=1e-12
+    )
+    with pytest.raises(InputError, match="on_grid"):
+        Uniform((1, 0, 0)) + Vortex()
+
+
+@pytest.mark.parametrize("kind", [".npz", ".nc"])
+def test_a_grid_comes_back_from_its_file(tmp_path, kind):
+    if kind == ".nc":
+        pytest.importorskip("xarray", reason="xarray is not installed: pip install xarray")
+    grid = on_grid(Vortex(), (-1, -1, 0), (1, 1, 2), 0.5, times=[0.0, 1.0])
+    path = write_wind(grid, tmp_path / f"wind{kind}")
+    again = read_wind(path)
+    np.testing.assert_array_equal(again.wind, grid.wind)
+    for a, b in zip(again.axes, grid.axes, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_netcdf_of_another_order_and_without_a_time_is_read(tmp_path):
+    xarray = pytest.importorskip("xarray", reason="xarray is not installed: pip install xarray")
+    axes = {"z": [0.0, 1.0], "y": [0.0, 1.0, 2.0], "x": [0.0, 0.5, 1.0, 1.5]}
+    u = np.arange(24.0).reshape(2, 3, 4)
+    data = xarray.Dataset({n: (("z", "y", "x"), k * u) for k, n in enumerate("uvw")}, coords=axes)
+    data.to_netcdf(tmp_path / "a.nc")
+    wind = read_wind(tmp_path / "a.nc")
+    np.testing.assert_allclose(wind.velocity([[1.5, 1.0, 1.0]], 4.0), [[0.0, 19.0, 38.0]])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "words"),
+    [
+        ({"x": [0.0]}, "lacks 'y'"),
+        ({"x": [0, 1, 3], "y": [0], "z": [0], "wind": np.zeros((1, 3, 1, 1, 3))}, "x must grow in"),
+        ({"x": [0, 1], "y": [0], "z": [0], "wind": np.zeros((1, 3, 1, 1, 3))}, "must have the sha"),
+        ({"x": [0], "y": [0], "z": [0], "wind": np.full((1, 1, 1, 1, 3), np.nan)}, "finite numb"),
+    ],
+)
+def test_a_spoiled_file_is_named(tmp_path, arrays, words):
+    path = tmp_path / "w.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(InputError, match=words) as refused:
+        read_wind(path)
+    assert str(path) in str(refused.value)
+
+
+def test_what_is_no_file_of_winds_is_named(tmp_path):
+    (tmp_path / "w.npz").write_bytes(b"nothing")
+    (tmp_path / "w.txt").write_text("nothing")
+    for name, words in (("w.npz", "cannot be read"), ("w.txt", "npz or .nc"), ("x.nc", "no such")):
+        with pytest.raises(InputError, match=words):
+            read_wind(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Uniform((1, 2)), "velocity must be three"),
+        (lambda: Shear((1, 0, 0), law="cubic"), "law"),
+        (lambda: Shear((1, 0, 0), reference=0.01), "roughness must be below"),
+        (lambda: Gust((0, 0, 0), 2.0), "direction must not be zero"),
+        (lambda: Gust((1, 0, 0), -2.0), "length must be"),
+        (lambda: Turbulence(0, 1.0, 2.0, (1, 0, 0), form="kolmogorov"), "form"),
+        (lambda: Turbulence(0, -1.0, 2.0, (1, 0, 0)), "sigma must be"),
+        (lambda: Turbulence(0, 1.0, 0.3, (1, 0, 0)), "smallest"),
+        (lambda: FanWall([1.0, 2.0]), r"shape \(9,\)"),
+        (lambda: FanWall([-1.0], 1, 1), "from 0 on"),
+        (lambda: VehicleWash((1, 2)), r"shape \(3,\)"),
+        (lambda: low_altitude(400.0, 3.0), "1000 ft"),
+        (lambda: GridWind(([0], [0], [0], [0]), np.zeros((1, 1, 1, 1, 2))), "must have the shape"),
+        (lambda: Uniform((1, 0, 0)).velocity([1.0, 2.0], 0.0), r"shape \(n, 3\)"),
+        (lambda: Uniform((1, 0, 0)).velocity([[1.0, 2.0, 3.0]], np.nan), "time"),
+        (lambda: pickle.dumps(Uniform((1, 0, 0))), "cannot be copied"),
+    ],
+)
+def test_what_cannot_be_is_named_in_one_line(make, words):
+    with pytest.raises(InputError, match=words) as refused:
+        make()
+    assert "\n" not in str(refused.value)
+
+
+def test_pyflyt_gets_the_same_field():
+    wind = Turbulence(0, 1.0, 2.0, (4, 0, 0))
+    points = np.random.default_rng(7).uniform(-1, 1, (5, 3))
+    # as Aviary makes and asks for it
+    field = pyflyt_wind_type(wind)(np_random=np.random.default_rng(0))
+    for one in (field, PyFlytWind(wind)):
+        np.testing.assert_array_equal(one(0.4, points), wind.velocity(points, 0.4))
+        assert one(0.0, np.array([[0.0, 0.0, 1.0]] * 5)).shape == (5, 3)
+
+
+def test_rotorpy_gets_the_same_field():
+    wind = FanWall(np.full(9, 4.0))
+    seen = RotorPyWind(wind).update(0.4, np.array([2.0, 0.1, 1.2]))
+    np.testing.assert_array_equal(seen, wind.velocity([[2.0, 0.1, 1.2]], 0.4)[0])
+
+
+@pytest.mark.slow
+def test_pyflyt_itself_flies_in_it():
+    core = pytest.importorskip("PyFlyt.core", reason="PyFlyt is not installed: pip install PyFlyt")
+    world = core.Aviary(
+        start_pos=np.array([[0.0, 0.0, 1.0]]),
+        start_orn=np.zeros((1, 3)),
+        drone_type="quadx",
+        wind_type=pyflyt_wind_type(Uniform((2.0, 0.0, 0.0))),
+    )
+    world.set_mode(0)
+    for _ in range(20):
+        world.step()
+    assert world.state(0)[3][0] > 0.01
+
+
+@pytest.mark.slow
+def test_rotorpy_itself_flies_in_it():
+    pytest.importorskip("rotorpy", reason="rotorpy is not installed: pip install rotorpy")
+    from rotorpy.controllers.quadrotor_control import SE3Control
+    from rotorpy.environments import Environment
+    from rotorpy.trajectories.hover_traj import HoverTraj
+    from rotorpy.vehicles.hummingbird_params import quad_params
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    wind = Uniform((3.0, 0.0, 0.0)) + Turbulence(0, 0.3, 2.0, (3, 0, 0))
+    profile, given = RotorPyWind(wind), []
+
+    class Watched:
+        def update(self, t, position):
+            given.append(wind.velocity(np.array(position)[None], t)[0])
+            return profile.update(t, position)
+
+    world = Environment(Multirotor(quad_params), SE3Control(quad_params), HoverTraj(), Watched())
+    flown = world.run(
+        t_final=0.5, use_mocap=False, terminate=False, plot=False, verbose=False,
+        animate_bool=False, plot_mocap=False, plot_estimator=False, plot_imu=False,
+    )  # fmt: skip
+    state = flown["state"]
+    assert all(any(np.array_equal(row, one) for one in given) for row in state["wind"][:-1])
+    assert state["x"][-1, 0] > 0.01
