@@ -119,7 +119,8 @@ class LiveFilter:
             if late and (row.has_pose or row.gyro is not None):
                 self._tallies.counts["too late"] += 1
             return None
-        self._tallies.counts["late"] += late
+        if late:
+            self._tallies.counts["late"] += 1
         return self._output(row, estimate, late)
 
     def _carry(self, timed: TimedFilter, row: Row, now: float) -> WrenchEstimate:

@@ -65,7 +65,8 @@ class Joiner:
             not moving and not (sample.whole or t - self._last_row > self._settings.silent)
         )
         if alone:
-            self._tallies.counts["waiting"] += sample.has_pose
+            if sample.has_pose:
+                self._tallies.counts["waiting"] += 1
             return None
         if not moving and sample.rotor_speeds is None and sample.command is None:
             return None

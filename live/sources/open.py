@@ -34,10 +34,31 @@ def _simulated(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tal
     return Simulated(text, vehicle)
 
 
+def _mavlink(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tallies) -> Source:
+    from .mavlink import Mavlink
+
+    return Mavlink(text, vehicle, tallies)
+
+
+def _crazyflie(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tallies) -> Source:
+    from .crazyflie import CrazyflieLog
+
+    return CrazyflieLog(text, vehicle, tallies)
+
+
+def _ros2(text: str, vehicle: Vehicle, log_map: LogMap | None, tallies: Tallies) -> Source:
+    from .ros2 import Ros2
+
+    return Ros2(text, vehicle, tallies)
+
+
 SOURCES: dict[str, tuple[Maker, str]] = {
     "sim": (_simulated, "sim:SCENARIO"),
     "csv": (_text, "- or csv:- (a table on standard input)"),
     "udp-json": (_udp_json, "udp-json://HOST:PORT"),
+    "mavlink": (_mavlink, "mavlink:udp://HOST:PORT or mavlink:/dev/ttyUSB0"),
+    "crazyflie": (_crazyflie, "crazyflie:radio://0/80/2M/E7E7E7E7E7"),
+    "ros2": (_ros2, "ros2:TOPICS.yaml"),
 }
 MAPPED = ("csv", "udp-json")  # kinds whose fields a map can name
 

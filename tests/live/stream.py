@@ -41,9 +41,7 @@ def as_objects(flown):
     return [
         {"t": t, **dict(zip(names, row, strict=True)), "vbat": v, "seq": i}
         for i, (t, row, v) in enumerate(
-            zip(
-                flown["t"].tolist(), table.tolist(), flown["voltage"].tolist(), strict=True
-            )
+            zip(flown["t"].tolist(), table.tolist(), flown["voltage"].tolist(), strict=True)
         )
     ]
 
