@@ -15,6 +15,7 @@ from .commands.from_checkout import close_loop, has_studies, leaderboard, real_f
 from .commands.identifying import identify
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
+from .commands.live import live
 from .commands.logs import diagnose, estimate, replay
 from .commands.output import prepare_output
 from .commands.paper import reproduce
@@ -79,6 +80,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     convert,
     estimate,
     diagnose,
+    live,
     identify,
     record,
     replay,

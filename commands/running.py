@@ -96,6 +96,8 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
             print(
                 json.dumps(plain({"command": name, **outcome, "written": written}), allow_nan=False)
             )
+        if run.code:
+            raise typer.Exit(run.code)
 
     shared = {
         "as_json": JsonOption,

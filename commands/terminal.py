@@ -51,10 +51,11 @@ class Run:
     written: list[Path] = field(default_factory=list)
     record: Path | None = None  # where it is noted how the results came about
     made: list[Path] = field(default_factory=list)  # folders, innermost first
+    code: int = 0  # exit code of work that was ended and has a result all the same
 
     def begin(self, dry: bool = False) -> None:
         """Forget the command before."""
-        self.dry, self.written, self.record, self.made = dry, [], None, []
+        self.dry, self.written, self.record, self.made, self.code = dry, [], None, [], 0
 
     def undo(self) -> None:
         """Take the folders away again that were made for results and are empty."""

@@ -1,6 +1,5 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchUKF, fit_noise
 from ..estimator.estimate import STATUSES
 from ..estimator.noise_fit import tuning_note
+from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
 from .logs.flight_log import FlightLog
@@ -25,9 +25,6 @@ Array = NDArray[np.float64]
 # every 50 s, and it is refused only if it also lies away from the pose before
 GATE = 0.9999
 _REPORTED = 10_000  # rows between two reports of progress
-# s without a row after which the filter holds its pose, and steps of any length do; at most so many
-_FORGETS, _REST = 20.0, 1000
-_SLACK = 0.1  # of a period: a step so little too long is still one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,14 +252,8 @@ def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
     dt = float(log.t[k] - log.t[k - 1])
     speeds = 0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k])
     voltage = None if log.voltage is None else 0.5 * float(log.voltage[k - 1] + log.voltage[k])
-    near = min(dt, _FORGETS)
-    steps = max(1, math.ceil(near / period - _SLACK))
-    for _ in range(steps):
-        ukf.predict(speeds, near / steps, voltage)
-    if dt > _FORGETS:
-        steps = min(math.ceil((dt - near) / period), _REST)
-        for _ in range(steps):
-            ukf.predict(speeds, (dt - near) / steps, voltage)
+    for step in steps_between(dt, period):
+        ukf.predict(speeds, step, voltage)
 
 
 def _take_in_imu(ukf: WrenchUKF, log: FlightLog, k: int) -> None:

@@ -21,6 +21,7 @@ from ...runtime.regular_files import open_regular
 from .table import WHAT, Array, Table, empty_columns, text_row
 from .text_layout import TextLayout, without_mark
 
+_CUT_OFF = "the last line was cut off, and left out"
 _PIECE = 2**18  # characters read at a time
 _BLOCK = 20_000  # lines turned into numbers at a time
 _DECIMAL_COMMA = (
@@ -58,13 +59,15 @@ def open_csv(path: Path, largest: int, layout: TextLayout | None = None) -> Tabl
         first_line = layout.before + layout.header + layout.between + 1
     elif quoted:
         rows = sum(1 for _ in all_lines()) - 1
+    elif rows > 1 and _cut_off(path, len(header)):
+        rows, notes = rows - 1, (_CUT_OFF,)
 
     def read(names: Sequence[str]) -> dict[str, Array]:
         columns = empty_columns(path, rows, names)
         where = [header.index(name) for name in names]
         lines, done = all_lines(), 0
         next(lines)
-        if layout is not None:  # the last may be cut off
+        if notes:  # the last is cut off
             lines = islice(lines, rows)
         while block := list(islice(lines, _BLOCK)):
             numbers = _numbers(path, block, (done, first_line), len(header) - 1, names, where)
@@ -202,8 +205,21 @@ def _whole_rows(lines: Iterator[str], width: int) -> tuple[int, tuple[str, ...]]
     for last in lines:  # noqa: B007 - the last is wanted
         rows += 1
     if rows > 1 and last.count(",") + 1 < width:
-        return rows - 1, ("the last line was cut off, and left out",)
+        return rows - 1, (_CUT_OFF,)
     return rows, ()
+
+
+def _cut_off(path: Path, width: int) -> bool:
+    """Return whether a file ends within its last line: without an end of the line, and with fewer
+    fields than the header. A recording that was killed leaves such a one.
+    """
+    if path.name.lower().endswith(".gz"):
+        return False
+    with open_regular(path, WHAT) as file:
+        size = file.seek(0, io.SEEK_END)
+        file.seek(max(0, size - LIMITS.table_line))
+        last = file.read().rpartition(b"\n")[2]
+    return bool(last) and last.count(b",") + 1 < width
 
 
 def _numbers(

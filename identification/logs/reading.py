@@ -198,6 +198,7 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
         name=log_name(path),
         source=str(path),
         notes=(
+            *table.notes,
             *gap_notes,
             *time_notes(columns["t"]),
             *_pose_notes(columns["t"], lost, accelerometer is not None or gyro is not None),

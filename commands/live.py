@@ -1,0 +1,268 @@
+"""The wrench while the vehicle flies."""
+
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.live import Live
+
+from ..runtime.errors import InputError
+from .terminal import MapOption, Out, console, errors, note, offering, run, vehicle_names, working
+
+if TYPE_CHECKING:
+    from ..dynamics.vehicle import Vehicle
+    from ..live.session import Means, Session
+
+_PAGES = 5.0  # a second
+_SIMULATED = "ardrone2"  # that flies in a simulation where nothing else is said
+
+LiveVehicleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="Vehicle that flies: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; with "
+        "sim: ardrone2, unless another is given.",
+        autocompletion=offering(vehicle_names),
+    ),
+]
+
+
+def live(
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="Where messages come from: sim:SCENARIO, - (a table on standard input), "
+            "udp-json://HOST:PORT, mavlink:udp://HOST:PORT or mavlink:/dev/ttyUSB0, "
+            "crazyflie:radio://0/80/2M/E7E7E7E7E7, ros2:TOPICS.yaml."
+        ),
+    ],
+    vehicle: LiveVehicleOption = None,
+    map: MapOption = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            help="Flight log to write meanwhile, a new .csv; whole up to its last second, whatever "
+            "ends the recording."
+        ),
+    ] = None,
+    view: Annotated[
+        bool,
+        typer.Option(
+            "--view",
+            help="Serve a page on this machine alone that draws vehicle, force and the last 30 s.",
+        ),
+    ] = False,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="With --view: port of the page; 0: any free one.")
+    ] = 8765,
+    diagnose_after: Annotated[
+        bool,
+        typer.Option("--diagnose-after", help="Diagnose the recorded log when the stream ends."),
+    ] = False,
+    out: Out = Path("results/diagnose"),
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1, help="End after so many seconds; default: with the source, or at Ctrl-C."
+        ),
+    ] = None,
+    gate: Annotated[
+        float | None,
+        typer.Option(
+            help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none. "
+            "Default: 0.9999."
+        ),
+    ] = None,
+    horizon: Annotated[
+        float,
+        typer.Option(
+            min=0.01,
+            max=5.0,
+            help="Time that a message may be late, s; it is fused where it belongs.",
+        ),
+    ] = 0.3,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0,
+            max=10_000.0,
+            help="Rate of the messages, Hz. Default: measured on the first 21, whose estimates "
+            "come then.",
+        ),
+    ] = None,
+    wait: Annotated[
+        float,
+        typer.Option(min=0.0, help="Give up after so many seconds without an estimate; 0: never."),
+    ] = 10.0,
+) -> dict[str, Any]:
+    """Estimate the wrench while the vehicle flies: show it, send it back, record the flight. Prints
+    a page on a terminal, else a line for each estimate, the columns of wrench.csv.
+
+    Example: windwrench live sim:base
+    """
+    import shutil
+
+    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..identification.logs.log_map import load_map
+    from ..live.filtering import LiveSettings, warm_up
+    from ..live.recorder import Recorder
+    from ..live.session import Means, Session, SessionSettings
+    from ..live.sources.open import kind_of, make_source
+    from ..live.tallies import Tallies
+
+    kind = kind_of(source)
+    if vehicle is None and kind != "sim":
+        raise InputError(
+            f"--vehicle: {source} does not say which vehicle flies; expected "
+            f"{', '.join(preset_names())} or the path of a YAML file"
+        )
+    model = load_vehicle(vehicle or _SIMULATED)
+    if diagnose_after and record is None:
+        raise InputError("--diagnose-after: expected --record LOG with it, the log to diagnose")
+    if gate is not None and gate != 0.0 and not 0.5 <= gate < 1.0:
+        raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
+    settings = LiveSettings(horizon=horizon, rate_hz=rate)
+    if gate is not None:
+        settings = LiveSettings(gate=gate or None, horizon=horizon, rate_hz=rate)
+    tallies, means = Tallies(), Means()
+    stream = make_source(source, model, None if map is None else load_map(map), tallies)
+    recorder = None
+    if record is not None:
+        preset = (vehicle or _SIMULATED) in preset_names()
+        recorder = Recorder(record, model, tallies, horizon, preset)
+    with working("preparing the filter"):
+        warm_up(model)
+    lines = not console.is_terminal and not console.quiet
+    out_text = sys.stdout
+    if lines:
+        from ..live.outputs import COLUMNS, as_line
+
+        out_text.write(",".join(COLUMNS) + "\n")
+
+    def tell(output: Any) -> None:
+        means.add(output)
+        if lines:
+            out_text.write(as_line(output))
+
+    session = Session(
+        stream,
+        model,
+        tallies,
+        settings,
+        recorder,
+        SessionSettings(wait=wait, seconds=seconds),
+        tell,
+        out_text.flush if lines else lambda: None,
+    )
+    with ExitStack() as shown:
+        if view:
+            from ..live.web_view import WebView
+
+            address = shown.enter_context(WebView(session, model, port)).address
+            note(f"page: {address}")
+        interrupted = _watch(session, model, shutil.get_terminal_size().columns)
+    result = _summary(session, model, means)
+    if recorder is not None and recorder.rows:
+        run.written.append(recorder.path)
+        note(f"wrote {recorder.path}")
+    if diagnose_after:
+        if recorder is None or not recorder.rows:
+            raise InputError("--diagnose-after: nothing was recorded to diagnose")
+        from .logs import diagnose
+
+        result["diagnosis"] = diagnose([recorder.path], vehicle=vehicle or _SIMULATED, out=out)
+    if interrupted:
+        run.code = 130
+    return result
+
+
+def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
+    """Show a stream until it ends; return whether the user ended it.
+
+    Raises:
+        InputError: as ``Session.run``.
+    """
+    failed: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            session.run()
+        except BaseException as error:
+            failed.append(error)
+
+    from ..live.terminal_page import page
+
+    title = f"{session.source.name}, {vehicle.name}"
+
+    def render() -> Any:
+        return page(session.snapshot(), title, vehicle.weight, vehicle.arm_l)
+
+    thread = threading.Thread(target=work, name="stream", daemon=True)
+    interrupted = False
+    draws = console.is_terminal and not console.quiet
+    thread.start()
+    try:
+        if draws:
+            with Live(render(), console=console, auto_refresh=False, transient=True) as shown:
+                _each_page(thread, lambda: shown.update(render(), refresh=True))
+        else:
+            _each_page(thread, lambda: None)
+    except KeyboardInterrupt:
+        interrupted = True
+    session.stop()
+    thread.join()
+    if failed:
+        raise failed[0]
+    if draws and session.output is not None:
+        console.print(render())
+    return interrupted
+
+
+def _each_page(thread: threading.Thread, show: Callable[[], None]) -> None:
+    while thread.is_alive():
+        show()
+        thread.join(1.0 / _PAGES)
+
+
+def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str, Any]:
+    """Say what came and what became of it; return it."""
+    from ..live.terminal_page import counts_words
+
+    now = session.snapshot()
+    median, most = now.latency_ms
+    result: dict[str, Any] = {
+        "source": session.source.name,
+        "vehicle": vehicle.name,
+        "seconds": now.seconds,
+        "estimates": now.estimates,
+        "messages": {kind: rate.count for kind, rate in session.tallies.rates.items()},
+        "counts": now.counts,
+        "restarts": now.restarts,
+        "period_s": session.filter.period,
+        "clock_drift_ppm": now.drift_ppm,
+        "latency_ms": {"median": median, "p99": most},
+        "recorded_rows": now.recorded,
+        "force_mean_N": means.mean[:3],
+        "force_std_N": means.deviation[:3],
+        "torque_mean_Nm": means.mean[3:],
+        "torque_std_Nm": means.deviation[3:],
+        "ended": session.ended,
+    }
+    messages = ", ".join(f"{n} {kind}" for kind, n in sorted(result["messages"].items()))
+    lines = [f"{now.estimates} estimates over {now.seconds:.1f} s, of {messages}"]
+    if now.counts:
+        lines.append(f"counted: {counts_words(now.counts)}")
+    if now.restarts:
+        lines.append(f"the filter restarted {now.restarts} time(s): after gaps or jumps")
+    if median == median:
+        lines.append(f"latency: median {median:.2f} ms, 99 % within {most:.2f} ms")
+    force = " ".join(f"{x:+.4g}" for x in means.mean[:3])
+    torque = " ".join(f"{x:+.4g}" for x in means.mean[3:])
+    lines.append(f"mean force {force} N, mean torque {torque} Nm")
+    for text in lines:
+        errors.print(text, highlight=False, markup=False, soft_wrap=True)
+    return result

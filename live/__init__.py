@@ -1,0 +1,1 @@
+"""On the vehicle: streams from vehicles, and the filter exported to C."""

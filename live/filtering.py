@@ -1,0 +1,181 @@
+"""The filter on a stream of rows: what `windwrench estimate` does with a log, one row at a time.
+
+A row that goes on from the last carries the filter there, in the same steps as offline, and
+corrects it. A row that lies in the past is fused where it belongs, by the filter with a clock
+(``estimator.late_poses``). The first rows are held back until their median step is known: it is the
+filter's period, and its tuning follows from it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dynamics.vehicle import Vehicle
+from ..estimator import TimedFilter, UKFTuning, WrenchEstimate, WrenchUKF
+from ..estimator.row_steps import steps_between
+from ..identification.wrench_series import GATE
+from .messages import Array, Row
+from .tallies import Tallies
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """How a stream is filtered."""
+
+    gate: float | None = GATE  # as of a log
+    horizon: float = 0.3  # s that a row may lie in the past; later is too late
+    first_rows: int = 21  # whose median step is the period
+    first_seconds: float = 1.0  # after which fewer do, of a source that is slow
+    rate_hz: float | None = None  # of rows, where it is known; then none are held back
+
+
+@dataclass(slots=True)
+class Output:
+    """The estimate that a row has led to."""
+
+    row: Row
+    t: float  # s, stream's time, of the estimate
+    estimate: WrenchEstimate
+    std: Array  # (6,) of force, N, and torque, Nm: the filter's own
+    late: bool = False  # the row lay in the past
+
+
+class LiveFilter:
+    """The external wrench, row by row.
+
+    Args:
+        vehicle: as it is declared.
+        tallies: where late, refused and left-out rows are counted.
+        settings: of the filter.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, tallies: Tallies, settings: LiveSettings | None = None
+    ) -> None:
+        self.vehicle, self.settings = vehicle, settings or LiveSettings()
+        self._tallies = tallies
+        self._held: list[Row] = []
+        self._timed: TimedFilter | None = None
+        self._before: Row | None = None
+        self.period = math.nan  # s
+        if self.settings.rate_hz is not None:
+            self._start(1.0 / self.settings.rate_hz)
+
+    @property
+    def tuning(self) -> UKFTuning | None:
+        """Of the filter; None before it has begun."""
+        return None if self._timed is None else self._timed.ukf.tuning
+
+    @property
+    def restarts(self) -> int:
+        """How often the filter restarted."""
+        return 0 if self._timed is None else self._timed.estimate.restarts
+
+    def take(self, row: Row) -> list[Output]:
+        """Return what a row leads to: nothing while rows are held back, then an estimate each."""
+        if self._timed is None:
+            self._held.append(row)
+            long = row.t - self._held[0].t > self.settings.first_seconds and len(self._held) > 2
+            if len(self._held) < self.settings.first_rows and not long:
+                return []
+            return self.begin()
+        output = self._process(row)
+        return [] if output is None else [output]
+
+    def begin(self) -> list[Output]:
+        """Begin with the rows that are held back, however few; return what they lead to."""
+        if self._timed is not None or len(self._held) < 2:
+            return []
+        held = sorted(self._held, key=lambda row: row.t)
+        self._held = []
+        steps = np.diff([row.t for row in held])
+        self._start(float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.005)
+        outputs = [self._process(row) for row in held]
+        return [output for output in outputs if output is not None]
+
+    def _start(self, period: float) -> None:
+        self.period = period
+        ukf = WrenchUKF(self.vehicle, period=period, gate=self.settings.gate)
+        self._timed = TimedFilter(ukf, self.settings.horizon)
+
+    def _process(self, row: Row) -> Output | None:
+        timed = self._timed
+        assert timed is not None
+        if math.isnan(timed.time):
+            if not row.has_pose:
+                return None
+            assert row.position is not None
+            assert row.quaternion is not None
+            timed.reset(row.t, row.position, row.quaternion)
+            self._before = row
+            return self._output(row, timed.estimate)
+        now = timed.time
+        if round(row.t, 9) > now:
+            return self._output(row, self._carry(timed, row, now))
+        late = round(row.t, 9) < now
+        estimate = self._correct(timed, row)
+        if estimate is None:
+            if late and (row.has_pose or row.gyro is not None):
+                self._tallies.counts["too late"] += 1
+            return None
+        if late:
+            self._tallies.counts["late"] += 1
+        return self._output(row, estimate, late)
+
+    def _carry(self, timed: TimedFilter, row: Row, now: float) -> WrenchEstimate:
+        """Carry the filter to a row, and correct it there."""
+        before = self._before
+        assert before is not None
+        speeds = 0.5 * (before.rotor_speeds + row.rotor_speeds)
+        voltage = None
+        if before.voltage is not None and row.voltage is not None:
+            voltage = 0.5 * (before.voltage + row.voltage)
+        steps = steps_between(row.t - now, self.period)
+        at = now
+        for step in steps[:-1]:
+            at += step
+            timed.predict(at, speeds, voltage)
+        estimate = timed.predict(row.t, speeds, voltage)
+        self._before = row
+        return self._correct(timed, row) or estimate
+
+    @staticmethod
+    def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:
+        """Take in what a row measured, at its time; None where that is nothing, or too late."""
+        estimate = None
+        if row.gyro is not None or row.accelerometer is not None:
+            estimate = timed.correct_imu(row.t, row.gyro, row.accelerometer)
+        if row.has_pose:
+            estimate = timed.correct(row.t, row.position, row.quaternion)
+        return estimate
+
+    def _output(self, row: Row, estimate: WrenchEstimate, late: bool = False) -> Output:
+        assert self._timed is not None
+        deviation = np.sqrt(np.diagonal(estimate.covariance)[12:18])
+        std = np.concatenate([deviation[3:6], deviation[0:3]])
+        if row.has_pose and estimate.status == "rejected":
+            self._tallies.counts["refused"] += 1
+        return Output(row, self._timed.time, estimate, std, late)
+
+
+def warm_up(vehicle: Vehicle) -> None:
+    """Have everything compiled that a stream of this vehicle calls."""
+    live = LiveFilter(vehicle, Tallies())
+    speeds = np.full(4, vehicle.hover_rate)
+    still, upright = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])
+    for i in range(40):
+        live.take(Row(0.005 * i, 0, speeds, still, upright, voltage=vehicle.voltage_ref or None))
+    live.take(Row(0.0501, 0, speeds, still, upright))  # late
+    for i in range(40, 45):
+        live.take(
+            Row(
+                0.005 * i,
+                0,
+                speeds,
+                still,
+                upright,
+                gyro=np.zeros(3),
+                accelerometer=np.array([0.0, 0.0, vehicle.gravity]),
+            )
+        )

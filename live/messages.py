@@ -1,0 +1,60 @@
+"""What comes from a vehicle, and the rows that are made of it.
+
+A source gives ``Sample``: what one message holds, in this kit's frames and units, with the time at
+which it was measured on the sender's clock and that at which it arrived here. A ``Row`` is what the
+filter and the recording take: a row of a flight log, on the stream's own time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Sample:
+    """One message; what it does not hold is None."""
+
+    kind: str  # of message: those of one kind come from one clock
+    stamp: int | None  # ns, sender's clock, when it was measured; None: the message does not say
+    arrival: int  # ns, this machine's monotonic clock
+    whole: bool = False  # it is a row by itself: pose and rotor speeds of one time
+    position: Array | None = None  # (3,) m, world
+    quaternion: Array | None = None  # (4,) body to world, scalar first, of length 1
+    rotor_speeds: Array | None = None  # (4,) rad/s
+    command: Array | None = None  # (4,) motor commands, 0 to 1
+    voltage: float | None = None  # V
+    gyro: Array | None = None  # (3,) rad/s, body
+    accelerometer: Array | None = None  # (3,) m/s2, body
+    force: Array | None = None  # (3,) N, world: the truth, where a simulator knows it
+    torque: Array | None = None  # (3,) Nm, likewise
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether it holds a whole pose."""
+        return self.position is not None and self.quaternion is not None
+
+
+@dataclass(slots=True)
+class Row:
+    """A row of the flight: all that is known of one time; fields as in ``Sample``."""
+
+    t: float  # s, stream's time
+    arrival: int  # ns, of the message that completed it
+    rotor_speeds: Array
+    position: Array | None = None
+    quaternion: Array | None = None
+    command: Array | None = None
+    commanded: bool = False  # the rotor speeds are those that the commands give
+    voltage: float | None = None
+    gyro: Array | None = None
+    accelerometer: Array | None = None
+    force: Array | None = None
+    torque: Array | None = None
+
+    @property
+    def has_pose(self) -> bool:
+        """Whether the pose was measured."""
+        return self.position is not None

@@ -1,0 +1,141 @@
+"""From messages, each of which holds a part, to rows of the flight.
+
+A message that is whole is a row. Otherwise each pose and each inertial measurement is one, with the
+rotor speeds of its time: between two that came, on a line between them, beyond the last, as they
+were last. Where poses stop, rotor speeds alone make rows, so that the estimate goes on.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..dynamics.vehicle import Vehicle
+from ..runtime.errors import InputError
+from .messages import Array, Row, Sample
+from .tallies import Tallies
+
+
+@dataclass(frozen=True)
+class JoiningSettings:
+    """Which rotor speeds belong to a pose."""
+
+    kept: float = 1.0  # s of rotor speeds that are kept; poses come much sooner
+    # s without a row from which on rotor speeds make rows: several poses at 30 Hz
+    silent: float = 0.15
+    # s that measured rotor speeds are waited for where commands come: an ESC reports at 10 Hz or
+    # more
+    measured: float = 1.0
+
+
+class Joiner:
+    """Makes rows of messages.
+
+    Args:
+        vehicle: whose motor curve turns commands into rotor speeds where none are measured.
+        tallies: where poses are counted that came while no rotor speeds were known.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, tallies: Tallies, settings: JoiningSettings | None = None
+    ) -> None:
+        self._vehicle, self._tallies = vehicle, tallies
+        self._settings = settings or JoiningSettings()
+        self._speeds: deque[tuple[float, Array]] = deque()  # by time
+        self._command: Array | None = None
+        self._voltage: float | None = None
+        self._measured = False  # rotor speeds come, and commands are not asked for them
+        self._first_command: float | None = None  # s
+        self._last_row = -np.inf
+
+    def take(self, sample: Sample, t: float) -> Row | None:
+        """Return the row that a message of time ``t``, s, completes, or None.
+
+        Raises:
+            InputError: commands come, no measured rotor speeds, and the vehicle states no motor
+                curve.
+        """
+        if sample.voltage is not None:
+            self._voltage = sample.voltage
+        if sample.command is not None:
+            self._command = sample.command
+        commanded = self._take_motors(sample, t)
+        moving = sample.has_pose or sample.gyro is not None or sample.accelerometer is not None
+        alone = not self._speeds or (
+            not moving and not (sample.whole or t - self._last_row > self._settings.silent)
+        )
+        if alone:
+            if sample.has_pose:
+                self._tallies.counts["waiting"] += 1
+            return None
+        if not moving and sample.rotor_speeds is None and sample.command is None:
+            return None
+        self._last_row = max(self._last_row, t)
+        pose = sample.has_pose
+        return Row(
+            t=t,
+            arrival=sample.arrival,
+            rotor_speeds=self._at(t),
+            position=sample.position if pose else None,
+            quaternion=sample.quaternion if pose else None,
+            command=self._command,
+            commanded=commanded,
+            voltage=self._voltage,
+            gyro=sample.gyro,
+            accelerometer=sample.accelerometer,
+            force=sample.force,
+            torque=sample.torque,
+        )
+
+    def _take_motors(self, sample: Sample, t: float) -> bool:
+        """Keep rotor speeds; return whether they are those that commands give."""
+        if sample.rotor_speeds is not None:
+            if not self._measured:
+                self._measured = True
+                self._speeds.clear()
+            self._keep(t, sample.rotor_speeds)
+        elif sample.command is not None and not self._measured:
+            if self._first_command is None:
+                self._first_command = t
+            wait = 0.0 if sample.whole else self._settings.measured
+            if t - self._first_command >= wait:
+                self._keep(t, self._commanded(sample.command))
+        return not self._measured
+
+    def _commanded(self, command: Array) -> Array:
+        if self._vehicle.motor_curve is None:
+            raise InputError(
+                f"vehicle {self._vehicle.name}: the stream has motor commands and no measured "
+                "rotor speeds, and the vehicle states no motor_curve; expected one in its file, "
+                "to turn commands into thrust"
+            )
+        voltage = None if self._voltage is None else np.array([self._voltage])
+        speeds: Array = self._vehicle.commanded_speeds(command[None, :], voltage)[0]
+        return speeds
+
+    def _keep(self, t: float, speeds: Array) -> None:
+        kept = self._speeds
+        if kept and t <= kept[-1][0]:  # out of order: where it belongs
+            later = []
+            while kept and kept[-1][0] > t:
+                later.append(kept.pop())
+            if not (kept and kept[-1][0] == t):
+                kept.append((t, speeds))
+            kept.extend(reversed(later))
+        else:
+            kept.append((t, speeds))
+        while len(kept) > 2 and kept[0][0] < kept[-1][0] - self._settings.kept:
+            kept.popleft()
+
+    def _at(self, t: float) -> Array:
+        """Return the rotor speeds at a time, s."""
+        kept = self._speeds
+        if t >= kept[-1][0] or len(kept) == 1:
+            return kept[-1][1]
+        after = len(kept) - 1
+        while after > 0 and kept[after - 1][0] > t:
+            after -= 1
+        if after == 0:
+            return kept[0][1]
+        (t0, a), (t1, b) = kept[after - 1], kept[after]
+        return np.asarray(a + (b - a) * ((t - t0) / (t1 - t0)))

@@ -1,0 +1,270 @@
+"""A stream from beginning to end: messages in, estimates out, a log beside it.
+
+Everything between a message's arrival and its estimate is done in one thread, one message after the
+other; whoever shows the estimates looks at ``snapshot`` from another.
+"""
+
+import gc
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.vehicle import Vehicle
+from ..runtime.errors import InputError
+from .clocks import Clocks
+from .filtering import LiveFilter, LiveSettings, Output
+from .messages import Row, Sample
+from .recorder import Recorder
+from .rows import Joiner
+from .sources.base import Source
+from .tallies import Tallies
+
+_SECOND = 1_000_000_000  # ns
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """When a stream is said to be none, to have stopped, or to be over."""
+
+    wait: float = 10.0  # s for the first estimate; 0: for ever
+    silent: float = 0.5  # s without a message after which a source has stopped
+    seconds: float | None = None  # s of the stream's time, after which it is over
+    poll: float = 0.1  # s between two looks at whether to end
+    # s after which Python has threads take turns: an arrival waits no longer for the page
+    turn: float = 2e-4
+
+
+@dataclass
+class Snapshot:
+    """What there is to show, now."""
+
+    output: Output | None
+    rates: dict[str, float]  # Hz, by kind of message
+    counts: dict[str, int]
+    silence: float  # s since the last message
+    latency_ms: tuple[float, float]  # median and 99 % quantile
+    drift_ppm: float | None
+    clocks: int
+    estimates: int
+    restarts: int
+    recorded: int  # rows
+    seconds: float  # of the stream's time, since it began
+
+
+class Session:
+    """One stream.
+
+    Args:
+        source: of messages.
+        vehicle: that flies.
+        tallies: that the source counts in.
+        live: settings of the filter.
+        recorder: where rows are recorded; None: nowhere.
+        settings: of the session.
+        tell: called with each estimate, in the stream's thread.
+        flush: called when all that has come is dealt with.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        vehicle: Vehicle,
+        tallies: Tallies,
+        live: LiveSettings | None = None,
+        recorder: Recorder | None = None,
+        settings: SessionSettings | None = None,
+        tell: Callable[[Output], None] = lambda output: None,
+        flush: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.source, self.tallies, self.recorder = source, tallies, recorder
+        self.filter = LiveFilter(vehicle, tallies, live)
+        self._clocks = Clocks(tallies, self.filter.settings.horizon, source.paced)
+        self._joiner = Joiner(vehicle, tallies)
+        self._settings = settings or SessionSettings()
+        self._tell, self._flush = tell, flush
+        self._stop = threading.Event()
+        self._first = self._last = time.monotonic_ns()  # of messages
+        self._stopped = False
+        self._begin_t: float | None = None
+        self._kinds: set[str] = set()
+        self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
+        self.output: Output | None = None
+        self.recent: deque[Output] = deque(maxlen=12_000)  # what a view has not taken yet
+        self.watched = False  # a view takes them
+        self.estimates = 0
+        self.ended = ""  # why, in words
+
+    def stop(self) -> None:
+        """Have the stream end; from any thread."""
+        self._stop.set()
+
+    def run(self) -> None:
+        """Open the source and deal with all that comes, until it ends or ``stop`` is called.
+
+        Raises:
+            InputError: there is no such source, what comes is none of its messages, or the log
+                cannot be written.
+        """
+        try:
+            self.source.open()
+            self._first = self._last = time.monotonic_ns()
+            with _undisturbed(self._settings.turn):
+                while not self._stop.is_set():
+                    if not self._once():
+                        break
+                else:
+                    self.ended = self.ended or "it was stopped"
+            for output in self.filter.begin():
+                self._out(output)
+            self._flush()
+            if self.recorder is not None and self.estimates:
+                self.recorder.close()
+            if not self.estimates and not self._stop.is_set():
+                raise self._nothing("before it ended")
+        finally:
+            self.source.close()
+            if self.recorder is not None and self.estimates:
+                self.recorder.close()
+
+    def _once(self) -> bool:
+        """Deal with what has come; return whether there may be more."""
+        samples = self.source.receive(self._settings.poll)
+        now = time.monotonic_ns()
+        if samples is None:
+            self.ended = "the source ended"
+            return False
+        if samples:
+            silence = now - self._last > self._settings.silent * _SECOND
+            if silence and self._kinds and self.source.paced:
+                self.tallies.counts["stops"] += 1
+            self._last = now
+            for sample in samples:
+                self.take(sample)
+                if self._stop.is_set():
+                    break
+            self._flush()
+            out = time.monotonic_ns()
+            for arrival in self._fresh:
+                self.tallies.latency.add(out - arrival)
+            self._fresh.clear()
+        elif self.recorder is not None:
+            self.recorder.idle(1e-9 * (now - self._last))
+        wait = self._settings.wait
+        if not self.estimates and wait and now - self._first > wait * _SECOND:
+            raise self._nothing(f"within {wait:g} s")
+        return True
+
+    def take(self, sample: Sample) -> None:
+        """Deal with one message."""
+        self.tallies.message(sample.kind, sample.arrival)
+        self._kinds.add(sample.kind)
+        t = self._clocks.time(sample)
+        row = None if t is None else self._joiner.take(sample, t)
+        if row is not None:
+            self._take_row(row)
+
+    def _take_row(self, row: Row) -> None:
+        for output in self.filter.take(row):
+            self._out(output)
+            if output.row is row and self.source.paced:  # not one that was held back
+                self._fresh.append(row.arrival)
+        if self.recorder is not None:
+            self.recorder.add(row)
+
+    def _out(self, output: Output) -> None:
+        self.estimates += 1
+        self.output = output
+        self.source.send(output)
+        self._tell(output)
+        if self.watched:
+            self.recent.append(output)
+        if self._begin_t is None:
+            self._begin_t = output.t
+        seconds = self._settings.seconds
+        if seconds is not None and output.t - self._begin_t >= seconds - 1e-9:
+            self.ended = f"{seconds:g} s have passed"
+            self._stop.set()
+
+    def _nothing(self, when: str) -> InputError:
+        """Return the error for a stream without an estimate."""
+        waiting = self.tallies.counts["waiting"]
+        came = ", ".join(sorted(self._kinds))
+        if not came:
+            found = "no message came"
+        elif waiting:
+            found = f"poses came ({came}), and no rotor speeds"
+        else:
+            found = f"{came} came, which is no estimate yet"
+        return InputError(f"{self.source.name}: {found} {when}; expected {self.source.expected()}")
+
+    @property
+    def seconds(self) -> float:
+        """How long the stream has run, s of its own time."""
+        if self.output is None or self._begin_t is None:
+            return 0.0
+        return self.output.t - self._begin_t
+
+    def snapshot(self) -> Snapshot:
+        """Return what there is to show, from any thread."""
+        now = time.monotonic_ns()
+        latency = self.tallies.latency
+        return Snapshot(
+            output=self.output,
+            rates={kind: rate.hertz(now) for kind, rate in list(self.tallies.rates.items())},
+            counts={name: n for name, n in list(self.tallies.counts.items()) if n},
+            silence=1e-9 * (now - self._last),
+            latency_ms=(latency.quantile(0.5), latency.quantile(0.99)),
+            drift_ppm=self._clocks.drift,
+            clocks=self._clocks.count,
+            estimates=self.estimates,
+            restarts=self.filter.restarts,
+            recorded=0 if self.recorder is None else self.recorder.rows,
+            seconds=self.seconds,
+        )
+
+
+@dataclass
+class Means:
+    """The mean wrench of a stream."""
+
+    count: int = 0
+    sums: Any = field(default_factory=lambda: np.zeros(6))
+    squares: Any = field(default_factory=lambda: np.zeros(6))
+
+    def add(self, output: Output) -> None:
+        """Take in one estimate."""
+        wrench = output.estimate.state[[16, 17, 18, 13, 14, 15]]
+        self.count += 1
+        self.sums += wrench
+        self.squares += wrench * wrench
+
+    @property
+    def mean(self) -> Any:
+        """Of force, N, and torque, Nm (6,)."""
+        return self.sums / max(self.count, 1)
+
+    @property
+    def deviation(self) -> Any:
+        """Standard deviation over the stream, (6,)."""
+        return np.sqrt(np.maximum(self.squares / max(self.count, 1) - self.mean**2, 0.0))
+
+
+@contextmanager
+def _undisturbed(turn: float) -> Iterator[None]:
+    """Have other threads give way soon, and the collector of garbage leave what is there alone."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(turn)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)

@@ -1,0 +1,236 @@
+"""A Crazyflie by its log, read with cflib over Crazyradio or USB.
+
+``crazyflie:radio://0/80/2M/E7E7E7E7E7`` (``?period=10`` ms between samples, ``?imu=1`` for gyro and
+accelerometer as well). One block of the log holds a row: position (``stateEstimate``), attitude
+(``stateEstimateZ.quat``, in 32 bits: steps of 0.003 rad), the motors and the battery's voltage. The
+motors are rpm where the firmware measures them (``rpm.m1``), else PWM (``motor.m1``), which the
+vehicle's motor curve turns into thrust.
+
+It only listens: no set point is ever sent, not even at the end, where cflib itself would send one
+that stops the motors.
+"""
+
+import importlib
+import logging
+import math
+import queue
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from ...dynamics.vehicle import Vehicle
+from ...identification.logs.rotor_orders import ORDERS
+from ...runtime.errors import InputError
+from ...runtime.extras import need
+from ..filtering import Output
+from ..messages import Sample
+from ..tallies import Tallies
+from .base import read_address
+
+_ORDER = [motor - 1 for motor in ORDERS["crazyflie"]]
+_FULL = 65_535.0  # PWM
+_G = 9.80665  # m/s2, of accelerometer readings in g
+_WRAP = 2**24  # ms, of a log's time stamps
+_POSE = (
+    ("stateEstimate.x", "float"),
+    ("stateEstimate.y", "float"),
+    ("stateEstimate.z", "float"),
+    ("stateEstimateZ.quat", "uint32_t"),
+)
+_IMU = tuple((f"{sensor}.{axis}", "float") for sensor in ("gyro", "acc") for axis in "xyz")
+_LONGEST = 1000  # rows that wait for us, 10 s
+_CONNECTS = 20.0  # s
+
+
+class CrazyflieLog:
+    """Rows of a Crazyflie's log.
+
+    Args:
+        text: the address.
+        vehicle: that flies.
+        tallies: where rows are counted that are lost or say nothing.
+
+    Raises:
+        InputError: the address is none, or cflib is not installed.
+    """
+
+    paced = True
+
+    def __init__(self, text: str, vehicle: Vehicle, tallies: Tallies) -> None:
+        need("cflib", "crazyflie")
+        address = read_address(text, "crazyflie", ("period", "imu"))
+        self.name = text
+        self._uri = text.removeprefix("crazyflie:").partition("?")[0]
+        if not address.scheme or not (address.host or address.path):
+            raise InputError(
+                f"{text}: expected the address of a Crazyflie, such as "
+                "crazyflie:radio://0/80/2M/E7E7E7E7E7"
+            )
+        self._period = int(address.number("period", 10.0, least=10.0)) // 10 * 10
+        self._imu = address.choice("imu", ("0", "1"), "0") == "1"
+        self._vehicle, self._tallies = vehicle, tallies
+        self._rows: queue.SimpleQueue[Sample] = queue.SimpleQueue()
+        self._problem = ""
+        self._over = threading.Event()
+        self._cf: Any = None
+        self._stamps: dict[str, int] = {}  # ms, the newest of each block
+
+    def open(self) -> None:
+        """Connect and start the log.
+
+        Raises:
+            InputError: there is no such Crazyflie, or its firmware lacks a variable.
+        """
+        crtp: Any = importlib.import_module("cflib.crtp")
+        crazyflie: Any = importlib.import_module("cflib.crazyflie")
+        log: Any = importlib.import_module("cflib.crazyflie.log")
+        for name in ("cflib.crazyflie", "cflib.crtp"):  # what it says comes as an error of ours
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        if not crtp.CLASSES:
+            crtp.init_drivers()
+        self._decompress = importlib.import_module("cflib.utils.encoding").decompress_quaternion
+        connected, failed = threading.Event(), threading.Event()
+        self._cf = crazyflie.Crazyflie()
+
+        def fail(uri: str, message: str) -> None:
+            self._problem = str(message).strip().splitlines()[0][:300] if message else "no answer"
+            failed.set()
+            connected.set()
+
+        self._cf.connected.add_callback(lambda uri: connected.set())
+        self._cf.connection_failed.add_callback(fail)
+        self._cf.connection_lost.add_callback(self._lost)
+        self._cf.open_link(self._uri)
+        came = connected.wait(_CONNECTS)
+        if failed.is_set() or not came:
+            self.close()
+            why = self._problem or f"no answer within {_CONNECTS:g} s"
+            raise InputError(f"{self.name}: no Crazyflie there: {why}")
+        self._start(log)
+
+    def _start(self, log: Any) -> None:
+        toc = self._cf.log.toc
+        measured = toc.get_element("rpm", "m1") is not None
+        motors = "rpm" if measured else "motor"
+        names = [*_POSE, *((f"{motors}.m{i}", "uint16_t") for i in range(1, 5))]
+        blocks = [("row", [*names, ("pm.vbat", "FP16")])]
+        if self._imu:
+            blocks.append(("imu", list(_IMU)))
+        for kind, variables in blocks:
+            block = log.LogConfig(name=kind, period_in_ms=self._period)
+            for name, fetched in variables:
+                block.add_variable(name, fetched)
+            take = self._take_row if kind == "row" else self._take_imu
+            block.data_received_cb.add_callback(take)
+            try:
+                self._cf.log.add_config(block)
+                block.start()
+            except (KeyError, AttributeError) as error:
+                self.close()
+                reason = error.args[0] if error.args else error
+                raise InputError(f"{self.name}: the Crazyflie's log: {reason}") from error
+
+    def _lost(self, uri: str, message: str) -> None:
+        self._problem = f"the link was lost: {str(message)[:200]}"
+        self._over.set()
+
+    def _stamp(self, kind: str, milliseconds: int) -> int:
+        """Return a block's time in ns: its stamp begins at 0 again after 4.7 h."""
+        last = self._stamps.get(kind, milliseconds)
+        # the nearest of all times that such a stamp stands for
+        now = last + (milliseconds - last + _WRAP // 2) % _WRAP - _WRAP // 2
+        missed = round((now - last) / self._period) - 1
+        if missed > 0:
+            self._tallies.counts["lost"] += missed
+        self._stamps[kind] = max(now, last)
+        return 1_000_000 * now
+
+    def _take_row(self, stamp: int, data: dict[str, Any], block: Any) -> None:
+        """Take a row, in cflib's thread."""
+        arrival = time.monotonic_ns()
+        x, y, z, w = self._decompress(data["stateEstimateZ.quat"])
+        quaternion = np.array([w, x, y, z], dtype=np.float64)
+        length = float(np.linalg.norm(quaternion))
+        position = np.array([data[name] for name, _ in _POSE[:3]], dtype=np.float64)
+        volts = float(data["pm.vbat"])
+        good = 0.9 < length < 1.1 and bool(np.isfinite(position).all())
+        if not good:
+            self._tallies.counts["malformed"] += 1
+            return
+        sample = Sample(
+            "row",
+            self._stamp("row", stamp),
+            arrival,
+            whole=True,
+            position=position,
+            quaternion=quaternion / length,
+            voltage=volts if math.isfinite(volts) and volts > 0.0 else None,
+        )
+        measured = "rpm.m1" in data
+        group = "rpm" if measured else "motor"
+        motors = np.array([data[f"{group}.m{i}"] for i in range(1, 5)], dtype=np.float64)[_ORDER]
+        if measured:
+            sample.rotor_speeds = motors * (math.pi / 30.0)
+        else:
+            curve = self._vehicle.motor_curve
+            low, high = (0.0, _FULL) if curve is None else curve.command
+            if high <= 1.0:  # of a curve whose command is a share
+                low, high = 0.0, _FULL
+            sample.command = np.clip((motors - low) / (high - low), 0.0, 1.0)
+        self._put(sample)
+
+    def _take_imu(self, stamp: int, data: dict[str, Any], block: Any) -> None:
+        arrival = time.monotonic_ns()
+        values = np.array([data[name] for name, _ in _IMU], dtype=np.float64)
+        if not np.isfinite(values).all():
+            self._tallies.counts["malformed"] += 1
+            return
+        self._put(
+            Sample(
+                "imu",
+                self._stamp("imu", stamp),
+                arrival,
+                gyro=np.radians(values[:3]),
+                accelerometer=_G * values[3:],
+            )
+        )
+
+    def _put(self, sample: Sample) -> None:
+        if self._rows.qsize() > _LONGEST:
+            self._tallies.counts["lost"] += 1
+            return
+        self._rows.put(sample)
+
+    def receive(self, timeout: float) -> list[Sample] | None:
+        """Return the rows that have come."""
+        samples = []
+        try:
+            samples.append(self._rows.get(timeout=timeout))
+            while True:
+                samples.append(self._rows.get_nowait())
+        except queue.Empty:
+            pass
+        if not samples and self._over.is_set():
+            return None
+        return samples
+
+    def send(self, output: Output) -> None:
+        """Say nothing: the vehicle is only listened to."""
+
+    def close(self) -> None:
+        """Close the link, without the set point that cflib sends there."""
+        if self._cf is None:
+            return
+        link, self._cf.link = self._cf.link, None
+        if link is not None:
+            link.close()
+        self._cf.close_link()
+        self._cf = None
+
+    def expected(self) -> str:
+        """Return what must come."""
+        return f"log blocks every {self._period} ms" + (
+            f"; {self._problem}" if self._problem else ""
+        )

@@ -1,0 +1,58 @@
+"""MAVLink's ESC_STATUS, which PX4 sends and the dialects that pymavlink ships lack: made known to a
+dialect as its other messages are.
+
+Of MAVLink's common set, message 291: index (of the first of four ESCs), time_usec, rpm[4] (with the
+sense of rotation), voltage[4] in V, current[4] in A.
+"""
+
+import struct
+from typing import Any
+
+NUMBER = 291
+# what the sender and we must have the same definition of, by MAVLink's rule for it
+CHECKSUM = 10
+_LAYOUT = "<Q4i4f4fB"  # in the order of the wire: larger types first
+
+
+def add_esc_status(dialect: Any) -> Any:
+    """Return the class of the message in a dialect; add it where it is not there."""
+    if NUMBER in dialect.mavlink_map:
+        return dialect.mavlink_map[NUMBER]
+
+    class EscStatus(dialect.MAVLink_message):  # type: ignore[misc]
+        """ESC status."""
+
+        id, msgname, name = NUMBER, "ESC_STATUS", "ESC_STATUS"
+        fieldnames = ("index", "time_usec", "rpm", "voltage", "current")
+        ordered_fieldnames = ("time_usec", "rpm", "voltage", "current", "index")
+        fieldtypes = ("uint8_t", "uint64_t", "int32_t", "float", "float")
+        fielddisplays_by_name: dict[str, str] = {}  # noqa: RUF012 - as pymavlink's own have it
+        fieldenums_by_name: dict[str, str] = {}  # noqa: RUF012
+        fieldunits_by_name = {"time_usec": "us", "rpm": "rpm", "voltage": "V", "current": "A"}  # noqa: RUF012
+        native_format = bytearray(b"<QiffB")
+        orders = (4, 0, 1, 2, 3)
+        lengths = (1, 4, 4, 4, 1)
+        array_lengths = (0, 4, 4, 4, 0)
+        crc_extra = CHECKSUM
+        unpacker = struct.Struct(_LAYOUT)
+        instance_field, instance_offset = None, -1
+
+        def __init__(
+            self, index: int, time_usec: int, rpm: Any, voltage: Any, current: Any
+        ) -> None:
+            dialect.MAVLink_message.__init__(self, NUMBER, "ESC_STATUS")
+            self._fieldnames = self.fieldnames
+            self._instance_field = self.instance_field
+            self._instance_offset = self.instance_offset
+            self.index, self.time_usec = index, time_usec
+            self.rpm, self.voltage, self.current = rpm, voltage, current
+
+        def pack(self, mav: Any, force_mavlink1: bool = False) -> Any:
+            """Return the message's bytes."""
+            payload = self.unpacker.pack(
+                self.time_usec, *self.rpm, *self.voltage, *self.current, self.index
+            )
+            return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+
+    dialect.mavlink_map[NUMBER] = EscStatus
+    return EscStatus

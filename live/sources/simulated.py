@@ -1,0 +1,142 @@
+"""The kit's own vehicle in the jet of a moving fan, flown in real time: no vehicle is needed.
+
+``sim:SCENARIO`` flies a scenario of the fan-tracking task with the paper's admittance controller,
+for as long as one watches. ``?seed=N`` draws another flight, ``?speed=X`` lets time pass X times as
+fast (0: as fast as it can be computed).
+"""
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from ...controllers import make_controller
+from ...dynamics.vehicle import Mocap, Vehicle
+from ...envs.closed_loop import ClosedLoop
+from ...envs.decision import DECISION_TICKS
+from ...envs.fan import Fan
+from ...envs.fan_tracking import DISTANCE, SETTLE_TICKS
+from ...envs.plant import NOISE, TICK, PlantSettings
+from ...envs.scenarios import draw_fan_path, get_scenario
+from ...estimator import UKFTuning
+from ...runtime.errors import InputError
+from ..filtering import Output
+from ..messages import Array, Sample
+from .base import read_address
+
+_SECOND = 1_000_000_000  # ns
+_AT_ONCE = 0.05  # s of flight that are made up for at once, at most
+_BEHIND = 1.0  # s: a machine that is further behind flies on from now
+
+
+class Simulated:
+    """A vehicle that flies in this process.
+
+    Args:
+        text: the address.
+        vehicle: that flies.
+        controller: that holds it in the jet, one of the kit's.
+
+    Raises:
+        InputError: no scenario has this name, or an option is none.
+    """
+
+    def __init__(self, text: str, vehicle: Vehicle, controller: str = "admittance") -> None:
+        address = read_address(text, "sim", ("seed", "speed"))
+        self.name = text
+        self._scenario = get_scenario(address.path or "base")
+        self._speed = address.number("speed", 1.0)
+        self.paced = self._speed == 1.0
+        self._seed = int(address.number("seed", 0.0))
+        self._vehicle, self._controller = vehicle, make_controller(controller)
+        self._rng = np.random.default_rng(self._seed)
+        self._loop: ClosedLoop | None = None
+        self._ticks = 0
+        self._begun = 0  # ns, when tick 0 was due
+        self._fan_y: Array = np.zeros(1)
+        self._command = 0.0
+
+    def open(self) -> None:
+        """Take off."""
+        scenario = self._scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        declared = replace(self._vehicle, mocap=mocap)
+        tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
+        fan = replace(Fan(), turbulence=scenario.turbulence)
+        self._loop = ClosedLoop(declared, None, tuning, fan, PlantSettings.for_vehicle(declared))
+        self._controller.reset()
+        offset = float(self._rng.uniform(*scenario.offset) * self._rng.choice([-1.0, 1.0]))
+        self._loop.reset(self._rng, np.array([DISTANCE, offset, fan.height]), math.pi)
+        self._loop.run(self._rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y)
+        self._begun = time.monotonic_ns()
+
+    def receive(self, timeout: float) -> list[Sample] | None:
+        """Fly as far as time has passed; return what was measured."""
+        now = time.monotonic_ns()
+        if self._speed == 0.0:
+            return [self._tick(time.monotonic_ns()) for _ in range(DECISION_TICKS)]
+        passed = 1e-9 * (now - self._begun) * self._speed
+        due = math.floor(passed / TICK) + 1 - self._ticks
+        if due <= 0:
+            wait = ((self._ticks * TICK) - passed) / self._speed
+            time.sleep(min(max(wait, 0.0), timeout))
+            return []
+        if due * TICK > _BEHIND * max(self._speed, 1.0):
+            self._begun += round((due - 1) * TICK / self._speed * _SECOND)
+            due = 1
+        due = min(due, max(1, round(_AT_ONCE * max(self._speed, 1.0) / TICK)))
+        return [self._tick(time.monotonic_ns()) for _ in range(due)]
+
+    def _tick(self, arrival: int) -> Sample:
+        """Fly one tick; return the pose that it samples, and the rotor speeds then."""
+        loop = self._loop
+        assert loop is not None
+        phase = self._ticks % DECISION_TICKS
+        if phase == 0:
+            self._decide(loop)
+        before, external = loop.unrounded.copy(), loop.external.copy()
+        loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
+        if not loop.healthy():
+            raise InputError(f"{self.name}: the simulated {self._vehicle.name} crashed")
+        # a rotor speed as it is at the instant of the pose: see ``envs.recording``
+        speeds = 0.25 * before + 0.75 * loop.unrounded
+        if self._vehicle.omega_lsb > 0:
+            speeds = self._vehicle.omega_lsb * np.round(speeds / self._vehicle.omega_lsb)
+        seen, battery = loop.seen, loop.battery
+        sample = Sample(
+            "row",
+            round(self._ticks * TICK * _SECOND),
+            arrival,
+            whole=True,
+            position=loop.sample[4:7].copy() if seen else None,
+            quaternion=loop.sample[7:11] / np.linalg.norm(loop.sample[7:11]) if seen else None,
+            rotor_speeds=speeds,
+            voltage=battery if battery > 0.0 else None,
+            force=external[:3],
+            torque=external[3:],
+        )
+        self._ticks += 1
+        return sample
+
+    def _decide(self, loop: ClosedLoop) -> None:
+        """Move the fan, and have the controller answer what the vehicle feels."""
+        # drawn anew from the same numbers each time: the path at these times, however long it is
+        # flown
+        t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
+        self._fan_y = draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[2]
+        x = loop.state
+        observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
+        self._command = float(self._controller(observation, None)[0])
+        loop.setpoint[4] = self._command
+
+    def send(self, output: Output) -> None:
+        """Say nothing: its controller has its own filter."""
+
+    def close(self) -> None:
+        """Land."""
+        self._loop = None
+
+    def expected(self) -> str:
+        """Return what must come."""
+        return "a flight of the plant"

@@ -1,0 +1,108 @@
+"""The stream as a terminal shows it, a few times a second."""
+
+import math
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from .session import Snapshot
+
+_BAR = 20  # characters
+_SILENT = 0.5  # s without a message that is worth red ink
+
+# words for counts that are good to know and no trouble
+_HARMLESS = ("late", "doubled")
+
+
+def page(snapshot: Snapshot, title: str, weight: float, arm: float) -> RenderableType:
+    """Return the page.
+
+    Args:
+        snapshot: of the stream.
+        title: source and vehicle.
+        weight: of the vehicle, N: half of it is a long bar.
+        arm: of its rotors, m.
+    """
+    head = Text(title, style="bold")
+    output = snapshot.output
+    if output is None:
+        return Group(head, Text(f"waiting for messages ... {snapshot.silence:.0f} s", style="dim"))
+    table = Table("", "x", "y", "z", "size", "", box=box.SIMPLE_HEAD)
+    for name, values, std, unit, scale in (
+        ("force", output.estimate.force, output.std[:3], "N", 0.5 * weight),
+        ("torque", output.estimate.torque, output.std[3:], "mNm", 0.25 * weight * arm),
+    ):
+        size = math.sqrt(float(values @ values))
+        factor = 1e3 if unit == "mNm" else 1.0
+        length = min(_BAR, round(_BAR * size / scale)) if scale > 0.0 else 0
+        table.add_row(
+            f"{name} ({unit})",
+            *(f"{factor * x:+.3f}" for x in values),
+            f"{factor * size:.3f}",
+            Text("█" * length + "·" * (_BAR - length), style="cyan"),
+        )
+        table.add_row(f"  +- ({unit})", *(f"{factor * x:.3f}" for x in std), "", "", style="dim")
+    return Group(head, table, *_lines(snapshot))
+
+
+def _lines(snapshot: Snapshot) -> list[Text]:
+    output = snapshot.output
+    assert output is not None
+    silent = snapshot.silence > _SILENT
+    status = f"SILENT for {snapshot.silence:.1f} s" if silent else output.estimate.status
+    good = not silent and output.estimate.status == "tracking"
+    nis = output.estimate.nis
+    lines = [
+        Text.assemble(
+            "status   ",
+            (status, "green" if good else "bold red" if silent else "yellow"),
+            f"   t {output.t:.2f} s   NIS {nis:.1f} (6 on average)"
+            if nis == nis
+            else f"   t {output.t:.2f} s",
+            f"   restarts {snapshot.restarts}",
+        ),
+        Text("rates    " + rates_words(snapshot)),
+    ]
+    median, most = snapshot.latency_ms
+    timing = f"latency  {median:.2f} ms, 99 % within {most:.2f} ms" if median == median else ""
+    if snapshot.drift_ppm is not None:
+        timing += f"   vehicle's clock {snapshot.drift_ppm:+.0f} ppm"
+    if snapshot.clocks > 1:
+        timing += f"   {snapshot.clocks} clocks"
+    if timing:
+        lines.append(Text(timing))
+    trouble = {k: n for k, n in snapshot.counts.items() if k not in _HARMLESS}
+    lines.append(
+        Text(
+            "dropped  " + (counts_words(snapshot.counts) or "nothing"), "yellow" if trouble else ""
+        )
+    )
+    if snapshot.recorded:
+        lines.append(Text(f"recorded {snapshot.recorded} rows"))
+    return lines
+
+
+def rates_words(snapshot: Snapshot) -> str:
+    """Return how often each kind of message comes."""
+    return ", ".join(f"{kind} {rate:.0f} Hz" for kind, rate in sorted(snapshot.rates.items()))
+
+
+def counts_words(counts: dict[str, int]) -> str:
+    """Return what was counted."""
+    return ", ".join(f"{name} {n}" for name, n in sorted(counts.items()))
+
+
+def line(snapshot: Snapshot) -> str:
+    """Return a plain line of the same, for where nothing can be drawn."""
+    output = snapshot.output
+    if output is None:
+        return "waiting for messages"
+    force = " ".join(f"{x:+.3f}" for x in output.estimate.force)
+    torque = " ".join(f"{1e3 * x:+.2f}" for x in output.estimate.torque)
+    counts = counts_words(snapshot.counts)
+    return (
+        f"t {output.t:.1f} s: force {force} N, torque {torque} mNm, {output.estimate.status}, "
+        f"{rates_words(snapshot)}" + (f"; {counts}" if counts else "")
+    )

@@ -1,0 +1,295 @@
+"""Tables on standard input, datagrams of JSON, and the simulated vehicle, through a session."""
+
+import json
+import os
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from tests.live.stream import as_csv, as_objects, flight
+from tests.live.test_pipeline import VEHICLE, offline
+from windwrench.dynamics import InputError
+from windwrench.identification.logs.log_map import load_map, parse_map
+from windwrench.identification.logs.reading import read_log
+from windwrench.live.field_map import FieldMap, Malformed
+from windwrench.live.session import Session, SessionSettings
+from windwrench.live.sources.open import make_source
+from windwrench.live.sources.text_stream import TextStream
+from windwrench.live.sources.udp_json import UdpJson
+from windwrench.live.tallies import Tallies
+
+
+def run_text(text, log_map=None, pieces=1, **settings):
+    """Run a table through a pipe; return the session and its estimates."""
+    read, write = os.pipe()
+    data = text.encode() if isinstance(text, str) else text
+
+    def feed():
+        size = max(-(-len(data) // pieces), 1)
+        for i in range(0, len(data), size):
+            os.write(write, data[i : i + size])
+        os.close(write)
+
+    thread = threading.Thread(target=feed, daemon=True)
+    thread.start()
+    tallies, outputs = Tallies(), []
+    source = TextStream(VEHICLE, log_map, tallies, read)
+    session = Session(
+        source, VEHICLE, tallies, settings=SessionSettings(**settings), tell=outputs.append
+    )
+    try:
+        session.run()
+    finally:
+        while os.read(read, 65536):  # what was not wanted
+            pass
+        thread.join()
+        os.close(read)
+    return session, np.array([[o.t, *o.estimate.force, *o.estimate.torque] for o in outputs])
+
+
+@pytest.mark.parametrize("pieces", [1, 977])
+def test_a_table_on_standard_input_is_the_log(pieces):
+    session, found = run_text(as_csv(flight()), pieces=pieces)
+    np.testing.assert_allclose(found, offline(flight()), atol=1e-9, rtol=0)
+    assert session.ended == "the source ended"
+    assert not session.tallies.counts
+
+
+def test_a_table_of_another_kind_by_its_map(tmp_path):
+    """NED, degrees, rpm in PX4's order: field by field what the map makes of the whole table."""
+    text = (
+        "time_ms;N;E;D;roll;pitch;yaw;r1;r2;r3;r4;v\n"
+        "1000;0.1;0.2;-1.5;1;-2;30;3000;3100;3200;3300;11.1\n"
+        "1005;0.11;0.21;-1.51;2;-3;31;3010;3110;3210;3310;11.0\n"
+        "1010;0.12;0.22;-1.52;3;-4;32;3020;3120;3220;3320;10.9\n"
+    )
+    wanted = parse_map(
+        {
+            "time": {"column": "time_ms", "unit": "ms", "offset": 0},
+            "world": "ned",
+            "body": "frd",
+            "position": {"columns": ["N", "E", "D"]},
+            "attitude": {"columns": ["roll", "pitch", "yaw"], "euler": "zyx"},
+            "rotors": {"columns": ["r1", "r2", "r3", "r4"], "order": "px4-x", "unit": "rpm"},
+            "battery": {"column": "v"},
+        },
+        "a map",
+    )
+    (tmp_path / "map.yaml").write_text(
+        "time: {column: time_ms, unit: ms, offset: 0}\nworld: ned\nbody: frd\n"
+        "position: {columns: [N, E, D]}\n"
+        "attitude: {columns: [roll, pitch, yaw], euler: zyx}\n"
+        "rotors: {columns: [r1, r2, r3, r4], order: px4-x, unit: rpm}\nbattery: {column: v}\n"
+    )
+    (tmp_path / "log.csv").write_text(text)
+    log = read_log(tmp_path / "log.csv", map=tmp_path / "map.yaml")
+    fields = FieldMap(wanted, VEHICLE, "here")
+    header, *lines = text.splitlines()
+    for k, line in enumerate(lines):
+        values = dict(zip(header.split(";"), map(float, line.split(";")), strict=True))
+        sample = fields.sample("row", values, 0)
+        assert sample.stamp == round(log.t[k] * 1e9)
+        np.testing.assert_allclose(sample.position, log.position[k])
+        sign = np.sign(sample.quaternion @ log.quaternion[k])
+        np.testing.assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
+        np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
+        assert sample.voltage == log.voltage[k]
+    session, found = run_text(text, wanted)
+    assert session.estimates == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,px,py\n1,2,3\n", "no field pz, qw, qx, qy, qz, omega1"),
+        (as_csv(flight())[:40], "expected"),
+        ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2,x" + ",1" * 9, "not a number"),
+        ("t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n1,2\n", "row of 2 field"),
+        (
+            "t,px,py,pz,qw,qx,qy,qz,omega1,omega2,omega3,omega4\n0,0,0,1,2,0,0,0" + ",9" * 4,
+            "length",
+        ),
+        ("", "no message came"),
+        (b"\x00\x01\x02" * 50_000, "a line of more than"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(text, said):
+    with pytest.raises(InputError, match=said):
+        run_text(text)
+
+
+def test_a_bad_line_on_the_way_is_counted():
+    lines = as_csv(flight()).splitlines()
+    lines[500] = lines[500][:20]
+    session, found = run_text("\n".join(lines))
+    assert session.tallies.counts == {"malformed": 1}
+    assert len(found) == len(flight()["t"]) - 1
+
+
+class Sender:
+    """Sends datagrams to a session that listens, and waits for each to be taken."""
+
+    def __init__(self, **options):
+        self.tallies = Tallies()
+        self.outputs, self.answers = [], []
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        probe.bind(("127.0.0.1", 0))
+        self.port = probe.getsockname()[1]
+        probe.close()
+        source = UdpJson(f"udp-json://127.0.0.1:{self.port}?reply=1", VEHICLE, None, self.tallies)
+        self.session = Session(
+            source,
+            VEHICLE,
+            self.tallies,
+            settings=SessionSettings(**{"wait": 0.0} | options),
+            tell=self.outputs.append,
+        )
+        self.failed = []
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self):
+        try:
+            self.session.run()
+        except InputError as error:
+            self.failed.append(str(error))
+
+    def send(self, data):
+        self.socket.sendto(data, ("127.0.0.1", self.port))
+
+    def read(self):
+        """What has come back, so that it does not wait in a buffer until that is full."""
+        while True:
+            try:
+                self.answers.append(json.loads(self.socket.recv(4096, socket.MSG_DONTWAIT)))
+            except BlockingIOError:
+                return
+
+    def end(self):
+        self.session.stop()
+        self.thread.join()
+        self.read()
+        self.socket.close()
+
+
+def wait_until(what, thread):
+    """Until it is so, or the stream has ended."""
+    while not what() and thread.is_alive():
+        thread.join(0.01)
+
+
+def _rows(sender):
+    rates = sender.tallies.rates
+    return rates["row"].count if "row" in rates else 0
+
+
+def test_datagrams_with_faults_over_the_loopback():
+    flown = flight()
+    objects = as_objects(flown)[:500]
+    for i, one in enumerate(objects):
+        one["seq"] = i
+    sender = Sender()
+    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
+    sent = [one for i, one in enumerate(objects) if i % 50 != 20]  # 10 are lost
+    for one in sent:
+        before = _rows(sender)
+        sender.send(json.dumps(one).encode())
+        wait_until(lambda n=before: _rows(sender) > n, sender.thread)
+        sender.read()
+    sender.send(json.dumps(sent[-1]).encode())  # once more
+    sender.send(b'{"t": 1.0, "px": ')  # cut off
+    sender.send(json.dumps({"t": 99.0, "px": 1.0, "py": 2.0}).encode())  # a field is missing
+    wait_until(lambda: sender.tallies.counts["malformed"] == 2, sender.thread)
+    sender.end()
+    answers = sender.answers
+    assert not sender.failed
+    assert dict(sender.tallies.counts) == {"lost": 10, "doubled": 1, "malformed": 2}
+    assert len(sender.outputs) == len(answers) == len(sent)
+    assert answers[-1]["fx"] == sender.outputs[-1].estimate.force[0]
+    assert answers[-1]["status"] == "tracking"
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"hello", "expected a datagram of JSON"),
+        (b"[1, 2]", "an object"),
+        (b'{"t": 1, "px": 1, "py": 2}', "no field pz"),
+        (b'{"t": "soon", "px": 1}', "expected a time"),
+        (b'{"t": 1, "speed": 4}', "none of the fields"),
+        (b'{"t": 1, "omega1": "fast", "omega2": 1, "omega3": 1, "omega4": 1}', "expected a number"),
+        (b"[" * 5000, "expected a datagram of JSON"),
+    ],
+)
+def test_a_first_datagram_that_is_none_ends_the_stream(data, said):
+    sender = Sender()
+    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
+    sender.send(data)
+    sender.thread.join()
+    sender.end()
+    assert said in sender.failed[0]
+
+
+def test_a_source_that_says_nothing_ends_in_what_was_expected():
+    sender = Sender(wait=0.2)
+    sender.thread.join()
+    sender.end()
+    assert "no message came within 0.2 s; expected datagrams of JSON" in sender.failed[0]
+
+
+def test_two_streams_cannot_listen_at_one_address():
+    sender = Sender()
+    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
+    again = UdpJson(f"udp-json://127.0.0.1:{sender.port}", VEHICLE, None, Tallies())
+    with pytest.raises(InputError, match="cannot listen"):
+        again.open()
+    sender.end()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sim:bose", "Did you mean 'base'"),
+        ("sim:base?sped=2", "unknown option 'sped'"),
+        ("sim:base?speed=-1", "at least 0"),
+        ("udp-json://127.0.0.1", "no port"),
+        ("udp-json://127.0.0.1:99999", "no address"),
+        ("flight.csv", "unknown source"),
+        ("csv:flight.csv", "windwrench estimate reads"),
+    ],
+)
+def test_an_address_that_is_none_is_refused(text, said):
+    with pytest.raises(InputError, match=said):
+        make_source(text, VEHICLE, None, Tallies())
+
+
+def test_a_map_of_messages_that_need_none_is_refused():
+    with pytest.raises(InputError, match="--map"):
+        make_source("sim:base", VEHICLE, load_map("rpm"), Tallies())
+
+
+def test_commands_beyond_their_range_are_no_commands():
+    fields = FieldMap(load_map("cflib"), VEHICLE, "here")
+    with pytest.raises(Malformed, match="expected 0 to 65535"):
+        fields.sample("row", {"timestamp": 1} | {f"motor.m{i}": 7e4 for i in range(1, 5)}, 0)
+
+
+def test_the_simulated_vehicle_feels_the_jet():
+    """At its true wrench, as a scenario's flight has it; the same seed flies the same."""
+    flights = []
+    for _ in range(2):
+        tallies, outputs = Tallies(), []
+        source = make_source("sim:static?seed=3&speed=0", VEHICLE, None, tallies)
+        settings = SessionSettings(seconds=6.0)
+        Session(source, VEHICLE, tallies, settings=settings, tell=outputs.append).run()
+        flights.append(outputs)
+    force = np.array([o.estimate.force for o in flights[0]])
+    np.testing.assert_array_equal(force, [o.estimate.force for o in flights[1]])
+    truth = np.array([o.row.force for o in flights[0]])
+    assert truth[600:, 0].mean() > 0.2
+    # the filter follows with 1 s, and has come from nothing
+    np.testing.assert_allclose(force[900:].mean(axis=0), truth[900:].mean(axis=0), atol=0.1)
