@@ -10,8 +10,15 @@ COMPILED = (
 
 
 def pytest_configure(config):
-    """Compile what most files need before workers start, or each of them compiles it."""
-    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+    """Compile what most files need before workers start, or each of them compiles it; a part of
+    the suite compiles what it needs.
+    """
+    whole = config.args == ["tests"]
+    if (
+        whole
+        and getattr(config.option, "numprocesses", None)
+        and not hasattr(config, "workerinput")
+    ):
         running = [
             subprocess.Popen(
                 [sys.executable, "-c", source],
