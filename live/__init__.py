@@ -1,1 +1,1 @@
-"""On the vehicle: streams from vehicles, and the filter exported to C."""
+"""Beside a vehicle that flies: streams from vehicles, and the filter exported to C."""
