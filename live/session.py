@@ -200,7 +200,7 @@ class Session:
         self.output = output
         self.source.send(output)
         self._tell(output)
-        if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED:
+        if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)
             self._shown, self._shown_t = self._shown + 1, output.t
         if self._begin_t is None:
