@@ -187,12 +187,16 @@ def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
         InputError: as ``Session.run``.
     """
     failed: list[BaseException] = []
+    # what is waited for: an interrupt within Thread.join has Python take the thread for ended
+    done = threading.Event()
 
     def work() -> None:
         try:
             session.run()
         except BaseException as error:
             failed.append(error)
+        finally:
+            done.set()
 
     from ..live.terminal_page import page
 
@@ -208,13 +212,13 @@ def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
     try:
         if draws:
             with Live(render(), console=console, auto_refresh=False, transient=True) as shown:
-                _each_page(thread, lambda: shown.update(render(), refresh=True))
+                _each_page(done, lambda: shown.update(render(), refresh=True))
         else:
-            _each_page(thread, lambda: None)
+            _each_page(done, lambda: None)
     except KeyboardInterrupt:
         interrupted = True
     session.stop()
-    thread.join()
+    done.wait()
     if failed:
         raise failed[0]
     if draws and session.output is not None:
@@ -222,10 +226,10 @@ def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
     return interrupted
 
 
-def _each_page(thread: threading.Thread, show: Callable[[], None]) -> None:
-    while thread.is_alive():
+def _each_page(done: threading.Event, show: Callable[[], None]) -> None:
+    while not done.is_set():
         show()
-        thread.join(1.0 / _PAGES)
+        done.wait(1.0 / _PAGES)
 
 
 def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str, Any]:

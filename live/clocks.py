@@ -1,11 +1,11 @@
 """Stamps of clocks that are not ours, on one time: the stream's.
 
 The stream's time is the first sender's clock itself, in s; it begins at zero where that clock
-counts from 1970. What only one clock has stamped is so never moved about: its estimates are those of the
-log offline. Stamps of a second clock (a camera's beside the autopilot's) are brought over by how
-much earlier than here each of them reads: the least over the last half minute, since transport only
-delays. That follows clocks that drift. A clock that jumps (an autopilot that boots again) goes on
-where the stream was, once enough messages agree that it did.
+counts from 1970. What only one clock has stamped is so never moved about: its estimates are those
+of the log offline. Stamps of a second clock (a camera's beside the autopilot's) are brought over by
+how much earlier than here each of them reads: the least over the last half minute, since transport
+only delays. That follows clocks that drift. A clock that jumps (an autopilot that boots again) goes
+on where the stream was, once enough messages agree that it did.
 """
 
 from collections import deque

@@ -53,6 +53,7 @@ class Row:
     accelerometer: Array | None = None
     force: Array | None = None
     torque: Array | None = None
+    stamp: int | None = None  # ns, sender's clock, of the message that completed it
 
     @property
     def has_pose(self) -> bool:

@@ -85,6 +85,7 @@ class Joiner:
             accelerometer=sample.accelerometer,
             force=sample.force,
             torque=sample.torque,
+            stamp=sample.stamp,
         )
 
     def _take_motors(self, sample: Sample, t: float) -> bool:

@@ -5,6 +5,7 @@ other; whoever shows the estimates looks at ``snapshot`` from another.
 """
 
 import gc
+import math
 import sys
 import threading
 import time
@@ -27,6 +28,7 @@ from .sources.base import Source
 from .tallies import Tallies
 
 _SECOND = 1_000_000_000  # ns
+_VIEW_SECONDS, _VIEWED = 30.0, 50.0  # what a view shows: so long, and so often a second
 
 
 @dataclass(frozen=True)
@@ -96,10 +98,25 @@ class Session:
         self._kinds: set[str] = set()
         self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
         self.output: Output | None = None
-        self.recent: deque[Output] = deque(maxlen=12_000)  # what a view has not taken yet
-        self.watched = False  # a view takes them
+        self._recent: deque[Output] | None = None  # what a view shows
+        self._shown, self._shown_t = 0, -math.inf  # how many it got, and the last one's time
         self.estimates = 0
         self.ended = ""  # why, in words
+
+    def watch(self) -> None:
+        """Keep the last 30 s for a view."""
+        if self._recent is None:
+            self._recent = deque(maxlen=round(_VIEW_SECONDS * _VIEWED))
+
+    def since(self, number: int) -> tuple[list[Output], int]:
+        """Return what a view has not got yet of the last 30 s, from any thread.
+
+        Args:
+            number: that the last call returned; 0 at first.
+        """
+        shown = self._shown
+        recent = [] if self._recent is None else list(self._recent)
+        return recent[max(0, len(recent) - (shown - number)) :] if shown > number else [], shown
 
     def stop(self) -> None:
         """Have the stream end; from any thread."""
@@ -183,8 +200,9 @@ class Session:
         self.output = output
         self.source.send(output)
         self._tell(output)
-        if self.watched:
-            self.recent.append(output)
+        if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED - 1e-6:
+            self._recent.append(output)
+            self._shown, self._shown_t = self._shown + 1, output.t
         if self._begin_t is None:
             self._begin_t = output.t
         seconds = self._settings.seconds

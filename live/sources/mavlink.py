@@ -14,8 +14,8 @@ up: both by half a turn about x, as in logs of PX4.
 SERVO_OUTPUT_RAW, which the vehicle's motor curve turns into thrust. Motors 1 to 4 are those of a
 quad x, which PX4 and ArduPilot number alike.
 
-**Sent back**, in north, east, down: DEBUG_FLOAT_ARRAY ``wrench`` for each pose (force, torque, their
-standard deviations, NIS, status), and ten times a second what ground stations plot:
+**Sent back**, in north, east, down: DEBUG_FLOAT_ARRAY ``wrench`` for each pose (force, torque,
+their standard deviations, NIS, status), and ten times a second what ground stations plot:
 NAMED_VALUE_FLOAT ``force_n, force_e, force_d, torque_n, torque_e, torque_d``. Where the vehicle
 declares a drag (rotor_drag), also WIND_COV: the steady wind whose drag the force would be.
 """

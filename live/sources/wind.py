@@ -1,4 +1,4 @@
-"""The steady wind whose drag an external force would be, where the vehicle declares its rotors' drag.
+"""The steady wind whose drag an external force would be, of a vehicle that declares rotor drag.
 
 The declared drag is that of still air. In a horizontal wind w it grows by
 ``sum_i W_i R diag(kdx, kdy, 0) R' w`` (``dynamics.effects.rotor_drag``), which the filter sees as

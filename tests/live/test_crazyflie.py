@@ -117,7 +117,7 @@ def test_pwm_by_the_motor_curve(monkeypatch):
             link.log(5 * k, values_of(flown, k))
         taken(100)
 
-    session, outputs, failed = run(play, vehicle)
+    _, outputs, failed = run(play, vehicle)
     assert not failed
     assert outputs[-1].row.commanded
     np.testing.assert_allclose(outputs[50].row.rotor_speeds, flown["rotor_speeds"][100], rtol=1e-3)
@@ -161,7 +161,7 @@ def test_a_link_that_is_lost_ends_the_stream():
         taken(50)
         link.fail("too many packets lost")
 
-    session, outputs, failed = run(play)
+    _, outputs, failed = run(play)
     assert not failed
     assert len(outputs) == 50
 

@@ -156,7 +156,7 @@ def test_a_flight_with_faults():
     """
     flown, pilot = flight(), Autopilot(options="?pose=ODOMETRY")
     lost = set(range(300, 310))
-    rows = [k for k in range(0, 1400) if not 800 <= k < 1000]  # a second of silence
+    rows = [k for k in range(1400) if not 800 <= k < 1000]  # a second of silence
     swapped = {500: 501, 501: 500}
     taken = 0
     for k in rows:
@@ -207,7 +207,7 @@ def test_commands_by_the_motor_curve_and_none_without():
     curve = MotorCurve((0.0, 0.0, float(VEHICLE.k[0] * 650.0**2)), command=(1000.0, 2000.0))
     for vehicle in (replace(VEHICLE, motor_curve=curve), VEHICLE):
         pilot = Autopilot(vehicle, options="?pose=ODOMETRY")
-        for k in range(0, 400):
+        for k in range(400):
             us = round(flown["t"][k] * 1e6)
             pulses = [round(1000 + 1000 * w / 650.0) for w in flown["rotor_speeds"][k][MOTORS]]
             pilot.mav.servo_output_raw_send(us, 0, *pulses, 0, 0, 0, 0)
@@ -225,7 +225,7 @@ def test_commands_by_the_motor_curve_and_none_without():
 def test_gyro_accelerometer_and_battery():
     flown = flight(4.0, "gentle", imu=True)
     pilot = Autopilot(options="?pose=ODOMETRY")
-    for k in range(0, 200):
+    for k in range(200):
         us = round(flown["t"][k] * 1e6)
         pilot.esc(flown, k)
         a, g = flown["accelerometer"][k] * NED, flown["gyro"][k] * NED

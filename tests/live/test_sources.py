@@ -96,7 +96,7 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
         np.testing.assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
         np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
         assert sample.voltage == log.voltage[k]
-    session, found = run_text(text, wanted)
+    session, _ = run_text(text, wanted)
     assert session.estimates == 3
 
 

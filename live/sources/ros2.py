@@ -1,0 +1,164 @@
+"""Topics of ROS 2, where rclpy is there (it comes with a ROS 2 installation, not from PyPI).
+
+``ros2:TOPICS.yaml`` names them as the map of a bag does (``identification.logs.readers.rosbag``);
+``ros2:?pose=/vicon/drone&rotors=/motors`` does so on the command line (pose, rotors, command,
+voltage, imu). Published are ``windwrench/wrench`` (geometry_msgs/WrenchStamped) and its twin with a
+covariance, ``windwrench/external_acceleration`` (geometry_msgs/AccelWithCovarianceStamped), in the
+frame ``?frame=world``.
+"""
+
+import importlib
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from ...dynamics.vehicle import Vehicle
+from ...identification.logs.readers.topic_map import topic_map
+from ...runtime.errors import InputError
+from ..filtering import Output
+from ..messages import Sample
+from ..tallies import Tallies
+from .base import read_address
+from .ros_conversions import (
+    ACCELERATION,
+    BUILT,
+    WRENCH,
+    Converter,
+    acceleration_message,
+    make_converter,
+    wrench_message,
+)
+
+_PARTS = ("pose", "rotors", "command", "voltage", "imu")
+_FOUND = 10.0  # s that topics are waited for
+_AT_ONCE = 64  # messages taken before their estimates are out
+
+
+class Ros2:
+    """Messages of topics.
+
+    Args:
+        text: the address.
+        vehicle: that flies.
+        tallies: where messages are counted that say nothing.
+
+    Raises:
+        InputError: rclpy is not there, or no topics are named.
+    """
+
+    paced = True
+
+    def __init__(self, text: str, vehicle: Vehicle, tallies: Tallies) -> None:
+        address = read_address(text, "ros2", (*_PARTS, "frame"))
+        self.name, self._frame = text, address.options.get("frame", "world")
+        settings: dict[str, dict[str, Any]] = {}
+        if address.path:
+            settings, _ = topic_map(Path("."), address.path)
+        for part in _PARTS:
+            if part in address.options:
+                settings[part] = {"topic": address.options[part]}
+        if "pose" not in settings or not {"rotors", "command"} & set(settings):
+            raise InputError(
+                f"{text}: expected topics of a pose and of rotors or command: ros2:TOPICS.yaml, or "
+                "ros2:?pose=/vicon/drone&rotors=/motors"
+            )
+        if find_spec("rclpy") is None:
+            raise InputError(
+                f"{text}: rclpy is not there; expected a ROS 2 installation whose setup.bash was "
+                "sourced in this shell (it is not on PyPI)"
+            )
+        self._settings, self._vehicle, self._tallies = settings, vehicle, tallies
+        self._node: Any = None
+        self._executor: Any = None
+        self._rclpy: Any = None
+        self._samples: list[Sample] = []
+        self._publishers: tuple[Any, Any] | None = None
+
+    def open(self) -> None:
+        """Make a node, and subscribe.
+
+        Raises:
+            InputError: a topic is not published, or its messages are of another kind.
+        """
+        self._rclpy = importlib.import_module("rclpy")
+        executors: Any = importlib.import_module("rclpy.executors")
+        qos: Any = importlib.import_module("rclpy.qos")
+        get_message = importlib.import_module("rosidl_runtime_py.utilities").get_message
+        self._rclpy.init()
+        self._node = self._rclpy.create_node("windwrench_live")
+        self._executor = executors.SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        names = {part: setting["topic"] for part, setting in self._settings.items()}
+        kinds = self._kinds(set(names.values()))
+        for part, topic in names.items():
+            converter = make_converter(part, topic, kinds[topic], self._settings[part])
+            self._node.create_subscription(
+                get_message(kinds[topic]),
+                topic,
+                lambda message, converter=converter: self._take(converter, message),
+                qos.qos_profile_sensor_data,
+            )
+        self._types = {name: get_message(name) for name in BUILT}
+        self._publishers = (
+            self._node.create_publisher(self._types[WRENCH], "windwrench/wrench", 10),
+            self._node.create_publisher(
+                self._types[ACCELERATION], "windwrench/external_acceleration", 10
+            ),
+        )
+
+    def _kinds(self, topics: set[str]) -> dict[str, str]:
+        """Return the type of each topic, once all are published."""
+        deadline = time.monotonic() + _FOUND
+        while True:
+            known = {name: kinds[0] for name, kinds in self._node.get_topic_names_and_types()}
+            missing = sorted(topics - set(known))
+            if not missing:
+                return known
+            if time.monotonic() > deadline:
+                raise InputError(
+                    f"{self.name}: no topic {', '.join(missing)}; found "
+                    f"{', '.join(sorted(known)) or 'none'}"
+                )
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _take(self, converter: Converter, message: Any) -> None:
+        sample = converter.sample(message, time.monotonic_ns())
+        if sample is None:
+            self._tallies.counts["malformed"] += 1
+        else:
+            self._samples.append(sample)
+
+    def receive(self, timeout: float) -> list[Sample] | None:
+        """Return what has come."""
+        if not self._rclpy.ok():
+            return None
+        self._samples = []
+        self._executor.spin_once(timeout_sec=timeout)
+        for _ in range(_AT_ONCE):
+            before = len(self._samples)
+            self._executor.spin_once(timeout_sec=0.0)
+            if len(self._samples) == before:
+                break
+        return self._samples
+
+    def send(self, output: Output) -> None:
+        """Publish the wrench."""
+        if self._publishers is None or not output.row.has_pose:
+            return
+        wrench, acceleration = self._publishers
+        wrench.publish(wrench_message(self._types, output, self._frame))
+        acceleration.publish(acceleration_message(self._types, output, self._frame, self._vehicle))
+
+    def close(self) -> None:
+        """Take the node down."""
+        if self._node is not None:
+            self._node.destroy_node()
+            self._node, self._publishers = None, None
+            if self._rclpy.ok():
+                self._rclpy.shutdown()
+
+    def expected(self) -> str:
+        """Return what must come."""
+        topics = ", ".join(f"{s['topic']} ({part})" for part, s in self._settings.items())
+        return f"messages on {topics}"

@@ -1,0 +1,208 @@
+"""``live``: what it prints, records, serves and refuses; ended by its user, and killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from io import StringIO
+
+import numpy as np
+import pytest
+
+from tests.live.stream import as_csv, flight
+from tests.live.test_pipeline import VEHICLE, offline
+from windwrench.cli import app
+from windwrench.identification.logs.reading import read_log
+from windwrench.live.session import Session, SessionSettings
+from windwrench.live.sources.open import make_source
+from windwrench.live.tallies import Tallies
+from windwrench.live.terminal_page import line, page
+from windwrench.live.web_view import WebView
+from windwrench.runtime.errors import InputError
+
+START = "from windwrench.cli import main; main()"
+
+
+def run(capsys, *arguments):
+    app(["live", *map(str, arguments)], standalone_mode=False)
+    return capsys.readouterr()
+
+
+def start(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-c", START, "live", *map(str, arguments)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def test_the_simulated_vehicle_prints_records_and_sums_up(tmp_path, capsys):
+    log = tmp_path / "flight.csv"
+    said = run(capsys, "sim:static?speed=0", "--seconds", "3", "--record", log)
+    lines = said.out.splitlines()
+    assert lines[0].startswith("t,fx,fy,fz,tx,ty,tz,std_fx")
+    found = np.array([line.split(",") for line in lines[1:]], dtype=float)
+    assert found[-1, 0] == pytest.approx(3.0)
+    assert "601 estimates over 3.0 s" in said.err
+    recorded = read_log(log)
+    assert (recorded.vehicle, len(recorded.t)) == ("ardrone2", 601)
+    assert recorded.force is not None
+
+
+def test_json_alone_on_standard_output(capsys):
+    out = json.loads(run(capsys, "sim:base?speed=0", "--seconds", "2", "--json").out)
+    assert out["command"] == "live"
+    result = out["result"]
+    assert result["estimates"] == 401
+    assert result["counts"] == {}
+    assert result["ended"] == "2 s have passed"
+
+
+@pytest.mark.slow
+def test_a_flight_is_diagnosed_when_it_lands(tmp_path, capsys):
+    out = run(
+        capsys, "sim:base?speed=0", "--seconds", "12", "--record", tmp_path / "flight.csv",
+        "--diagnose-after", "--out", tmp_path / "found", "--json",
+    )  # fmt: skip
+    assert json.loads(out.out)["result"]["diagnosis"]["verdict"]
+    assert (tmp_path / "found" / "report.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("-",), "--vehicle: - does not say"),
+        (("udp-json://127.0.0.1:1",), "--vehicle"),
+        (("sim:base", "--diagnose-after"), "--diagnose-after: expected --record"),
+        (("sim:base", "--gate", "0.1"), "--gate"),
+        (("sim:base", "--record", "flight.parquet"), "--record"),
+        (("sim:base", "--map", "rpm"), "--map"),
+        (("nothing:there", "--vehicle", "ardrone2"), "unknown source"),
+        (("sim:base", "--vehicle", "ardron"), "Did you mean 'ardrone2'"),
+    ],
+)
+def test_what_cannot_be_is_refused(arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=said):
+        app(["live", *arguments], standalone_mode=False)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def watched():
+    """A flight of 2 s that was watched."""
+    tallies = Tallies()
+    source = make_source("sim:base?speed=0", VEHICLE, None, tallies)
+    session = Session(source, VEHICLE, tallies, settings=SessionSettings(seconds=2.0))
+    session.watch()
+    session.run()
+    return session
+
+
+def test_the_terminal_page_shows_what_there_is(watched):
+    from rich.console import Console
+
+    out = Console(file=StringIO(), width=100)
+    out.print(page(watched.snapshot(), "sim:base", VEHICLE.weight, VEHICLE.arm_l))
+    text = out.file.getvalue()
+    for word in ("force (N)", "torque (mNm)", "+-", "status", "rates", "row", "dropped", "nothing"):
+        assert word in text
+    assert "force" in line(watched.snapshot())
+
+
+def test_the_page_in_a_browser_is_served_here_alone(watched):
+    with WebView(watched, VEHICLE, 0) as view:
+        assert view.address.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(view.address) as answer:
+            text = answer.read().decode()
+            assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+        assert "http://" not in text
+        assert "https://" not in text
+        with urllib.request.urlopen(view.address + "events") as answer:
+            event = json.loads(answer.readline().removeprefix(b"data: "))
+        assert event["vehicle"] == "ardrone2"
+        assert len(event["points"]) == 101  # 50 a second
+        assert event["points"][-1][0] == 2.0
+        other = urllib.request.Request(view.address, headers={"Host": "evil.example"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(other)
+        with pytest.raises(InputError, match="--port"):
+            WebView(watched, VEHICLE, int(view.address.rpartition(":")[2].strip("/")))
+
+
+@pytest.mark.slow
+def test_the_page_in_a_real_browser(watched, tmp_path):
+    from tests.support.browser import BROWSER
+
+    if BROWSER is None:
+        pytest.skip("no browser is installed")
+    with WebView(watched, VEHICLE, 0) as view:
+        view._over.set()  # one event, and the page is done
+        shown = subprocess.run(
+            [
+                BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu",
+                "--disable-dev-shm-usage", f"--user-data-dir={tmp_path}",
+                "--enable-logging=stderr", "--virtual-time-budget=3000", "--timeout=20000",
+                "--dump-dom", view.address,
+            ],
+            capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+    assert "sim:base?speed=0, ardrone2" in shown.stdout
+    assert "rates: row" in shown.stdout
+    assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
+
+
+def test_its_user_ends_it_and_loses_nothing(tmp_path):
+    text = as_csv(flight()).splitlines(keepends=True)
+    log = tmp_path / "flight.csv"
+    running = start("-", "--vehicle", "ardrone2", "--record", log)
+    lines = []
+    reader = threading.Thread(target=lambda: lines.extend(running.stdout))
+    reader.start()
+    running.stdin.write("".join(text[:701]).encode())
+    running.stdin.flush()
+    while len(lines) < 701 and running.poll() is None:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    said = running.stderr.read().decode()
+    assert running.wait() == 130
+    reader.join()
+    assert "700 estimates over 3.5 s" in said
+    assert said.rstrip().endswith("interrupted")
+    found = np.array([line.split(b",")[:7] for line in lines[1:]], dtype=float)
+    np.testing.assert_allclose(found, offline(flight())[:700], atol=1e-9, rtol=0)
+    assert len(read_log(log).t) == 700
+
+
+def test_a_recording_that_is_killed_is_a_log_up_to_its_last_second(tmp_path):
+    text = as_csv(flight()).splitlines(keepends=True)
+    log = tmp_path / "flight.csv"
+    running = start("-", "--vehicle", "ardrone2", "--record", log)
+    lines = []
+    reader = threading.Thread(target=lambda: lines.extend(running.stdout))
+    reader.start()
+    running.stdin.write("".join(text[:1201]).encode())
+    running.stdin.flush()
+    while len(lines) < 1201 and running.poll() is None:
+        time.sleep(0.02)
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    reader.join()
+    assert read_log(log).t[-1] > 0.005 * 1199 - 1.0
+
+
+@pytest.mark.parametrize("text", ["t,px,py\n1,2,3\n", ""])
+def test_nothing_is_half_recorded_of_what_is_no_stream(tmp_path, monkeypatch, text):
+    (tmp_path / "in").write_text(text)
+    log = tmp_path / "flight.csv"
+    with open(tmp_path / "in") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with pytest.raises(InputError, match="standard input: no"):
+            app(["live", "-", "--vehicle", "ardrone2", "--record", str(log)], standalone_mode=False)
+    assert not log.exists()

@@ -1,0 +1,137 @@
+"""ROS 2: messages to and from this kit's, as rosbags writes and reads them; and the node, against a
+stand-in for rclpy, which is not to be had without a ROS 2 installation.
+"""
+
+import importlib.util
+import xml.etree.ElementTree as ElementTree
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from tests.live.stream import Pipeline, flight
+from tests.live.test_pipeline import VEHICLE, whole
+from windwrench.dynamics import InputError
+from windwrench.dynamics.rotation import matrix_of
+from windwrench.live.session import Session, SessionSettings
+from windwrench.live.sources.open import make_source
+from windwrench.live.tallies import Tallies
+
+pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'windwrench[logs]'")
+
+from tests.support.fake_ros import STORE, World, array, install, pose
+from windwrench.live.sources.ros_conversions import (
+    ACCELERATION,
+    WRENCH,
+    acceleration_message,
+    make_converter,
+    wrench_message,
+)
+
+
+def test_a_pose_that_goes_over_the_wire():
+    flown = flight()
+    message = pose(1_700_000_000_123_456_789, flown["position"][7], flown["quaternion"][7])
+    data = STORE.serialize_cdr(message, "geometry_msgs/msg/PoseStamped")
+    again = STORE.deserialize_cdr(data, "geometry_msgs/msg/PoseStamped")
+    converter = make_converter("pose", "/p", "geometry_msgs/msg/PoseStamped", {})
+    sample = converter.sample(again, 5)
+    assert sample.stamp == 1_700_000_000_123_456_789
+    np.testing.assert_array_equal(sample.position, flown["position"][7])
+    np.testing.assert_allclose(sample.quaternion, flown["quaternion"][7], rtol=1e-15)
+    turned = make_converter("pose", "/p", "geometry_msgs/msg/PoseStamped", {"frame": "ned"})
+    ned = turned.sample(again, 5)
+    np.testing.assert_array_equal(ned.position, flown["position"][7] * [1, -1, -1])
+
+
+def test_rotors_of_a_multi_array_need_a_unit():
+    kind = "std_msgs/msg/Float64MultiArray"
+    with pytest.raises(InputError, match="does not say its unit"):
+        make_converter("rotors", "/m", kind, {})
+    converter = make_converter("rotors", "/m", kind, {"unit": "rpm", "order": [4, 3, 2, 1]})
+    sample = converter.sample(array([10, 20, 30, 40]), 0)
+    np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
+    assert sample.stamp is None
+    assert converter.sample(array([1.0, 2.0]), 0) is None
+    with pytest.raises(InputError, match="unknown type"):
+        make_converter("pose", "/m", kind, {})
+
+
+def test_the_wrench_and_its_twin_as_ros_writes_them():
+    output = Pipeline().take(whole(flight())[:200]).outputs[-1]
+    wrench = wrench_message(STORE.types, output, "world")
+    again = STORE.deserialize_cdr(STORE.serialize_cdr(wrench, WRENCH), WRENCH)
+    got = [again.wrench.force.x, again.wrench.force.y, again.wrench.force.z]
+    np.testing.assert_array_equal(got, output.estimate.force)
+    assert again.wrench.torque.z == output.estimate.torque[2]
+    assert (again.header.stamp.sec, again.header.stamp.nanosec) == (0, 995_000_000)
+    twin = acceleration_message(STORE.types, output, "world", VEHICLE)
+    twin = STORE.deserialize_cdr(STORE.serialize_cdr(twin, ACCELERATION), ACCELERATION)
+    covariance = np.array(twin.accel.covariance).reshape(6, 6)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)[:3]), output.std[:3] / VEHICLE.mass)
+    angular = twin.accel.accel.angular
+    R = matrix_of(output.estimate.quaternion)
+    back = R @ VEHICLE.inertia @ R.T @ [angular.x, angular.y, angular.z]
+    np.testing.assert_allclose(back, output.estimate.torque)
+
+
+def run(monkeypatch, world, text):
+    install(monkeypatch, world)
+    tallies = Tallies()
+    source = make_source(text, VEHICLE, None, tallies)
+    session = Session(source, VEHICLE, tallies, settings=SessionSettings(wait=0.0))
+    session.run()
+    return session
+
+
+def test_a_node_reads_topics_and_publishes(monkeypatch, tmp_path):
+    flown = flight()
+    world = World(
+        {"/vicon/drone": "geometry_msgs/msg/PoseStamped", "/m": "std_msgs/msg/Float64MultiArray"}
+    )
+    for k in range(300):
+        ns = 1_700_000_000 * 10**9 + round(flown["t"][k] * 1e9)
+        world.waiting.append(("/m", array(flown["rotor_speeds"][k])))
+        world.waiting.append(
+            ("/vicon/drone", pose(ns, flown["position"][k], flown["quaternion"][k]))
+        )
+    (tmp_path / "topics.yaml").write_text("pose: /vicon/drone\nrotors: {topic: /m, unit: rad/s}\n")
+    session = run(monkeypatch, world, f"ros2:{tmp_path / 'topics.yaml'}")
+    assert session.estimates > 280
+    published = world.published["windwrench/wrench"]
+    assert len(published) == len(world.published["windwrench/external_acceleration"])
+    assert published[-1].header.stamp.sec == 1_700_000_001
+    np.testing.assert_array_equal(published[-1].wrench.force.x, session.output.estimate.force[0])
+
+
+def test_a_topic_that_is_not_there_is_told(monkeypatch):
+    monkeypatch.setattr("windwrench.live.sources.ros2._FOUND", 0.0)
+    world = World({"/other": "geometry_msgs/msg/PoseStamped"})
+    with pytest.raises(InputError, match=r"no topic /m, /p; found /other"):
+        run(monkeypatch, world, "ros2:?pose=/p&rotors=/m")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("ros2:", "expected topics of a pose"),
+        ("ros2:?pose=/p", "expected topics of a pose"),
+        ("ros2:no-such.yaml", "no-such.yaml"),
+        ("ros2:?pose=/p&rotors=/m", "rclpy is not there"),
+    ],
+)
+def test_no_topics(text, said):
+    if importlib.util.find_spec("rclpy") and "rclpy" in said:
+        pytest.skip("rclpy is there")
+    with pytest.raises(InputError, match=said):
+        make_source(text, VEHICLE, None, Tallies())
+
+
+def test_the_package_for_ros_is_one():
+    folder = resources.files("windwrench.live").joinpath("ros2_package")
+    root = ElementTree.fromstring(folder.joinpath("package.xml").read_text())
+    assert root.findtext("name") == "windwrench_live"
+    assert f"project({root.findtext('name')})" in folder.joinpath("CMakeLists.txt").read_text()
+    launch = folder.joinpath("launch/live.launch.py").read_text()
+    compile(launch, "live.launch.py", "exec")
+    assert "windwrench" in launch
