@@ -108,10 +108,11 @@ def scenario_names() -> Iterable[str]:
 
 
 def controller_names() -> Iterable[str]:
-    """Return the controllers that come with the kit."""
+    """Return the controllers that come with the kit, trained policies among them."""
     from ..controllers import CONTROLLERS
+    from ..controllers.shipped import shipped_policies
 
-    return CONTROLLERS
+    return [*CONTROLLERS, *shipped_policies()]
 
 
 def reader_names() -> Iterable[str]:

@@ -138,14 +138,15 @@ def test_rows_are_those_of_the_files(places):
     assert row.rmse_m == pytest.approx(rmse["sac"].mean())
     assert row.by_seed == pytest.approx(rmse["sac"].mean(axis=1))
     rival = min("admittance", "admittance-tuned-fast", key=lambda name: rmse[name].mean())
-    assert row.rival == rival
-    assert row.change == pytest.approx(rmse["sac"].mean() / rmse[rival].mean() - 1)
+    against = row.against["admittance"]
+    assert against.rival == rival
+    assert against.change == pytest.approx(rmse["sac"].mean() / rmse[rival].mean() - 1)
     hover, oracle = rmse["hover"].mean(), rmse["oracle"].mean()
     assert row.score == pytest.approx((hover - rmse["sac"].mean()) / (hover - oracle))
     assert rows["base", "oracle"].score == 1.0
     assert rows["base", "hover"].score == 0.0
     assert {name for _, name in rows} == {*PLAN["designed"], "sac"}
-    names = [name for name, _, _ in aggregate(lines_of(results, PLAN), ["base", "fast"])]
+    names = [one.name for one in aggregate(lines_of(results, PLAN), ["base", "fast"])]
     assert names[0] == "oracle"
     assert set(names) == {*PLAN["designed"], "sac"}
 
