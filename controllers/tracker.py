@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 
 _SEED = 2016  # of the own generator, the same in every episode
 _FEW = 0.5  # share of effective particles below which they are drawn anew
+# what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
+# take any other velocity
+_STOP, _TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
 _SMALLEST = 1e-12 * np.eye(3)  # of a covariance
 
@@ -109,8 +112,8 @@ class _Belief:
 
 
 class Tracker(_Belief):
-    """Knows nothing of how the fan moves: its velocity stays, drifts a little, and now and then
-    changes at once, to none, to the opposite, or to any other.
+    """Knows nothing of how the fan moves: it rests, or its velocity stays and drifts a little; now
+    and then this changes at once, to none, to the opposite, or to any other.
 
     ``mean`` holds what it believes after a decision: the fan's place from the vehicle (m) and its
     velocity (m/s); ``deviation`` the standard deviation of the place.
@@ -150,17 +153,17 @@ class Tracker(_Belief):
     def _begin(self) -> None:
         rng, n = self._rng, self.particles
         self._place = rng.uniform(-self.reach, self.reach, n)
-        self._velocity = np.where(rng.random(n) < 1 / 3, 0.0, self.speed * rng.standard_normal(n))
+        self._velocity = np.where(rng.random(n) < _STOP, 0.0, self.speed * rng.standard_normal(n))
 
     def _move(self) -> None:
         rng, n = self._rng, self.particles
         before = self._velocity
-        drift = self.acceleration * np.sqrt(DECISION_PERIOD)
+        drift = self.acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
         self._velocity = before + drift * rng.standard_normal(n)
         jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
         kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
         self._velocity[jumped] = np.where(
-            kind < 1 / 3, 0.0, np.where(kind < 2 / 3, -before[jumped], fresh)
+            kind < _STOP, 0.0, np.where(kind < _STOP + _TURN, -before[jumped], fresh)
         )
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
 
