@@ -1,5 +1,6 @@
 """Comparisons: controllers on the same episodes, and speed beside that of other packages."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -110,7 +111,7 @@ def benchmark(
             f"{row.lost_fraction:.1%}",
             f"{row.score:.2f}",
             f"{row.wins_over_admittance:.1%}",
-            f"{row.share_of_limit:.0%}",
+            "-" if math.isnan(row.share_of_limit) else f"{row.share_of_limit:.0%}",
             end_section=last,
         )
     console.print(table)

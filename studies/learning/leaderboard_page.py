@@ -140,8 +140,8 @@ def _verdict(rows: Sequence[Row]) -> str:
             else ("below" if lead.change < 0 else "above")
         )
         text = (
-            f"* **{world}**: of {len(learned)} kinds of learned policies {beaten} are clearly worse than the tracker "
-            f"`{tracker.rival}`, which knows nothing of how the fan moves, and {ahead} clearly better. The best of them, {best.name} "
+            f"* **{world}**: {beaten} of {len(learned)} kinds of learned policies are clearly worse than the tracker "
+            f"`{tracker.rival}`, which knows nothing of how the fan moves, {ahead} clearly better. The best of them, {best.name} "
             f"({best.rmse_m:.3f} m), is {_said(tracker)} against it, and {_said(lead)} against `{lead.rival}`, a law of three "
             f"numbers: {even} it."
         )

@@ -189,7 +189,7 @@ def test_what_learning_loses_to_stands_first_and_claims_are_corrected():
         _verdict(list(rows.values())),
         _answers(list(rows.values()), lines_of(results, plan)),
     )
-    assert "1 are clearly worse than the tracker `tracker`" in verdict
+    assert "1 of 1 kinds of learned policies are clearly worse than the tracker" in verdict
     assert "no clear difference from it" in verdict
     told = [line for line in asked.splitlines() if line.startswith("| sac")]
     holds = ["**no**" not in line for line in told]
