@@ -48,7 +48,10 @@ def jet_map(vehicle: Vehicle, jet: Jet, air: Air) -> JetMap:
     stations; the gusts' from the drag at these stations, each in its own gust.
     """
     coefficients = {"u0": jet.u0, "x": 0.0, "y": 0.0, "z": 0.0, "kd": jet.kd, "area": jet.area}
-    bundle = compile_effects(replace(vehicle, effects=(EffectSetting("fan_jet", coefficients),)))
+    alone = replace(
+        compile_effects(vehicle).vehicle, effects=(EffectSetting("fan_jet", coefficients),)
+    )
+    bundle = compile_effects(alone)
     state, wrench = np.zeros(STATE_SIZE), np.zeros(6)
     state[POSITION] = jet.distance
     state[[ROTATION, ROTATION + 4, ROTATION + 8]] = -1.0, -1.0, 1.0  # it faces the fan

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..dynamics.effects import compile_effects
 from .briefing import Briefing
 from .flight import FlightGains
 from .jet_map import AXES, COUNT, FIRST, STEP, jet_map
@@ -38,8 +39,9 @@ def sensor_model(briefing: Briefing) -> SensorModel:
     """Return the model of the sensing of a briefed vehicle."""
     from scipy.linalg import expm
 
-    vehicle, air = briefing.vehicle, briefing.air
-    jets = jet_map(vehicle, briefing.jet, air)
+    air = briefing.air
+    jets = jet_map(briefing.vehicle, briefing.jet, air)
+    vehicle = compile_effects(briefing.vehicle).vehicle
     inertia = float(vehicle.inertia[2, 2])
     torque, force = lags(vehicle.mass, inertia, briefing.noise, air, DECISION_PERIOD)
     axes = (torque, force, force)

@@ -36,10 +36,13 @@ _SMALLEST = 1e-12 * np.eye(3)  # of a covariance
 class _Belief:
     """What the trackers share: particles with weights, and the command that follows from them.
 
+    After a decision ``mean`` holds what is believed: the fan's place from the vehicle (m) and its
+    velocity (m/s); ``deviation`` is the standard deviation of the place (m).
+
     Args:
         gain: 1/s, from the offset to a velocity.
-        feed: share of the fan's estimated velocity that is commanded at once.
-        damping: of the difference between the fan's velocity and the vehicle's own.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
         level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
         particles: how many.
     """
@@ -68,6 +71,7 @@ class _Belief:
         self._chosen = np.empty(n, dtype=np.int64)
         self._place = np.zeros(n)  # m, of the fan, from where the vehicle was at first
         self._velocity = np.zeros(n)  # m/s
+        self.mean, self.deviation = (0.0, 0.0), float("nan")
         self._begin()
 
     def _begin(self) -> None:
@@ -115,17 +119,17 @@ class Tracker(_Belief):
     """Knows nothing of how the fan moves: it rests, or its velocity stays and drifts a little; now
     and then this changes at once, to none, to the opposite, or to any other.
 
-    ``mean`` holds what it believes after a decision: the fan's place from the vehicle (m) and its
-    velocity (m/s); ``deviation`` the standard deviation of the place.
+    After a decision ``mean`` holds what it believes, the fan's place from the vehicle (m) and its
+    velocity (m/s), and ``deviation`` the standard deviation of the place (m).
 
     Args:
-        gain: see ``_Belief``.
-        feed: likewise.
-        damping: likewise.
-        acceleration: m/s2 for 1 s: how much the velocity drifts.
+        gain: 1/s, from the expected offset to a velocity.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
+        acceleration: m/s, standard deviation of the velocity's drift over a second.
         jumps: 1/s, how often it changes at once.
         speed: m/s, standard deviation of a fresh velocity.
-        level: see ``_Belief``.
+        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
         reach: m, on either side, where the fan may be at first.
         particles: how many.
     """
@@ -180,12 +184,12 @@ class InformedTracker(_Belief):
     filtering*, 2001).
 
     Args:
-        gain: see ``_Belief``.
-        feed: likewise.
-        damping: likewise.
+        gain: 1/s, from the expected offset to a velocity.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
         ahead: s, over which the velocity that is commanded is that of the motion to come.
         spread: of the particles that are drawn anew, as a share of their standard deviation.
-        level: see ``_Belief``.
+        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
         particles: how many.
     """
 
