@@ -1,5 +1,6 @@
 """Comparisons: controllers on the same episodes, and speed beside that of other packages."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,8 +32,8 @@ def benchmark(
     controllers: Annotated[
         str,
         typer.Option(
-            help="Controllers, comma-separated: names, paths of trained policies, or "
-            "FILE.py:CLASS.",
+            help="Controllers, comma-separated: names, such as lead, tracker or the policy sac-0, "
+            "paths of trained policies, or FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
     ] = _CONTROLLERS,
@@ -45,7 +46,7 @@ def benchmark(
     episodes: Annotated[
         int, typer.Option(min=1, help="Number of paired episodes per scenario.")
     ] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Random seed.")] = 0,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
     ] = None,
@@ -64,7 +65,7 @@ def benchmark(
 ) -> dict[str, Any]:
     """Fly controllers through the same episodes. Write the leaderboard as JSON, table and picture.
 
-    Example: windwrench benchmark --controllers hover,admittance,oracle --scenarios base,fast
+    Example: windwrench benchmark --controllers lead,tracker,sac-0 --scenarios base,fast
     --episodes 40
     """
     if task != "FanTracking":
@@ -83,6 +84,7 @@ def benchmark(
         count_flights,
         fly_all,
         leaderboard,
+        short_names,
         write_leaderboard,
     )
     from ..evaluation.pictures import draw_leaderboard
@@ -118,25 +120,28 @@ def benchmark(
         "lost",
         "score",
         "wins*",
+        "to the limit**",
         box=box.SIMPLE_HEAD,
     )
+    shown = short_names(names)
     for i, row in enumerate(rows):
         low, high = row.rmse_ci95_m
         last = i + 1 == len(rows) or rows[i + 1].scenario != row.scenario
         table.add_row(
             row.scenario,
-            row.controller,
+            shown[row.controller],
             f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
             f"{row.median_rmse_m:.3f}",
             f"{row.lost_fraction:.1%}",
             f"{row.score:.2f}",
             f"{row.wins_over_admittance:.1%}",
+            "-" if math.isnan(row.share_of_limit) else f"{row.share_of_limit:.0%}",
             end_section=last,
         )
     console.print(table)
     console.print(
         f"{episodes} paired episodes per scenario, seed {seed}; score: 0 = hover, 1 = oracle; "
-        "*over admittance",
+        "*over admittance; **share of the way from admittance to the limit of what can be measured",
         highlight=False,
     )
     say(path, folder / "leaderboard.png")

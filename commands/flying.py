@@ -36,7 +36,7 @@ def fly(
     controller: Annotated[
         str,
         typer.Option(
-            help="Controller: hover, admittance, ratio, oracle ..., the path of a trained policy, "
+            help="Controller: admittance, lead, tracker, sac-0 ..., the path of a trained policy, "
             "or FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
@@ -81,7 +81,7 @@ def fly(
     from ..dynamics.effects import parse_setting
     from ..envs.fan_tracking import FanTrackingEnv
     from ..envs.video import Film, save_picture
-    from ..evaluation.benchmark import make_pilot
+    from ..evaluation.benchmark import make_pilot, short_names
     from ..evaluation.episodes import DECISIONS, fly_episode
     from ..evaluation.pictures import draw_episode
 
@@ -139,12 +139,13 @@ def fly(
         )
         write_rrd(flight, env.truth, folder / "fly.rrd")
         written.append(folder / "fly.rrd")
-    draw_episode(episode, f"{controller}, {scenario}", folder / "fly.png")
+    shown = short_names([controller])[controller]
+    draw_episode(episode, f"{shown}, {scenario}", folder / "fly.png")
     table = Table(
         "controller", "scenario", "fan", "RMSE (m)", "lost", "reward", box=box.SIMPLE_HEAD
     )
     table.add_row(
-        controller,
+        shown,
         scenario,
         episode.motion,
         f"{episode.rmse:.3f}",

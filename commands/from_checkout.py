@@ -344,7 +344,7 @@ def leaderboard(
                 f"{row.rmse_m:.3f}",
                 f"{row.interval[0]:.3f}-{row.interval[1]:.3f}",
                 f"{row.lost_fraction:.1%}",
-                f"{row.change:+.0%}",
+                f"{row.against['admittance'].change:+.0%}",
             )
     console.print(table)
     say(*written)

@@ -161,8 +161,7 @@ def imitate(
     config: ConfigFile = None,
     out: Out = Path("results/imitate"),
 ) -> dict[str, Any]:
-    """Train a policy to imitate the oracle. With DAgger; its score bounds what imitation
-    reaches with this observation.
+    """Train a policy to imitate the oracle. With DAgger, from what a policy may observe.
 
     Example: windwrench imitate --scenario base --seed 0 --out results/imitation-0
     """
@@ -231,7 +230,9 @@ def _learn(
 
 def tunable_names() -> list[str]:
     """Return the controllers that have gains to tune."""
-    return ["admittance", "ratio"]
+    from ..controllers import LAWS
+
+    return list(LAWS)
 
 
 @expensive
@@ -239,7 +240,7 @@ def tune(
     law: Annotated[
         str,
         typer.Argument(
-            help="Controller: admittance or ratio.",
+            help="Controller: admittance, ratio, lead, admittance-pid, tracker, tracker-informed.",
             metavar="CONTROLLER",
             autocompletion=offering(tunable_names),
         ),

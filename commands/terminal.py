@@ -109,10 +109,11 @@ def scenario_names() -> Iterable[str]:
 
 
 def controller_names() -> Iterable[str]:
-    """Return the controllers that come with the kit."""
+    """Return the controllers that come with the kit, trained policies among them."""
     from ..controllers import CONTROLLERS
+    from ..controllers.shipped import shipped_policies
 
-    return CONTROLLERS
+    return [*CONTROLLERS, *shipped_policies()]
 
 
 def task_names() -> Iterable[str]:

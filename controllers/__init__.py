@@ -8,15 +8,34 @@ from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
 from .admittance import Admittance, Ratio
+from .lead import AdmittancePID, Lead
 from .references import Hover, Oracle
+from .tracker import InformedTracker, Limit, Tracker
 from .tuned import tuned_controllers
 
-__all__ = ["CONTROLLERS", "Admittance", "Controller", "Hover", "Oracle", "Ratio", "make_controller"]
+__all__ = [
+    "CONTROLLERS",
+    "LAWS",
+    "Admittance",
+    "AdmittancePID",
+    "Controller",
+    "Hover",
+    "InformedTracker",
+    "Lead",
+    "Limit",
+    "Oracle",
+    "Ratio",
+    "Tracker",
+    "make_controller",
+]
 
 
 class Controller(Protocol):
     """From an observation to a command; ``info`` is the environment's, for those that may see the
     truth.
+
+    One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
+    (``controllers.briefing.Briefing``) before ``reset``.
     """
 
     def reset(self) -> None:
@@ -30,12 +49,22 @@ class Controller(Protocol):
         ...
 
 
-CONTROLLERS: dict[str, Callable[[], Controller]] = {
-    "hover": Hover,
+# designed laws with gains that can be tuned
+LAWS: dict[str, Callable[..., Controller]] = {
     "admittance": Admittance,
     "ratio": Ratio,
+    "lead": Lead,
+    "admittance-pid": AdmittancePID,
+    "tracker": Tracker,
+    "tracker-informed": InformedTracker,
+}
+
+CONTROLLERS: dict[str, Callable[[], Controller]] = {
+    "hover": Hover,
+    **LAWS,
+    "limit": Limit,
     "oracle": Oracle,
-    **tuned_controllers({"admittance": Admittance, "ratio": Ratio}),
+    **tuned_controllers(LAWS),
 }
 
 

@@ -8,3 +8,4 @@ velocity along the world's y.
 FORCE_X, FORCE_Y, FORCE_Z, TORQUE_X, TORQUE_Y, TORQUE_Z, VELOCITY_Y, LAST_COMMAND = range(8)
 OBSERVATION_SIZE = 8
 MAX_COMMAND = 1.0  # m/s
+DECISION_PERIOD = 0.08  # s, from one observation to the next

@@ -9,18 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from ..controllers import Controller, make_controller
+from ..controllers import CONTROLLERS, Controller, make_controller
 from ..controllers.own_file import is_file_name, load_controller
+from ..controllers.shipped import shipped_policies
 from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
 from ..envs.scenarios import get_scenario
 from ..envs.watched_fan_tracking import scenario_env
-from ..runtime.errors import InputError
+from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from ..runtime.workers import workers
 from .episodes import Episode, benchmark_seeds, fly_episode
 
 _CHUNK = 5  # episodes that a worker flies at a time
-_REFERENCES = ("hover", "admittance", "oracle")  # what scores and wins are relative to
+# what scores, wins and shares are relative to
+_REFERENCES = ("hover", "admittance", "limit", "oracle")
+_SEEDS = 2**32
 _RESAMPLES = 4_000
 
 Results = dict[tuple[str, str], list[Episode]]
@@ -40,11 +43,14 @@ class Row:
     lost_fraction: float
     score: float  # (hover - this) / (hover - oracle), of the means
     wins_over_admittance: float  # share of the paired episodes with a smaller RMSE
+    # (admittance - this) / (admittance - limit), of the means: what of the way from the reference
+    # law to the best that these measurements allow is gone
+    share_of_limit: float
 
 
 def make_pilot(name: str) -> Controller:
-    """Return a new controller by its name, by the path of a trained policy, or by FILE.py:CLASS of
-    a file that is then run.
+    """Return a new controller by its name or that of a policy that comes with the kit, by the path
+    of a trained policy, or by FILE.py:CLASS of a file that is then run.
 
     Raises:
         InputError: no controller has this name, or the file holds none.
@@ -52,7 +58,32 @@ def make_pilot(name: str) -> Controller:
     if is_file_name(name):
         controller: Controller = load_controller(name)
         return controller
-    return load_policy(name) if is_policy_path(name) else make_controller(name)
+    if is_policy_path(name):
+        return load_policy(name)
+    shipped = shipped_policies()
+    if name in shipped:
+        return load_policy(shipped[name])
+    if name not in CONTROLLERS:
+        raise unknown_name("controller", name, [*CONTROLLERS, *shipped])
+    return make_controller(name)
+
+
+def short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return what tables and pictures call controllers: a policy by the name of its file, with as
+    many of its folders as it takes to tell it from the others.
+    """
+    parts = {
+        name: Path(name).with_suffix("").parts if is_policy_path(name) else (name,)
+        for name in names
+    }
+    shown = {}
+    for name, own in parts.items():
+        others = [other for key, other in parts.items() if key != name]
+        length = 1
+        while length < len(own) and any(other[-length:] == own[-length:] for other in others):
+            length += 1
+        shown[name] = "/".join(own[-length:])
+    return shown
 
 
 def check_request(
@@ -65,8 +96,8 @@ def check_request(
     """
     if episodes < 1:
         raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed < 100_000:
-        raise InputError(f"benchmark: --seed must lie between 0 and 99999, got {seed}")
+    if not 0 <= seed < _SEEDS:
+        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {seed}")
     for name in controllers:
         make_pilot(name)
     for name in scenarios:
@@ -85,7 +116,7 @@ def fly_all(
     """Fly every controller, and the references, through every scenario on the same seeds.
 
     Args:
-        controllers: names, or paths of trained policies.
+        controllers: names, of trained policies too, or their paths.
         scenarios: names.
         episodes: a scenario.
         seed: of the benchmark.
@@ -153,6 +184,8 @@ def leaderboard(results: Results, controllers: Sequence[str], seed: int) -> list
             if s == scenario
         }
         span = rmse["hover"].mean() - rmse["oracle"].mean()
+        start = rmse["admittance"].mean()
+        way = start - rmse["limit"].mean() if "limit" in rmse else math.nan
         some = []
         for name in dict.fromkeys(controllers):
             flown, values = results[name, scenario], rmse[name]
@@ -171,6 +204,7 @@ def leaderboard(results: Results, controllers: Sequence[str], seed: int) -> list
                     if span > 0
                     else math.nan,
                     wins_over_admittance=float(np.mean(ahead < 0) + 0.5 * np.mean(ahead == 0)),
+                    share_of_limit=float((start - values.mean()) / way) if way > 0 else math.nan,
                 )
             )
         rows.extend(sorted(some, key=lambda row: row.rmse_m))

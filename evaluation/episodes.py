@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..controllers import Controller
 from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET, FanTrackingEnv
 from ..envs.plant import TICK
+from .briefing import briefing_of
 
 Array = NDArray[np.float64]
 DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)
@@ -49,9 +50,15 @@ class Episode:
 def fly_episode(
     env: FanTrackingEnv, controller: Controller, seed: int, each: Callable[[], None] = lambda: None
 ) -> Episode:
-    """Fly one episode and return it; ``each`` is called after every decision."""
-    controller.reset()
+    """Fly one episode and return it; ``each`` is called after every decision.
+
+    A controller that has ``brief`` is told what the environment says of itself, first of all.
+    """
     observation, info = env.reset(seed=seed)
+    brief = getattr(controller, "brief", None)
+    if brief is not None:
+        brief(briefing_of(env))
+    controller.reset()
     rows: list[tuple[float, float, float, float]] = []
     observations, forces, torques = [], [], []
     total = 0.0

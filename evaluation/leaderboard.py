@@ -8,18 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .statistics import (
+    hierarchical_bootstrap,
+    hierarchical_draws,
     interquartile_mean,
+    interval_of,
     mean,
     paired_wins,
     probability_of_improvement,
     relative_change,
-    stratified_bootstrap,
+    sign_probability,
 )
 
 Array = NDArray[np.float64]
 Result = Mapping[str, Any]
 Interval = tuple[float, float]
 REFERENCES = ("hover", "oracle")
+# laws that every controller is compared with, each with its best gains; two must have flown
+NEEDED = ("admittance", "ratio")
+RIVALS = (*NEEDED, "lead", "tracker")
+_CLAIM_RESAMPLES = 4_000  # enough for a p-value that is corrected for a hundred claims
 
 
 @dataclass(frozen=True)
@@ -36,10 +43,23 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Row:
-    """One controller in one world. ``change`` is relative to a rival's mean RMSE: -0.1 is ten per
-    cent less error.
+class Comparison:
+    """One controller against a rival. ``change`` is relative to the rival's mean RMSE: -0.1 is ten
+    per cent less error.
     """
+
+    rival: str
+    change: float
+    interval: Interval  # 95 %, over policies and episodes, as all of them
+    p: float  # two-sided, of no change
+    wins: float  # paired episodes with a smaller RMSE
+    improvement: float  # probability of improvement
+    improvement_interval: Interval
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller in one world."""
 
     world: str
     name: str
@@ -47,19 +67,14 @@ class Row:
     seeds: int
     episodes: int
     rmse_m: float
-    interval: Interval  # 95 %, over seeds and episodes
+    interval: Interval  # 95 %, over policies and episodes
     by_seed: tuple[float, ...]
     median_m: float
     lost_fraction: float
-    score: float
-    rival: str  # the admittance law with the gains that are best in this very world
-    change: float
-    change_interval: Interval
-    wins: float
-    improvement: float
-    ratio_rival: str
-    ratio_change: float
-    ratio_interval: Interval
+    lost_interval: Interval
+    score: float  # 0: hover, 1: oracle
+    share: float | None  # of the way from the admittance law to the limit, where that has flown
+    against: dict[str, Comparison]  # by law: with the gains that are best in this very world
 
 
 def lines_of(results: Sequence[Result], plan: Mapping[str, Any]) -> list[Line]:
@@ -99,9 +114,28 @@ def best_of(lines: Sequence[Line], law: str, world: str) -> Line | None:
     The choice looks at the test episodes, which favours the law and nobody else.
     """
     some = [
-        x for x in lines if x.group == "designed" and x.name.startswith(law) and world in x.rmse
+        x
+        for x in lines
+        if x.group == "designed"
+        and (x.name == law or x.name.startswith(f"{law}-tuned"))
+        and world in x.rmse
     ]
     return min(some, key=lambda x: float(x.rmse[world].mean()), default=None)
+
+
+def compare(x: Array, rival: Line, world: str) -> Comparison:
+    """Return how errors (seeds, episodes) in a world compare with a rival's."""
+    y = rival.rmse[world]
+    draws = hierarchical_draws(relative_change, x, y, resamples=_CLAIM_RESAMPLES)
+    return Comparison(
+        rival=rival.name,
+        change=float(relative_change(x, y)),
+        interval=interval_of(draws),
+        p=sign_probability(draws),
+        wins=float(paired_wins(x, y)),
+        improvement=float(probability_of_improvement(-x, -y)),
+        improvement_interval=hierarchical_bootstrap(probability_of_improvement, -x, -y),
+    )
 
 
 def rows_of(
@@ -115,10 +149,9 @@ def rows_of(
         if any(name not in by_name or world not in by_name[name].rmse for name in REFERENCES):
             continue
         hover, oracle = (float(by_name[name].rmse[world].mean()) for name in REFERENCES)
-        admittance, ratio = best_of(lines, "admittance", world), best_of(lines, "ratio", world)
-        if admittance is None or ratio is None:
+        rivals = {law: best_of(lines, law, world) for law in RIVALS}
+        if any(rivals[law] is None for law in NEEDED):
             continue
-        a, r = admittance.rmse[world], ratio.rmse[world]
         some = []
         for line in lines:
             if world not in line.rmse or (line.group == "ablation") is not ablation:
@@ -132,23 +165,30 @@ def rows_of(
                     seeds=len(x),
                     episodes=x.shape[1],
                     rmse_m=float(x.mean()),
-                    interval=stratified_bootstrap(mean, x, tasks=True),
+                    interval=hierarchical_bootstrap(mean, x),
                     by_seed=tuple(x.mean(axis=1).tolist()),
                     median_m=float(np.median(x)),
                     lost_fraction=float(line.lost[world].mean()),
+                    lost_interval=hierarchical_bootstrap(mean, line.lost[world]),
                     score=(hover - float(x.mean())) / (hover - oracle),
-                    rival=admittance.name,
-                    change=float(relative_change(x, a)),
-                    change_interval=stratified_bootstrap(relative_change, x, a, tasks=True),
-                    wins=float(paired_wins(x, a)),
-                    improvement=float(probability_of_improvement(-x, -a)),
-                    ratio_rival=ratio.name,
-                    ratio_change=float(relative_change(x, r)),
-                    ratio_interval=stratified_bootstrap(relative_change, x, r, tasks=True),
+                    share=_share(by_name, world, float(x.mean())),
+                    against={
+                        law: compare(x, rival, world)
+                        for law, rival in rivals.items()
+                        if rival is not None
+                    },
                 )
             )
         rows.extend(sorted(some, key=lambda row: row.rmse_m))
     return rows
+
+
+def _share(by_name: Mapping[str, Line], world: str, rmse: float) -> float | None:
+    ends = [by_name[n].rmse.get(world) if n in by_name else None for n in ("admittance", "limit")]
+    if ends[0] is None or ends[1] is None:
+        return None
+    start, end = (float(x.mean()) for x in ends if x is not None)
+    return (start - rmse) / (start - end) if start > end else None
 
 
 def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Array | None:
@@ -169,17 +209,41 @@ def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Arra
     return np.concatenate([c[:seeds] for c in columns], axis=1)
 
 
-def aggregate(lines: Sequence[Line], worlds: Sequence[str]) -> list[tuple[str, float, Interval]]:
-    """Return name, interquartile mean of the normalised score over all worlds, and its interval;
-    best first.
+@dataclass(frozen=True)
+class Aggregate:
+    """One controller over several worlds: mean of its scores, none of them left out."""
 
-    The interval is over training seeds, stratified by episode; a law that was designed has one run,
-    and episodes vary.
+    name: str
+    seeds: int
+    score: float
+    interval: Interval  # 95 %, over policies and episodes
+    middle: float  # interquartile mean, of the middle half of the scores
+    middle_interval: Interval
+    lost: float  # share of all episodes
+    lost_interval: Interval
+
+
+def aggregate(lines: Sequence[Line], worlds: Sequence[str]) -> list[Aggregate]:
+    """Return what controllers reach over all worlds, best mean score first; the interquartile mean,
+    which does not see a lost episode, stands beside it, not in its place.
     """
     found = []
     for line in lines:
         scores = None if line.group == "ablation" else normalised(line, lines, worlds)
-        if scores is not None:
-            interval = stratified_bootstrap(interquartile_mean, scores, tasks=len(scores) == 1)
-            found.append((line.name, float(interquartile_mean(scores)), interval))
-    return sorted(found, key=lambda one: -one[1])
+        if scores is None:
+            continue
+        lost = np.concatenate([line.lost[w][: len(scores)] for w in worlds], axis=1)
+        blocks = len(worlds)
+        found.append(
+            Aggregate(
+                name=line.name,
+                seeds=len(scores),
+                score=float(mean(scores)),
+                interval=hierarchical_bootstrap(mean, scores, blocks=blocks),
+                middle=float(interquartile_mean(scores)),
+                middle_interval=hierarchical_bootstrap(interquartile_mean, scores, blocks=blocks),
+                lost=float(lost.mean()),
+                lost_interval=hierarchical_bootstrap(mean, lost, blocks=blocks),
+            )
+        )
+    return sorted(found, key=lambda one: -one.score)

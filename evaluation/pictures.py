@@ -7,10 +7,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..runtime.whole_files import replaced
-from .benchmark import Results, Row
+from .benchmark import Results, Row, short_names
 from .episodes import DECISIONS, Episode
 
-COLOURS = {"hover": "#8c8c8c", "admittance": "#d1495b", "ratio": "#edae49", "oracle": "#30638e"}
+COLOURS = {
+    "hover": "#8c8c8c",
+    "admittance": "#d1495b",
+    "ratio": "#edae49",
+    "lead": "#f2811d",
+    "admittance-pid": "#a4243b",
+    "tracker": "#3d5a80",
+    "tracker-informed": "#98c1d9",
+    "limit": "#293241",
+    "oracle": "#30638e",
+}
 _OTHERS = ("#2a9d8f", "#8d5a97", "#6a994e", "#bc6c25", "#00798c", "#5f0f40")
 _JET = "#cfe5f5"
 
@@ -89,7 +99,8 @@ def draw_leaderboard(rows: Sequence[Row], results: Results, path: Path) -> None:
                 va="center",
                 fontsize=9,
             )
-        left.set_yticks(range(len(some)), names)
+        shown = short_names(names)
+        left.set_yticks(range(len(some)), [shown[name] for name in names])
         left.invert_yaxis()
         left.set_xlim(left=0)
         left.set_title(
@@ -101,7 +112,7 @@ def draw_leaderboard(rows: Sequence[Row], results: Results, path: Path) -> None:
         ]
         for i, name in enumerate(names):
             episode = results[name, scenario][middle]
-            right.plot(episode.time, episode.y, color=colour_of(name, i), lw=1.6, label=name)
+            right.plot(episode.time, episode.y, color=colour_of(name, i), lw=1.6, label=shown[name])
         longest = max(
             (results[name, scenario][middle] for name in names), key=lambda e: len(e.time)
         )

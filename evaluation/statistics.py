@@ -147,6 +147,110 @@ def stratified_bootstrap(
     return float(low), float(high)
 
 
+def hierarchical_draws(
+    statistic: Callable[..., Any],
+    *matrices: ArrayLike,
+    resamples: int = _RESAMPLES,
+    seed: int = 0,
+    blocks: int = 1,
+) -> Array:
+    """Return a statistic of one or more score matrices over many draws of policies and episodes.
+
+    Both levels are drawn anew, each as a whole: a policy keeps all its episodes together, and an
+    episode is the same for all policies of all matrices (the pigeonhole bootstrap of Owen, 2007,
+    for two crossed factors). What differs between policies so counts as often as there are
+    policies, not once an episode. Of n policies or episodes n - 1 are drawn, which makes the
+    variance of a mean unbiased for few of them (Rao and Wu, 1988); a single policy, as a designed
+    law is, stays as it is.
+
+    Args:
+        statistic: takes as many stacks (k, runs, tasks) as there are matrices; returns (k,).
+        *matrices: (runs, tasks).
+        resamples: how often everything is drawn.
+        seed: of the draws.
+        blocks: how many blocks of the same tasks stand side by side in the columns: one for each
+            world in which they were flown. The same tasks are drawn in each.
+
+    Returns:
+        (resamples,).
+
+    Raises:
+        InputError: matrices that do not have the same tasks, or not that many blocks of them.
+    """
+    given = _same_tasks(*matrices)
+    whole = given[0].shape[1]
+    if blocks < 1 or whole % blocks:
+        raise InputError(f"bootstrap: {whole} tasks do not make {blocks} equal blocks")
+    rng, count = np.random.default_rng(seed), whole // blocks
+    step = max(_AT_ONCE // max(m.size for m in given), 1)
+    values = []
+    for first in range(0, resamples, step):
+        k = min(step, resamples - first)
+        columns = rng.integers(count, size=(k, max(count - 1, 1)))
+        columns = np.concatenate([columns + b * count for b in range(blocks)], axis=1)
+        drawn = []
+        for m in given:
+            rows = rng.integers(len(m), size=(k, max(len(m) - 1, 1)))
+            drawn.append(m[rows[:, :, None], columns[:, None, :]])
+        values.append(np.asarray(statistic(*drawn), dtype=np.float64))
+    return np.concatenate(values)
+
+
+def interval_of(draws: ArrayLike, level: float = 0.95) -> tuple[float, float]:
+    """Return the percentile interval that holds a share ``level`` of the draws (n,).
+
+    Raises:
+        InputError: a level that is no share.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"bootstrap: level must lie between 0 and 1, got {level}")
+    low, high = np.quantile(np.asarray(draws), [(1.0 - level) / 2.0, (1.0 + level) / 2.0])
+    return float(low), float(high)
+
+
+def hierarchical_bootstrap(
+    statistic: Callable[..., Any],
+    *matrices: ArrayLike,
+    resamples: int = _RESAMPLES,
+    seed: int = 0,
+    level: float = 0.95,
+    blocks: int = 1,
+) -> tuple[float, float]:
+    """Return the percentile interval of ``hierarchical_draws``; arguments and errors are its own,
+    and those of ``interval_of``.
+    """
+    return interval_of(
+        hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed, blocks=blocks),
+        level,
+    )
+
+
+def sign_probability(draws: ArrayLike, null: float = 0.0) -> float:
+    """Return the two-sided p-value of a statistic being ``null``, from its bootstrap draws (n,):
+    twice the share on the rarer side, never below what n draws can tell.
+    """
+    values = np.asarray(draws, dtype=np.float64)
+    rarer = min(int(np.sum(values >= null)), int(np.sum(values <= null)))
+    return min(1.0, 2.0 * (rarer + 1) / (len(values) + 1))
+
+
+def holm(p_values: ArrayLike) -> Array:
+    """Return p-values (n,) of n claims, adjusted so that all claims below 0.05 hold together with
+    95 % (Holm, 1979): the k-th smallest times (n - k + 1), never less than one before it.
+
+    Raises:
+        InputError: a number that is no probability.
+    """
+    p = np.asarray(p_values, dtype=np.float64)
+    if p.ndim != 1 or not np.all((p >= 0.0) & (p <= 1.0)):
+        raise InputError("holm: expected probabilities (n,) between 0 and 1")
+    order = np.argsort(p, kind="stable")
+    adjusted = np.empty_like(p)
+    stepped = (len(p) - np.arange(len(p))) * p[order]
+    adjusted[order] = np.minimum(np.maximum.accumulate(stepped), 1.0)
+    return adjusted
+
+
 def _same_tasks(*matrices: ArrayLike) -> list[Array]:
     given = [score_matrix(m) for m in matrices]
     if len({m.shape[-1] for m in given}) > 1:

@@ -65,6 +65,11 @@ class MixedFanTracking(gym.Env[Frame, Frame]):
         inner = int(self.np_random.integers(2**31)) if seed is None else seed
         return self._env.reset(seed=inner, options=options)
 
+    @property
+    def current(self) -> FanTrackingEnv:
+        """The environment of this episode's scenario."""
+        return self._env
+
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
         """Step in the scenario of this episode."""
         return self._env.step(action)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from ..controllers import Admittance, Controller, Ratio
+from ..controllers import LAWS
 from ..evaluation.episodes import fly_episode
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
@@ -19,8 +19,29 @@ from .training_envs import check_training_env, make_training_env
 RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "admittance": {"gain": (4.0, 80.0)},
     "ratio": {"gain": (1.5, 40.0), "least_force": (0.02, 0.5)},
+    "lead": {"gain": (3.0, 40.0), "lead": (0.3, 15.0), "least_force": (0.02, 0.5)},
+    "admittance-pid": {"gain": (4.0, 80.0), "integral": (0.05, 30.0), "lead": (0.1, 30.0)},
+    "tracker": {
+        "gain": (0.5, 5.0),
+        "damping": (0.05, 2.0),
+        "acceleration": (0.005, 0.3),
+        "jumps": (0.05, 1.5),
+        "speed": (0.1, 0.5),
+    },
+    "tracker-informed": {
+        "gain": (0.5, 5.0),
+        "damping": (0.05, 2.0),
+        "ahead": (0.08, 0.8),
+        "spread": (0.03, 0.4),
+    },
 }
-_LAWS: dict[str, Callable[..., Controller]] = {"admittance": Admittance, "ratio": Ratio}
+# gains with which the search begins where they are not the law's own defaults: what it found has
+# become those
+STARTS: dict[str, dict[str, float]] = {
+    "admittance-pid": {"gain": 18.0, "integral": 4.0, "lead": 4.0},
+    "tracker": {"gain": 1.5, "damping": 0.3, "acceleration": 0.03, "jumps": 0.3, "speed": 0.25},
+    "tracker-informed": {"gain": 2.0, "damping": 0.5, "ahead": 0.3, "spread": 0.1},
+}
 _PRUNE_AFTER = 10  # episodes
 
 
@@ -48,13 +69,13 @@ def tune(
     Args:
         law: a key of ``RANGES``.
         scenario: scenario or tier.
-        trials: gains tried; the first are the law's own defaults.
+        trials: gains tried; the first are the law's own defaults, or those of ``STARTS``.
         episodes: validation episodes of each; a trial far behind is given up after ten.
         seed: of the search.
         advance: called with the number of trials done.
 
     Returns:
-        ``gains``, ``rmse_m`` and ``lost`` of the best, ``default_rmse_m`` of the law as it comes,
+        ``gains``, ``rmse_m`` and ``lost`` of the best, ``default_rmse_m`` of the first gains tried,
             and the request.
 
     Raises:
@@ -75,7 +96,7 @@ def tune(
             name: trial.suggest_float(name, low, high, log=True)
             for name, (low, high) in RANGES[law].items()
         }
-        controller, rmse, lost = _LAWS[law](**gains), [], 0
+        controller, rmse, lost = LAWS[law](**gains), [], 0
         for k, one in enumerate(seeds):
             episode = fly_episode(env, controller, one)
             rmse.append(episode.rmse)
@@ -91,8 +112,9 @@ def tune(
         sampler=optuna.samplers.TPESampler(seed=seed),
         pruner=optuna.pruners.PercentilePruner(60.0, n_startup_trials=4),
     )
-    default = _LAWS[law]()
-    study.enqueue_trial({name: getattr(default, name) for name in RANGES[law]})
+    default = LAWS[law]()
+    start = {name: float(getattr(default, name)) for name in RANGES[law]}
+    study.enqueue_trial({**start, **STARTS.get(law, {})})
     study.optimize(
         objective, n_trials=trials, callbacks=[lambda _, trial: advance(trial.number + 1)]
     )

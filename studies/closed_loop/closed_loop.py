@@ -135,8 +135,8 @@ def check_requests(requests: Sequence[Request]) -> None:
     for r in requests:
         if r.episodes < 1:
             raise InputError(f"close-loop: --episodes must be at least 1, got {r.episodes}")
-        if not 0 <= r.seed < 100_000:
-            raise InputError(f"close-loop: --seed must lie between 0 and 99999, got {r.seed}")
+        if not 0 <= r.seed < 2**32:
+            raise InputError(f"close-loop: --seed must lie between 0 and 4294967295, got {r.seed}")
         if any(e.name == r.effect.name for e in r.vehicle.effects):
             raise InputError(
                 f"close-loop: --effect {r.effect.name}: {r.vehicle.name} declares it already; "

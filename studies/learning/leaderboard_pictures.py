@@ -14,7 +14,7 @@ from windwrench.evaluation.benchmark import make_pilot
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, fly_episode
 from windwrench.evaluation.leaderboard import Line, Result, Row, normalised
 from windwrench.evaluation.pictures import COLOURS
-from windwrench.evaluation.statistics import performance_profile, stratified_bootstrap
+from windwrench.evaluation.statistics import hierarchical_bootstrap, performance_profile
 from windwrench.runtime.page_files import write_png
 from windwrench.training.training_envs import make_training_env
 
@@ -28,7 +28,15 @@ _LEARNED = {
     "imitation": "#3a6ea5",
     "imitation-wide": "#8fb8de",
 }
-_TRACKED = ("hover", "admittance", "admittance-tuned-fast", "ratio-tuned-fast", "oracle")
+_TRACKED = (
+    "hover",
+    "admittance-tuned-fast",
+    "lead-tuned-fast",
+    "tracker-tuned-fast",
+    "tracker-informed",
+    "limit",
+    "oracle",
+)
 _THOUSANDS = (5, 10, 20, 50, 100, 200, 400)
 _WORLD, _SEED = "fast", FIRST_TEST_SEED + 3  # of the tracking picture
 
@@ -122,7 +130,14 @@ def draw_profiles(lines: Sequence[Line], worlds: Sequence[str], path: Path) -> N
     axes = figure.subplots()
     thresholds = np.linspace(0.0, 1.2, 121)
     for line in lines:
-        shown = line.group == "learned" or line.name in ("admittance", "ratio", "oracle")
+        shown = line.group == "learned" or line.name in (
+            "admittance",
+            "ratio",
+            "lead",
+            "tracker",
+            "limit",
+            "oracle",
+        )
         scores = normalised(line, lines, worlds) if shown else None
         if scores is None:
             continue
@@ -135,8 +150,8 @@ def draw_profiles(lines: Sequence[Line], worlds: Sequence[str], path: Path) -> N
         )
         band = np.array(
             [
-                stratified_bootstrap(
-                    partial(_share_above, t), scores, resamples=200, tasks=len(scores) == 1
+                hierarchical_bootstrap(
+                    partial(_share_above, t), scores, resamples=200, blocks=len(worlds)
                 )
                 for t in thresholds[::6]
             ]

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from windwrench.controllers import Limit
+from windwrench.controllers.flight_response import half_response
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, save_policy
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.fan_tracking import FanTrackingEnv
@@ -177,10 +180,17 @@ def train_entry(
 
 def fly_world(
     pilot: Any, world: Mapping[str, Any], seeds: Sequence[int]
-) -> Iterator[tuple[float, bool]]:
+) -> Iterator[tuple[float, bool, float | None]]:
     """Yield RMSE (m) of the offset and whether the vehicle was lost, for each seed in a world of
-    the plan.
+    the plan; and for the pilot ``limit`` the root mean square (m) of how uncertain the fan's place
+    was when a command given now is carried out by half.
     """
+    ahead, uncertain = half_response(), []
+
+    def note() -> None:
+        if isinstance(pilot, Limit):
+            uncertain.append(pilot.deviation_ahead(ahead))
+
     effects = [parse_setting(text) for text in world.get("effects", ())]
     if effects or "estimator" in world:
         env = FanTrackingEnv(
@@ -192,8 +202,10 @@ def fly_world(
             pilot.features.sources if isinstance(pilot, TrainedPolicy) else frozenset(),
         )
     for seed in seeds:
-        episode = fly_episode(env, pilot, seed)
-        yield episode.rmse, episode.lost
+        uncertain.clear()
+        episode = fly_episode(env, pilot, seed, note)
+        bound = float(np.sqrt(np.mean(np.square(uncertain)))) if uncertain else None
+        yield episode.rmse, episode.lost, bound
 
 
 def do_entry(
@@ -245,16 +257,19 @@ def do_entry(
     for done, name in enumerate(entry.worlds):
         if len(result["scores"].get(name, {}).get("rmse_m", ())) >= plan["episodes"]:
             continue
-        rmse, lost = [], []
-        for value, gone in fly_world(
+        rmse, lost, bounds = [], [], []
+        for value, gone, bound in fly_world(
             pilot, plan["worlds"][name], benchmark_seeds(0, plan["episodes"])
         ):
             rmse.append(round(value, 6))
             lost.append(int(gone))
+            bounds += [round(bound, 6)] if bound is not None else []
             advance(
                 f"{entry.file}: {name}", (done + len(rmse) / plan["episodes"]) / len(entry.worlds)
             )
         result["scores"][name] = {"rmse_m": rmse, "lost": lost}
+        if bounds:
+            result["scores"][name]["bound_m"] = bounds
         write_json(result, path)
 
 

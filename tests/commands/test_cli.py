@@ -223,7 +223,7 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
         (("benchmark", "--scenarios", ","), "--scenarios"),
         (("benchmark", "--episodes", "0"), "--episodes"),
         (("benchmark", "--episodes", "many"), "--episodes"),
-        (("benchmark", "--seed", "100000"), "--seed"),
+        (("benchmark", "--seed", "4294967296"), "--seed"),
         (("estimate", "nowhere.csv"), "nowhere.csv"),
         (("estimate", "nowhere.txt"), "nowhere.txt: cannot be read"),
         (("estimate",), "argument"),

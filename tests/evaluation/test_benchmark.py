@@ -10,7 +10,15 @@ import pytest
 from windwrench.controllers import make_controller
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.evaluation.benchmark import count_flights, fly_all, leaderboard, write_leaderboard
+from windwrench.evaluation.benchmark import (
+    check_request,
+    count_flights,
+    fly_all,
+    leaderboard,
+    make_pilot,
+    short_names,
+    write_leaderboard,
+)
 from windwrench.evaluation.episodes import DECISIONS, FIRST_TEST_SEED, benchmark_seeds, fly_episode
 
 NAMES = ["hover", "admittance", "ratio", "oracle"]
@@ -26,6 +34,7 @@ KEYS = [
     "lost_fraction",
     "score",
     "wins_over_admittance",
+    "share_of_limit",
 ]
 
 
@@ -85,7 +94,7 @@ def test_benchmark_episodes_are_never_those_of_training():
 def test_the_number_of_processes_changes_nothing(rows):
     advanced = []
     split = fly_all(["admittance"], ["base"], EPISODES, seed=0, jobs=2, advance=advanced.append)
-    assert sum(advanced) == count_flights(["admittance"], ["base"], EPISODES) == 3 * EPISODES
+    assert sum(advanced) == count_flights(["admittance"], ["base"], EPISODES) == 4 * EPISODES
     assert leaderboard(split, ["admittance"], 0) == [rows["admittance"]]
 
 
@@ -147,6 +156,50 @@ def test_a_score_that_means_nothing_is_still_valid_json(tmp_path, results):
 
     rows = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
     assert rows[0]["score"] is None
+    assert rows[0]["share_of_limit"] is None
+
+
+def test_the_share_of_the_way_to_the_limit(results, rows):
+    rmse = {c: np.mean([e.rmse for e in results[c, "base"]]) for c in ("admittance", "limit")}
+    assert rmse["limit"] < rmse["admittance"]
+    assert rows["admittance"].share_of_limit == 0.0
+    way = rmse["admittance"] - rmse["limit"]
+    assert rows["ratio"].share_of_limit == pytest.approx(
+        (rmse["admittance"] - rows["ratio"].rmse_m) / way
+    )
+    assert rows["oracle"].share_of_limit > 1.0  # it sees what no wrench shows
+    assert leaderboard(results, ["limit"], 0)[0].share_of_limit == 1.0
+
+
+def test_policies_are_flown_by_their_names(tmp_path):
+    pilot = make_pilot("sac-0")
+    assert pilot.card["features"]["history"] > 1
+    with pytest.raises(InputError, match="Did you mean 'sac-0'"):
+        make_pilot("sac-00")
+    with pytest.raises(InputError, match="Did you mean 'tracker'"):
+        make_pilot("trakcer")
+
+
+def test_tables_show_names_and_not_paths():
+    names = ["runs/a/best.npz", "runs/b/best.npz", "x/sac-0.npz", "hover", "laws.py:Mine"]
+    assert short_names(names) == {
+        "runs/a/best.npz": "a/best",
+        "runs/b/best.npz": "b/best",
+        "x/sac-0.npz": "sac-0",
+        "hover": "hover",
+        "laws.py:Mine": "laws.py:Mine",
+    }
+    assert short_names(["a/sac-0.npz", "sac-0"]) == {"a/sac-0.npz": "a/sac-0", "sac-0": "sac-0"}
+
+
+def test_any_seed_of_32_bits_has_episodes_of_its_own():
+    check_request(["hover"], ["base"], 1, 2**32 - 1)
+    with pytest.raises(InputError, match="between 0 and 4294967295"):
+        check_request(["hover"], ["base"], 1, 2**32)
+    last = benchmark_seeds(2**32 - 1, 2)
+    assert not set(last) & set(benchmark_seeds(2**32 - 2, 10_000))
+    episode = fly_episode(FanTrackingEnv("static"), make_controller("oracle"), last[0])
+    assert not episode.lost
 
 
 @pytest.mark.parametrize(

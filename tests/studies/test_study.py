@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 import yaml
 
+from windwrench.controllers import Limit, Tracker
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.evaluation.leaderboard import aggregate, lines_of, rows_of
 from windwrench.runtime.provenance import commit, made_by
-from windwrench.studies.learning.leaderboard_page import write_page
+from windwrench.studies.learning.leaderboard_page import _answers, _verdict, write_page
 from windwrench.studies.learning.study import (
     Places,
     do_entry,
     entries_of,
+    fly_world,
     is_done,
     load_plan,
     read_results,
@@ -127,6 +129,75 @@ def test_a_shipped_policy_reproduces_its_line(places):
     assert kept["lost"] == [int(e.lost) for e in flown]
 
 
+def test_the_limit_says_how_uncertain_it_was():
+    flown = list(fly_world(Limit(particles=60), {"scenario": "base"}, [5, 6]))
+    assert all(0.01 < bound < 0.4 for _, _, bound in flown)
+    assert [
+        bound for _, _, bound in fly_world(Tracker(particles=10), {"scenario": "base"}, [5])
+    ] == [None]
+
+
+def test_what_learning_loses_to_stands_first_and_claims_are_corrected():
+    """A learner between a tracker and the admittance law, by known errors."""
+    rng = np.random.default_rng(4)
+    hard = rng.uniform(0.8, 1.2, 30)
+    errors = {
+        "hover": 0.6,
+        "admittance": 0.16,
+        "ratio": 0.15,
+        "lead": 0.14,
+        "tracker": 0.11,
+        "limit": 0.09,
+        "oracle": 0.04,
+    }
+    scores = {
+        name: {"rmse_m": list(value * hard), "lost": [0] * 30} for name, value in errors.items()
+    }
+    plan = {
+        "worlds": {"base": {"scenario": "base"}},
+        "episodes": 30,
+        "designed": list(errors),
+        "learned": {"sac": {}},
+        "ablation": None,
+    }
+    results = [
+        {"name": name, "group": "designed", "seed": None, "scores": {"base": one}}
+        for name, one in scores.items()
+    ]
+    for seed, value in enumerate((0.138, 0.14, 0.142, 0.139, 0.141)):
+        noisy = value * hard * rng.uniform(0.98, 1.02, 30)
+        lost = [1, *[0] * 29] if seed == 0 else [0] * 30
+        results.append(
+            {
+                "name": "sac",
+                "group": "learned",
+                "seed": seed,
+                "scenario": "base",
+                "scores": {"base": {"rmse_m": list(noisy), "lost": lost}},
+            }
+        )
+    rows = {row.name: row for row in rows_of(results, plan)}
+    sac = rows["sac"]
+    assert sac.against["tracker"].interval[0] > 0.2 > sac.against["admittance"].interval[1]
+    assert sac.against["tracker"].p < 0.01
+    assert sac.against["lead"].interval[0] < 0.0 < sac.against["lead"].interval[1]
+    assert sac.share == pytest.approx((0.16 - sac.rmse_m / hard.mean()) / 0.07, abs=0.05)
+    assert rows["limit"].share == pytest.approx(1.0)
+    assert sac.lost_fraction == pytest.approx(1 / 150)
+    assert sac.lost_interval[1] > 0.0
+    verdict, asked = (
+        _verdict(list(rows.values())),
+        _answers(list(rows.values()), lines_of(results, plan)),
+    )
+    assert "1 of 1 kinds of learned policies are clearly worse than the tracker" in verdict
+    assert "no clear difference from it" in verdict
+    told = [line for line in asked.splitlines() if line.startswith("| sac")]
+    holds = ["**no**" not in line for line in told]
+    assert holds == sorted(holds)
+    assert "better than the best tracker (tracker) | **no**" in asked
+    assert "corrected for all 3 comparisons" in asked
+
+
 def test_rows_are_those_of_the_files(places):
     results = read_results(places)
     rows = {(r.world, r.name): r for r in rows_of(results, PLAN)}
@@ -138,14 +209,15 @@ def test_rows_are_those_of_the_files(places):
     assert row.rmse_m == pytest.approx(rmse["sac"].mean())
     assert row.by_seed == pytest.approx(rmse["sac"].mean(axis=1))
     rival = min("admittance", "admittance-tuned-fast", key=lambda name: rmse[name].mean())
-    assert row.rival == rival
-    assert row.change == pytest.approx(rmse["sac"].mean() / rmse[rival].mean() - 1)
+    against = row.against["admittance"]
+    assert against.rival == rival
+    assert against.change == pytest.approx(rmse["sac"].mean() / rmse[rival].mean() - 1)
     hover, oracle = rmse["hover"].mean(), rmse["oracle"].mean()
     assert row.score == pytest.approx((hover - rmse["sac"].mean()) / (hover - oracle))
     assert rows["base", "oracle"].score == 1.0
     assert rows["base", "hover"].score == 0.0
     assert {name for _, name in rows} == {*PLAN["designed"], "sac"}
-    names = [name for name, _, _ in aggregate(lines_of(results, PLAN), ["base", "fast"])]
+    names = [one.name for one in aggregate(lines_of(results, PLAN), ["base", "fast"])]
     assert names[0] == "oracle"
     assert set(names) == {*PLAN["designed"], "sac"}
 

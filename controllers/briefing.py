@@ -1,0 +1,71 @@
+"""What a designed controller may be told before it flies: its own vehicle, its own sensors, the
+kind of fan, and for those that say so, how the fan is known to move.
+"""
+
+from dataclasses import dataclass, field
+
+from ..dynamics.vehicle import Vehicle
+from ..dynamics.vehicle_file import load_vehicle
+
+
+@dataclass(frozen=True)
+class FilterNoise:
+    """What the wrench filter was told of noise: standard deviations in one of its steps. They
+    settle how fast its estimate follows the truth.
+    """
+
+    torque: float = 0.03  # Nm about z, that the rotor model misses, new each step
+    torque_walk: float = 3.26e-4 / 0.45  # Nm, change of the external torque
+    thrust: float = 0.3  # N along y, likewise
+    force_walk: float = 3.26e-3 / 0.45  # N
+    position: float = 0.001  # m, one measurement
+    attitude: float = 0.005  # rad, one measurement
+    period: float = 0.005  # s, of a step
+
+
+@dataclass(frozen=True)
+class Air:
+    """What makes the wrench uncertain beside the mean jet: the actuators' own unmodelled
+    disturbance and the gusts of the jet, as the standard scenarios have them.
+    """
+
+    disturbance_force: float = 0.03  # N, standard deviation along each axis
+    disturbance_torque: float = 0.01  # Nm
+    disturbance_time: float = 0.3  # s, over which it lasts
+    turbulence: float = 0.10  # gusts as a share of the local axial speed
+    gust_length: float = 0.25  # m, over which gusts at two places are correlated
+    gust_time: float = 0.10  # s, over which they last
+
+
+@dataclass(frozen=True)
+class Jet:
+    """The fan in front of the vehicle, coefficients of the effect ``fan_jet``."""
+
+    u0: float = 3.6  # m/s
+    kd: float = 0.020  # N/(m/s), drag of each rotor
+    area: float = 0.060  # m2, drag area of the hull
+    distance: float = 2.3  # m, of the vehicle from it
+
+
+@dataclass(frozen=True)
+class Motions:
+    """The family of a fan's motions, each from its place at the start: a share ``motions`` of
+    still, sine, triangle and ramp, at a largest ``speed`` and over a ``travel`` within these
+    ranges; a ramp ends after 0.8 m and 8/7 of what the travel exceeds its least.
+    """
+
+    motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
+    speed: tuple[float, float] = (0.05, 0.35)  # m/s
+    travel: tuple[float, float] = (0.5, 1.2)  # m
+    offset: tuple[float, float] = (0.0, 0.1)  # m, from the axis at the start, on either side
+
+
+@dataclass(frozen=True)
+class Briefing:
+    """All of it. The defaults are those of the scenario ``base``."""
+
+    vehicle: Vehicle = field(default_factory=lambda: load_vehicle("ardrone2"))
+    noise: FilterNoise = FilterNoise()
+    air: Air = Air()
+    jet: Jet = Jet()
+    motions: Motions = Motions()

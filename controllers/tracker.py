@@ -1,0 +1,307 @@
+"""Trackers: controllers that keep a belief of where the fan is and how it moves, and fly along.
+
+Each is a particle filter. A particle is a path of the fan; what the wrench filter should show if
+the fan had moved so is the jet's mean at the vehicle's stations (effect ``fan_jet``) behind the
+filter's own lag, and what it shows instead is coloured noise of known covariance
+(``sensor_model``). Nothing is known but the observation and what ``briefing`` says: the declared
+vehicle, the fan, the pose's noise and the filter's tuning, and how much a vehicle of this size is
+disturbed as a rule. The random numbers come from a generator of the controller's own, which begins
+anew with every episode.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .briefing import Air, Briefing
+from .fan_motion import KINDS, place_after
+from .observation import DECISION_PERIOD, MAX_COMMAND
+from .sensor_model import Sensing, sensor_model
+from .tracker_filter import MEMORY, resample
+
+Array = NDArray[np.float64]
+
+_SEED = 2016  # of the own generator, the same in every episode
+_FEW = 0.5  # share of effective particles below which they are drawn anew
+# what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
+# take any other velocity
+_STOP, _TURN = 1 / 3, 1 / 2
+_FEWEST = 8  # particles of a kind of motion whose covariance means something
+_SMALLEST = 1e-12 * np.eye(3)  # of a covariance
+
+
+class _Belief:
+    """What the trackers share: particles with weights, and the command that follows from them.
+
+    After a decision ``mean`` holds what is believed: the fan's place from the vehicle (m) and its
+    velocity (m/s); ``deviation`` is the standard deviation of the place (m).
+
+    Args:
+        gain: 1/s, from the offset to a velocity.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
+        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
+        particles: how many.
+    """
+
+    def __init__(
+        self, gain: float, feed: float, damping: float, level: float, particles: int
+    ) -> None:
+        self.gain, self.feed, self.damping = gain, feed, damping
+        self.level, self.particles = level, int(particles)
+        self._briefing = Briefing()
+        self.reset()
+
+    def brief(self, briefing: Briefing) -> None:
+        """Take what is known of vehicle, sensors and fan; it counts from the next ``reset`` on."""
+        self._briefing = briefing
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        n = self.particles
+        self._rng = np.random.default_rng(_SEED)
+        self._sensing = Sensing(sensor_model(self._briefing))
+        self._level = np.exp(self.level * self._rng.standard_normal(n))
+        self._memory = np.zeros((n, MEMORY))
+        self._weight = np.zeros(n)  # logarithm
+        self._fresh = np.empty(n)
+        self._chosen = np.empty(n, dtype=np.int64)
+        self._place = np.zeros(n)  # m, of the fan, from where the vehicle was at first
+        self._velocity = np.zeros(n)  # m/s
+        self.mean, self.deviation = (0.0, 0.0), float("nan")
+        self._begin()
+
+    def _begin(self) -> None:
+        """Draw particles for the first observation."""
+        raise NotImplementedError
+
+    def _move(self) -> None:
+        """Carry particles on by one decision."""
+        raise NotImplementedError
+
+    def _choose(self, chosen: NDArray[np.int64]) -> None:
+        """Let the particles be those chosen (n,)."""
+        raise NotImplementedError
+
+    def __call__(
+        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
+    ) -> NDArray[np.float32]:
+        """Return the command (1,) m/s for an observation (8,)."""
+        sensing = self._sensing
+        sensing.look(observation)
+        if sensing.count > 1:
+            self._move()
+        sensing.weigh(observation, self._place, self._level, self._memory, self._fresh)
+        self._weight += self._fresh
+        self._weight -= self._weight.max()
+        shares = np.exp(self._weight)
+        shares /= shares.sum()
+        place, velocity = float(shares @ self._place), float(shares @ self._velocity)
+        self.mean = place - sensing.own, velocity
+        self.deviation = float(np.sqrt(shares @ (self._place - place) ** 2))
+        if shares @ shares > 1.0 / (_FEW * len(shares)):
+            resample(shares, self._rng.random(), self._chosen)
+            self._level, self._memory = self._level[self._chosen], self._memory[self._chosen]
+            self._weight[:] = 0.0
+            self._choose(self._chosen)
+        command = (
+            self.feed * velocity
+            + self.gain * (place - sensing.own)
+            + self.damping * (velocity - sensing.velocity)
+        )
+        return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)
+
+
+class Tracker(_Belief):
+    """Knows nothing of how the fan moves: it rests, or its velocity stays and drifts a little; now
+    and then this changes at once, to none, to the opposite, or to any other.
+
+    After a decision ``mean`` holds what it believes, the fan's place from the vehicle (m) and its
+    velocity (m/s), and ``deviation`` the standard deviation of the place (m).
+
+    Args:
+        gain: 1/s, from the expected offset to a velocity.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
+        acceleration: m/s, standard deviation of the velocity's drift over a second.
+        jumps: 1/s, how often it changes at once.
+        speed: m/s, standard deviation of a fresh velocity.
+        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
+        reach: m, on either side, where the fan may be at first.
+        particles: how many.
+    """
+
+    def __init__(
+        self,
+        gain: float = 2.5,
+        feed: float = 1.0,
+        damping: float = 0.4,
+        acceleration: float = 0.025,
+        jumps: float = 0.25,
+        speed: float = 0.28,
+        level: float = 0.0,
+        reach: float = 1.6,
+        particles: int = 1000,
+    ) -> None:
+        self.acceleration, self.jumps, self.speed = acceleration, jumps, speed
+        self.reach = reach
+        super().__init__(gain, feed, damping, level, particles)
+
+    def brief(self, briefing: Briefing) -> None:
+        """Take what is known of vehicle, sensors and fan, but neither its motions nor its gusts."""
+        super().brief(nominal(briefing))
+
+    def _begin(self) -> None:
+        rng, n = self._rng, self.particles
+        self._place = rng.uniform(-self.reach, self.reach, n)
+        self._velocity = np.where(rng.random(n) < _STOP, 0.0, self.speed * rng.standard_normal(n))
+
+    def _move(self) -> None:
+        rng, n = self._rng, self.particles
+        before = self._velocity
+        drift = self.acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
+        self._velocity = before + drift * rng.standard_normal(n)
+        jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
+        kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
+        self._velocity[jumped] = np.where(
+            kind < _STOP, 0.0, np.where(kind < _STOP + _TURN, -before[jumped], fresh)
+        )
+        self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
+
+    def _choose(self, chosen: NDArray[np.int64]) -> None:
+        self._place, self._velocity = self._place[chosen], self._velocity[chosen]
+
+
+class InformedTracker(_Belief):
+    """Knows the family of the fan's motions (``briefing.Motions``) and learns which one it is: a
+    particle is a motion with its speed, travel and place at the start.
+
+    Drawn anew, particles of a kind are shrunk towards their mean and spread again, which keeps mean
+    and covariance (Liu and West, *Combined parameter and state estimation in simulation-based
+    filtering*, 2001).
+
+    Args:
+        gain: 1/s, from the expected offset to a velocity.
+        feed: share of the fan's expected velocity that is commanded at once.
+        damping: share of the difference between the fan's velocity and the vehicle's own.
+        ahead: s, over which the velocity that is commanded is that of the motion to come.
+        spread: of the particles that are drawn anew, as a share of their standard deviation.
+        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
+        particles: how many.
+    """
+
+    def __init__(
+        self,
+        gain: float = 1.6,
+        feed: float = 1.0,
+        damping: float = 0.3,
+        ahead: float = 0.12,
+        spread: float = 0.15,
+        level: float = 0.0,
+        particles: int = 1000,
+    ) -> None:
+        self.ahead, self.spread = ahead, spread
+        super().__init__(gain, feed, damping, level, particles)
+
+    def brief(self, briefing: Briefing) -> None:
+        """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts."""
+        super().brief(nominal(briefing))
+
+    def _begin(self) -> None:
+        rng, n, known = self._rng, self.particles, self._briefing.motions
+        names = np.array([KINDS.index(name) for name in known.motions])
+        self._kind = names[rng.integers(len(names), size=n)]
+        self._sign = rng.choice([-1.0, 1.0], n)
+        side = rng.choice([-1.0, 1.0], n)
+        low, high = np.transpose([known.speed, known.travel, known.offset])
+        # speed, travel and offset at the start of each, within their bounds
+        self._bounds = low, high
+        self._motion = rng.uniform(low, high, (n, 3))
+        self._side = side
+        self._go(0.0)
+
+    def _move(self) -> None:
+        self._go((self._sensing.count - 1) * DECISION_PERIOD)
+
+    def _go(self, time: float) -> None:
+        """Put the particles where they are at a time (s), and see where they go."""
+        speed, travel, offset = self._motion.T
+        start = self._side * offset
+        now, then = (
+            self._sign * place_after(self._kind, speed, travel, t)
+            for t in (time, time + self.ahead)
+        )
+        self._place = start + now
+        self._velocity = (then - now) / self.ahead
+
+    def deviation_ahead(self, seconds: float) -> float:
+        """Return the standard deviation (m) of where the fan will be some seconds from now, given
+        all that has been observed.
+        """
+        time = max(self._sensing.count - 1, 0) * DECISION_PERIOD + seconds
+        speed, travel, offset = self._motion.T
+        place = self._side * offset + self._sign * place_after(self._kind, speed, travel, time)
+        shares = np.exp(self._weight)
+        shares /= shares.sum()
+        return float(np.sqrt(shares @ (place - shares @ place) ** 2))
+
+    def _choose(self, chosen: NDArray[np.int64]) -> None:
+        self._kind, self._sign = self._kind[chosen], self._sign[chosen]
+        self._side, self._motion = self._side[chosen], self._motion[chosen]
+        low, high = self._bounds
+        keep = np.sqrt(1.0 - self.spread**2)
+        noise = self._rng.standard_normal(self._motion.shape)
+        # the offset counts with its side: it may cross the axis
+        self._motion[:, 2] *= self._side
+        for kind in range(len(KINDS)):
+            some = np.flatnonzero(self._kind == kind)
+            if len(some) < _FEWEST:
+                continue
+            x = self._motion[some]
+            x[:, 0] *= self._sign[some]
+            mean = x.mean(axis=0)
+            apart = x - mean
+            covariance = apart.T @ apart / len(some) + _SMALLEST
+            root = np.linalg.cholesky(covariance)
+            x = mean + keep * apart + self.spread * noise[some] @ root.T
+            self._sign[some] = np.where(x[:, 0] < 0.0, -1.0, 1.0)
+            x[:, 0] = np.abs(x[:, 0])
+            self._motion[some] = x
+        self._side = np.where(self._motion[:, 2] < 0.0, -1.0, 1.0)
+        self._motion[:, 2] = np.abs(self._motion[:, 2])
+        # reflected at their bounds
+        over = np.where(self._motion > high, 2.0 * high - self._motion, self._motion)
+        over = np.where(over < low, 2.0 * low - over, over)
+        self._motion = np.clip(over, low, high)
+
+
+class Limit(InformedTracker):
+    """What the best controller could reach from these measurements: the informed tracker with the
+    true parameters of everything that is drawn at random, gusts included, and many particles.
+
+    No entry, but the end of the scale for those that see the wrench alone. What an episode of the
+    scenario ``varied`` draws anew, and effects that nobody declared, it does not know either.
+    """
+
+    def __init__(
+        self,
+        gain: float = 1.6,
+        feed: float = 1.0,
+        damping: float = 0.3,
+        ahead: float = 0.12,
+        spread: float = 0.15,
+        particles: int = 2000,
+    ) -> None:
+        super().__init__(gain, feed, damping, ahead, spread, 0.0, particles)
+
+    def brief(self, briefing: Briefing) -> None:
+        """Take all that is known."""
+        self._briefing = briefing
+
+
+def nominal(briefing: Briefing) -> Briefing:
+    """Return a briefing whose air is as gusty as in the standard scenarios."""
+    return replace(briefing, air=replace(briefing.air, turbulence=Air().turbulence))

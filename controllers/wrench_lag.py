@@ -1,0 +1,127 @@
+"""How an estimated wrench follows the true one: the wrench filter in steady flight, as a linear
+system, and what its errors have in common from one decision to the next.
+
+Along one axis the filter knows a place (or an angle), its rate, and a wrench that walks at random;
+a noise of its own drives the rate, and the place is measured. Its error ``e`` obeys ``e' = (I - K
+C) (A e + b dw) - K v``, ``dw`` being the change of the true wrench and ``v`` the noise of the
+measurement: the estimate is the true wrench less the third part of ``e``. Whatever is not the jet's
+mean is a coloured noise with known covariance, told from decision to decision by an autoregression
+(Yule and Walker; Levinson and Durbin for the first decisions).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .briefing import Air, FilterNoise
+
+Array = NDArray[np.float64]
+
+ORDER = 3  # of the autoregression
+
+
+@dataclass(frozen=True, eq=False)
+class AxisLag:
+    """One axis of the filter, from decision to decision."""
+
+    keep: Array  # (3, 3), what a decision leaves of the error
+    enter: Array  # (3,), what an even change of the wrench over it adds
+    disturbance: Array  # (ORDER + 1,) autocovariance that a disturbance of unit variance leaves,
+    gust: Array  # (ORDER + 1,) a gust of unit variance,
+    pose: Array  # (ORDER + 1,) and the noise of the pose
+
+    @property
+    def delay(self) -> float:
+        """How many decisions the estimate of a wrench that changes evenly is behind."""
+        return float(np.linalg.solve(np.eye(3) - self.keep, self.enter)[2])
+
+
+@lru_cache(maxsize=64)
+def axis_lag(
+    inertia: float, noise: tuple[float, float, float], air: Air, period: float, steps: int
+) -> AxisLag:
+    """Return how one axis follows.
+
+    Args:
+        inertia: kg or kg m2.
+        noise: what the filter assumes of its model (N or Nm, a step), of the wrench's walk
+            (likewise) and of the measurement (m or rad).
+        air: whose times count.
+        period: of the filter, s.
+        steps: of the filter in a decision.
+    """
+    from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+
+    white, walk, measured = noise
+    A = np.array([[1.0, period, 0.0], [0.0, 1.0, period / inertia], [0.0, 0.0, 1.0]])
+    C = np.array([[1.0, 0.0, 0.0]])
+    Q = np.diag([0.0, (period / inertia * white) ** 2, walk**2])
+    # scaled, so that the numbers of the equation are of one size
+    scale = np.diag([measured, measured / period, measured * inertia / period**2])
+    inverse = np.linalg.inv(scale)
+    a, q = inverse @ A @ scale, inverse @ Q @ inverse
+    P = scale @ solve_discrete_are(a.T, C.T, q, np.eye(1)) @ scale
+    K = P @ C.T / (P[0, 0] + measured**2)
+    left = np.eye(3) - K @ C
+    F, b = left @ A, left[:, 2]
+
+    def over(matrix: Array) -> Array:
+        return np.asarray(np.linalg.matrix_power(matrix, steps))
+
+    enter, power = np.zeros(3), np.eye(3)
+    for _ in range(steps):
+        enter += power @ b / steps
+        power = F @ power
+
+    def coloured(time: float) -> Array:
+        """Return the autocovariance of the output for a unit wrench that lasts over ``time``."""
+        phi = float(np.exp(-period / time))
+        whole = np.zeros((4, 4))
+        whole[:3, :3], whole[:3, 3], whole[3, 3] = F, b * (phi - 1.0), phi
+        drive = np.append(b, 1.0) * np.sqrt(1.0 - phi * phi)
+        return _autocovariance(whole, np.outer(drive, drive), np.array([0.0, 0.0, -1.0, 1.0]))
+
+    def _autocovariance(matrix: Array, driven: Array, output: Array) -> Array:
+        S, jump = solve_discrete_lyapunov(matrix, driven), over(matrix)
+        values = []
+        for _ in range(ORDER + 1):
+            values.append(float(output @ S @ output))
+            S = jump @ S
+        return np.array(values)
+
+    pose = _autocovariance(F, K @ K.T * measured**2, np.array([0.0, 0.0, -1.0]))
+    return AxisLag(over(F), enter, coloured(air.disturbance_time), coloured(air.gust_time), pose)
+
+
+def autoregressions(autocovariance: Array) -> tuple[Array, Array]:
+    """Return coefficients (ORDER + 1, ORDER) and innovation variances (ORDER + 1,) of the
+    autoregressions of order 0 to ORDER of a stationary process.
+    """
+    R = np.asarray(autocovariance, dtype=np.float64)
+    order = len(R) - 1
+    coefficients, variances = np.zeros((order + 1, order)), np.zeros(order + 1)
+    variances[0] = R[0]
+    phi = np.zeros(order)
+    for m in range(1, order + 1):
+        last = (R[m] - phi[: m - 1] @ R[m - 1 : 0 : -1]) / variances[m - 1]
+        before = phi.copy()
+        phi[m - 1] = last
+        phi[: m - 1] = before[: m - 1] - last * before[: m - 1][::-1]
+        coefficients[m, :] = phi
+        variances[m] = variances[m - 1] * (1.0 - last * last)
+    return coefficients, variances
+
+
+def lags(
+    mass: float, inertia_z: float, noise: FilterNoise, air: Air, decision: float
+) -> tuple[AxisLag, AxisLag]:
+    """Return how the estimated torque about z and the estimated force follow."""
+    steps = max(1, round(decision / noise.period))
+    torque = (noise.torque, noise.torque_walk, noise.attitude)
+    force = (noise.thrust, noise.force_walk, noise.position)
+    return (
+        axis_lag(inertia_z, torque, air, noise.period, steps),
+        axis_lag(mass, force, air, noise.period, steps),
+    )
