@@ -33,6 +33,10 @@ TASK_LAWS: dict[str, dict[str, Callable[..., Any]]] = {
 }
 
 
+# tasks that are flown with the gains of another where the file has none of their own
+_AS = {"WindTrajectory": "WindHover"}
+
+
 def task_gains() -> dict[str, dict[str, dict[str, Any]]]:
     """Return the gains found by search: task, law, and then ``gains`` and how they were found."""
     text = (resources.files(__package__) / "task_gains.yaml").read_text(encoding="utf-8")
@@ -50,4 +54,6 @@ def make_task_law(name: str, task: str) -> Any:
     laws = TASK_LAWS[task]
     if name not in laws:
         raise unknown_name("controller", name, laws)
-    return partial(laws[name], **task_gains().get(task, {}).get(name, {}).get("gains", {}))()
+    known = task_gains()
+    found = known.get(task, {}).get(name) or known.get(_AS.get(task, ""), {}).get(name, {})
+    return partial(laws[name], **found.get("gains", {}))()

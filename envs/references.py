@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from ..dynamics.motion import Array
 from .plant import TICK
 
-_FADE = 1.5  # s, over which a moving reference gets up to speed
+REFERENCE_FADE = 1.5  # s, over which a moving reference gets up to speed
 
 
 def hold(position: Array, yaw: float, seconds: float) -> Array:
@@ -31,9 +31,9 @@ def _rows(position: Array, yaw: float) -> Array:
 
 def _warp(t: Array) -> Array:
     """Return times that run slow at first and then as ``t`` less half the fade; twice smooth."""
-    u = np.clip(t / _FADE, 0.0, 1.0)
+    u = np.clip(t / REFERENCE_FADE, 0.0, 1.0)
     # integral of the smooth step 10 u^3 - 15 u^4 + 6 u^5
-    return _FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - _FADE, 0.0)
+    return REFERENCE_FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - REFERENCE_FADE, 0.0)
 
 
 def figure_of_eight(

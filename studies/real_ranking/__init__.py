@@ -1,0 +1,1 @@
+"""Published flights of one vehicle in a wall of fans, beside the same flights simulated."""

@@ -1,0 +1,145 @@
+"""A figure of eight in five winds, flown by PD, INDI and L1 with gains fitted without wind."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import brentq
+
+from windwrench.controllers.flight import FlightGains
+from windwrench.controllers.wind_laws import INDI, FlightLoopAlone, L1Adaptive, WindLaw
+from windwrench.controllers.wind_observation import (
+    FORCE,
+    LAST_ACTION,
+    POSITION_ERROR,
+    REFERENCE_ACCELERATION,
+    REFERENCE_VELOCITY,
+    ROTOR_FORCE,
+    SPECIFIC_FORCE,
+    VELOCITY,
+    WIND_OBSERVATION_SIZE,
+)
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.motion import Array
+from windwrench.envs.fan import Fan
+from windwrench.envs.plant import TICK, PlantSettings
+from windwrench.envs.references import REFERENCE_FADE
+from windwrench.envs.wind import CompiledWind, GridWind, Turbulence
+from windwrench.envs.wind_tasks import ACCELEROMETER, WIND_DECISION_TICKS
+from windwrench.envs.windy_flight import WINDY_NOISE, WindyFlight
+
+WINDS = ("0", "4.2", "8.5", "8.5 + 2.4 sin t", "12.1")
+PUBLISHED = {  # tracking RMSE, m
+    "PD": (0.112, 0.127, 0.243, 0.357, 0.457),
+    "INDI": (0.080, 0.086, 0.169, 0.123, 0.281),
+}
+LAP = 2.0 * math.pi  # s
+SECONDS = 3.0 * LAP + REFERENCE_FADE  # the first lap is not counted
+SEEDS = 8
+_FILE = Path(__file__).with_name("vehicle.yaml")
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """What the publication does not state."""
+
+    rotor_drag: float = 0.15  # N/(m/s), each rotor; 0.23 1/s of the mass in all
+    hull_area: float = 0.04  # m2, drag area
+    turbulence: float = 0.05  # of the mean wind; a wall of many small fans is smooth
+    length: float = 0.5  # m, of its eddies
+    damping: float = 0.9  # of the position loop: velocity gain 2 d sqrt(position gain)
+
+
+def wind_of(name: str, seed: int, assumed: Assumed) -> list[CompiledWind]:
+    """Return what blows along x in one of ``WINDS``."""
+    if name == "0":
+        return []
+    mean = float(name.split()[0])
+    t = 0.02 * np.arange(round(SECONDS / 0.02) + 1)
+    speed = mean + (2.4 * np.sin(t) if "sin" in name else 0.0 * t)
+    table = np.zeros((len(t), 1, 1, 1, 3))
+    table[:, 0, 0, 0, 0] = speed
+    gusts = Turbulence(seed, assumed.turbulence * mean, assumed.length, (mean, 0.0, 0.0), modes=32)
+    return [GridWind((t, [0.0], [0.0], [0.0]), table), gusts]
+
+
+def reference() -> Array:
+    """Return an upright figure of eight, 2.5 m wide along x and 1.5 m high, in 2 pi seconds."""
+    t = TICK * np.arange(round(SECONDS / TICK) + 1)
+    u = np.clip(t / REFERENCE_FADE, 0.0, 1.0)
+    phase = REFERENCE_FADE * (2.5 * u**4 - 3.0 * u**5 + u**6) + np.maximum(t - REFERENCE_FADE, 0.0)
+    rows = np.zeros((len(t), 10))
+    rows[:, 0] = 1.25 * np.sin(phase)
+    rows[:, 2] = 2.0 + 0.75 * np.sin(2.0 * phase)
+    rows[:, 3:6] = np.gradient(rows[:, :3], TICK, axis=0)
+    rows[:, 6:9] = np.gradient(rows[:, 3:6], TICK, axis=0)
+    return rows
+
+
+LAWS: dict[str, Callable[[], WindLaw]] = {
+    "PD": FlightLoopAlone,
+    "INDI": partial(INDI, cutoff=5.0),
+    "L1": partial(L1Adaptive, pole=2.0, bandwidth=10.0),
+}
+
+
+def fly(law: str, position_gain: float, wind: str, seed: int, assumed: Assumed) -> float:
+    """Return the RMSE of position, m, after the first lap; infinite where the vehicle is lost."""
+    vehicle, pilot, rows = load_vehicle(str(_FILE)), LAWS[law](), reference()
+    gains = FlightGains(
+        position=position_gain,
+        velocity=2.0 * assumed.damping * math.sqrt(position_gain),
+        integral=0.0,
+        tilt_limit=0.9,
+    )
+    flight = WindyFlight(
+        vehicle,
+        fan=Fan(speed=0.0, rotor_drag=assumed.rotor_drag, hull_area=assumed.hull_area),
+        settings=PlantSettings.for_vehicle(vehicle),
+        gains=gains,
+        accelerometer=ACCELEROMETER,
+    )
+    rng = np.random.default_rng(seed)
+    flight.reset(rng, rows[0, :3], 0.0, wind_of(wind, seed, assumed), rows, settle=300)
+    pilot.reset()
+    errors = []
+    for _ in range(round(SECONDS / TICK) // WIND_DECISION_TICKS):
+        flight.action[:] = pilot(_observation(flight, rows[min(flight.ticks, len(rows) - 1)]))
+        flight.run(rng.standard_normal((WIND_DECISION_TICKS, WINDY_NOISE)))
+        if not flight.healthy():
+            return math.inf
+        row = rows[min(flight.ticks, len(rows) - 1)]
+        if flight.ticks * TICK > LAP + REFERENCE_FADE:
+            errors.append(float(np.sum((flight.loop.position - row[:3]) ** 2)))
+    return math.sqrt(float(np.mean(errors)))
+
+
+def _observation(flight: WindyFlight, row: Array) -> Array:
+    x, o = flight.loop.state, np.zeros(WIND_OBSERVATION_SIZE)
+    o[POSITION_ERROR], o[VELOCITY], o[FORCE] = row[:3] - x[:3], x[7:10], x[16:19]
+    o[REFERENCE_VELOCITY], o[REFERENCE_ACCELERATION] = row[3:6], row[6:9]
+    ready = flight.ticks > 0
+    o[SPECIFIC_FORCE] = flight.specific if ready else (0.0, 0.0, 9.81)
+    o[ROTOR_FORCE] = flight.thrust if ready else (0.0, 0.0, 9.81)
+    o[LAST_ACTION:] = flight.action
+    return o
+
+
+def fit(law: str, target: float, assumed: Assumed) -> float:
+    """Return the position gain (1/s2) with which the law's RMSE without wind is the published one,
+    or the end of 1-60 that comes closest.
+    """
+
+    def over(log_gain: float) -> float:
+        some = [fly(law, math.exp(log_gain), "0", 1000 + k, assumed) for k in range(2)]
+        return math.log(float(np.mean(some)) / target)
+
+    low, high = 0.0, math.log(60.0)
+    if over(low) <= 0.0:
+        return math.exp(low)
+    if over(high) >= 0.0:
+        return math.exp(high)
+    return math.exp(float(brentq(over, low, high, xtol=0.05)))
