@@ -9,8 +9,8 @@ import ctypes
 from functools import cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ..rotation import matrix_of
 from .base import (
     CEILING,
     DIRECTION,
@@ -121,12 +121,12 @@ def _flight() -> tuple[Array, Array, Array]:
     rotors = np.zeros((_SAMPLES, ROTORS_SIZE))
     samples = np.zeros((_SAMPLES, SAMPLE_SIZE))
     q = np.array([1.0, 0.0, 0.0, 0.0]) + 0.3 * rng.standard_normal((_SAMPLES, 4))
-    turned = Rotation.from_quat(q, scalar_first=True)
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
     speeds = rng.uniform(0.5, 1.5, (_SAMPLES, 4)) * _HOVER
     volts, t = rng.uniform(9.0, 12.0, _SAMPLES), 0.3 * np.arange(_SAMPLES)
     at = rng.uniform([-3.0, -3.0, 0.05], [3.0, 3.0, 2.9], (_SAMPLES, 3))
     states[:, POSITION : POSITION + 3] = samples[:, SAMPLE_POSITION : SAMPLE_POSITION + 3] = at
-    states[:, ROTATION : ROTATION + 9] = turned.as_matrix().reshape(-1, 9)
+    states[:, ROTATION : ROTATION + 9] = [matrix_of(x).ravel() for x in q]
     states[:, VELOCITY : VELOCITY + 3] = rng.normal(0.0, 3.0, (_SAMPLES, 3))
     states[:, RATE : RATE + 3] = rng.standard_normal((_SAMPLES, 3))
     states[:, ROTOR_SPEED : ROTOR_SPEED + 4] = speeds
@@ -135,7 +135,7 @@ def _flight() -> tuple[Array, Array, Array]:
     states[:, ROTOR_ACCELERATION : ROTOR_ACCELERATION + 4] = rng.normal(0.0, 500.0, (_SAMPLES, 4))
     rotors[:, :4] = samples[:, SAMPLE_SPEED : SAMPLE_SPEED + 4] = speeds
     rotors[:, ROTOR_VOLTAGE], rotors[:, ROTOR_TIME], rotors[:, STEP] = volts, t, _PERIOD
-    samples[:, SAMPLE_QUATERNION : SAMPLE_QUATERNION + 4] = turned.as_quat(scalar_first=True)
+    samples[:, SAMPLE_QUATERNION : SAMPLE_QUATERNION + 4] = q
     samples[:, SAMPLE_STEP], samples[:, DIRECTION] = _PERIOD, 1.0
     samples[:, [HAS_SPEED, HAS_POSITION, HAS_QUATERNION]] = 1.0
     return states, rotors, samples

@@ -1,0 +1,119 @@
+"""What effects declare: the words that there are, what a role promises, and laws that need starting
+points.
+"""
+
+import pytest
+
+from tests.support.own_effects import joined
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.effects import (
+    Coefficient,
+    Effect,
+    Family,
+    Need,
+    Role,
+    get,
+    names,
+    needing,
+    of_family,
+    playing,
+)
+from windwrench.dynamics.effects.declaration import Found
+from windwrench.dynamics.effects.vanishing import does_nothing_alone
+
+HOSE = '''"""A pull that comes and goes."""
+
+import math
+
+from numba import cfunc
+from windwrench.dynamics.effects.base import EFFECT_MODEL, TIME, Coefficient, Effect
+
+
+@cfunc(EFFECT_MODEL)
+def model(c, vehicle, state, wrench):
+    wrench[0] += c[0] * math.sin(c[1] * state[TIME])
+
+
+EFFECT = Effect(
+    name="hose",
+    kind="wrench",
+    coefficients=(
+        Coefficient("a", "N", (0.2, 0.02), "pull"),
+        Coefficient("w", "rad/s", (3.0, 3.0), "frequency"),
+    ),
+    source="test",
+    confused_with=("wind",),
+    excitation="any flight",
+    model=model,
+    # more
+)
+'''
+
+
+def declared(**words):
+    coefficients = words.pop("coefficients", (Coefficient("x", "1", (0.1, 0.1), "share"),))
+    return Effect("mine", "body", coefficients, "test", "any flight", **words)
+
+
+@pytest.mark.parametrize(
+    "words", [{"family": "drags"}, {"role": "weight"}, {"needs": ("fast movement",)}]
+)
+def test_a_word_that_there_is_not_is_refused(words):
+    with pytest.raises(InputError, match=r"effect mine: unknown .*expected one of"):
+        declared(**words)
+
+
+def test_a_role_is_played_with_its_coefficients():
+    assert declared(role=Role.MASS).role == Role.MASS
+    assert declared(role="mass").role == Role.MASS
+    with pytest.raises(InputError, match="role delay: expected coefficient 1 in s, got 1"):
+        declared(role=Role.DELAY)
+    with pytest.raises(InputError, match="role inertia: expected coefficient 2 in 1, got none"):
+        declared(role=Role.INERTIA)
+
+
+def test_effects_are_looked_up_by_what_they_declare():
+    assert playing(Role.LAG, Role.MASS) == (*playing(Role.LAG), *playing(Role.MASS))
+    assert playing(Role.MASS, among=["wind"]) == ()
+    for family in Family:
+        assert all(get(name).family == family for name in of_family(family))
+    assert sum(len(of_family(family)) for family in Family) == len(names())
+    assert needing(Need.FAST_MOTION) < needing(Need.FINE_ROTOR_SPEEDS)
+    assert needing(Need.FAST_MOTION, Need.MOMENTS) == needing(Need.FAST_MOTION) | needing(
+        Need.MOMENTS
+    )
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_effect_does_something_one_by_one_or_says_where_to_start(name):
+    assert not does_nothing_alone(get(name)) or get(name).starting_points is not None
+    if get(name).trace:
+        assert any(get(x).trace == get(name).trace for x in names() if x != name)
+
+
+def test_a_law_that_does_nothing_one_by_one_must_say_where_to_start(tmp_path):
+    (tmp_path / "hose.py").write_text(HOSE)
+    starts = "starting_points=lambda flights: [{'a': 0.2, 'w': 3.0}]"
+    started = HOSE.replace("# more", starts).replace('"hose"', '"told_hose"')
+    (tmp_path / "told_hose.py").write_text(started)
+    with joined(tmp_path):
+        with pytest.raises(InputError, match=r"hose\.py: effect hose: .*add starting_points="):
+            get("hose")
+        assert get("told_hose").confused_with == ()  # what older files state is read no more
+
+
+def test_joint_bounds_are_those_of_physics():
+    vehicle, load = load_vehicle("ardrone2"), get("slung_payload")
+    assert load.possible({"m": 0.03, "l": 0.3, "damping": 1.0}, vehicle)
+    assert not load.possible({"m": 0.03, "l": 0.3, "damping": 5.0}, vehicle)
+
+    def asked(name, beside=(), **found):
+        typical = {c.name: c.typical[0] for c in get(name).coefficients}
+        return get(name).implausible(Found(found, {}, typical, 1.0, frozenset(beside)))
+
+    assert "hardly any drag" in asked("wind", wx=6.0, cd=1e-3)
+    assert not asked("wind", [Family.DRAG], wx=6.0, cd=1e-3)
+    assert "z alone" in asked("rate_damping", dx=0.0, dy=0.0, dz=1e-3)
+    assert not asked("rate_damping", dx=1e-3, dy=1e-3, dz=1e-3)
+    assert "some axes" in asked("body_drag", dx=0.0, dy=0.05, dz=0.1)
+    assert not asked("body_drag", dx=0.05, dy=0.05, dz=0.1)
