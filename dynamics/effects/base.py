@@ -99,6 +99,14 @@ CENTRAL = "0: it acts at the rotors, and so with a moment; 1: as a whole at the 
 class Coefficient:
     """One coefficient of an effect, with its typical size for a 0.45 kg and for a
     0.03 kg vehicle.
+
+    Attributes:
+        name: as vehicle files write it.
+        unit: SI, "1" for a pure number.
+        typical: in ``unit``, for a vehicle of 0.45 kg and one of 0.03 kg.
+        meaning: in words.
+        minimum: in ``unit``, least value that means anything.
+        maximum: in ``unit``, largest value that means anything.
     """
 
     name: str
@@ -116,6 +124,22 @@ class Effect:
 
     ``confused_with`` names the effects that can leave much the same traces in a log, and
     ``excitation`` says what flight tells them apart.
+
+    Attributes:
+        name: as vehicle files and reports write it.
+        kind: what it changes: rotor input, wrench, rigid body or sensing.
+        coefficients: each with its unit.
+        source: of equation and sizes.
+        confused_with: names of effects that can leave much the same traces in a log.
+        excitation: what flight tells it from those.
+        model: compiled C function, for rotor input, wrench and sensing.
+        advance: compiled C function, for a wrench that has a state of its own.
+        memory: numbers that a rotor-input or sensing model keeps from step to step; all zero before
+            its first.
+        sets_wind: a wrench effect that changes the wind in ``state``: asked before all others.
+        amend: function from a vehicle and coefficients to the changed vehicle, for an effect on
+            the rigid body.
+        law: the older name of ``model``, in effects that users have written.
     """
 
     name: str
@@ -124,15 +148,12 @@ class Effect:
     source: str
     confused_with: tuple[str, ...]
     excitation: str
-    model: Any = None  # compiled C function, for rotor input, wrench and sensing
-    advance: Any = None  # compiled C function, for a wrench that has a state of its own
-    # numbers that a rotor-input or sensing model keeps from step to step; all zero before its first
+    model: Any = None
+    advance: Any = None
     memory: int = 0
-    sets_wind: bool = (
-        False  # a wrench effect that changes the wind in ``state``: asked before all others
-    )
+    sets_wind: bool = False
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
-    law: Any = None  # the older name of ``model``, in effects that users have written
+    law: Any = None
 
     def __post_init__(self) -> None:
         """Let ``model`` and ``law`` be the same, whichever was given."""
