@@ -69,6 +69,10 @@ def fly(
             "--rrd", help="Also write a recording for the Rerun viewer, fly.rrd (rerun extra)."
         ),
     ] = False,
+    csv: Annotated[
+        bool,
+        typer.Option("--csv", help="Also write the flight's time series, fly.csv."),
+    ] = False,
     view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
@@ -108,7 +112,7 @@ def fly(
 
         def each() -> None:
             progress.advance(task)
-            if rrd and env.loop is not None:
+            if (rrd or csv) and env.loop is not None:
                 poses.append((*env.loop.position, *env.loop.quaternion))
             wanted = [film for film in open_films if not film.is_full]
             if wanted:
@@ -122,6 +126,12 @@ def fly(
             save_picture(last, folder / "fly.scene.png")
             written.append(folder / "fly.scene.png")
     env.close()
+    if csv:
+        from ..evaluation.episodes import time_series
+        from ..identification.logs.tables import write_csv
+
+        write_csv(time_series(episode, np.array(poses)), folder / "fly.csv")
+        written.append(folder / "fly.csv")
     if rrd:
         from ..envs.replay import Flight
         from ..envs.rerun_export import write_rrd

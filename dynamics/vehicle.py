@@ -27,7 +27,13 @@ _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Mocap:
-    """Motion capture: sampling rate and the standard deviation of one sample, per axis."""
+    """Motion capture: sampling rate and the standard deviation of one sample, per axis.
+
+    Attributes:
+        rate_hz: Hz, poses a second.
+        sigma_pos_m: m.
+        sigma_att_rad: rad, about each axis.
+    """
 
     rate_hz: float = 200.0
     sigma_pos_m: float = 0.001
@@ -38,11 +44,15 @@ class Mocap:
 class MotorCurve:
     """Static thrust of one rotor against its command ``u``, 0 to 1:
     ``f(u, V) = sum_i thrust[i] u^i (V / voltage_ref)^voltage_exponent``.
+
+    Attributes:
+        thrust: N: coefficients of u^0, u^1, ... at the vehicle's voltage_ref.
+        voltage_exponent: 0: thrust does not depend on the battery's voltage.
+        command: raw command (PWM counts, us, ...) at u = 0 and at u = 1.
     """
 
-    thrust: tuple[float, ...]  # N: coefficients of u^0, u^1, ... at the vehicle's voltage_ref
-    voltage_exponent: float = 0.0  # 0: thrust does not depend on the battery's voltage
-    # raw command (PWM counts, us, ...) at u = 0 and at u = 1
+    thrust: tuple[float, ...]
+    voltage_exponent: float = 0.0
     command: tuple[float, float] = (0.0, 1.0)
 
 
@@ -50,6 +60,10 @@ class MotorCurve:
 class EffectSetting:
     """One effect of a vehicle's model: its name and the coefficients given; those not given are
     zero.
+
+    Attributes:
+        name: of an effect in the library.
+        coefficients: by their names, in the units that the effect states.
     """
 
     name: str
@@ -58,30 +72,58 @@ class EffectSetting:
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A quadrotor as it is declared; SI units, body axes x forward, y left, z up."""
+    """A quadrotor as it is declared; SI units, body axes x forward, y left, z up.
+
+    Attributes:
+        name: of the vehicle, as messages and reports give it.
+        mass: kg.
+        inertia: (3, 3) kg m2, about the centre of mass.
+        arm_l: m, distance of every rotor from the body x and the body y axis.
+        k: (4,) N/(rad/s)^2, thrust.
+        p: (4,) Nm/(rad/s)^2, reaction torque.
+        rotor_radius: m.
+        omega_lsb: rad/s, step of the logged rotor speeds; 0: not quantised.
+        omega_max: rad/s, fastest rotor speed.
+        omega_source: "measured" or "commanded": what rotor speeds in logs are.
+        voltage_ref: V, battery voltage at which k and p hold; 0: not stated.
+        gravity: m/s2.
+        spin: (4,) turning sense about body +z.
+        rotor_positions: (4, 3) m from the geometric centre; default from arm_l.
+        com: (3,) m, centre of mass from the geometric centre.
+        mocap: how its pose is measured.
+        effects: declared effects, which the model includes.
+        motor_curve: thrust against command; None: not known.
+        floor_z: m, world, height of the floor.
+        ceiling_z: m, world, height of the ceiling.
+    """
 
     name: str
-    mass: float  # kg
-    inertia: Array  # (3, 3) kg m2, about the centre of mass
-    arm_l: float  # m, distance of every rotor from the body x and the body y axis
-    k: Array  # (4,) N/(rad/s)^2, thrust
-    p: Array  # (4,) Nm/(rad/s)^2, reaction torque
-    rotor_radius: float = 0.1  # m
-    omega_lsb: float = 0.0  # rad/s, step of the logged rotor speeds; 0: not quantised
-    omega_max: float = math.inf  # rad/s, fastest rotor speed
-    omega_source: str = "measured"  # or "commanded"
-    voltage_ref: float = 0.0  # V, battery voltage at which k and p hold; 0: not stated
-    gravity: float = 9.81  # m/s2
-    spin: Array = field(default_factory=_SPIN.copy)  # (4,) turning sense about body +z
-    rotor_positions: Array | None = None  # (4, 3) m from the geometric centre; default from arm_l
-    com: Array = field(
-        default_factory=lambda: np.zeros(3)
-    )  # (3,) m, centre of mass from the geometric centre
+    mass: float
+    inertia: Array
+    arm_l: float
+    k: Array
+    p: Array
+    rotor_radius: float = 0.1
+    omega_lsb: float = 0.0
+    omega_max: float = math.inf
+    omega_source: str = "measured"
+    voltage_ref: float = 0.0
+    gravity: float = 9.81
+    spin: Array = field(default_factory=_SPIN.copy)
+    rotor_positions: Array | None = None
+    com: Array = field(default_factory=lambda: np.zeros(3))
     mocap: Mocap = Mocap()
     effects: tuple[EffectSetting, ...] = ()
-    motor_curve: MotorCurve | None = None  # None: thrust is not known from commands
-    floor_z: float = -math.inf  # m
-    ceiling_z: float = math.inf  # m
+    motor_curve: MotorCurve | None = None
+    floor_z: float = -math.inf
+    ceiling_z: float = math.inf
+
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.name for effect in self.effects) or "none"
+        return (
+            f"<{type(self).__name__} {self.name}: {self.mass:g} kg, arm {self.arm_l:g} m, hover "
+            f"at {self.hover_rate:.3g} rad/s, declared effects: {effects}>"
+        )
 
     @property
     def positions(self) -> Array:

@@ -99,21 +99,32 @@ def chi2_band(dof: int, runs: int, probability: float = 0.95) -> tuple[float, fl
 class ConsistencyReport:
     """What ``check_consistency`` found; every band holds a mean over the runs with
     ``probability``.
+
+    Attributes:
+        probability: of the bands, 0.95 for one.
+        runs: how many.
+        nees: (K,) mean over the runs, step by step.
+        nis: (K,) likewise.
+        nees_band: for one entry of ``nees``.
+        nis_band: for one entry of ``nis``.
+        nees_fraction: of the steps within the band.
+        nis_fraction: likewise, of ``nis``.
+        mean_nees: over runs and steps.
+        mean_nis: likewise.
+        mean_nis_band: for ``mean_nis``: a consistent filter's innovations are independent.
     """
 
     probability: float
     runs: int
-    nees: Array  # (K,) mean over the runs, step by step
-    nis: Array  # (K,) likewise
-    nees_band: tuple[float, float]  # for one entry of ``nees``
-    nis_band: tuple[float, float]  # for one entry of ``nis``
-    nees_fraction: float  # of the steps within the band
+    nees: Array
+    nis: Array
+    nees_band: tuple[float, float]
+    nis_band: tuple[float, float]
+    nees_fraction: float
     nis_fraction: float
-    mean_nees: float  # over runs and steps
+    mean_nees: float
     mean_nis: float
-    mean_nis_band: tuple[
-        float, float
-    ]  # for ``mean_nis``: a consistent filter's innovations are independent
+    mean_nis_band: tuple[float, float]
 
     @property
     def consistent(self) -> bool:
@@ -218,28 +229,46 @@ def plot(report: ConsistencyReport, period: float, path: str | Path | None = Non
 class ModelRun:
     """A flight drawn from the filter's own model: truth and measurement at the end of each of K
     steps.
+
+    Attributes:
+        initial_position: (3,) m, what the filter is to start with; the truth is drawn around it.
+        initial_quaternion: (4,)
+        initial_velocity: (3,) m/s, world.
+        initial_angular_velocity: (3,) rad/s, body.
+        initial_covariance: (18, 18)
+        rotor_speeds: (K, 4) rad/s.
+        measured_position: (K, 3) m.
+        measured_quaternion: (K, 4)
+        position: (K, 3) m.
+        quaternion: (K, 4)
+        velocity: (K, 3) m/s, world.
+        angular_velocity: (K, 3) rad/s, body.
+        torque: (K, 3) Nm, world.
+        force: (K, 3) N, world.
+        gyro: (K, 3) rad/s, body, as measured.
+        accelerometer: (K, 3) m/s2, body, as measured.
+        gyro_bias: (K, 3) rad/s, in them.
+        accelerometer_bias: (K, 3) m/s2.
     """
 
-    initial_position: (
-        Array  # (3,) m, what the filter is to start with; the truth is drawn around it
-    )
-    initial_quaternion: Array  # (4,)
-    initial_velocity: Array  # (3,) m/s, world
-    initial_angular_velocity: Array  # (3,) rad/s, body
-    initial_covariance: Array  # (18, 18)
-    rotor_speeds: Array  # (K, 4) rad/s
-    measured_position: Array  # (K, 3) m
-    measured_quaternion: Array  # (K, 4)
-    position: Array  # (K, 3) m
-    quaternion: Array  # (K, 4)
-    velocity: Array  # (K, 3) m/s, world
-    angular_velocity: Array  # (K, 3) rad/s, body
-    torque: Array  # (K, 3) Nm, world
-    force: Array  # (K, 3) N, world
-    gyro: Array  # (K, 3) rad/s, body, as measured
-    accelerometer: Array  # (K, 3) m/s2, body, as measured
-    gyro_bias: Array  # (K, 3) rad/s, in them
-    accelerometer_bias: Array  # (K, 3) m/s2
+    initial_position: Array
+    initial_quaternion: Array
+    initial_velocity: Array
+    initial_angular_velocity: Array
+    initial_covariance: Array
+    rotor_speeds: Array
+    measured_position: Array
+    measured_quaternion: Array
+    position: Array
+    quaternion: Array
+    velocity: Array
+    angular_velocity: Array
+    torque: Array
+    force: Array
+    gyro: Array
+    accelerometer: Array
+    gyro_bias: Array
+    accelerometer_bias: Array
 
     def truth(self, k: int) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return the true state after step ``k`` in the order in which ``nees`` takes it."""

@@ -5,6 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..runtime.arguments import in_brackets
+
 Array = NDArray[np.float64]
 
 # Layout of the state vector: the estimate and nothing else
@@ -28,6 +30,12 @@ class WrenchEstimate:
     def __init__(self, numbers: Array) -> None:
         # (346,) state, covariance, status and count of restarts, one after the other
         self._numbers = numbers
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} {self.status}: force {in_brackets(self.force)} N, torque "
+            f"{in_brackets(self.torque)} Nm, NIS {self.nis:.3g}>"
+        )
 
     @property
     def state(self) -> Array:

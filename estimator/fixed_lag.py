@@ -47,6 +47,9 @@ class FixedLagSmoother:
         self._steps = 0  # since the reset
         self._work = np.empty(WORK)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.lag:g} s: {self.ukf!r}>"
+
     @property
     def lag(self) -> float:
         """How old an estimate is, s, once that much time has passed since the reset."""

@@ -84,6 +84,12 @@ class TimedFilter:
         self._start = math.nan  # s, time of the filter before the first event
         self._snapped = math.nan  # s, time of the last snapshot
 
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} at {self.time:g} s, {self.late} late, {self.too_late} too "
+            f"late: {self.ukf!r}>"
+        )
+
     @property
     def time(self) -> float:
         """Time of the filter, s; NaN before ``reset``."""

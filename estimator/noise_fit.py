@@ -49,27 +49,43 @@ class NoiseFitSettings:
     Walks are bounded as a random walk over a second, white noise as a deviation at 200 Hz; both
     are shares of the vehicle's weight, or of weight times arm. Bounds keep the filter sane where a
     log was filtered before it was written and has no noise to find.
+
+    Attributes:
+        startup: s after each start of the filter that do not count.
+        longest_gap: s without a pose, after which the filter starts anew.
+        rows: of the log that are fitted; a longer one is thinned to spread excerpts.
+        excerpt: s, each of them; the first ``startup`` s do not count.
+        fewest_poses: that count: 600 numbers for 8 parameters.
+        outlier_chance: of a pose, before it is looked at.
+        outlier_range: m from the truth, along each axis.
+        walk: share of the weight by which a force may change in a second: from a breath to a
+            tumble.
+        white: share of the weight: no rotor is known better than 0.1 %, none is worse than its own
+            thrust.
+        position: m: the best motion capture, a poor radio.
+        attitude: rad.
+        rise_times: s, of tunings among which the search starts.
+        quieter: factors on their white noise.
+        consistent: mean NIS by 6 within which a tuning counts as consistent for a user: far wider
+            than the 95 % band of a long log, which the smallest imperfection leaves.
+        notable_gain: log-likelihood of a pose by which another tuning is clearly better.
     """
 
-    startup: float = 1.0  # s after each start of the filter that do not count
-    longest_gap: float = 0.5  # s without a pose, after which the filter starts anew
-    rows: int = 12_000  # of the log that are fitted; a longer one is thinned to spread excerpts
-    excerpt: float = 4.0  # s, each of them; the first ``startup`` s do not count
-    fewest_poses: int = 100  # that count: 600 numbers for 8 parameters
-    outlier_chance: float = 0.01  # of a pose, before it is looked at
-    outlier_range: float = 1.0  # m from the truth, along each axis
-    # share of the weight by which a force may change in a second: from a breath to a tumble
+    startup: float = 1.0
+    longest_gap: float = 0.5
+    rows: int = 12_000
+    excerpt: float = 4.0
+    fewest_poses: int = 100
+    outlier_chance: float = 0.01
+    outlier_range: float = 1.0
     walk: tuple[float, float] = (1e-4, 10.0)
-    # share of the weight: no rotor is known better than 0.1 %, none is worse than its own thrust
     white: tuple[float, float] = (6e-4, 0.6)
-    position: tuple[float, float] = (2e-5, 0.3)  # m: the best motion capture, a poor radio
-    attitude: tuple[float, float] = (1e-4, 0.5)  # rad
-    rise_times: tuple[float, ...] = (1.0, 0.3, 0.1)  # s, of tunings among which the search starts
-    quieter: tuple[float, ...] = (0.1,)  # factors on their white noise
-    # mean NIS by 6 within which a tuning counts as consistent for a user: far wider than the 95 %
-    # band of a long log, which the smallest imperfection leaves
+    position: tuple[float, float] = (2e-5, 0.3)
+    attitude: tuple[float, float] = (1e-4, 0.5)
+    rise_times: tuple[float, ...] = (1.0, 0.3, 0.1)
+    quieter: tuple[float, ...] = (0.1,)
     consistent: tuple[float, float] = (0.9, 1.1)
-    notable_gain: float = 0.05  # log-likelihood of a pose by which another tuning is clearly better
+    notable_gain: float = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +94,38 @@ class NoiseFit:
 
     Figures "before" are those of the given tuning and "after" those of the fitted one, both over
     the whole log without start-ups and outliers.
+
+    Attributes:
+        tuning: the fitted one.
+        given: the tuning that was given.
+        poses: that count.
+        outliers: of them, to the fitted tuning.
+        nis_before: mean; 6 is expected.
+        nis_after: mean; 6 is expected.
+        nis_band: of a mean over so many poses, 95 %.
+        log_likelihood_before: sum over the poses, outliers included.
+        log_likelihood_after: sum over the poses, outliers included.
+        rise_before: (3,) s of the force, (3,) s of the torque, 10-90 %.
+        rise_after: likewise (s), of the fitted tuning.
+        deviation: standard deviation of the logarithm of each fitted number (8,), in the order of
+            force walk (horizontal, vertical), torque walk (the same), thrust, motor torque,
+            position and attitude noise; NaN where it came to rest on a bound.
+        consistent: from the settings.
     """
 
     tuning: UKFTuning
     given: UKFTuning
-    poses: int  # that count
-    outliers: int  # of them, to the fitted tuning
-    nis_before: float  # mean; 6 is expected
+    poses: int
+    outliers: int
+    nis_before: float
     nis_after: float
-    nis_band: tuple[float, float]  # of a mean over so many poses, 95 %
-    log_likelihood_before: float  # sum over the poses, outliers included
+    nis_band: tuple[float, float]
+    log_likelihood_before: float
     log_likelihood_after: float
-    rise_before: tuple[Array, Array]  # (3,) s of the force, (3,) s of the torque, 10-90 %
+    rise_before: tuple[Array, Array]
     rise_after: tuple[Array, Array]
-    # standard deviation of the logarithm of each fitted number (8,), in the order of force walk
-    # (horizontal, vertical), torque walk (the same), thrust, motor torque, position and attitude
-    # noise; NaN where it came to rest on a bound
     deviation: Array
-    consistent: tuple[float, float]  # from the settings
+    consistent: tuple[float, float]
 
     @property
     def given_is_consistent(self) -> bool:

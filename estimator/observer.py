@@ -117,10 +117,16 @@ class ObserverTuning:
     """Gains of the observer and cutoffs of its pose filters.
 
     The 10-90 % rise time of force and torque is about ``2.2 / gain``: 1 s as given.
+
+    Attributes:
+        force_gain: 1/s, a scalar or (3,) for world x, y, z.
+        torque_gain: 1/s, likewise.
+        position_cutoff_hz: Hz, of the low-pass of the position.
+        attitude_cutoff_hz: Hz, of the low-pass of the attitude.
     """
 
-    force_gain: ArrayLike = 2.2  # 1/s, a scalar or (3,) for world x, y, z
-    torque_gain: ArrayLike = 2.2  # 1/s, likewise
+    force_gain: ArrayLike = 2.2
+    torque_gain: ArrayLike = 2.2
     position_cutoff_hz: float = 3.0
     attitude_cutoff_hz: float = 5.0
 
@@ -202,6 +208,12 @@ class NonlinearObserver:
         o["covariance"] = self._error_covariance()
         self.reset((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} of {self.vehicle.name}: period {self.period:g} s, "
+            f"{self.estimate.status}>"
+        )
+
     def reset(
         self,
         position: ArrayLike,
@@ -259,8 +271,8 @@ class NonlinearObserver:
             voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the quaternion's length is not 1; the observer stays as
-                it was.
+            InputError: a shape or type is wrong, a rotor speed is negative, or the quaternion's
+                length is not 1; the observer stays as it was.
         """
         sample = self._sample
         parts = sample.read(rotor_speeds, position, quaternion)

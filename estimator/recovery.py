@@ -42,33 +42,39 @@ _LOST = 0.9  # of a prior's variance: known no better than that
 class Recovery:
     """What the filter assumes of gaps, outliers and restarts; the defaults suit vehicles from 30 g
     to a few kg.
+
+    Attributes:
+        patience: s: measurements that are refused in a row, and agree with each other, are believed
+            after this time; longer than the bursts that motion capture is known for (0.1 to 0.5 s)
+        jump_at: standard deviations of an innovation beyond which a filter without a gate asks
+            whether the pose jumped, and restarts there if so; a consistent filter never sees them.
+        restart_at: standard deviations beyond which no push is followed by linear corrections: the
+            filter restarts. One of a weight makes 70 on a filter that rises in 1 s.
+        attitude_std: rad: standard deviation of the attitude beyond which a vehicle that is not
+            seen is no longer predicted: where its thrust points has become a guess, and sigma
+            points reach half a turn.
+        velocity_std: m/s and rad/s: standard deviations of velocity and angular velocity of a
+            vehicle of which only the pose is known; a small multirotor in brisk flight. At long
+            periods the latter, and that of the torque, are less: no more than attitudes a period
+            apart can tell.
+        angular_velocity_std: rad/s: see ``velocity_std``.
+        position_std: m: standard deviation beyond which a position means nothing; a flight hall.
+        force_std: of the weight, and of weight times arm: standard deviations of a force and a
+            torque about which a contradiction has left nothing known.
+        torque_std: of weight times arm: see ``force_std``.
+        response: s: time in which the filter follows a push, which is at most two weights and the
+            same about the arm; how far two poses in a row may lie apart follows from it.
     """
 
-    # s: measurements that are refused in a row, and agree with each other, are believed after this
-    # time; longer than the bursts that motion capture is known for (0.1 to 0.5 s)
     patience: float = 0.6
-    # standard deviations of an innovation beyond which a filter without a gate asks whether the
-    # pose jumped, and restarts there if so; a consistent filter never sees them
     jump_at: float = 10.0
-    # standard deviations beyond which no push is followed by linear corrections: the filter
-    # restarts. One of a weight makes 70 on a filter that rises in 1 s
     restart_at: float = 100.0
-    # rad: standard deviation of the attitude beyond which a vehicle that is not seen is no longer
-    # predicted: where its thrust points has become a guess, and sigma points reach half a turn
     attitude_std: float = 0.4
-    # m/s and rad/s: standard deviations of velocity and angular velocity of a vehicle of which only
-    # the pose is known; a small multirotor in brisk flight. At long periods the latter, and that of
-    # the torque, are less: no more than attitudes a period apart can tell
     velocity_std: float = 5.0
     angular_velocity_std: float = 10.0
-    # m: standard deviation beyond which a position means nothing; a flight hall
     position_std: float = 100.0
-    # of the weight, and of weight times arm: standard deviations of a force and a torque about
-    # which a contradiction has left nothing known
     force_std: float = 0.5
     torque_std: float = 0.25
-    # s: time in which the filter follows a push, which is at most two weights and the same about
-    # the arm; how far two poses in a row may lie apart follows from it
     response: float = 0.05
 
     def __post_init__(self) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..dynamics.model import rewrite_sample
+from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .estimate import ESTIMATE_SIZE, RESTARTS, STATE_SIZE, STATUS, Array
@@ -39,12 +40,15 @@ class Sample:
         """Take in rotor speeds (4,) and what there is of a pose, (3,) and (4,); return its parts.
 
         Raises:
-            InputError: a shape is wrong.
+            InputError: a shape or a type is wrong, or a rotor speed is negative.
         """
         try:
             # a memory view takes in arrays of doubles of its own shape, in half the time that NumPy
             # would need
             self._speeds[:] = rotor_speeds  # type: ignore[assignment]
+            a, b, c, d = self._speeds
+            if a < 0.0 or b < 0.0 or c < 0.0 or d < 0.0:
+                raise ValueError
             if position is None:
                 if quaternion is None:
                     return 0
@@ -65,24 +69,22 @@ class Sample:
     ) -> int:
         """Do the same with anything that NumPy can make numbers of."""
         parts = 0
-        try:
-            for value, where, part in (
-                (rotor_speeds, self.z[0:4], 0),
-                (position, self.z[4:7], POSITION),
-                (quaternion, self.z[7:11], ATTITUDE),
-            ):
-                if value is None and part:
-                    continue
-                if len(value) != len(where):  # type: ignore[arg-type]
-                    raise ValueError
-                where[:] = value
-                parts += part
-        except (TypeError, ValueError):
-            raise InputError(
-                "step: expected rotor_speeds (4,), position (3,) or None, quaternion (4,) or None; "
-                "got shapes "
-                f"{np.shape(rotor_speeds)}, {np.shape(position)}, {np.shape(quaternion)}"  # type: ignore[arg-type]
-            ) from None
+        for value, where, part, expected in (
+            (rotor_speeds, self.z[0:4], 0, "rotor_speeds (4,) of rad/s"),
+            (position, self.z[4:7], POSITION, "position (3,) in m or None"),
+            (quaternion, self.z[7:11], ATTITUDE, "quaternion (4,) or None"),
+        ):
+            if value is None and part:
+                continue
+            array = real_numbers(value)
+            if array is None or array.shape != where.shape:
+                raise InputError(f"step: expected {expected}, got {described(value)}")
+            where[:] = array
+            parts += part
+        if np.any(self.z[0:4] < 0.0):
+            error = negative_speeds("step", self.z[0:4])
+            self.z[0:4] = math.nan  # not known: the last ones hold for what comes next
+            raise error
         return parts
 
     def bad_quaternion(self) -> InputError:
@@ -90,6 +92,14 @@ class Sample:
         return InputError(
             f"step: quaternion must have length 1, got {np.linalg.norm(self.z[7:11]):g}"
         )
+
+
+def negative_speeds(where: str, rotor_speeds: Array) -> InputError:
+    """Return the error for rotor speeds (..., 4) of which one is negative."""
+    return InputError(
+        f"{where}: rotor_speeds must not be negative, got {np.nanmin(rotor_speeds):g} rad/s; the "
+        "vehicle's spin says in which direction a rotor turns"
+    )
 
 
 @compiled

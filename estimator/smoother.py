@@ -38,11 +38,20 @@ _SLACK = 0.1  # of a period: a step so little too long is still one step
 
 @dataclass(frozen=True, eq=False)
 class SmoothedSeries:
-    """The smoothed estimate at M times. Standard deviations are the smoother's own."""
+    """The smoothed estimate at M times. Standard deviations are the smoother's own.
 
-    state: Array  # (M, 20), laid out by the constants of ``estimator.estimate``
-    std: Array  # (M, 18) of the error state (rho, omega, x, v, torque, force)
-    covariance: Array | None = None  # (M, 18, 18) of the same, where it was asked for
+    Attributes:
+        state: (M, 20), laid out by the constants of ``estimator.estimate``.
+        std: (M, 18) of the error state (rho, omega, x, v, torque, force)
+        covariance: (M, 18, 18) of the same, where it was asked for.
+    """
+
+    state: Array
+    std: Array
+    covariance: Array | None = None
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} at {len(self.state)} times>"
 
     @property
     def position(self) -> Array:

@@ -30,25 +30,36 @@ class UKFTuning:
     0.1 rad/s, ``ABIAS_INIT`` 0.2 m/s2) and walk as its process noise has it to within a factor of
     five (``GYR_B_NOISE`` 1e-3 rad/s2, ``ACC_B_NOISE`` 3e-3 m/s3, at its 10 ms per update 7e-6 rad/s
     and 2e-5 m/s2 in 5 ms); of the accelerometer the walk is faster, for temperature and vibration.
+
+    Attributes:
+        motor_torque_noise: Nm, body frame: torque that the rotor model misses, new each step.
+        torque_walk: Nm, world frame: change of the external torque in a step.
+        thrust_noise: N, body frame: force that the rotor model misses, new each step.
+        force_walk: N, world frame: change of the external force in a step.
+        position_noise: m, one measurement.
+        attitude_noise: rad, one measurement; the quarter of an MRP is handled inside.
+        kappa: spread of the sigma points, (28)
+        gyro_noise: rad/s, one measurement of ``correct_imu``.
+        accelerometer_noise: m/s2, likewise.
+        gyro_bias_walk: rad/s: change of the gyro's bias in a step.
+        accelerometer_bias_walk: m/s2: change of the accelerometer's in a step.
+        gyro_bias_std: rad/s: of the gyro's bias, before it is estimated.
+        accelerometer_bias_std: m/s2: of the accelerometer's, likewise.
     """
 
-    motor_torque_noise: ArrayLike = (
-        0.03  # Nm, body frame: torque that the rotor model misses, new each step
-    )
-    torque_walk: ArrayLike = 3.26e-4  # Nm, world frame: change of the external torque in a step
-    thrust_noise: ArrayLike = 0.3  # N, body frame: force that the rotor model misses, new each step
-    force_walk: ArrayLike = 3.26e-3  # N, world frame: change of the external force in a step
-    position_noise: ArrayLike = 0.001  # m, one measurement
-    attitude_noise: ArrayLike = (
-        0.005  # rad, one measurement; the quarter of an MRP is handled inside
-    )
-    kappa: float = 2.0  # spread of the sigma points, (28)
-    gyro_noise: ArrayLike = 0.005  # rad/s, one measurement of ``correct_imu``
-    accelerometer_noise: ArrayLike = 0.05  # m/s2, likewise
-    gyro_bias_walk: ArrayLike = 1e-5  # rad/s: change of the gyro's bias in a step
-    accelerometer_bias_walk: ArrayLike = 1e-4  # m/s2: change of the accelerometer's in a step
-    gyro_bias_std: ArrayLike = 0.1  # rad/s: of the gyro's bias, before it is estimated
-    accelerometer_bias_std: ArrayLike = 0.2  # m/s2: of the accelerometer's, likewise
+    motor_torque_noise: ArrayLike = 0.03
+    torque_walk: ArrayLike = 3.26e-4
+    thrust_noise: ArrayLike = 0.3
+    force_walk: ArrayLike = 3.26e-3
+    position_noise: ArrayLike = 0.001
+    attitude_noise: ArrayLike = 0.005
+    kappa: float = 2.0
+    gyro_noise: ArrayLike = 0.005
+    accelerometer_noise: ArrayLike = 0.05
+    gyro_bias_walk: ArrayLike = 1e-5
+    accelerometer_bias_walk: ArrayLike = 1e-4
+    gyro_bias_std: ArrayLike = 0.1
+    accelerometer_bias_std: ArrayLike = 0.2
 
     def __post_init__(self) -> None:
         for f in fields(self):

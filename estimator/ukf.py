@@ -359,6 +359,12 @@ class WrenchUKF:
         self._voltage = vehicle.voltage_ref
         self._bind()
 
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} of {self.vehicle.name}: period {self.period:g} s, "
+            f"{self.estimate.status}>"
+        )
+
     def _bind(self) -> None:
         """Lay what Python reads and writes in a step over the record."""
         self._sample = Sample(self.record["z"][0])
@@ -517,8 +523,8 @@ class WrenchUKF:
             voltage: battery voltage, V, for effects that depend on it; default ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the quaternion's length is not 1; the filter stays as it
-                was.
+            InputError: a shape or type is wrong, a rotor speed is negative, or the quaternion's
+                length is not 1; the filter stays as it was.
         """
         parts = self._sample.read(rotor_speeds, position, quaternion)
         return self._run(parts, self.period, voltage)

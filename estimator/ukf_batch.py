@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import announced, compiled_without_gil
 from ..runtime.errors import InputError
 from .estimate import (
@@ -29,6 +30,7 @@ from .estimate import (
 )
 from .filter_record import N
 from .recovery import Recovery
+from .sample import negative_speeds
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
 from .ukf_lanes import Blocks
@@ -84,6 +86,11 @@ class WrenchEstimates:
 
     def __init__(self, numbers: Array) -> None:
         self._numbers = numbers  # (n, 22): state, status, count of restarts
+
+    def __repr__(self) -> str:
+        status = self.status
+        counts = ", ".join(f"{status.count(s)} {s}" for s in STATUSES if s in status)
+        return f"<{type(self).__name__} of {len(status)}: {counts}>"
 
     @property
     def state(self) -> Array:
@@ -180,6 +187,10 @@ class WrenchUKFBatch:
         )
         self._z = np.zeros((self.count, 11))
 
+    def __repr__(self) -> str:
+        names = ", ".join(dict.fromkeys(ukf.vehicle.name for ukf in self._filters))
+        return f"<{type(self).__name__} of {self.count} x {names}: period {self.period:g} s>"
+
     def __len__(self) -> int:
         """Return how many filters there are."""
         return self.count
@@ -268,8 +279,8 @@ class WrenchUKFBatch:
             voltage: (n,) V, or one for all; default: ``voltage_ref``.
 
         Raises:
-            InputError: a shape is wrong or the length of a quaternion is not 1; the filters stay as
-                they were.
+            InputError: a shape or type is wrong, a rotor speed is negative, or the length of a
+                quaternion is not 1; the filters stay as they were.
         """
         z, parts = self._z, 0
         for name, value, where, part in (
@@ -280,12 +291,14 @@ class WrenchUKFBatch:
             if value is None:
                 z[:, where] = math.nan
                 continue
-            array = np.asarray(value, dtype=np.float64)
-            if array.shape != (self.count, where.stop - where.start):
+            array = real_numbers(value)
+            if array is None or array.shape != (self.count, where.stop - where.start):
                 raise InputError(
-                    f"step: {name} must be ({self.count}, {where.stop - where.start}), got shape "
-                    f"{array.shape}"
+                    f"step: {name} must be ({self.count}, {where.stop - where.start}), got "
+                    f"{described(value)}"
                 )
+            if not part and np.any(array < 0.0):
+                raise negative_speeds("step", array)
             z[:, where] = array
             parts += part
         bad = _first_bad_quaternion(z)

@@ -92,3 +92,25 @@ def fly_episode(
 def benchmark_seeds(seed: int, episodes: int) -> list[int]:
     """Return the seeds of a benchmark's episodes; every controller flies the same ones."""
     return [FIRST_TEST_SEED + 10_000 * seed + i for i in range(episodes)]
+
+
+def time_series(episode: Episode, poses: Array) -> dict[str, Array]:
+    """Return an episode as columns (n,), a row a decision; ``poses`` (n, 7) are position and
+    quaternion.
+
+    ``t`` s; ``px, py, pz`` m and ``qw, qx, qy, qz``, true, body to world; ``fan_y`` m; ``command``
+    m/s along y; ``fx, fy, fz`` N and ``tx, ty, tz`` Nm, estimated, ``true_fx`` to ``true_tz`` true,
+    both in the world frame; ``vy`` m/s, estimated.
+    """
+    pose = ("px", "py", "pz", "qw", "qx", "qy", "qz")
+    wrench = ("fx", "fy", "fz", "tx", "ty", "tz")
+    true = np.column_stack([episode.force, episode.torque])
+    return {
+        "t": episode.time,
+        **{name: poses[:, i] for i, name in enumerate(pose)},
+        "fan_y": episode.fan_y,
+        "command": episode.command,
+        **{name: episode.observation[:, i] for i, name in enumerate(wrench)},
+        **{f"true_{name}": true[:, i] for i, name in enumerate(wrench)},
+        "vy": episode.observation[:, 6],
+    }

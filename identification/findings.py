@@ -22,84 +22,147 @@ CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that the model lacked."""
+    """An effect that the model lacked.
+
+    Attributes:
+        name: as the effect library has it.
+        coefficients: in ``units``.
+        std: standard deviation of each coefficient.
+        units: of each coefficient; "1" for a pure number.
+        tentative: it may stand for another effect: see ``Diagnosis.structure``.
+        indistinguishable_from: effects that would explain these logs as well.
+        evidence: e.g. share of the residual on held-out blocks that it alone explains.
+        channels: of the logs, that carried the finding.
+    """
 
     name: str
     coefficients: Mapping[str, float]
-    std: Mapping[str, float]  # standard deviation of each coefficient
+    std: Mapping[str, float]
     units: Mapping[str, str]
-    tentative: bool  # it may stand for another effect: see ``Diagnosis.structure``
-    indistinguishable_from: tuple[str, ...]  # effects that would explain these logs as well
-    evidence: Mapping[
-        str, float
-    ]  # e.g. share of the residual on held-out blocks that it alone explains
-    channels: tuple[str, ...] = ()  # of the logs, that carried the finding
+    tentative: bool
+    indistinguishable_from: tuple[str, ...]
+    evidence: Mapping[str, float]
+    channels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Errors:
-    """How wrong a model is on the held-out blocks; NaN where it could not be worked out."""
+    """How wrong a model is on the held-out blocks; NaN where it could not be worked out.
 
-    force_rms: float  # N, all three axes
-    torque_rms: float  # Nm
-    nis_without_wrench_state: float  # mean, 6 in a perfect filter
-    rollout_1s_position_rms: float  # m
+    Attributes:
+        force_rms: N, all three axes.
+        torque_rms: Nm.
+        nis_without_wrench_state: mean, 6 in a perfect filter.
+        rollout_1s_position_rms: m.
+    """
+
+    force_rms: float
+    torque_rms: float
+    nis_without_wrench_state: float
+    rollout_1s_position_rms: float
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that was tried first, alone, against the bare model."""
+    """An effect that was tried first, alone, against the bare model.
+
+    Attributes:
+        name: as the effect library has it.
+        gain: share of the residual's deviance that it explains on left-out blocks; may be negative.
+        named: whether the diagnosis names it.
+    """
 
     name: str
-    # share of the residual's deviance that it explains on left-out blocks; may be negative
     gain: float
     named: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The residual of one unbroken piece of a log, over time (n samples)."""
+    """The residual of one unbroken piece of a log, over time (n samples).
+
+    Attributes:
+        log: its name.
+        period: s.
+        t: (n,) s.
+        before: (n, 6) N and Nm, by the declared vehicle.
+        after: (n, 6) N and Nm, with the named effects.
+        held_out: (n,) the fit never saw it.
+        parts: (n, 6) N and Nm, of each named effect: by how much ``after`` grows where this
+            effect alone is left out.
+    """
 
     log: str
-    period: float  # s
-    t: Array  # (n,) s
-    before: Array  # (n, 6) N and Nm, by the declared vehicle
-    after: Array  # (n, 6) with the named effects
-    held_out: Mask  # (n,) the fit never saw it
-    # (n, 6) of each named effect: by how much ``after`` grows where this effect alone is left out
+    period: float
+    t: Array
+    before: Array
+    after: Array
+    held_out: Mask
     parts: Mapping[str, Array] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} of {self.log}: {len(self.t)} samples, {self.t[0]:.3g} to "
+            f"{self.t[-1]:.3g} s>"
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Signature:
     """Residual against the variable that a named effect follows (n points), with the effect's own
     part.
+
+    Attributes:
+        effect: its name.
+        channel: one of CHANNELS.
+        regressor: what x is, with its unit.
+        x: (n,) in the unit that ``regressor`` states.
+        residual: (n,) N or Nm, by the model with all named effects but this one.
+        fitted: (n,) N or Nm, by this effect.
     """
 
     effect: str
-    channel: str  # one of CHANNELS
-    regressor: str  # what x is, with its unit
-    x: Array  # (n,)
-    residual: Array  # (n,) by the model with all named effects but this one
-    fitted: Array  # (n,) by this effect
+    channel: str
+    regressor: str
+    x: Array
+    residual: Array
+    fitted: Array
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__} of {self.effect}: {self.channel} over {self.regressor}, "
+            f"{len(self.x)} points>"
+        )
 
 
 @dataclass(frozen=True)
 class Structure:
-    """One sign that the residual after all named effects still has structure."""
+    """One sign that the residual after all named effects still has structure.
 
-    test: str  # what was tried, in words
-    where: str  # channel and regressor, in words
-    gain: float  # share of the residual's deviance that it explains on left-out blocks
+    Attributes:
+        test: what was tried, in words.
+        where: channel and regressor, in words.
+        gain: share of the residual's deviance that it explains on left-out blocks.
+    """
+
+    test: str
+    where: str
+    gain: float
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood."""
+    """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood.
 
-    channel: str  # one of CHANNELS
-    rms: float  # N, or Nm
-    time: float  # s, correlation time
+    Attributes:
+        channel: one of CHANNELS.
+        rms: N, or Nm.
+        time: s, correlation time.
+    """
+
+    channel: str
+    rms: float
+    time: float
 
     def below(self, frequency: float) -> float:
         """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
@@ -110,12 +173,19 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class TransientDisturbance:
-    """The largest transient disturbance of one channel."""
+    """The largest transient disturbance of one channel.
 
-    channel: str  # one of CHANNELS
+    Attributes:
+        channel: one of CHANNELS.
+        log: its name.
+        t: s, of its peak.
+        peak: N, or Nm.
+    """
+
+    channel: str
     log: str
-    t: float  # s, of its peak
-    peak: float  # N, or Nm
+    t: float
+    peak: float
 
 
 Gusts, Push = Disturbance, TransientDisturbance  # their older names
@@ -127,43 +197,69 @@ class Diagnosis:
 
     ``remainder``, ``gusts`` and ``pushes`` are named as in ``report.json``: the kind of the
     residual, the disturbances and the transient disturbances.
+
+    Attributes:
+        verdict: explained, partly explained, unexplained, nothing to explain.
+        remainder: none, random, structured.
+        effects: named ones, in the order in which they were found.
+        held_out_segments: log, from, to (s)
+        before: errors of the declared vehicle.
+        after: errors of the amended vehicle.
+        floor_force_rms: N, what sensors alone leave.
+        floor_torque_rms: Nm.
+        advice: what to fly to separate what these logs cannot.
+        notes: doubts about the logs, thrust models of readers, corrections that were made.
+        candidates: best first.
+        traces: residual over time, a piece of flight each.
+        signatures: one a named effect.
+        structure: strongest first.
+        gusts: of each channel; none where rotor speeds are worked out from commands.
+        pushes: one a channel at most, the plainest first; none where rotor speeds are worked out
+            from commands.
+        cutoff_hz: Hz, of the low-pass of everything that was compared.
+        declared: the vehicle that was given.
+        amended: with the named effects, ready for ``estimate`` and the environment.
+        logs: names of those it learned from.
+        test_logs: those the error is on, if they were given apart.
+        seconds: of flight in all.
+        floor_is_bound: whether the logs' noise was filtered before they were written (or is not
+            white for another reason): then the floor is a lower bound.
+        rotor_faults: one a log that can show it: whether a rotor lost thrust during the flight, as
+            plain data (``rotor_faults/words.py``); empty where that was not looked for.
+        needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
+            beside the IMU.
     """
 
-    verdict: str  # explained, partly explained, unexplained, nothing to explain
-    remainder: str  # none, random, structured
+    verdict: str
+    remainder: str
     effects: tuple[NamedEffect, ...]
-    held_out_segments: tuple[tuple[str, float, float], ...]  # log, from, to (s)
+    held_out_segments: tuple[tuple[str, float, float], ...]
     before: Errors
     after: Errors
-    floor_force_rms: float  # N, what sensors alone leave
-    floor_torque_rms: float  # Nm
-    advice: tuple[str, ...]  # what to fly to separate what these logs cannot
-    notes: tuple[
-        str, ...
-    ]  # doubts about the logs, thrust models of readers, corrections that were made
-    candidates: tuple[Candidate, ...]  # best first
+    floor_force_rms: float
+    floor_torque_rms: float
+    advice: tuple[str, ...]
+    notes: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
     traces: tuple[Trace, ...]
     signatures: tuple[Signature, ...]
-    structure: tuple[Structure, ...]  # strongest first
-    gusts: tuple[
-        Disturbance, ...
-    ]  # of each channel; none where rotor speeds are worked out from commands
-    pushes: tuple[
-        TransientDisturbance, ...
-        # one a channel at most, the plainest first; none where rotor speeds are worked out from
-        # commands
-    ]
+    structure: tuple[Structure, ...]
+    gusts: tuple[Disturbance, ...]
+    pushes: tuple[TransientDisturbance, ...]
     cutoff_hz: float
     declared: Vehicle
-    amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment
+    amended: Vehicle
     logs: tuple[str, ...]
-    test_logs: tuple[str, ...]  # those the error is on, if they were given apart
-    seconds: float  # of flight in all
-    # whether the logs' noise was filtered before they were written (or is not white for another
-    # reason): then the floor is a lower bound
+    test_logs: tuple[str, ...]
+    seconds: float
     floor_is_bound: bool = False
-    # one a log that can show it: whether a rotor lost thrust during the flight, as plain data
-    # (``rotor_faults/words.py``); empty where that was not looked for
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
-    # effects that these logs cannot show because the pose is missing, or too slow, beside the IMU
     needs_pose: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        names = ", ".join(e.name + (" (tentative)" if e.tentative else "") for e in self.effects)
+        return (
+            f"<{type(self).__name__} {self.verdict}: {names or 'no effect'}; force error "
+            f"{self.before.force_rms:.3g} -> {self.after.force_rms:.3g} N, torque error "
+            f"{self.before.torque_rms:.3g} -> {self.after.torque_rms:.3g} Nm>"
+        )

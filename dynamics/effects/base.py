@@ -112,8 +112,17 @@ class Coefficient:
 
     Before any flight is seen a coefficient is as likely positive as negative within its range, zero
     on average, and of the order of its typical size: that is the scale by which a diagnosis
-    measures it. ``minimum`` and ``maximum`` are what a vehicle's file may state; beyond
-    ``plausible`` it is no physics of this effect, but the trace of another.
+    measures it.
+
+    Attributes:
+        name: as vehicle files write it.
+        unit: SI, "1" for a pure number.
+        typical: in ``unit``, for a vehicle of 0.45 kg and one of 0.03 kg.
+        meaning: in words.
+        minimum: in ``unit``, least value that a vehicle's file may state.
+        maximum: in ``unit``, largest value that a vehicle's file may state.
+        plausible: in ``unit``, size beyond which it is no physics of this effect, but the trace of
+            another.
     """
 
     name: str
@@ -130,8 +139,38 @@ class Effect:
     """A physical effect: its model, coefficients and source, and what it declares itself to be. The
     docstring of its file states the equation.
 
-    ``excitation`` says what flight tells it from the effects that can leave much the same traces in
-    a log. The words of ``family``, ``role`` and ``needs`` are explained in ``declaration``.
+    Attributes:
+        name: as vehicle files and reports write it.
+        kind: what it changes: rotor input, wrench, rigid body or sensing.
+        coefficients: each with its unit.
+        source: of equation and sizes.
+        excitation: what flight tells it from the effects that can leave much the same traces in a
+            log.
+        model: compiled C function, for rotor input, wrench and sensing.
+        advance: compiled C function, for a wrench that has a state of its own.
+        memory: numbers that a rotor-input or sensing model keeps from step to step; all zero before
+            its first.
+        sets_wind: a wrench effect that changes the wind in ``state``: asked before all others.
+        amend: function from a vehicle and coefficients to the changed vehicle, for an effect on
+            the rigid body.
+        family: what kind of physics it is; the words are explained in ``declaration``.
+        role: what it is to a fit that must know one effect by what it does, not by its name.
+        needs: what a flight must have to show it.
+        trace: effects with the same word leave nearly the same force in slow flight that hardly
+            yaws; any word.
+        usual: it is as likely the cause as others of that trace.
+        any_size: what it changes may be of any size: a load, a fault of assembly. Others are of
+            the order of their typical sizes.
+        scales_noise: a sensing effect that multiplies what is measured, and with it the
+            measurement's noise.
+        starting_points: of a law whose coefficients do nothing one by one: sets of coefficients of
+            which one is near enough to whatever a flight may hold.
+        possible: joint bounds: whether a vehicle can have these coefficients together.
+        implausible: why found coefficients are no physics of this effect, as the rest of a sentence
+            that begins with its name; empty where they are.
+        law: the older name of ``model``, in effects that users have written.
+        confused_with: which effects leave much the same traces: flights decide that now; in effects
+            that users have written.
 
     Raises:
         InputError: a word that there is not, or coefficients that the role does not have.
@@ -142,37 +181,22 @@ class Effect:
     coefficients: tuple[Coefficient, ...]
     source: str
     excitation: str
-    model: Any = None  # compiled C function, for rotor input, wrench and sensing
-    advance: Any = None  # compiled C function, for a wrench that has a state of its own
-    # numbers that a rotor-input or sensing model keeps from step to step; all zero before its first
+    model: Any = None
+    advance: Any = None
     memory: int = 0
-    sets_wind: bool = (
-        False  # a wrench effect that changes the wind in ``state``: asked before all others
-    )
+    sets_wind: bool = False
     amend: "Callable[[Vehicle, Mapping[str, float]], Vehicle] | None" = None
     family: Family = Family.OTHER
     role: Role | None = None
     needs: tuple[Need, ...] = ()
-    # effects with the same word leave nearly the same force in slow flight that hardly yaws; it may
-    # be any word. ``usual``: it is as likely the cause as others of that trace
     trace: str = ""
     usual: bool = True
-    # what it changes may be of any size: a load, a fault of assembly. Others are of the order of
-    # their typical sizes
     any_size: bool = False
-    # a sensing effect that multiplies what is measured, and with it the measurement's noise
     scales_noise: bool = False
-    # of a law whose coefficients do nothing one by one: sets of coefficients of which one is near
-    # enough to whatever a flight may hold
     starting_points: StartingPoints | None = None
-    # joint bounds: whether a vehicle can have these coefficients together
     possible: "Callable[[Mapping[str, float], Vehicle], bool] | None" = None
-    # why found coefficients are no physics of this effect, as the rest of a sentence that begins
-    # with its name; empty where they are
     implausible: Implausible | None = None
-    law: Any = None  # the older name of ``model``, in effects that users have written
-    # which effects leave much the same traces: flights decide that now; in effects that users have
-    # written
+    law: Any = None
     confused_with: InitVar[tuple[str, ...]] = ()
 
     def __post_init__(self, confused_with: tuple[str, ...]) -> None:

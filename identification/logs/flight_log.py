@@ -54,40 +54,60 @@ _GAP = 3.0  # median time steps
 
 @dataclass(frozen=True, eq=False)
 class FlightLog:
-    """One flight, checked: times increase, numbers are finite, quaternions have length 1."""
+    """One flight, checked: times increase, numbers are finite, quaternions have length 1.
 
-    t: Array  # (N,) s
-    position: Array  # (N, 3) m, world; NaN where the pose is missing
-    quaternion: Array  # (N, 4) body to world, scalar first; NaN where the pose is missing
-    # (N, 4) rad/s; NaN in every row where the log has commands that nothing turned into speeds
+    Attributes:
+        t: (N,) s.
+        position: (N, 3) m, world; NaN where the pose is missing.
+        quaternion: (N, 4) body to world, scalar first; NaN where the pose is missing.
+        rotor_speeds: (N, 4) rad/s; NaN in every row where the log has commands that nothing turned
+            into speeds.
+        voltage: (N,) V.
+        force: (N, 3) N, world, truth.
+        torque: (N, 3) Nm, world, truth.
+        accelerometer: (N, 3) m/s2, body: specific force, +g along z in a hover; NaN rows: not
+            measured.
+        gyro: (N, 3) rad/s, body; NaN rows: not measured.
+        name: by which messages call it.
+        source: the file and the reader.
+        notes: gaps, doubts about units, and the thrust model where rotor speeds were not measured.
+        valid: (N,) the pose is there.
+        extra: (N,) or (N, ...) SI; what a reader found besides.
+        commanded: rotor speeds are computed from commands: scale of thrust unknown, moments not to
+            be trusted.
+        command: (N, 4) motor commands, 0 to 1, in the rotors' order.
+        vehicle: name of the vehicle that flew, where the log or its reader knows it.
+    """
+
+    t: Array
+    position: Array
+    quaternion: Array
     rotor_speeds: Array
-    voltage: Array | None = None  # (N,) V
-    force: Array | None = None  # (N, 3) N, world, truth
-    torque: Array | None = None  # (N, 3) Nm, world, truth
-    # (N, 3) m/s2, body: specific force, +g along z in a hover; NaN rows: not measured
+    voltage: Array | None = None
+    force: Array | None = None
+    torque: Array | None = None
     accelerometer: Array | None = None
-    gyro: Array | None = None  # (N, 3) rad/s, body; NaN rows: not measured
+    gyro: Array | None = None
     name: str = ""
-    source: str = ""  # the file and the reader
-    notes: tuple[
-        str, ...
-    ] = ()  # gaps, doubts about units, and the thrust model where rotor speeds were not measured
-    valid: Mask = field(
-        default_factory=lambda: np.empty(0, dtype=np.bool_)
-    )  # (N,) the pose is there
-    extra: Mapping[str, Array] = field(
-        default_factory=dict
-    )  # (N,) or (N, ...) SI; what a reader found besides
-    # rotor speeds are computed from commands: scale of thrust unknown, moments not to be trusted
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    valid: Mask = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    extra: Mapping[str, Array] = field(default_factory=dict)
     commanded: bool = False
-    command: Array | None = None  # (N, 4) motor commands, 0 to 1, in the rotors' order
-    vehicle: str = ""  # name of the vehicle that flew, where the log or its reader knows it
+    command: Array | None = None
+    vehicle: str = ""
 
     def __post_init__(self) -> None:
         if len(self.valid) != len(self.t):
             pose = np.column_stack([self.position, self.quaternion])
             there = np.isfinite(pose).all(axis=1)
             object.__setattr__(self, "valid", there)
+
+    def __repr__(self) -> str:
+        times = f", {self.t[0]:.3g} to {self.t[-1]:.3g} s" if len(self.t) else ""
+        whose = f", of {self.vehicle}" if self.vehicle else ""
+        name = self.name or "without a name"
+        return f"<{type(self).__name__} {name}: {len(self.t)} samples{times}{whose}>"
 
     @property
     def has_pose(self) -> bool:

@@ -1,5 +1,5 @@
 """A diagnosis as a person and a machine read it: page, pictures, sentences, `report.json`."""
 
-from .files import report_data, write_report
+from .files import report_data, report_schema, write_report
 
-__all__ = ["report_data", "write_report"]
+__all__ = ["report_data", "report_schema", "write_report"]

@@ -7,6 +7,7 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,10 @@ from ...runtime.whole_files import replaced
 from ..findings import Diagnosis, Errors
 from .page import report_page
 from .words import headline
+
+# MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
+# is a new minor version, a key that goes or changes its meaning a new major one
+SCHEMA_VERSION = "1.0"
 
 
 def write_report(
@@ -52,7 +57,7 @@ def write_report(
 
 def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what ``report.json`` holds: plain Python values, six significant digits, None for what
-    is not finite.
+    is not finite. ``report_schema`` describes it.
     """
     segments = [[start, end] for _, start, end in diagnosis.held_out_segments]
     error: dict[str, Any] = {
@@ -93,9 +98,17 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "cutoff_hz": diagnosis.cutoff_hz,
         "vehicle": diagnosis.declared.name,
         "version": __version__,
+        "schema_version": SCHEMA_VERSION,
     }
     plain: dict[str, Any] = _plain(data)
     return plain
+
+
+def report_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of ``report.json``."""
+    text = resources.files(__package__).joinpath("report.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
 
 
 def _errors(errors: Errors) -> dict[str, float]:

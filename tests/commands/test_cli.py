@@ -97,11 +97,19 @@ def test_fly_draws_the_episode(tmp_path):
         "admittance",
         "--seed",
         3,
+        "--csv",
         "--out",
         out,
     )
     assert (out / "fly.png").read_bytes().startswith(PNG)
-    assert {p.name for p in out.iterdir()} == {"fly.png", "run.json"}
+    assert {p.name for p in out.iterdir()} == {"fly.png", "fly.csv", "run.json"}
+    flight = np.genfromtxt(out / "fly.csv", delimiter=",", names=True)
+    assert len(flight) == 250
+    assert np.all(np.diff(flight["t"]) > 0.0)
+    assert np.hypot(flight["qw"], flight["qz"]) == pytest.approx(1.0, abs=0.02)
+    assert abs(flight["px"] - 2.3).max() < 0.5
+    # what is felt is what acts, but for noise and the filter's delay
+    assert np.corrcoef(flight["fx"][50:], flight["true_fx"][50:])[0, 1] > 0.3
     assert f"wrote {out / 'fly.png'}" in text
 
 

@@ -1,0 +1,36 @@
+"""Arguments of functions that should be numbers: as arrays, and in words where they are not."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def real_numbers(value: object) -> NDArray[np.float64] | None:
+    """Return an array of real numbers as one of doubles; None for anything else, strings of digits
+    among it.
+    """
+    try:
+        array: NDArray[Any] = np.asarray(value)
+        return array.astype(np.float64) if array.dtype.kind in "biuf" else None
+    except (TypeError, ValueError):
+        return None
+
+
+def described(value: object) -> str:
+    """Return what an argument is, for a message: its type, or the shape of an array of numbers."""
+    array = real_numbers(value)
+    kind = type(value).__name__
+    if array is not None:
+        return f"{array.item():g}" if array.ndim == 0 else f"shape {array.shape}"
+    if isinstance(value, (list, tuple)) and value:
+        kinds = sorted({type(item).__name__ for item in value})
+        return f"a {kind} of {' and '.join(kinds)}"
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype}"
+    return kind
+
+
+def in_brackets(values: NDArray[np.float64], digits: int = 3) -> str:
+    """Return a vector (n,) with so many significant digits, for a short ``repr``."""
+    return f"({', '.join(f'{x:.{digits}g}' for x in values)})"

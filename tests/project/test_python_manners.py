@@ -1,0 +1,132 @@
+"""What Python shows of this kit: short ``repr``, units in ``help``, and errors that say what came
+in.
+"""
+
+import dataclasses
+import inspect
+import re
+
+import numpy as np
+import pytest
+
+from tests.support.diagnoses import made_diagnosis, made_trace
+from windwrench.dynamics import EffectSetting, InputError, Mocap, Vehicle, load_vehicle
+from windwrench.dynamics.effects.base import Coefficient, Effect
+from windwrench.dynamics.vehicle import MotorCurve
+from windwrench.estimator import (
+    FixedLagSmoother,
+    NoiseFit,
+    NoiseFitSettings,
+    NonlinearObserver,
+    ObserverTuning,
+    Recovery,
+    SmoothedSeries,
+    TimedFilter,
+    UKFTuning,
+    WrenchUKF,
+    WrenchUKFBatch,
+)
+from windwrench.estimator.consistency import ConsistencyReport, ModelRun
+from windwrench.identification import FlightLog, findings
+
+DOCUMENTED = (
+    *(Coefficient, Effect, EffectSetting, Mocap, MotorCurve, Vehicle),
+    *(ConsistencyReport, ModelRun, NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
+    *(SmoothedSeries, UKFTuning, FlightLog),
+    *(c for c in vars(findings).values() if inspect.isclass(c) and dataclasses.is_dataclass(c)),
+)
+VEHICLE = load_vehicle("ardrone2")
+POSE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+SPEEDS = np.full(4, VEHICLE.hover_rate)
+
+
+@pytest.mark.parametrize("kind", DOCUMENTED, ids=lambda kind: kind.__name__)
+def test_help_says_what_each_field_is(kind):
+    text = inspect.getdoc(kind)
+    if kind is Vehicle and dataclasses.fields(kind):
+        assert "mass: kg." in text
+    described = set(re.findall(r"^ {4}(\w+): \S", text.split("Attributes:")[1], re.MULTILINE))
+    own = [f for f in dataclasses.fields(kind) if f.name in kind.__annotations__]
+    assert {f.name for f in own} - described == set()
+
+
+def filters():
+    ukf = WrenchUKF(VEHICLE)
+    ukf.reset(*POSE)
+    observer = NonlinearObserver(VEHICLE)
+    observer.reset(*POSE)
+    batch = WrenchUKFBatch(VEHICLE, 2)
+    batch.reset(*POSE)
+    return ukf, observer, batch
+
+
+def test_repr_is_short_and_says_what_it_is():
+    ukf, observer, batch = filters()
+    assert repr(ukf) == "<WrenchUKF of ardrone2: period 0.005 s, tracking>"
+    assert repr(observer).startswith("<NonlinearObserver of ardrone2: period 0.005 s")
+    assert repr(batch) == "<WrenchUKFBatch of 2 x ardrone2: period 0.005 s>"
+    estimate = ukf.step(SPEEDS, *POSE)
+    assert repr(estimate).startswith("<WrenchEstimate tracking: force (")
+    assert " Nm, NIS " in repr(estimate)
+    assert "coasting" in repr(ukf.step(SPEEDS))
+    assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimates of 2: 2 coasting>"
+    assert "of 0.3 s: <WrenchUKF" in repr(FixedLagSmoother(ukf))
+    assert "0 late, 0 too late: <WrenchUKF" in repr(TimedFilter(ukf))
+    made = made_diagnosis(made_trace(5.0))
+    log = FlightLog(np.arange(3.0), np.zeros((3, 3)), np.tile(POSE[1], (3, 1)), np.ones((3, 4)))
+    for thing, words in (
+        (VEHICLE, "<Vehicle ardrone2: 0.465 kg, arm 0.126"),
+        (made, "<Diagnosis explained: rotor_drag; force error "),
+        (made.traces[0], "<Trace of flight: 125 samples"),
+        (made.signatures[0], "<Signature of rotor_drag: Fx over body velocity x (m/s), 125 points"),
+        (log, "<FlightLog without a name: 3 samples, 0 to 2 s>"),
+        (SmoothedSeries(np.zeros((7, 20)), np.zeros((7, 18))), "<SmoothedSeries at 7 times>"),
+    ):
+        assert repr(thing).startswith(words)
+        assert len(repr(thing)) < 160
+
+
+@pytest.mark.parametrize(
+    ("speeds", "position", "quaternion", "words"),
+    [
+        ("fast", *POSE, "expected rotor_speeds (4,) of rad/s, got str"),
+        ("1234", *POSE, "expected rotor_speeds (4,) of rad/s, got str"),
+        (["1", "2", "3", "4"], *POSE, "rotor_speeds (4,) of rad/s, got a list of str"),
+        (None, *POSE, "rotor_speeds (4,) of rad/s, got NoneType"),
+        (376.0, *POSE, "rotor_speeds (4,) of rad/s, got 376"),
+        (np.ones(3), *POSE, "rotor_speeds (4,) of rad/s, got shape (3,)"),
+        (np.array(["a"] * 4), *POSE, "got an array of <U1"),
+        ([[1.0], [1.0, 2.0]], *POSE, "got a list of list"),
+        (SPEEDS, {"x": 1}, POSE[1], "expected position (3,) in m or None, got dict"),
+        (SPEEDS, POSE[0], (1.0, 0.0), "expected quaternion (4,) or None, got shape (2,)"),
+        ([376.0, 376.0, -1.0, 376.0], *POSE, "must not be negative, got -1 rad/s"),
+        (np.array([376.0, 376.0, -1.0, np.nan]), *POSE, "must not be negative, got "),
+    ],
+)
+def test_a_wrong_argument_is_named_with_its_type(speeds, position, quaternion, words):
+    ukf, observer, _ = filters()
+    for estimator in (ukf, observer):
+        before = estimator.estimate.state.copy()
+        with pytest.raises(InputError) as error:
+            estimator.step(speeds, position, quaternion)
+        assert words in str(error.value)
+        np.testing.assert_array_equal(estimator.estimate.state, before)
+        assert estimator.step(SPEEDS, *POSE).status == "tracking"
+
+
+def test_a_batch_refuses_the_same():
+    *_, batch = filters()
+    speeds = np.tile(SPEEDS, (2, 1))
+    with pytest.raises(InputError, match="got a list of str"):
+        batch.step(["a", "b"])
+    speeds[1, 2] = -3.0
+    with pytest.raises(InputError, match="must not be negative, got -3 rad/s"):
+        batch.step(speeds)
+
+
+def test_after_a_negative_speed_a_pose_can_still_be_taken_in():
+    ukf, *_ = filters()
+    ukf.step(SPEEDS, *POSE)
+    with pytest.raises(InputError, match="must not be negative"):
+        ukf.step(-SPEEDS, *POSE)
+    assert ukf.correct(*POSE).status == "tracking"
