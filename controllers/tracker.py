@@ -195,11 +195,11 @@ class InformedTracker(_Belief):
 
     def __init__(
         self,
-        gain: float = 1.6,
+        gain: float = 1.429,
         feed: float = 1.0,
-        damping: float = 0.3,
-        ahead: float = 0.12,
-        spread: float = 0.15,
+        damping: float = 0.407,
+        ahead: float = 0.08354,
+        spread: float = 0.1486,
         level: float = 0.0,
         particles: int = 1000,
     ) -> None:

@@ -309,7 +309,10 @@ def _overview(rows: Sequence[Row], lines: Sequence[Line], plan: Mapping[str, Any
         "| - | - |" + " - |" * len(worlds),
     ]
     best = {
-        w: min((r.rmse_m for r in rows if r.world == w and r.name != "oracle"), default=0.0)
+        w: min(
+            (r.rmse_m for r in rows if r.world == w and r.name not in ("oracle", "limit")),
+            default=0.0,
+        )
         for w in worlds
     }
     for line in lines:
@@ -332,7 +335,7 @@ def _overview(rows: Sequence[Row], lines: Sequence[Line], plan: Mapping[str, Any
     return (
         f"""## All worlds
 
-Mean RMSE in m; the best but for the oracle is bold. A policy trained on base flies all other worlds unprepared; wide mixes
+Mean RMSE in m; the best but for the oracle and the limit is bold. A policy trained on base flies all other worlds unprepared; wide mixes
 {", ".join(dict.fromkeys(TIERS["wide"]))}.{notes}
 
 """
