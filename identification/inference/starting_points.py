@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Unexplained
-from ...dynamics.vehicle import EffectSetting
+from ...dynamics.vehicle import EffectSetting, Vehicle
 from ..motion.residual import residual_wrench
 from ..motion.signals import Signals
 from .regression import Flights, typical_size
@@ -29,6 +29,9 @@ class StartingSettings:
     most_tried: int = 12  # all of them, if there are no more
     kept_of_more: int = 4  # of more, those that resemble the residual most
     sample_step: int = 20  # every so many samples are enough to see the resemblance
+    # of one sample, repeated, and s between them: for a minute, and in step with no whole Hz
+    steady_samples: int = 200
+    steady_period: float = 0.317
     least_size: float = 1e-12  # of a channel of the residual, against a division by zero
 
 
@@ -84,8 +87,9 @@ def _likeness(
     """Return how much of the residual goes like each start's wrench; minus infinity where it has
     none.
     """
-    # an effect with a state of its own must see every sample
-    whole = get(effect).advance is not None or get(effect).memory > 0
+    bare = replace(flights.vehicle, effects=())
+    first = bare.with_effects(EffectSetting(effect, starts[0]))
+    whole = not _is_steady(flights.pieces({})[0].signals, first)
     looked_at, rows, picked = [], [], []
     row = 0
     for piece in flights.pieces({}):
@@ -98,7 +102,6 @@ def _likeness(
     seen = flights.fit_rows[every]
     target = residual[every][seen]
     scale = 1.0 / np.maximum(np.sqrt(np.mean(np.square(target), axis=0)), STARTING.least_size)
-    bare = replace(flights.vehicle, effects=())
     base = [residual_wrench(s, bare) for s in looked_at]
     out = []
     for start in starts:
@@ -113,6 +116,18 @@ def _likeness(
             float(np.sum(shape * target * scale)) / math.sqrt(size) if size > 0.0 else -math.inf
         )
     return out
+
+
+def _is_steady(signals: Signals, vehicle: Vehicle) -> bool:
+    """Return whether a vehicle's effects do the same as long as nothing else changes: they have no
+    state of their own and go by no clock, so not every sample need be looked at.
+    """
+    same = replace(
+        _thinned(signals, np.zeros(STARTING.steady_samples, dtype=np.int64)),
+        period=STARTING.steady_period,
+    )
+    found = residual_wrench(same, vehicle)
+    return bool(np.all(found == found[0]))
 
 
 def _every(rows: NDArray[np.int64]) -> NDArray[np.int64]:

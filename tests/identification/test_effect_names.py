@@ -120,7 +120,7 @@ def assert_alike(one, other):
 @pytest.mark.parametrize(
     "name",
     [
-        name if name in ("late", "commanded") else pytest.param(name, marks=pytest.mark.slow)
+        name if name in ("wind", "commanded") else pytest.param(name, marks=pytest.mark.slow)
         for name in FLIGHTS
     ],
 )
