@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
+from .commands.exporting import export_c
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.identifying import identify
@@ -80,6 +81,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     estimate,
     diagnose,
     identify,
+    export_c,
     record,
     replay,
     reproduce,

@@ -1,0 +1,150 @@
+"""The filter for a flight controller, as C."""
+
+import shlex
+import sys
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..runtime.errors import InputError
+from .terminal import VehicleOption, console, offering, results_folder, say, working
+
+_EFFECTS = ("declared", "none")
+
+
+def _estimators() -> list[str]:
+    from ..live.export_c import ESTIMATORS
+
+    return list(ESTIMATORS)
+
+
+def _policies() -> list[str]:
+    folder = resources.files("windwrench.training").joinpath("policies")
+    shipped = [file.name[:-4] for file in folder.iterdir() if file.name.endswith(".npz")]
+    return ["lead", *sorted(shipped)]
+
+
+def _policy_path(name: str) -> Path | None:
+    """Return the file of a trained policy, by its path or its name; None for a law.
+
+    Raises:
+        InputError: there is none of this name.
+    """
+    if name == "lead":
+        return None
+    if name == "tracker":
+        raise InputError("--policy tracker: cannot be exported yet; expected lead or sac-0")
+    if name.endswith((".npz", ".json")):
+        return Path(name)
+    path = Path(str(resources.files("windwrench.training"))) / "policies" / f"{name}.npz"
+    if name not in _policies():
+        raise InputError(
+            f"--policy {name}: no such policy; expected {', '.join(_policies())}, or the path of "
+            "a trained one"
+        )
+    return path
+
+
+def export_c(
+    vehicle: VehicleOption,
+    estimator: Annotated[
+        str,
+        typer.Option(
+            help="constant-gain (the least work), ekf or ukf.",
+            autocompletion=offering(_estimators),
+        ),
+    ] = "ekf",
+    effects: Annotated[
+        str,
+        typer.Option(
+            help="declared: the effects in the vehicle file are part of the filter's model; none: "
+            "they are left out.",
+            autocompletion=offering(lambda: _EFFECTS),
+        ),
+    ] = "declared",
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            help="Also a policy that tracks a fan: lead, the name of a trained one (sac-0), or its "
+            "path.",
+            autocompletion=offering(_policies),
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(help="Poses a second; default: the vehicle's mocap rate_hz."),
+    ] = None,
+    rise_time: Annotated[
+        float, typer.Option(help="Rise time of force and torque, 10-90 %, s.")
+    ] = 1.0,
+    gate: Annotated[
+        float,
+        typer.Option(
+            help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none."
+        ),
+    ] = 0.9999,
+    out: Annotated[
+        Path, typer.Option("--out", help="Folder for the C files; created if it does not exist.")
+    ] = Path("results/export_c"),
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace C files that are there already.")
+    ] = False,
+) -> dict[str, Any]:
+    """Write the filter as C: one header and one C99 source in single precision, without a heap, for
+    a flight controller; with an example and a CMake file.
+
+    Example: windwrench export-c --vehicle ardrone2 --estimator ekf --out filter
+    """
+    from dataclasses import replace
+
+    from ..dynamics.vehicle_file import load_vehicle
+    from ..live.export_c import ESTIMATORS, exportable_policy
+    from ..live.export_c import export_c as export
+    from ..live.export_c.export import FILES
+    from ..runtime.errors import unknown_name
+    from ..runtime.whole_files import replaced
+
+    if estimator not in ESTIMATORS:
+        raise unknown_name("estimator", estimator, ESTIMATORS)
+    if effects not in _EFFECTS:
+        raise InputError(f"--effects {effects}: expected {' or '.join(_EFFECTS)}")
+    if gate != 0.0 and not 0.5 <= gate < 1.0:
+        raise InputError(f"--gate {gate:g}: expected a probability from 0.5 to below 1, or 0")
+    model = load_vehicle(vehicle)
+    if effects == "none":
+        model = replace(model, effects=())
+    flown = None if policy is None else exportable_policy(policy, _policy_path(policy))
+    there = [out / name for name in FILES if (out / name).exists()]
+    if there and not overwrite:
+        raise InputError(f"{there[0]}: is there already; expected a new folder, or --overwrite")
+    with working("exporting"):
+        found = export(
+            model,
+            estimator,
+            rate,
+            rise_time,
+            gate or None,
+            flown,
+            shlex.join(["windwrench", *sys.argv[1:]]),
+        )
+    results_folder(out, vehicle=model.name, estimator=estimator, files=list(FILES))
+    for name, text in found.files.items():
+        with replaced(out / name) as partial:
+            partial.write_text(text, encoding="utf-8")
+    console.print(
+        f"{estimator} of {model.name} for {1.0 / found.filter.period:g} poses a second, with "
+        f"{', '.join(found.effects) or 'no effects'}.",
+        highlight=False,
+        markup=False,
+    )
+    say(*(out / name for name in found.files))
+    return {
+        "vehicle": model.name,
+        "estimator": estimator,
+        "effects": list(found.effects),
+        "policy": policy,
+        "period_s": found.filter.period,
+        "files": [str(out / name) for name in found.files],
+    }

@@ -1,0 +1,6 @@
+"""The wrench filter of a vehicle, and a policy, as C that a flight controller compiles."""
+
+from .export import ESTIMATORS, Exported, export_c
+from .policies import exportable_policy
+
+__all__ = ["ESTIMATORS", "Exported", "export_c", "exportable_policy"]

@@ -1,0 +1,43 @@
+"""Numbers as C writes them."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...runtime.errors import InputError
+
+_WIDTH = 100  # columns
+
+
+def literal(value: float, what: str = "a number") -> str:
+    """Return a number as a C literal in single precision, the shortest that reads as the same.
+
+    Raises:
+        InputError: single precision does not hold it; ``what`` names it.
+    """
+    with np.errstate(over="ignore"):
+        number = np.float32(value)
+    if np.isnan(number) or (np.isinf(number) and np.isfinite(value)):
+        raise InputError(f"{what}: single precision does not hold {value:g}")
+    if np.isinf(number):
+        return "INFINITY" if number > 0 else "-INFINITY"
+    text = str(number)
+    return f"{text if '.' in text or 'e' in text else text + '.0'}f"
+
+
+def table(values: ArrayLike, what: str = "a number") -> str:
+    """Return an array of one or two dimensions as the initialiser of a C array."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim == 1:
+        return _wrapped([literal(x, what) for x in array])
+    return "{\n    " + ",\n    ".join(table(row, what) for row in array) + "}"
+
+
+def _wrapped(words: list[str]) -> str:
+    lines, line = [], ""
+    for word in words:
+        if line and len(line) + len(word) + 2 > _WIDTH:
+            lines.append(line)
+            line = ""
+        line = f"{line}, {word}" if line else word
+    lines.append(line)
+    return "{" + ",\n     ".join(lines) + "}"

@@ -1,0 +1,99 @@
+"""A policy as C: weights as tables, or a law with its two gains."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...controllers.features import QUANTITIES
+from ...controllers.observation import (
+    FORCE_X,
+    FORCE_Y,
+    FORCE_Z,
+    LAST_COMMAND,
+    TORQUE_X,
+    TORQUE_Y,
+    TORQUE_Z,
+    VELOCITY_Y,
+)
+from ...controllers.trained_policy import layers_of, load_policy
+from ...runtime.errors import InputError
+from .c_numbers import literal, table
+
+# Fan tracking by the ratio of torque and force, with the lead that makes up for the filter's delay:
+# gains (1/s, 1) and the least force (N) fitted to what the trained policies command
+LEAD_GAIN, LEAD_RATE_GAIN, LEAD_LEAST_FORCE = 11.35, 2.79, 0.183
+LAWS = ("lead",)
+_COLUMNS = {
+    FORCE_X: "e->force[0]",
+    FORCE_Y: "e->force[1]",
+    FORCE_Z: "e->force[2]",
+    TORQUE_X: "e->torque[0]",
+    TORQUE_Y: "e->torque[1]",
+    TORQUE_Z: "e->torque[2]",
+    VELOCITY_Y: "e->velocity[1]",
+    LAST_COMMAND: "m->command",
+}
+
+
+def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
+    """Return what the templates need of a policy: ``lead``, or the trained one at ``path``.
+
+    Raises:
+        InputError: there is no such policy, or it is of a kind that is not exported.
+    """
+    if name == "lead":
+        return {
+            "kind": "lead",
+            "title": "Fan tracking with lead: u = -(gain x + rate_gain dx/dt), x = tau_z / f_x.",
+            "source": "live/export_c/policies.py",
+            "gain": literal(LEAD_GAIN),
+            "rate_gain": literal(LEAD_RATE_GAIN),
+            "least_force": literal(LEAD_LEAST_FORCE),
+        }
+    if path is None:
+        raise InputError(
+            f"--policy {name}: expected {', '.join(LAWS)} or the name or path of a trained policy"
+        )
+    policy = load_policy(path)
+    if "lstm_input" in policy.weights:
+        raise InputError(
+            f"--policy {name}: is recurrent; only policies of dense layers can be exported"
+        )
+    frame = []
+    for quantity, scale in zip(policy.features.frame, policy.features.scale, strict=True):
+        known = QUANTITIES[quantity]
+        if known.source != "observation":
+            raise InputError(
+                f"--policy {name}: sees {quantity}, which is not in the estimate; such a policy "
+                "cannot be exported"
+            )
+        frame.append({"c": _COLUMNS[known.column], "scale": literal(scale, name)})
+    layers = []
+    for i in range(layers_of(policy.weights)):
+        weight, bias = policy.weights[f"weight{i}"], policy.weights[f"bias{i}"]
+        layers.append(
+            {
+                "rows": weight.shape[0],
+                "columns": weight.shape[1],
+                "weight": table(weight),
+                "bias": table(bias),
+            }
+        )
+    squash, activation = bool(policy.card["squash"]), str(policy.card["activation"])
+    last = "b" if len(layers) % 2 == 1 else "a"
+    widest = max(policy.features.size, *(layer["rows"] for layer in layers))
+    return {
+        "kind": "dense",
+        "title": f"The policy {path.stem}, trained with "
+        f"{policy.card.get('algorithm', 'an unknown algorithm')}.",
+        "source": "controllers/trained_policy.py",
+        "repeat": int(policy.card["repeat"]),
+        "frame": frame,
+        "history": policy.features.history,
+        "layers": layers,
+        "widest": widest,
+        "activation": activation,
+        "squash": squash,
+        "tanh": squash or activation == "tanh",
+        "last": last,
+    }

@@ -1,0 +1,171 @@
+"""An exported C filter, compiled on this machine and driven from Python."""
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from windwrench.estimator import WrenchUKF
+from windwrench.estimator.estimate import STATUSES
+from windwrench.live.export_c import Exported
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
+Array = NDArray[np.float64]
+_FLOATS = ctypes.POINTER(ctypes.c_float)
+
+
+def missing(*programs: str) -> list[str]:
+    """Return which of some programs are not installed."""
+    return [program for program in programs if shutil.which(program) is None]
+
+
+def write(exported: Exported, folder: Path) -> Path:
+    """Write the files of an export into a folder; return it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in exported.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
+    """Run a program; return what it says.
+
+    Raises:
+        RuntimeError: it fails, with the end of what it said.
+    """
+    done = subprocess.run(
+        [*map(str, words)], capture_output=True, text=True, cwd=cwd, timeout=timeout
+    )
+    if done.returncode != 0:
+        raise RuntimeError(
+            f"{words[0]} ended with {done.returncode}: {done.stdout[-3000:]}{done.stderr[-3000:]}"
+        )
+    return done.stdout
+
+
+def _estimate_type(imu: bool) -> Any:
+    names = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
+    fields: list[tuple[str, Any]] = [
+        (n, ctypes.c_float * (4 if n == "quaternion" else 3)) for n in names
+    ]
+    fields += [(f"std_{n}", ctypes.c_float * 3) for n in PARTS]
+    fields += [("nis", ctypes.c_float), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
+    if imu:
+        biases = ("gyro_bias", "accelerometer_bias", "std_gyro_bias", "std_accelerometer_bias")
+        fields += [(name, ctypes.c_float * 3) for name in biases]
+        fields += [("imu_refused", ctypes.c_uint)]
+    return type("Estimate", (ctypes.Structure,), {"_fields_": fields})
+
+
+def _floats(values: Any) -> Any:
+    return None if values is None else (ctypes.c_float * len(values))(*map(float, values))
+
+
+class CompiledFilter:
+    """An export, compiled, with the methods of the Python filter; each returns what C returns."""
+
+    def __init__(self, exported: Exported, folder: Path, compiler: str = "gcc") -> None:
+        write(exported, folder)
+        (folder / "size.c").write_text(
+            '#include "windwrench_filter.h"\nunsigned size_of_filter(void);\n'
+            "unsigned size_of_filter(void) { return (unsigned)sizeof(ww_filter); }\n"
+        )
+        library = folder / "filter.so"
+        sources = ("windwrench_filter.c", "size.c")
+        run(
+            *(compiler, *STRICT, "-O1", "-fno-math-errno", "-shared", "-fPIC", *sources),
+            *("-o", library.name, "-lm"),
+            cwd=folder,
+        )
+        self.c: Any = ctypes.CDLL(str(library.resolve()))
+        self.c.ww_predict.argtypes = [ctypes.c_void_p, _FLOATS, ctypes.c_float]
+        self.bytes = int(self.c.size_of_filter())
+        self._memory = ctypes.create_string_buffer(self.bytes)
+        header = exported.files["windwrench_filter.h"]
+        self._now = _estimate_type("gyro_bias" in header)()
+        if "ww_policy" in header:
+            self.c.ww_policy.restype = ctypes.c_float
+            self._policy = ctypes.create_string_buffer(4096)
+            self.c.ww_policy_init(self._policy)
+
+    def reset(self, position: Any, quaternion: Any) -> int:
+        """Call ww_init."""
+        return int(self.c.ww_init(self._memory, _floats(position), _floats(quaternion)))
+
+    def predict(self, rotor_speeds: Any, dt: float) -> int:
+        """Call ww_predict."""
+        return int(self.c.ww_predict(self._memory, _floats(rotor_speeds), dt))
+
+    def correct(self, position: Any, quaternion: Any) -> int:
+        """Call ww_correct_pose."""
+        return int(self.c.ww_correct_pose(self._memory, _floats(position), _floats(quaternion)))
+
+    def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
+        """Call ww_correct_imu."""
+        return int(self.c.ww_correct_imu(self._memory, _floats(gyro), _floats(accelerometer)))
+
+    def policy(self, estimate: Any) -> float:
+        """Call ww_policy."""
+        return float(self.c.ww_policy(self._policy, ctypes.byref(estimate)))
+
+    @property
+    def estimate(self) -> Any:
+        """What ww_get writes; the next call writes over it."""
+        self.c.ww_get(self._memory, ctypes.byref(self._now))
+        return self._now
+
+
+def differences(c: CompiledFilter, python: WrenchUKF) -> dict[str, float]:
+    """Return the largest difference of each part of two estimates, in standard deviations of the
+    Python filter's; that of the standard deviations, relative; and whether status or restarts
+    differ.
+    """
+    e, p = c.estimate, python.estimate
+    std = np.sqrt(np.diag(p.covariance)).reshape(6, 3)
+    std[0] *= 4.0  # an MRP is a quarter of an angle
+    out = {}
+    for k, name in enumerate(PARTS):
+        if name == "attitude":
+            q, r = np.array(e.quaternion, dtype=float), p.quaternion
+            turn = r[0] * q[1:] - q[0] * r[1:] - np.cross(q[1:], r[1:])
+            difference = 2.0 * np.abs(turn)
+        else:
+            difference = np.abs(np.array(getattr(e, name), dtype=float) - getattr(p, name))
+        out[name] = float(np.max(difference / std[k]))
+        mine = np.array(getattr(e, f"std_{name}"), dtype=float)
+        out["std"] = max(out.get("std", 0.0), float(np.max(np.abs(mine / std[k] - 1.0))))
+    same = STATUSES[e.status] == p.status and e.restarts == p.restarts
+    out["status"] = 0.0 if same else 1.0
+    return out
+
+
+def compare(
+    c: CompiledFilter, python: WrenchUKF, flight: Mapping[str, Array], every: int = 1
+) -> dict[str, float]:
+    """Fly both filters along a flight of ``flights``; return the largest of ``differences``, looked
+    at ``every`` so many steps.
+    """
+    first = int(np.flatnonzero(np.isfinite(flight["position"]).all(axis=1))[0])
+    c.reset(flight["position"][first], flight["quaternion"][first])
+    python.reset(flight["position"][first], flight["quaternion"][first])
+    worst: dict[str, float] = {}
+    for k in range(first + 1, len(flight["dt"])):
+        dt, position, quaternion = flight["dt"][k], flight["position"][k], flight["quaternion"][k]
+        c.predict(flight["rotor_speeds"][k], dt)
+        python.predict(flight["rotor_speeds"][k], dt)
+        c.correct(position, quaternion)
+        python.correct(position, quaternion)
+        if "gyro" in flight:
+            c.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
+            python.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
+        if k % every == 0:
+            for name, value in differences(c, python).items():
+                worst[name] = max(worst.get(name, 0.0), value)
+    worst["restarts"] = float(python.estimate.restarts)
+    return worst

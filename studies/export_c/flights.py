@@ -1,0 +1,99 @@
+"""Five flights for C and Python, with faults of a pose: numbers as single precision holds them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import parse_setting
+from windwrench.dynamics.vehicle import Vehicle
+from windwrench.envs.recording import record_flight
+
+Array = NDArray[np.float64]
+# name: vehicle, trajectory, declared effects, centre of mass (m), rows of the flight between poses
+FLIGHTS: dict[str, tuple[str, str, tuple[str, ...], tuple[float, float, float], int]] = {
+    "ardrone2, turning": ("ardrone2", "yaw", (), (0.0, 0.0, 0.0), 1),
+    "crazyflie, brisk": ("crazyflie", "fast", (), (0.0, 0.0, 0.0), 1),
+    "hummingbird, centre of mass off": ("hummingbird", "excite", (), (0.01, -0.005, 0.02), 1),
+    "ardrone2, four effects": (
+        "ardrone2",
+        "excite",
+        ("motor_lag", "rotor_drag", "body_drag", "inflow_thrust"),
+        (0.0, 0.0, 0.0),
+        1,
+    ),
+    "crazyflie, 50 poses a second": ("crazyflie", "circle", (), (0.0, 0.0, 0.0), 4),
+}
+_FAULT = 0.01  # chance a step that a fault begins
+_LENGTHS = (0.015, 0.08, 0.3, 0.8, 1.5)  # s
+
+
+def vehicle_of(name: str) -> Vehicle:
+    """Return the vehicle that flies a flight."""
+    vehicle, _, effects, com, every = FLIGHTS[name]
+    model = replace(load_vehicle(vehicle), com=np.array(com))
+    rate = replace(model.mocap, rate_hz=200.0 / every)
+    return replace(model, mocap=rate).with_effects(*(parse_setting(e, model) for e in effects))
+
+
+def flight(
+    name: str, steps: int, seed: int = 0, faults: bool = True, imu: bool = False
+) -> dict[str, Array]:
+    """Return ``dt`` (n,), ``rotor_speeds`` (n, 4), ``position`` (n, 3), ``quaternion`` (n, 4), and
+    with an IMU ``gyro`` and ``accelerometer`` (n, 3); what was not measured is NaN.
+
+    Steps are uneven by 2 %. Faults are gaps, positions or attitudes alone, jumps by 1.5 m, and
+    turns by half a radian, of 15 ms to 1.5 s.
+    """
+    vehicle, trajectory, _, com, every = FLIGHTS[name]
+    model = replace(load_vehicle(vehicle), com=np.array(com))
+    log = record_flight(
+        model, vehicle_of(name).effects, trajectory, max(0.1, steps * every / 200.0), seed, imu=imu
+    )
+    rng = np.random.default_rng(seed)
+    rows = slice(0, steps * every, every)
+    position, quaternion = log["position"][rows].copy(), log["quaternion"][rows].copy()
+    n, period = len(position), every / 200.0
+    out = {
+        "dt": period * (1.0 + 0.02 * rng.uniform(-1.0, 1.0, n)),
+        "rotor_speeds": log["rotor_speeds"][rows],
+        "position": position,
+        "quaternion": quaternion,
+    }
+    if imu:
+        for key, noise, bias in (("gyro", 0.005, 0.02), ("accelerometer", 0.05, 0.1)):
+            out[key] = log[key][rows] + bias * rng.uniform(-1.0, 1.0, 3)
+            out[key] += noise * rng.standard_normal((n, 3))
+        _saturate(rng, out["accelerometer"])
+    for begin, end, kind in _faults(rng, n, period) if faults else ():
+        if kind in ("gap", "attitude"):
+            position[begin:end] = np.nan
+        if kind in ("gap", "position"):
+            quaternion[begin:end] = np.nan
+        if kind == "jump":
+            position[begin:end] += (1.5, 0.0, 0.0)
+        if kind == "turn":
+            w, x, y, z = quaternion[begin:end].T
+            c, s = np.cos(0.25), np.sin(0.25)
+            turned = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=1)
+            quaternion[begin:end] = turned
+    return {key: np.asarray(value, dtype=np.float32).astype(float) for key, value in out.items()}
+
+
+def _saturate(rng: np.random.Generator, accelerometer: Array) -> None:
+    """Let the accelerometer shake and saturate now and then, for up to 0.8 s."""
+    for begin in np.flatnonzero(rng.random(len(accelerometer)) < 0.001):
+        rows = slice(begin, begin + int(rng.integers(1, 160)))
+        accelerometer[rows] = np.clip(8.0 * accelerometer[rows], -39.0, 39.0)
+
+
+def _faults(rng: np.random.Generator, n: int, period: float) -> Iterator[tuple[int, int, str]]:
+    k = round(0.5 / period)
+    while k < n:
+        if rng.random() < _FAULT * period / 0.005:
+            length = max(1, round(float(rng.choice(_LENGTHS)) / period))
+            yield k, min(k + length, n), str(rng.choice(["gap", "position", "attitude", "jump", "turn"]))
+            k += length
+        k += 1

@@ -1,0 +1,353 @@
+"""The exported C filter against the Python one, and what may not happen to it."""
+
+import subprocess
+
+import numpy as np
+import pytest
+
+from tests.support.paths import ROOT
+from windwrench.controllers.trained_policy import load_policy
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import compile_effects, get, parse_setting
+from windwrench.dynamics.effects.base import ROTORS_SIZE, STATE_SIZE
+from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.live.export_c.effect_code import exportable_effects
+from windwrench.runtime.errors import InputError
+from windwrench.studies.export_c import firmware
+from windwrench.studies.export_c.compiled import STRICT, CompiledFilter, compare, missing, run, write
+from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
+
+LARGEST = 0.01  # of a standard deviation
+QUICK, SLOW = 2_000, 20_000  # steps of each of five flights
+POLICY = ROOT / "training" / "policies" / "sac-0.npz"
+
+
+def needs(*programs):
+    if lacking := missing(*programs):
+        pytest.skip(f"not installed: {', '.join(lacking)}")
+
+
+def assert_same(worst):
+    """Every part within 1 % of its standard deviation; standard deviations, statuses, restarts."""
+    assert worst["status"] == 0.0
+    for name, value in worst.items():
+        assert name == "restarts" or value < LARGEST, (name, worst)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, tmp_path):
+    needs("gcc")
+    exported = export_c(vehicle_of(name), estimator)
+    worst = compare(CompiledFilter(exported, tmp_path), exported.filter, flight(name, QUICK), 10)
+    assert worst["restarts"] > 0
+    assert_same(worst)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
+    needs("gcc")
+    exported = export_c(vehicle_of(name), estimator)
+    c = CompiledFilter(exported, tmp_path)
+    assert_same(compare(c, exported.filter, flight(name, SLOW, seed=1)))
+
+
+@pytest.mark.parametrize("estimator", ["ekf", "ukf"])
+def test_c_and_python_agree_with_an_imu(estimator, tmp_path):
+    needs("gcc")
+    name = "ardrone2, turning"
+    exported = export_c(vehicle_of(name), estimator)
+    c = CompiledFilter(exported, tmp_path)
+    assert_same(compare(c, exported.filter, flight(name, QUICK, imu=True), 4))
+    e = c.estimate
+    for mine, other, std in (
+        (e.gyro_bias, exported.filter.gyro_bias, exported.filter.gyro_bias_std),
+        (
+            e.accelerometer_bias,
+            exported.filter.accelerometer_bias,
+            exported.filter.accelerometer_bias_std,
+        ),
+    ):
+        assert np.all(np.abs(np.array(mine) - other) < LARGEST * std)
+    assert e.imu_refused == exported.filter.imu_refused > 0
+
+
+def test_without_a_gate_c_restarts_where_python_does(tmp_path):
+    needs("gcc")
+    name = "crazyflie, brisk"
+    exported = export_c(vehicle_of(name), "ekf", gate=None)
+    worst = compare(CompiledFilter(exported, tmp_path), exported.filter, flight(name, QUICK), 10)
+    assert worst["restarts"] > 2
+    assert_same(worst)
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
+    """With everything in it: effects, an offset centre of mass, a policy."""
+    needs(compiler)
+    model = load_vehicle("ardrone2")
+    effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset")
+    model = model.with_effects(*(parse_setting(e, model) for e in effects))
+    policy = exportable_policy("sac-0", POLICY) if estimator == "ekf" else None
+    for number, exported in enumerate(
+        (
+            export_c(model, estimator, policy=policy or exportable_policy("lead", None)),
+            export_c(load_vehicle("crazyflie"), estimator, gate=None),
+        )
+    ):
+        folder = write(exported, tmp_path / str(number))
+        run(compiler, *STRICT, "-O1", "-c", "windwrench_filter.c", "main.c", cwd=folder)
+
+
+def test_only_the_allowed_functions_of_libm_are_called(tmp_path):
+    needs("gcc", "nm")
+    model = load_vehicle("ardrone2")
+    model = model.with_effects(*(parse_setting(e, model) for e in exportable_effects()))
+    allowed = {"sqrtf", "sinf", "cosf", "fabsf", "memcpy", "memset"}
+    for estimator in ("ekf", "ukf"):
+        exported = export_c(model, estimator, policy=exportable_policy("sac-0", POLICY))
+        folder = write(exported, tmp_path / estimator)
+        run("gcc", "-std=c99", "-O1", "-fno-stack-protector", "-c", "windwrench_filter.c", cwd=folder)
+        called = run("nm", "-u", "windwrench_filter.o", cwd=folder).split()[1::2]
+        assert set(called) - {"_GLOBAL_OFFSET_TABLE_"} <= allowed
+
+
+FAULTS = """
+#include <math.h>
+#include <stdio.h>
+#include "windwrench_filter.h"
+
+static unsigned long long seed = 1;
+static double uniform(void)
+{
+    seed = seed * 6364136223846793005ULL + 1442695040888963407ULL;
+    return (double)(seed >> 33) / 2147483648.0;
+}
+static float odd(float usual)
+{
+    const double which = uniform();
+    if (which > 0.02) return usual;
+    const float values[8] = {NAN, INFINITY, -INFINITY, 1e20f, -1e30f, 3e38f, 1e-40f, 0.0f};
+    return values[(int)(uniform() * 8.0)];
+}
+int main(void)
+{
+    static ww_filter f;
+    ww_estimate e;
+    float level[4] = {1.0f, 0.0f, 0.0f, 0.0f}, origin[3] = {0.0f, 0.0f, 1.0f};
+    if (ww_init(&f, origin, level) != 0) return 1;
+    for (long k = 0; k < STEPS; k++) {
+        float w[4], x[3], q[4], g[3], a[3];
+        const float turn = (float)uniform(), jump = uniform() < 0.01 ? 50.0f : 0.0f;
+        for (int i = 0; i < 4; i++) w[i] = odd(SPEED * (float)(0.8 + 0.4 * uniform()));
+        for (int i = 0; i < 3; i++) {
+            x[i] = odd(jump + 0.01f * (float)uniform());
+            g[i] = odd((float)uniform());
+            a[i] = odd((i == 2 ? 9.81f : 0.0f) + (float)uniform());
+        }
+        q[0] = odd(cosf(turn)); q[1] = odd(0.0f); q[2] = odd(sinf(turn)); q[3] = odd(0.0f);
+        ww_predict(&f, w, odd(uniform() < 0.01 ? 2.0f * (float)uniform() : 0.005f));
+        if (uniform() < 0.9) ww_correct_pose(&f, uniform() < 0.05 ? 0 : x, uniform() < 0.05 ? 0 : q);
+        if (k > STEPS / 2 && uniform() < 0.9)
+            ww_correct_imu(&f, uniform() < 0.05 ? 0 : g, uniform() < 0.05 ? 0 : a);
+        ww_get(&f, &e);
+        const float *numbers = (const float *)&e;
+        for (int i = 0; i < 37; i++)
+            if (!isfinite(numbers[i])) { printf("step %ld: number %d\\n", k, i); return 2; }
+    }
+    /* good poses bring it back */
+    for (int k = 0; k < 2000; k++) {
+        const float w[4] = {SPEED, SPEED, SPEED, SPEED};
+        ww_predict(&f, w, 0.005f);
+        ww_correct_pose(&f, origin, level);
+    }
+    ww_get(&f, &e);
+    printf("%d %.4f %.4f\\n", e.status, (double)e.position[2], (double)e.quaternion[0]);
+    return 0;
+}
+"""
+
+
+def fly_faults(estimator, steps, folder):
+    needs("gcc")
+    model = load_vehicle("ardrone2")
+    model = model.with_effects(*(parse_setting(e, model) for e in ("rotor_drag", "motor_lag")))
+    exported = export_c(model, estimator)
+    write(exported, folder)
+    (folder / "faults.c").write_text(FAULTS)
+    speed = float(exported.filter.record[0]["last_speeds"][0])
+    run(
+        *("gcc", "-std=c99", "-O1", "-g", "-fsanitize=address,undefined,float-cast-overflow"),
+        *("-fno-sanitize-recover=all", f"-DSTEPS={steps}L", f"-DSPEED={speed}f"),
+        *("faults.c", "windwrench_filter.c", "-o", "faults", "-lm"),
+        cwd=folder,
+    )
+    status, height, along = run("./faults", cwd=folder).split()
+    assert status == "0"
+    assert float(height) == pytest.approx(1.0, abs=1e-3)
+    assert abs(float(along)) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_no_fault_makes_it_read_elsewhere_or_lose_its_numbers(estimator, tmp_path):
+    fly_faults(estimator, 50_000 if estimator == "ekf" else 10_000, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_million_steps_with_faults(estimator, tmp_path):
+    fly_faults(estimator, 1_000_000, tmp_path)
+
+
+def test_effects_in_c_are_those_in_python(tmp_path):
+    """Every effect that can be exported, at states drawn at random."""
+    import ctypes
+
+    needs("gcc")
+    model = load_vehicle("ardrone2")
+    names = [n for n in exportable_effects() if get(n).kind != "body"]
+    assert {"rotor_drag", "body_drag", "inflow_thrust", "motor_lag", "ground_effect"} <= set(names)
+    model = model.with_effects(*(parse_setting(n, model) for n in names))
+    folder = write(export_c(model, "ekf"), tmp_path)
+    # its functions are the file's own: here they are called from outside
+    text = (folder / "windwrench_filter.c").read_text().replace("static void ww_", "void ww_")
+    (folder / "effects.c").write_text(text)
+    run("gcc", "-std=c99", "-O1", "-shared", "-fPIC", "effects.c", "-o", "e.so", "-lm", cwd=folder)
+    library = ctypes.CDLL(str(folder / "e.so"))
+    vehicle = compile_effects(model).constants
+    rng = np.random.default_rng(0)
+    for name in names:
+        effect = get(name)
+        for _ in range(5):
+            c = np.zeros(16)
+            c[: len(effect.coefficients)] = effect.vector(parse_setting(name, model).coefficients)
+            state = rng.uniform(0.2, 2.0, STATE_SIZE)
+            state[18:22] = rng.uniform(300.0, 500.0, 4)
+            rotors = rng.uniform(300.0, 500.0, ROTORS_SIZE)
+            rotors[4:] = 0.005, 11.0, 2.0
+            third, fourth = (
+                (state, np.zeros(6)) if effect.kind == "wrench" else (rotors, np.zeros(112))
+            )
+            if effect.kind == "rotor input":
+                fourth[:5] = 1.0, 410.0, 420.0, 430.0, 440.0
+            given = [x.astype(np.float32) for x in (c, vehicle, third, fourth)]
+            double = [x.astype(np.float64) for x in given]
+            pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in double]
+            effect.model.ctypes(*pointers)
+            getattr(library, f"ww_{name}")(*(ctypes.c_void_p(x.ctypes.data) for x in given))
+            which = 3 if effect.kind == "wrench" else 2
+            assert np.any(double[which] != 0.0), name
+            scale = np.abs(double[which]).max()
+            np.testing.assert_allclose(given[which], double[which], rtol=0, atol=2e-6 * scale)
+
+
+def test_the_policy_in_c_commands_what_it_does_in_python(tmp_path):
+    needs("gcc")
+    policy = exportable_policy("sac-0", POLICY)
+    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
+    python, rng, command = load_policy(POLICY), np.random.default_rng(0), 0.0
+    e = c.estimate
+    for _ in range(50):
+        force, torque = rng.normal(0.3, 0.3, 3), rng.normal(0.0, 0.03, 3)
+        e.force[:], e.torque[:], e.velocity[1] = force, torque, 0.2
+        mine = c.policy(e)
+        observation = np.array([*force, *torque, 0.2, command])
+        command = float(python(observation)[0])
+        assert mine == pytest.approx(command, abs=2e-5)
+
+
+def test_the_law_with_lead(tmp_path):
+    needs("gcc")
+    policy = exportable_policy("lead", None)
+    c = CompiledFilter(export_c(load_vehicle("ardrone2"), policy=policy), tmp_path)
+    e = c.estimate
+    torque = np.array([0.001, 0.004, -0.003, 0.01, 0.1])
+    force = np.array([0.5, 0.4, 0.1, -0.2, 0.3])
+    x = torque / np.maximum(force, 0.183)
+    wanted = np.clip(-(11.35 * x + 2.79 * np.diff(x, prepend=x[0]) / 0.08), -1.0, 1.0)
+    for k in range(5):
+        e.force[0], e.torque[2] = force[k], torque[k]
+        assert c.policy(e) == pytest.approx(wanted[k], abs=1e-5)
+
+
+def test_the_example_finds_the_force_that_it_is_given(tmp_path):
+    needs("gcc")
+    folder = write(export_c(load_vehicle("crazyflie"), "ukf"), tmp_path)
+    run("gcc", *STRICT, "-O1", "main.c", "windwrench_filter.c", "-o", "main", "-lm", cwd=folder)
+    said = run("./main", cwd=folder)
+    assert said.startswith("force 0.")
+    assert float(said.split()[1]) == pytest.approx(0.2, abs=0.02)
+
+
+def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
+    """Code, memory and instructions of every filter on the board that qemu imitates."""
+    needs(*firmware.TOOLS)
+    name = "ardrone2, turning"
+    flown = flight(name, 400)
+    for estimator, ram, instructions in (
+        ("constant-gain", 1_024, 8_400),
+        ("ekf", 16_384, 168_000),
+        ("ukf", 16_384, 168_000),
+    ):
+        exported = export_c(vehicle_of(name), estimator)
+        board = firmware.fly(exported, flown, tmp_path / estimator, "-Os")
+        assert abs(board.loop - 2_000) < 20
+        assert board.code <= 40_960
+        assert board.ram <= ram
+        assert board.ram + board.stack <= 16_384
+        assert np.median(board.predict + board.correct) <= instructions
+        c = CompiledFilter(exported, tmp_path / f"{estimator}-here")
+        c.reset(flown["position"][0], flown["quaternion"][0])
+        for k in range(1, 400):
+            c.predict(flown["rotor_speeds"][k], flown["dt"][k])
+            c.correct(flown["position"][k], flown["quaternion"][k])
+            e = c.estimate
+            mine = np.concatenate(
+                [e.position, e.quaternion, e.velocity, e.angular_velocity, e.torque, e.force]
+            )
+            std = np.concatenate(
+                [e.std_position, [0.01] * 4, e.std_velocity, e.std_angular_velocity]
+                + [e.std_torque, e.std_force]
+            )
+            assert board.status[k - 1] == e.status
+            assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
+
+
+def test_what_cannot_be_exported_is_said_in_a_line():
+    model = load_vehicle("ardrone2")
+    for effect in ("latency", "battery_sag", "marker_offset", "fan_jet", "slung_payload"):
+        declared = model.with_effects(parse_setting(effect, model))
+        with pytest.raises(InputError, match=rf"{effect} .*rotor_drag") as refused:
+            export_c(declared)
+        assert "\n" not in str(refused.value)
+    with pytest.raises(InputError, match="recurrent"):
+        exportable_policy("recurrent-ppo-0", POLICY.with_name("recurrent-ppo-0.npz"))
+    with pytest.raises(InputError, match="rate"):
+        export_c(model, rate=-1.0)
+    with pytest.raises(InputError, match="estimator"):
+        export_c(model, "kalman")
+
+
+def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
+    from dataclasses import replace
+
+    needs("gcc")
+    model = replace(load_vehicle("ardrone2"), name="a*/ #error \n\\ b")
+    folder = write(export_c(model, command="windwrench */\n#error"), tmp_path)
+    run("gcc", *STRICT, "-fsyntax-only", "windwrench_filter.c", cwd=folder)
+
+
+def test_two_exports_are_the_same_bytes():
+    model = load_vehicle("hummingbird")
+    assert export_c(model, "ukf").files == export_c(model, "ukf").files
+
+
+def test_cmake_builds_it(tmp_path):
+    needs("cmake", "gcc")
+    folder = write(export_c(load_vehicle("ardrone2")), tmp_path / "source")
+    run("cmake", "-S", folder, "-B", tmp_path / "build", cwd=tmp_path)
+    run("cmake", "--build", tmp_path / "build", cwd=tmp_path)
+    assert subprocess.run([tmp_path / "build" / "windwrench_example"], timeout=60).returncode == 0
