@@ -138,7 +138,7 @@ def export_c(
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 - C, no page
+        autoescape=False,  # C, no page
     )
     files = {
         name: environment.get_template(source).render(context) for name, source in FILES.items()

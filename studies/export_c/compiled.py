@@ -159,11 +159,11 @@ def compare(
         dt, position, quaternion = flight["dt"][k], flight["position"][k], flight["quaternion"][k]
         c.predict(flight["rotor_speeds"][k], dt)
         python.predict(flight["rotor_speeds"][k], dt)
-        c.correct(position, quaternion)
-        python.correct(position, quaternion)
         if "gyro" in flight:
             c.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
             python.correct_imu(flight["gyro"][k], flight["accelerometer"][k])
+        c.correct(position, quaternion)
+        python.correct(position, quaternion)
         if k % every == 0:
             for name, value in differences(c, python).items():
                 worst[name] = max(worst.get(name, 0.0), value)

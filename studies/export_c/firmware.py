@@ -29,7 +29,8 @@ _COLUMNS = ("dt", "rotor_speeds", "position", "quaternion", "gyro", "acceleromet
 class Measured:
     """What a filter needs on the microcontroller, and what it estimated there."""
 
-    code: int  # bytes, of the filter's object: code and tables
+    code: int  # bytes, of the filter's object: instructions and tables
+    tables: int  # bytes, of the tables alone
     ram: int  # bytes, of one ww_filter
     stack: int  # bytes, at most, of a call
     predict: Array  # (n,) instructions of each ww_predict
@@ -45,8 +46,8 @@ def tools_missing() -> list[str]:
     return missing(*TOOLS)
 
 
-def object_size(exported: Exported, folder: Path, optimise: str = "-O2") -> int:
-    """Return the bytes of code and tables of the filter's object on a Cortex-M4F.
+def object_size(exported: Exported, folder: Path, optimise: str = "-O2") -> tuple[int, int]:
+    """Return the bytes of the filter's object on a Cortex-M4F, and those of its tables alone.
 
     Raises:
         RuntimeError: it does not compile.
@@ -55,7 +56,9 @@ def object_size(exported: Exported, folder: Path, optimise: str = "-O2") -> int:
     options = ("-std=c99", optimise, "-fno-math-errno", "-Wall", "-Wextra", "-Werror", *_CPU)
     run(TOOLS[0], *options, "-c", "windwrench_filter.c", "-o", "filter.o", cwd=folder)
     said = run(TOOLS[1], "filter.o", cwd=folder)
-    return int(said.splitlines()[1].split()[0])
+    sections = run(TOOLS[1], "-A", "filter.o", cwd=folder)
+    tables = sum(int(size) for size in re.findall(r"^\.rodata\S*\s+(\d+)", sections, re.M))
+    return int(said.splitlines()[1].split()[0]), tables
 
 
 def fly(
@@ -66,7 +69,7 @@ def fly(
     Raises:
         RuntimeError: a tool fails, or the program on the board does.
     """
-    code = object_size(exported, folder, optimise)
+    sizes = object_size(exported, folder, optimise)
     columns = [np.atleast_2d(flight[name].T).T for name in _COLUMNS if name in flight]
     rows = np.concatenate(columns, axis=1)
     unmeasured = "12345.678"  # a number that no flight has, where nothing was measured
@@ -92,10 +95,10 @@ def fly(
         *("-kernel", "bench.elf"),
         cwd=folder,
     )
-    return _read(said, code)
+    return _read(said, *sizes)
 
 
-def _read(said: str, code: int) -> Measured:
+def _read(said: str, code: int, tables: int) -> Measured:
     words = {name: int(value, 16) for name, value in re.findall(r"^(\w+) (\w{8}) $", said, re.M)}
     rows = [
         [int(word, 16) for word in line.split()[1:]]
@@ -107,6 +110,7 @@ def _read(said: str, code: int) -> Measured:
     numbers = np.array(rows, dtype=np.uint32)
     return Measured(
         code,
+        tables,
         words["size"],
         words["stack"],
         numbers[:, 0].astype(float),

@@ -94,6 +94,10 @@ def _faults(rng: np.random.Generator, n: int, period: float) -> Iterator[tuple[i
     while k < n:
         if rng.random() < _FAULT * period / 0.005:
             length = max(1, round(float(rng.choice(_LENGTHS)) / period))
-            yield k, min(k + length, n), str(rng.choice(["gap", "position", "attitude", "jump", "turn"]))
+            yield (
+                k,
+                min(k + length, n),
+                str(rng.choice(["gap", "position", "attitude", "jump", "turn"])),
+            )
             k += length
         k += 1

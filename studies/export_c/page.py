@@ -1,0 +1,227 @@
+"""The page of the exported filter: every figure from the results."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from windwrench.dynamics.effects import names
+from windwrench.live.export_c import ESTIMATORS
+from windwrench.live.export_c.effect_code import exportable_effects, refusal
+from windwrench.runtime.page_files import write_text
+from windwrench.runtime.provenance import made_by
+from windwrench.studies.export_c.compiled import PARTS
+from windwrench.studies.export_c.firmware import CLOCK
+
+Result = Mapping[str, Any]  # as ``study.run`` returns it
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:.2f}"
+
+
+def _agreement(rows: list[Mapping[str, Any]]) -> list[str]:
+    out = [
+        "| filter | flight | "
+        + " | ".join(p.replace("_", " ") for p in PARTS)
+        + " | std | restarts |",
+        "|---|---|" + "---:|" * (len(PARTS) + 2),
+    ]
+    for row in rows:
+        flight = row["flight"] + ("" if row["faults"] else " (without faults)")
+        cells = [_percent(row[p]) for p in (*PARTS, "std")]
+        out.append(
+            f"| {row['estimator']} | {flight} | {' | '.join(cells)} | {row['restarts']:.0f} |"
+        )
+    return out
+
+
+def _board(rows: list[Mapping[str, Any]]) -> list[str]:
+    out = [
+        "| filter | compiled with | instructions, tables, bytes | `ww_filter`, bytes | stack, bytes "
+        "(with faults) | instructions a predict | a pose | both at 168 MHz, us | longest call, us |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for row in rows:
+        both = row["predict"] + row["correct"]
+        out.append(
+            f"| {row['estimator']} | `{row['optimise']}` | {row['code'] - row['tables']:,} + "
+            f"{row['tables']:,} | {row['ram']:,} | {row['stack']:,} ({row['stack_with_faults']:,}) "
+            f"| {row['predict']:,.0f} | {row['correct']:,.0f} | {1e6 * both / CLOCK:.0f} "
+            f"| {1e6 * row['longest_call'] / CLOCK:,.0f} |"
+        )
+    return out
+
+
+def _with_imu(rows: list[Mapping[str, Any]]) -> list[str]:
+    out = [
+        "| filter | compiled with | instructions a predict | a pose | an IMU sample | "
+        "all three at 168 MHz, us |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    for row in rows:
+        if "with_imu" in row:
+            felt = row["with_imu"]
+            total = felt["predict"] + felt["correct"] + felt["imu"]
+            out.append(
+                f"| {row['estimator']} | `{row['optimise']}` | {felt['predict']:,.0f} "
+                f"| {felt['correct']:,.0f} | {felt['imu']:,.0f} | {1e6 * total / CLOCK:.0f} |"
+            )
+    return out
+
+
+def write_page(result: Result, data: Path, page: Path) -> None:
+    """Write the page that shows the results in ``data``.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    write_text("\n".join(_lines(result, data)) + "\n", page)
+
+
+def _lines(result: Result, data: Path) -> list[str]:
+    board = {(row["estimator"], row["optimise"]): row for row in result["board"]}
+    small = board["constant-gain", "-Os"]
+    worst = max(max(row[p] for p in PARTS) for row in result["agreement"])
+    spread = max(row["std"] for row in result["agreement"])
+    other = sum(row["status"] for row in result["agreement"])
+    steps = result["steps"] * len({row["flight"] for row in result["agreement"]})
+    longest = max(row["longest_call"] for row in result["board"])
+    refused = {n: refusal(n) for n in names()}
+    over = small["code"] - 8_192
+    size = (
+        f"* **The constant gain needs {small['code']:,} bytes of flash with `-Os`**, "
+        f"{small['tables']:,} of them tables: {over:,} more than the 8 kB aimed at. What a gap, a "
+        "restart or a refused pose needs is a whole filter with a covariance, and it is in there."
+        if over > 0
+        else f"* The constant gain needs {small['code']:,} bytes of flash with `-Os`."
+    )
+    return [
+        "# The filter in C, for a flight controller",
+        "",
+        "`windwrench export-c` writes the filter of your vehicle as one header and one C99 source: "
+        "single precision, no heap, no recursion, no global variables; of libm `sqrtf`, `sinf`, "
+        "`cosf`, `fabsf`.",
+        "",
+        "```sh",
+        "windwrench export-c --vehicle my_drone.yaml --estimator ekf --policy sac-0 --out filter",
+        "cmake -S filter -B build && cmake --build build && build/windwrench_example",
+        "```",
+        "",
+        "## What it does not do, and what was not tried",
+        "",
+        size,
+        f"* **Its memory is {small['ram']:,} bytes, but its stack is {small['stack_with_faults']:,} "
+        "bytes** while it runs with its covariance. A task with a small stack overflows then, and "
+        "not in a calm hover.",
+        f"* **One call after a gap of 0.1 s takes up to {1e6 * longest / CLOCK:,.0f} us** with the "
+        "constant gain: it makes up for the gap in up to 32 predictions at once. EKF and UKF have "
+        "no such call.",
+        "* Instructions are counted by an emulator, and taken as one cycle each. A real Cortex-M4 "
+        "needs more: a division or a root takes 14 cycles, a load often two, and flash may wait. "
+        "Nothing here was run on a board.",
+        "* It was not tried in Simulink, in PX4 or on a Crazyflie.",
+        "* Not in C: poses that come late (`TimedFilter`), the mass as a state, smoothing, fitting "
+        "the noise to a log.",
+        "* Effects that cannot be exported: "
+        + "; ".join(f"{n} ({why})" for n, why in refused.items() if why)
+        + ". `--effects none` leaves out all that are declared. Recurrent policies, and those that "
+        "see what is not in the estimate, are refused too, and so is `--policy tracker`.",
+        "* A gap of exactly 0.1 s or 0.6 s may be judged a step earlier or later than in Python: a "
+        "sum of single-precision steps is not exact.",
+        "* Positions are single precision: 100 m from the origin a step of the number is 8 um. Keep "
+        "the origin where the vehicle flies.",
+        "* The constant gain with declared effects carries its covariance over a gap with them; the "
+        "Python one leaves them out, and its standard deviations are some 10 % larger for a while. "
+        "That flight is compared without faults.",
+        "* The first gyro sample counts with its bias in doubt, also where no prediction came right "
+        "before it; in Python it then counts as if it had none.",
+        "",
+        "## How to call it",
+        "",
+        "```c",
+        "static ww_filter filter;          /* one a vehicle; its fields are no part of the interface */",
+        "ww_init(&filter, position, quaternion);          /* once, at a first pose */",
+        "",
+        "/* each time a pose arrives, dt s after the one before */",
+        "ww_predict(&filter, rotor_speeds, dt);           /* rad/s, the mean of that time */",
+        "ww_correct_pose(&filter, position, quaternion);  /* NULL or NaN: not measured */",
+        "ww_correct_imu(&filter, gyro, accelerometer);    /* if there is one; before or after the pose */",
+        "ww_get(&filter, &estimate);                      /* force, torque, their std, status */",
+        "```",
+        "",
+        "* Without a pose call `ww_predict` alone at the filter's rate. The filter coasts, holds what "
+        "is lost, and restarts at the next pose: `status` says which.",
+        "* An IMU that is faster than the pose: `ww_predict` over each of its periods, then "
+        "`ww_correct_imu`; noise is stated for a period and scaled with dt.",
+        "* Frames are those of the whole kit: world z up, body x forward, y left, z up, quaternion "
+        "scalar first, body to world. From PX4 (FRD in NED) turn both first.",
+        "* `ww_policy`, where `--policy` is given, is called every 0.08 s with an estimate, and "
+        "returns the velocity (m/s) that is commanded along the world's y axis. `lead` is "
+        "`u = -(11.35 x + 2.79 dx/dt)` with `x = tau_z / max(f_x, 0.183)`.",
+        "* Not for `-ffast-math`, which knows no NaN: the source refuses to compile. "
+        "`-fno-math-errno` makes roots a single instruction.",
+        "* Files that are there already stay as they are, unless `--overwrite` is given: `main.c` "
+        "may be yours.",
+        "",
+        "**Simulink.** The C Caller block takes such functions as they are: add the header and the "
+        "source under Simulation Target, keep `ww_filter` as an opaque type (`ww_filter *` as a "
+        "persistent buffer of `sizeof(ww_filter)` bytes in a C Function block is simplest), and give "
+        "NaN instead of a null pointer for what was not measured. This was not tried in Simulink. "
+        "What was tried is `ctypes`: `tests/live/test_export_c.py` drives the same functions from "
+        "Python.",
+        "",
+        "## How C and Python are kept one",
+        "",
+        "* Every number (vehicle, noise, prior, gate, gain) is read from the Python filter's own "
+        "memory when the C is written.",
+        "* The equations of effects are translated from their Python when the C is written "
+        "(`live/export_c/effect_code.py`); there is no second copy. Exported can be: "
+        + ", ".join(exportable_effects())
+        + ".",
+        "* The filter's own equations are written twice, in `estimator/` and in the templates of "
+        "`live/export_c/templates/`, and held together by tests: five flights with gaps, jumps, "
+        "turned poses and halves of poses, statuses and restarts included; each exportable effect; "
+        "the policy; gyro and accelerometer with bias, vibration and saturation.",
+        "* What differs on purpose: poses are taken in one number after the other, which is the same "
+        "in exact numbers and loses less in single precision; an IMU's biases are rows of the "
+        "covariance; derivatives of effects (EKF) are taken over wider steps.",
+        "",
+        "## C against Python",
+        "",
+        f"The largest difference over {result['steps']:,} steps of each flight ({steps:,} a filter), "
+        "in per cent of the estimate's own standard deviation at that step; `std`: the largest "
+        f"relative difference of a standard deviation. Largest of all: {_percent(worst)} % and "
+        f"{_percent(spread)} %. Flights on which a status or a count of restarts was ever another: "
+        f"{other:.0f} of {len(result['agreement'])}. These are maxima, so there is no interval. "
+        "Flights are simulated, with a fault of the pose about every second.",
+        "",
+        *_agreement(result["agreement"]),
+        "",
+        "## On a Cortex-M4F",
+        "",
+        "Cross-compiled with Debian's `gcc-arm-none-eabi` and run by `qemu-system-arm` as the board "
+        "mps2-an386. There every instruction takes 64 ns of the board's time (`-icount shift=6`), "
+        "and the processor's timer counts it; a loop of 2,000 instructions read "
+        f"{result['board'][0]['loop_of_2000']:,}, its call included. Sizes are those of "
+        "`arm-none-eabi-size` for the filter's object, without libm's `sinf` and `cosf` (about 3 kB) "
+        "; the stack is what was painted over. Median over "
+        "1,000 steps of a calm flight; the longest call is of a flight with faults.",
+        "",
+        *_board(result["board"]),
+        "",
+        "With gyro and accelerometer at every step, biases and their covariance included:",
+        "",
+        *_with_imu(result["board"]),
+        "",
+        f"The policy `sac-0` adds {board['ekf', '-Os']['policy']:,} bytes to the EKF, nearly all of "
+        "them weights.",
+        "",
+        "Aims were: constant gain 8 kB of code, 1 kB of memory, 50 us; EKF or UKF 40 kB, 16 kB, "
+        "1 ms.",
+        "",
+        made_by("python -m studies.export_c", ())
+        + f" Data: `docs/{data.parent.name}/{data.name}`.",
+    ]
+
+
+__all__ = ["ESTIMATORS", "write_page"]

@@ -1,0 +1,102 @@
+"""Agreement of C and Python along five flights, and sizes and instructions on a Cortex-M4F."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.studies.export_c import firmware
+from windwrench.studies.export_c.compiled import CompiledFilter, compare
+from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
+
+BOARD_STEPS = 1_000
+BOARD_FLIGHT = "ardrone2, turning"
+_POLICY = Path(__file__).parents[2] / "training" / "policies" / "sac-0.npz"
+
+
+def run(steps: int, seed: int, report: Callable[[str, float], None]) -> dict[str, Any]:
+    """Return the results of ``steps`` of each flight with every filter, and of the board.
+
+    Raises:
+        RuntimeError: a compiler or the board fails.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        agreement = _agreement(steps, seed, Path(folder), report)
+        return {
+            "steps": steps,
+            "seed": seed,
+            "agreement": agreement,
+            "board": _board(seed, Path(folder), report),
+        }
+
+
+def _agreement(
+    steps: int, seed: int, folder: Path, report: Callable[[str, float], None]
+) -> list[dict[str, Any]]:
+    rows = []
+    for estimator in ESTIMATORS:
+        for name in FLIGHTS:
+            vehicle = vehicle_of(name)
+            # the Python constant gain carries its covariance over a gap without declared effects
+            faults = estimator != "constant-gain" or not vehicle.effects
+            exported = export_c(vehicle, estimator)
+            c = CompiledFilter(exported, folder / f"c{len(rows)}")
+            worst = compare(c, exported.filter, flight(name, steps, seed, faults), 2)
+            rows.append(
+                {
+                    "estimator": estimator,
+                    "flight": name,
+                    "faults": faults,
+                    **{key: float(f"{value:.3g}") for key, value in worst.items()},
+                }
+            )
+            report("flights", len(rows) / (len(ESTIMATORS) * len(FLIGHTS)))
+    return rows
+
+
+def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> list[dict[str, Any]]:
+    rows = []
+    for estimator in ESTIMATORS:
+        exported = export_c(vehicle_of(BOARD_FLIGHT), estimator)
+        for optimise in ("-O2", "-Os"):
+            here = folder / f"board{len(rows)}"
+            calm = firmware.fly(
+                exported, flight(BOARD_FLIGHT, BOARD_STEPS, seed, faults=False), here, optimise
+            )
+            hard = firmware.fly(exported, flight(BOARD_FLIGHT, BOARD_STEPS, seed), here, optimise)
+            row = {
+                "estimator": estimator,
+                "optimise": optimise,
+                "code": calm.code,
+                "tables": calm.tables,
+                "ram": calm.ram,
+                "stack": calm.stack,
+                "stack_with_faults": hard.stack,
+                "predict": float(np.median(calm.predict)),
+                "correct": float(np.median(calm.correct)),
+                "longest_call": float(max(hard.predict.max(), hard.correct.max())),
+                "loop_of_2000": calm.loop,
+            }
+            if estimator != "constant-gain":
+                felt = flight(BOARD_FLIGHT, BOARD_STEPS, seed, faults=False, imu=True)
+                felt_row = firmware.fly(exported, felt, here, optimise)
+                row["with_imu"] = {
+                    "predict": float(np.median(felt_row.predict)),
+                    "correct": float(np.median(felt_row.correct)),
+                    "imu": float(np.median(felt_row.imu)),
+                }
+            if optimise == "-Os":
+                row["policy"] = _policy(estimator, here) - calm.code
+            rows.append(row)
+            report("board", len(rows) / (2 * len(ESTIMATORS)))
+    return rows
+
+
+def _policy(estimator: str, folder: Path) -> int:
+    """Return the bytes of the filter with the policy sac-0 beside it."""
+    policy = exportable_policy("sac-0", _POLICY)
+    both = export_c(vehicle_of(BOARD_FLIGHT), estimator, policy=policy)
+    return firmware.object_size(both, folder, "-Os")[0]

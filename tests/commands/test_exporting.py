@@ -1,0 +1,106 @@
+"""The command export-c: files, words and refusals."""
+
+import json
+import sys
+
+import pytest
+
+from windwrench.cli import main
+
+FILES = {"windwrench_filter.h", "windwrench_filter.c", "main.c", "CMakeLists.txt"}
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    def work(*arguments):
+        monkeypatch.setattr(sys, "argv", ["windwrench", "export-c", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr()
+        return ended.value.code or 0, said.out, said.err
+
+    return work
+
+
+def test_it_writes_the_files_and_says_what_they_are(call, tmp_path):
+    out = tmp_path / "filter"
+    code, text, _ = call(
+        *("--vehicle", "crazyflie", "--estimator", "ukf", "--policy", "sac-0"),
+        *("--rate", 100, "--gate", 0, "--out", out, "--json"),
+    )
+    assert code == 0
+    said = json.loads(text)["result"]
+    assert said["period_s"] == 0.01
+    assert said["effects"] == []
+    assert {p.name for p in out.iterdir()} == FILES | {"run.json"}
+    source = (out / "windwrench_filter.c").read_text()
+    assert "--estimator ukf" in source
+    assert "ww_policy" in source
+
+
+def test_files_that_are_there_stay_unless_said_otherwise(call, tmp_path):
+    mine = tmp_path / "main.c"
+    mine.write_text("int mine;\n")
+    code, _, err = call("--vehicle", "ardrone2", "--out", tmp_path)
+    assert code == 2
+    assert "main.c" in err
+    assert "--overwrite" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["main.c"]
+    assert mine.read_text() == "int mine;\n"
+    assert call("--vehicle", "ardrone2", "--out", tmp_path, "--overwrite")[0] == 0
+    assert "ww_init" in mine.read_text()
+
+
+def test_declared_effects_are_in_it_or_refused(call, tmp_path):
+    vehicle = tmp_path / "mine.yaml"
+    text = "name: mine\nmass: 0.5\ninertia: [3e-3, 3e-3, 5e-3]\narm_l: 0.12\n"
+    text += "k: [8e-6, 8e-6, 8e-6, 8e-6]\np: [2e-7, 2e-7, 2e-7, 2e-7]\neffects:\n"
+    drag = "- {name: rotor_drag, coefficients: {kdx: 1.0e-4, kdy: 1.0e-4}}\n"
+    vehicle.write_text(text + drag)
+    code, out, _ = call("--vehicle", vehicle, "--out", tmp_path / "a", "--json")
+    assert code == 0
+    assert json.loads(out)["result"]["effects"] == ["rotor_drag"]
+    assert "ww_rotor_drag" in (tmp_path / "a" / "windwrench_filter.c").read_text()
+    vehicle.write_text(text + drag + "- {name: latency, coefficients: {d: 0.02}}\n")
+    code, _, err = call("--vehicle", vehicle, "--out", tmp_path / "b")
+    assert code == 2
+    assert "latency" in err
+    assert "rotor_drag" in err
+    assert not (tmp_path / "b").exists()
+    code, out, _ = call(
+        "--vehicle", vehicle, "--effects", "none", "--out", tmp_path / "c", "--json"
+    )
+    assert code == 0
+    assert json.loads(out)["result"]["effects"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--vehicle", "ardrone2", "--estimator", "efk"), ("efk", "ekf")),
+        (("--vehicle", "ardrone2", "--effects", "some"), ("some", "declared", "none")),
+        (("--vehicle", "ardrone2", "--policy", "tracker"), ("tracker", "lead")),
+        (("--vehicle", "ardrone2", "--policy", "sac-99"), ("sac-99", "sac-0")),
+        (("--vehicle", "ardrone2", "--policy", "nothing.npz"), ("nothing.json",)),
+        (("--vehicle", "ardrone2", "--rate", "-5"), ("rate",)),
+        (("--vehicle", "ardrone2", "--rate", "nan"), ("rate",)),
+        (("--vehicle", "ardrone2", "--rise-time", "0"), ("rise_time",)),
+        (("--vehicle", "ardrone2", "--gate", "1.5"), ("gate",)),
+        (("--vehicle", "nothing"), ("nothing",)),
+        ((), ("--vehicle",)),
+    ],
+)
+def test_a_mistake_is_one_line_and_writes_nothing(call, tmp_path, arguments, words):
+    out = tmp_path / "out"
+    code, _, err = call(*arguments, "--out", out)
+    assert code == 2
+    assert len(err.strip().splitlines()) == 1
+    for word in words:
+        assert word in err
+    assert not out.exists()
+
+
+def test_the_tracker_is_refused_until_there_is_one(call, tmp_path):
+    code, _, err = call("--vehicle", "ardrone2", "--policy", "tracker", "--out", tmp_path / "x")
+    assert code == 2
+    assert "cannot be exported yet" in err
