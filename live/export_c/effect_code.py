@@ -32,8 +32,12 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.Or: "||",
 }
 _MATHS = {"sqrt": "sqrtf", "sin": "sinf", "cos": "cosf", "exp": "ww_exp", "fabs": "fabsf"}
-# the least that a model may be given of its four arrays; what it writes into is not constant
-_ARRAYS = ("c", "vehicle")
+# words of C that may be names in Python
+_KEYWORDS = {
+    *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "goto"),
+    *("inline", "long", "register", "restrict", "short", "signed", "sizeof", "static", "struct"),
+    *("switch", "typedef", "union", "unsigned", "void", "volatile"),
+}
 
 
 class UntranslatableError(Exception):
@@ -86,6 +90,8 @@ class _Function:
         )
         head = [f"float {', '.join(f'{name} = 0.0f' for name in local)};"] if local else []
         used = {node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)}
+        if taken := sorted(used & _KEYWORDS):
+            raise UntranslatableError(f"has a variable {taken[0]}, which is a word of C")
         head += [f"(void){name};" for name in self.arrays if name not in used]
         lines = [f"static void {self.name}({', '.join(parameters)})", "{"]
         lines += [f"    {line}" for line in (*head, *body)]
@@ -170,7 +176,7 @@ class _Function:
             self.counter += 1
             t = f"t{self.counter}"
             call = self.part_call(node.value, t)
-            return [f"float {t}[3];", f"{call};"], f"{t}[{node.slice.value}]"
+            return [f"float {t}[3];", f"{call};"], f"{t}[{node.slice.value!r}]"
         return [], self.expression(node)
 
     def part_call(self, node: ast.expr, out: str | None) -> str:
@@ -287,7 +293,7 @@ def _stored(tree: ast.AST) -> set[str]:
 
 
 def translate(effect: Effect, needed: dict[str, str]) -> str:
-    """Return an effect's model as a C function ``ww_NAME``; what it calls is added to ``needed``.
+    """Return an effect's model as a C function ``effect_NAME``; add what it calls to ``needed``.
 
     Raises:
         UntranslatableError: it does something else than what is translated.
@@ -298,7 +304,7 @@ def translate(effect: Effect, needed: dict[str, str]) -> str:
         raise UntranslatableError("has a state of its own")
     if effect.model is None:
         raise UntranslatableError("has no model")
-    return _Function(effect.model.__wrapped__, f"ww_{effect.name}", needed).code()
+    return _Function(effect.model.__wrapped__, f"effect_{effect.name}", needed).code()
 
 
 def definitions(code: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.runtime.provenance import commit
 from windwrench.studies.export_c import firmware
 from windwrench.studies.export_c.compiled import CompiledFilter, compare
 from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
@@ -23,9 +24,11 @@ def run(steps: int, seed: int, report: Callable[[str, float], None]) -> dict[str
     Raises:
         RuntimeError: a compiler or the board fails.
     """
+    made = commit()
     with tempfile.TemporaryDirectory() as folder:
         agreement = _agreement(steps, seed, Path(folder), report)
         return {
+            "commit": made,
             "steps": steps,
             "seed": seed,
             "agreement": agreement,
@@ -36,7 +39,7 @@ def run(steps: int, seed: int, report: Callable[[str, float], None]) -> dict[str
 def _agreement(
     steps: int, seed: int, folder: Path, report: Callable[[str, float], None]
 ) -> list[dict[str, Any]]:
-    rows = []
+    rows: list[dict[str, Any]] = []
     for estimator in ESTIMATORS:
         for name in FLIGHTS:
             vehicle = vehicle_of(name)
@@ -58,7 +61,7 @@ def _agreement(
 
 
 def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> list[dict[str, Any]]:
-    rows = []
+    rows: list[dict[str, Any]] = []
     for estimator in ESTIMATORS:
         exported = export_c(vehicle_of(BOARD_FLIGHT), estimator)
         for optimise in ("-O2", "-Os"):
@@ -67,7 +70,7 @@ def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> lis
                 exported, flight(BOARD_FLIGHT, BOARD_STEPS, seed, faults=False), here, optimise
             )
             hard = firmware.fly(exported, flight(BOARD_FLIGHT, BOARD_STEPS, seed), here, optimise)
-            row = {
+            row: dict[str, Any] = {
                 "estimator": estimator,
                 "optimise": optimise,
                 "code": calm.code,

@@ -60,7 +60,7 @@ def test_declared_effects_are_in_it_or_refused(call, tmp_path):
     code, out, _ = call("--vehicle", vehicle, "--out", tmp_path / "a", "--json")
     assert code == 0
     assert json.loads(out)["result"]["effects"] == ["rotor_drag"]
-    assert "ww_rotor_drag" in (tmp_path / "a" / "windwrench_filter.c").read_text()
+    assert "effect_rotor_drag" in (tmp_path / "a" / "windwrench_filter.c").read_text()
     vehicle.write_text(text + drag + "- {name: latency, coefficients: {d: 0.02}}\n")
     code, _, err = call("--vehicle", vehicle, "--out", tmp_path / "b")
     assert code == 2

@@ -22,6 +22,7 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "faults.md",
     "fleets.md",
     "identify.md",
+    "export-c.md",
 )
 MADE = re.compile(
     r"^Made by `(?:windwrench|python -m studies\.)[^`]+`, "
