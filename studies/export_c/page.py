@@ -171,12 +171,12 @@ def _lines(result: Result, data: Path) -> list[str]:
         "* Files that are there already stay as they are, unless `--overwrite` is given: `main.c` "
         "may be yours.",
         "",
-        "**Simulink.** The C Caller block takes such functions as they are: add the header and the "
-        "source under Simulation Target, keep `ww_filter` as an opaque type (`ww_filter *` as a "
-        "persistent buffer of `sizeof(ww_filter)` bytes in a C Function block is simplest), and give "
-        "NaN instead of a null pointer for what was not measured. This was not tried in Simulink. "
-        "What was tried is `ctypes`: `tests/live/test_export_c.py` drives the same functions from "
-        "Python.",
+        "**Simulink.** Simulink's C Caller block calls plain C functions that a header declares. Name "
+        "the header and the source under Simulation Target in the model's settings; call the five "
+        "functions in the order above; keep one `ww_filter` a vehicle in your own C file, with a "
+        "function of plain arrays around the calls, so that the block sees arrays alone; give NaN "
+        "for what was not measured. **This was not tried in Simulink.** What was tried is Python's "
+        "`ctypes`: `tests/live/test_export_c.py` drives the same functions.",
         "",
         "## How C and Python are kept one",
         "",
