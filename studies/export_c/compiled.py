@@ -149,12 +149,14 @@ def compare(
     c: CompiledFilter, python: WrenchUKF, flight: Mapping[str, Array], every: int = 1
 ) -> dict[str, float]:
     """Fly both filters along a flight of ``flights``; return the largest of ``differences``, looked
-    at ``every`` so many steps.
+    at ``every`` so many steps, and the share of those looked at in which a part differs by more
+    than 1 % of its standard deviation (``over``).
     """
     first = int(np.flatnonzero(np.isfinite(flight["position"]).all(axis=1))[0])
     c.reset(flight["position"][first], flight["quaternion"][first])
     python.reset(flight["position"][first], flight["quaternion"][first])
     worst: dict[str, float] = {}
+    over = looked = 0
     for k in range(first + 1, len(flight["dt"])):
         dt, position, quaternion = flight["dt"][k], flight["position"][k], flight["quaternion"][k]
         c.predict(flight["rotor_speeds"][k], dt)
@@ -165,7 +167,11 @@ def compare(
         c.correct(position, quaternion)
         python.correct(position, quaternion)
         if k % every == 0:
-            for name, value in differences(c, python).items():
+            found = differences(c, python)
+            looked += 1
+            over += max(found[name] for name in PARTS) > 0.01
+            for name, value in found.items():
                 worst[name] = max(worst.get(name, 0.0), value)
+    worst["over"] = over / max(looked, 1)
     worst["restarts"] = float(python.estimate.restarts)
     return worst
