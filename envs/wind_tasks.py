@@ -310,9 +310,10 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             rotors = past[:4] - (past[:4] @ up)[:, None] * up
             hull = 0.5 * AIR_DENSITY * float(fan["hull_area"]) / (STATIONS - 4)
             speeds = np.sqrt(np.sum(past[4:] ** 2, axis=1))[:, None]
-            return float(fan["rotor_drag"]) * rotors.sum(axis=0) + hull * np.sum(
+            made: Array = float(fan["rotor_drag"]) * rotors.sum(axis=0) + hull * np.sum(
                 speeds * past[4:], axis=0
             )
+            return made
 
         return np.asarray(info["force"] + drag(then) - drag(w["air"].T))
 

@@ -121,7 +121,7 @@ def _observation(flight: WindyFlight, row: Array) -> Array:
     x, o = flight.loop.state, np.zeros(WIND_OBSERVATION_SIZE)
     o[POSITION_ERROR], o[VELOCITY], o[FORCE] = row[:3] - x[:3], x[7:10], x[16:19]
     o[REFERENCE_VELOCITY], o[REFERENCE_ACCELERATION] = row[3:6], row[6:9]
-    ready = flight.ticks > 0
+    ready = flight.ticks > 0  # nothing was measured before
     o[SPECIFIC_FORCE] = flight.specific if ready else (0.0, 0.0, 9.81)
     o[ROTOR_FORCE] = flight.thrust if ready else (0.0, 0.0, 9.81)
     o[LAST_ACTION:] = flight.action
