@@ -51,6 +51,7 @@ WIND_SETTLE_TICKS = 300
 WIND_LOST = 2.5  # m, from the reference
 TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
 CHANGE_COST = 0.002  # per (m/s2)^2 of change of the action
+_DRAWS = 20  # of an episode's winds, until the vehicle is not lost in them at once
 _UPRIGHT = 0.34  # cosine of 70 degrees
 # m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
 ACCELEROMETER = (0.15, 0.05)
@@ -233,6 +234,24 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.flight = self._make_flight(vehicle, fan)
         elif self.flight is None:
             self.flight = self._make_flight(self.truth, fan)
+        # winds that carry the vehicle off before it is the agent's are drawn anew
+        for _ in range(_DRAWS):
+            self._draw(self.flight)
+            if not self.outcome["lost"][0]:
+                break
+        else:
+            raise InputError(
+                f"{self.name}: the vehicle is lost before the episode begins in {_DRAWS} draws of "
+                f"these winds; expected winds that its flight loop can hold for 1.5 s"
+            )
+        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self._info()
+
+    def _draw(self, flight: WindyFlight) -> None:
+        """Draw winds and reference, settle in them, and look at the start."""
+        rng = self.np_random
         given = draw_winds(self.scenario, rng, WIND_EPISODE_SECONDS)
         self.blowing = [
             part
@@ -242,14 +261,10 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.reference_name, reference = draw_reference(
             rng, math.pi, WIND_EPISODE_SECONDS, self.moving
         )
-        self.flight.reset(rng, START, math.pi, self.blowing, reference, settle=WIND_SETTLE_TICKS)
+        flight.reset(rng, START, math.pi, self.blowing, reference, settle=WIND_SETTLE_TICKS)
         self._begun = True
         self._change[:] = 0.0
         self._look()
-        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
-        if self.render_mode == "human":
-            self.render()
-        return self._observation(), self._info()
 
     def step(
         self, action: NDArray[np.float32]
