@@ -95,8 +95,11 @@ def tune_task(
         if score[0] < best[0]:
             best, best_at = score, at
         report(trial, best[0])
+    found = _gains(ranges, best_at)
+    if default[0] <= best[0]:  # the law's own defaults
+        found, best = {}, default
     return {
-        "gains": _gains(ranges, best_at),
+        "gains": found,
         "rmse_m": best[0],
         "lost": best[1],
         "default_rmse_m": default[0],
