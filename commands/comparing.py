@@ -99,14 +99,14 @@ def benchmark(
         jobs=jobs,
     )
     with progress_bar() as progress:
-        task = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
+        bar = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
         results = fly_all(
             names,
             worlds,
             episodes,
             seed,
             jobs,
-            lambda count: progress.advance(task, count),
+            lambda count: progress.advance(bar, count),
             cluster,
         )
     rows = leaderboard(results, names, seed)

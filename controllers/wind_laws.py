@@ -231,12 +231,15 @@ class L1Adaptive(WindLaw):
 
 
 class WindOracle(WindLaw):
-    """Knows the true external force: cancels it, with a lead against the lag of motors and tilt.
-    The upper end of the score, 1.
+    """Knows the true external force, and the wind to come: ``- gain f(t + preview) / m``, so that
+    motors and tilt have turned the thrust when it is needed. The upper end of the score, 1.
+
+    ``f(t + preview)`` is the true force now, with the wind's part of it as the winds will blow at
+    the place where the vehicle is.
 
     Args:
         gain: share of the force that is cancelled.
-        lead: s.
+        preview: s; the environment's ``preview`` is set to it.
     """
 
     def __init__(
@@ -245,28 +248,22 @@ class WindOracle(WindLaw):
         kd: float = 0.0,
         ki: float = 0.0,
         gain: float = 1.0,
-        lead: float = 0.0,
+        preview: float = 0.15,
         mass: float = _MASS,
     ) -> None:
         super().__init__(kp, kd, ki)
-        self.gain, self.lead, self.mass = gain, lead, mass
-        self._last: Wide | None = None
-
-    def reset(self) -> None:
-        """Forget the last episode."""
-        super().reset()
-        self._last = None
+        self.gain, self.preview, self.mass = gain, preview, mass
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
-        """Return ``- gain (f + lead df/dt) / m`` of the true force.
+        """Return ``- gain f / m`` of the force to come.
 
         Raises:
-            InputError: no ``info``.
+            InputError: no ``info``, or one without the force to come.
         """
-        if info is None:
-            raise InputError("oracle: needs the environment's info (force), which only it has")
-        force = np.asarray(info["force"], dtype=np.float64)
-        rate = 0.0 * force if self._last is None else (force - self._last) / WIND_PERIOD
-        self._last = force
-        against: Wide = -self.gain / self.mass * (force + self.lead * rate)
+        if info is None or "force_ahead" not in info:
+            raise InputError(
+                "oracle: needs the environment's info (force_ahead), which it has where its "
+                "preview is above 0"
+            )
+        against: Wide = -self.gain / self.mass * np.asarray(info["force_ahead"], dtype=np.float64)
         return against

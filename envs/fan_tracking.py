@@ -169,7 +169,8 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
         self.action_space = gym.spaces.Box(-MAX_COMMAND, MAX_COMMAND, (1,), np.float32)
         self.view = View(observe, normalize)
-        self.observation_space = self.view.space()
+        bound = self.view.bound()
+        self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
         self._viewer: Any = None
         self.loop: ClosedLoop | None = None
         self.fan_motion = ""

@@ -4,7 +4,6 @@ pose alone; in SI units or divided by fixed scales.
 
 import math
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,10 +70,10 @@ class View:
         """Whether a frame alone says what is seen, so that many can be turned at once."""
         return self.observe in ("wrench", "wrench-without-fx")
 
-    def space(self) -> gym.spaces.Box:
-        """Return the space of what is seen."""
-        bound = np.tile(self._limits / self._scales, self.size // len(self._kept))
-        return gym.spaces.Box(-bound, bound, (self.size,), np.float32)
+    def bound(self) -> Frame:
+        """Return the largest size (n,) of what is seen."""
+        largest: Frame = np.tile(self._limits / self._scales, self.size // len(self._kept))
+        return largest
 
     def restart(self, state: Array) -> None:
         """Begin an episode at an estimated state (20,)."""

@@ -44,7 +44,7 @@ def figure_of_eight(
 
     ``along = a sin(w t)``, ``across = b sin(2 w t)``.
     """
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1))
+    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
     phase = 2.0 * math.pi / period * t
     along, across = size[0] * np.sin(phase), size[1] * np.sin(2.0 * phase)
     c, s = math.cos(turn), math.sin(turn)
@@ -62,5 +62,5 @@ def random_spline(
     points = centre + size * rng.uniform(-1.0, 1.0, (count, 3))
     points[0] = centre
     spline = CubicSpline(every * np.arange(count), points, bc_type=((1, np.zeros(3)), "not-a-knot"))
-    t = _warp(TICK * np.arange(round(seconds / TICK) + 1))
+    t = _warp(TICK * np.arange(round(seconds / TICK) + 1, dtype=np.float64))
     return _rows(np.asarray(spline(t)), yaw)

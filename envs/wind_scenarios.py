@@ -141,9 +141,9 @@ def draw_winds(
         at = float(rng.uniform(1.0, 3.0))
         while at < seconds:
             turn = float(rng.uniform(-math.pi, math.pi))
-            size, length = float(rng.uniform(*scenario.gusts)), float(rng.uniform(1.0, 3.0))
+            size, rise = float(rng.uniform(*scenario.gusts)), float(rng.uniform(1.0, 3.0))
             along = np.array([math.cos(turn), math.sin(turn), 0.0])
-            winds.append(Gust(size * along, length, start=at, speed=max(mean, size), front=START))
+            winds.append(Gust(size * along, rise, start=at, speed=max(mean, size), front=START))
             at += float(rng.uniform(3.0, 6.0))
     if scenario.wash:
         period, turn = float(rng.uniform(4.0, 8.0)), float(rng.uniform(-math.pi, math.pi))

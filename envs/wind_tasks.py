@@ -20,6 +20,7 @@ from ..controllers.wind_observation import (
     WIND_OBSERVATION_SIZE,
 )
 from ..dynamics.effects import check_setting
+from ..dynamics.mean_jet import AIR_DENSITY
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
@@ -31,7 +32,7 @@ from .closed_loop import ESTIMATORS, FASTEST, LOOP, has_been_reset
 from .display import modes_shown, need_display
 from .fan import STATIONS, Fan
 from .plant import TICK, PlantSettings
-from .wind import CompiledWind, FanWall, winds_of
+from .wind import CompiledWind, FanWall, Sum, winds_of
 from .wind.field import check_compiled
 from .wind_scenarios import (
     HEIGHT,
@@ -50,6 +51,7 @@ WIND_SETTLE_TICKS = 300
 WIND_LOST = 2.5  # m, from the reference
 TRACKING_WIDTH = 0.1  # m, error at which the tracking reward is a half
 CHANGE_COST = 0.002  # per (m/s2)^2 of change of the action
+_DRAWS = 20  # of an episode's winds, until the vehicle is not lost in them at once
 _UPRIGHT = 0.34  # cosine of 70 degrees
 # m/s2, standard deviation of the accelerometer's noise a tick, and of its bias
 ACCELEROMETER = (0.15, 0.05)
@@ -184,6 +186,7 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._change = np.zeros(3)
         self._looks = specialised(_look, np.zeros(1, dtype=WINDY), self.outcome, self._change)
         self._begun = False
+        self.preview = 0.0  # s; above 0, ``info["force_ahead"]`` is the true force to come
         self._viewer: Any = None
 
     def _make_flight(self, vehicle: Vehicle, fan: Fan) -> WindyFlight:
@@ -231,6 +234,24 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             self.flight = self._make_flight(vehicle, fan)
         elif self.flight is None:
             self.flight = self._make_flight(self.truth, fan)
+        # winds that carry the vehicle off before it is the agent's are drawn anew
+        for _ in range(_DRAWS):
+            self._draw(self.flight)
+            if not self.outcome["lost"][0]:
+                break
+        else:
+            raise InputError(
+                f"{self.name}: the vehicle is lost before the episode begins in {_DRAWS} draws of "
+                f"these winds; expected winds that its flight loop can hold for 1.5 s"
+            )
+        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), self._info()
+
+    def _draw(self, flight: WindyFlight) -> None:
+        """Draw winds and reference, settle in them, and look at the start."""
+        rng = self.np_random
         given = draw_winds(self.scenario, rng, WIND_EPISODE_SECONDS)
         self.blowing = [
             part
@@ -240,14 +261,10 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.reference_name, reference = draw_reference(
             rng, math.pi, WIND_EPISODE_SECONDS, self.moving
         )
-        self.flight.reset(rng, START, math.pi, self.blowing, reference, settle=WIND_SETTLE_TICKS)
+        flight.reset(rng, START, math.pi, self.blowing, reference, settle=WIND_SETTLE_TICKS)
         self._begun = True
         self._change[:] = 0.0
         self._look()
-        self.outcome["reward_tracking"] = self.outcome["reward_change"] = 0.0
-        if self.render_mode == "human":
-            self.render()
-        return self._observation(), self._info()
 
     def step(
         self, action: NDArray[np.float32]
@@ -287,7 +304,33 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for name in ("position", "reference", "force", "torque", "wind"):
             info[name] = info[name].copy()
         info["trajectory"] = self.reference_name
+        if self.preview > 0.0:
+            info["force_ahead"] = self._force_ahead(info)
         return info
+
+    def _force_ahead(self, info: dict[str, Any]) -> Array:
+        """Return the true force (3,) N, with the wind's part of it as it will blow ``preview`` s
+        from now where the vehicle is; for the oracle.
+        """
+        assert self.flight is not None
+        w, loop = self.flight.record[0], self.flight.loop
+        if not self.blowing:
+            return np.asarray(info["force"])
+        fan = loop.record[0]["fan"]
+        up, still = w["rotation"][:, 2], loop.velocity
+        then = Sum(*self.blowing).velocity(w["points"].T, info["time"] + self.preview)
+
+        def drag(air: Array) -> Array:
+            past = air - still
+            rotors = past[:4] - (past[:4] @ up)[:, None] * up
+            hull = 0.5 * AIR_DENSITY * float(fan["hull_area"]) / (STATIONS - 4)
+            speeds = np.sqrt(np.sum(past[4:] ** 2, axis=1))[:, None]
+            made: Array = float(fan["rotor_drag"]) * rotors.sum(axis=0) + hull * np.sum(
+                speeds * past[4:], axis=0
+            )
+            return made
+
+        return np.asarray(info["force"] + drag(then) - drag(w["air"].T))
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return a picture (height, width, 3) of vehicle, reference, wind and wrench, or show it in

@@ -63,7 +63,7 @@ class WindTrajectoryEnv(WindEnv):
 
     The vehicle hovers at the start of the reference, 2.3 m in front of the wall and 1.5 m high, facing
     it, for 1.5 s in the wind of time 0, in which the filter settles. Winds, reference and all noise are
-    drawn from the seed.
+    drawn from the seed; winds in which the vehicle is lost before the episode begins are drawn anew.
 
     ## Episode end
 

@@ -251,7 +251,7 @@ class WindyFlight:
         w["bias"] = self._sigma_bias * rng.standard_normal(3)
         w["ticks"] = -settle
         self.loop.reset(rng, position, yaw)
-        loop["fan"]["air"], loop["fan"]["blown"] = 0.0, int(len(parts) > 0)
+        loop["fan"]["air"], loop["fan"]["blown"] = 0.0, 1  # drag, in still air too
         if settle > 0:
             self.run(rng.standard_normal((settle, WINDY_NOISE)))
 

@@ -115,6 +115,8 @@ def make_task_pilot(name: str, task: str) -> Any:
 def fly_task_episode(env: Any, law: Any, seed: int, task: Task) -> TaskEpisode:
     """Fly one episode of a task and return it."""
     law.reset()
+    if hasattr(env, "preview"):
+        env.preview = getattr(law, "preview", 0.0)
     observation, info = env.reset(seed=seed)
     errors, total = [], 0.0
     for _ in range(task.decisions):

@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 from scipy.stats import qmc
 
-from ..controllers.task_laws import TASK_LAWS
+from ..controllers.task_laws import TASK_LAWS, task_gains
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from .task_benchmark import TASKS, fly_task_episode, task_of
@@ -35,9 +35,11 @@ RANGES: dict[str, dict[str, tuple[float, float]]] = {
 }
 _ORACLES = {
     "FanTracking2D": {"gain": (0.5, 8.0)},
-    "WindHover": {**_PID, **_KI, "gain": (0.3, 1.2), "lead": (0.02, 1.0)},
-    "WindTrajectory": {**_PID, **_KI, "gain": (0.3, 1.2), "lead": (0.02, 1.0)},
+    "WindHover": {**_PID, **_KI, "gain": (0.5, 1.2), "preview": (0.03, 0.5)},
+    "WindTrajectory": {**_PID, **_KI, "gain": (0.5, 1.2), "preview": (0.03, 0.5)},
 }
+
+_MODEL = "pid-force"  # the law that the oracle in the wind is, but for the force that it knows
 
 
 def tune_task(
@@ -73,12 +75,18 @@ def tune_task(
 
     rng = np.random.default_rng(seed)
     spread = max(trials // 4, 2)
-    points = qmc.Halton(len(ranges), seed=rng).random(spread)
+    points = low + (high - low) * qmc.Halton(len(ranges), seed=rng).random(spread)
+    if law == "oracle" and (model := task_gains().get(task, {}).get(_MODEL, {}).get("gains")):
+        # the oracle is the same law with the true force: it begins with that law's gains
+        points[0] = [
+            math.log(model.get(name, 1.0) if name in _PID else known_start)
+            for name, known_start in zip(ranges, np.exp(0.5 * (low + high)), strict=True)
+        ]
     default = flown({})
     best, best_at = (math.inf, 0), 0.5 * (low + high)
     for trial in range(trials):
         if trial < spread:
-            at = low + (high - low) * points[trial]
+            at = points[trial]
         else:
             width = 0.25 * (1.0 - 0.8 * (trial - spread) / (trials - spread))
             at = best_at + width * (high - low) * rng.standard_normal(len(low))
@@ -87,8 +95,11 @@ def tune_task(
         if score[0] < best[0]:
             best, best_at = score, at
         report(trial, best[0])
+    found = _gains(ranges, best_at)
+    if default[0] <= best[0]:  # the law's own defaults
+        found, best = {}, default
     return {
-        "gains": _gains(ranges, best_at),
+        "gains": found,
         "rmse_m": best[0],
         "lost": best[1],
         "default_rmse_m": default[0],

@@ -62,4 +62,5 @@ class RotorPyWind:
     def update(self, t: float, position: ArrayLike) -> Array:
         """Return the wind (3,) m/s at a position (3,) m and a time in s."""
         at = np.asarray(position, dtype=np.float64).reshape(1, 3)
-        return np.asarray(self.wind.velocity(at, float(t)), dtype=np.float64)[0]
+        seen: Array = np.asarray(self.wind.velocity(at, float(t)), dtype=np.float64)[0]
+        return seen

@@ -121,7 +121,7 @@ def _observation(flight: WindyFlight, row: Array) -> Array:
     x, o = flight.loop.state, np.zeros(WIND_OBSERVATION_SIZE)
     o[POSITION_ERROR], o[VELOCITY], o[FORCE] = row[:3] - x[:3], x[7:10], x[16:19]
     o[REFERENCE_VELOCITY], o[REFERENCE_ACCELERATION] = row[3:6], row[6:9]
-    ready = flight.ticks > 0
+    ready = flight.ticks > 0  # nothing was measured before
     o[SPECIFIC_FORCE] = flight.specific if ready else (0.0, 0.0, 9.81)
     o[ROTOR_FORCE] = flight.thrust if ready else (0.0, 0.0, 9.81)
     o[LAST_ACTION:] = flight.action
@@ -130,14 +130,14 @@ def _observation(flight: WindyFlight, row: Array) -> Array:
 
 def fit(law: str, target: float, assumed: Assumed) -> float:
     """Return the position gain (1/s2) with which the law's RMSE without wind is the published one,
-    or the end of 1-60 that comes closest.
+    or the end of 0.5-25 that comes closest (above it the loop is not stable).
     """
 
     def over(log_gain: float) -> float:
         some = [fly(law, math.exp(log_gain), "0", 1000 + k, assumed) for k in range(2)]
         return math.log(float(np.mean(some)) / target)
 
-    low, high = 0.0, math.log(60.0)
+    low, high = math.log(0.5), math.log(25.0)
     if over(low) <= 0.0:
         return math.exp(low)
     if over(high) >= 0.0:

@@ -15,7 +15,7 @@ from windwrench.controllers import wind_observation as seen
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
 from windwrench.envs.references import figure_of_eight, hold, random_spline
-from windwrench.envs.wind import Uniform
+from windwrench.envs.wind import GridWind, Uniform
 from windwrench.envs.wind_hover import WindHoverEnv
 from windwrench.envs.wind_scenarios import START, WIND_SCENARIOS
 from windwrench.envs.wind_trajectory import WindTrajectoryEnv
@@ -200,7 +200,10 @@ def test_references_are_smooth_and_begin_at_rest():
 
 
 def test_a_lost_vehicle_ends_the_episode():
-    env = WindHoverEnv("calm", winds=[Uniform((14.0, 0.0, 0.0))])
+    # a storm that comes with the grid's second half
+    wind = np.zeros((3, 1, 1, 1, 3))
+    wind[1:, ..., 0] = 16.0
+    env = WindHoverEnv("calm", winds=[GridWind(([0, 1, 2], [0], [0], [0]), wind)])
     env.reset(seed=0)
     for _ in range(200):
         *_, lost, _, info = env.step(np.zeros(3))
@@ -208,6 +211,11 @@ def test_a_lost_vehicle_ends_the_episode():
             break
     assert lost
     assert info["lost"]
+
+
+def test_winds_that_nothing_can_hold_are_refused():
+    with pytest.raises(InputError, match="lost before the episode begins"):
+        WindHoverEnv("calm", winds=[Uniform((40.0, 0.0, 0.0))]).reset(seed=0)
 
 
 def test_the_cage_feels_a_vertical_offset_and_the_ring_does_not():

@@ -168,7 +168,7 @@ def test_the_force_is_fed_forward_with_its_lead():
     with pytest.raises(InputError, match="info"):
         oracle(frame())
     np.testing.assert_allclose(
-        oracle(frame(), {"force": np.array([0.0, 0.465, 0.0])}), [0, -1, 0], rtol=1e-6
+        oracle(frame(), {"force_ahead": np.array([0.0, 0.465, 0.0])}), [0, -1, 0], rtol=1e-6
     )
 
 
