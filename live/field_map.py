@@ -203,7 +203,7 @@ class FieldMap:
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return a section's numbers, with signs and scale; None where it has none."""
-    given = [fields.get(name) for name in part.columns]
+    given: list[Any] = [fields.get(name) for name in part.columns]
     if all(type(value) is float for value in given):  # nearly always, and quick
         total = sum(given)
         if total == total and max(given) <= _LARGEST and min(given) >= -_LARGEST:
