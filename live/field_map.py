@@ -203,6 +203,26 @@ class FieldMap:
 
 def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
     """Return a section's numbers, with signs and scale; None where it has none."""
+    given: list[Any] = [fields.get(name) for name in part.columns]
+    if all(type(value) is float for value in given):  # nearly always, and quick
+        total = sum(given)
+        if total == total and max(given) <= _LARGEST and min(given) >= -_LARGEST:
+            return _scaled(np.array(given), part)
+    elif not any(value is not None for value in given) and not any(
+        name[0] == "=" for name in part.columns
+    ):
+        return None
+    return _checked(part, section, fields)
+
+
+def _scaled(values: Array, part: Columns) -> Array:
+    if part.signs:
+        values = values * np.array(part.signs, dtype=np.float64)
+    return values * part.scale if part.scale != 1.0 else values
+
+
+def _checked(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | None:
+    """Return the same of numbers that may be none; say what is wrong with them."""
     numbers = []
     for name in part.columns:
         value = float(name[1:]) if name.startswith("=") else fields.get(name)
@@ -227,10 +247,7 @@ def _values(part: Columns, section: str, fields: Mapping[str, Any]) -> Array | N
         raise Malformed(
             f"no field {', '.join(missing)}; expected all of {', '.join(named)} ({section})"
         )
-    values = np.array(numbers)
-    if part.signs:
-        values = values * np.array(part.signs, dtype=np.float64)
-    values = values * part.scale if part.scale != 1.0 else values
+    values = _scaled(np.array(numbers), part)
     if not np.all(np.abs(values) <= _LARGEST):
         raise Malformed(
             f"{section}: {', '.join(f'{x:.3g}' for x in values)}; expected numbers of a flight"

@@ -29,9 +29,8 @@ class Durations:
         for i, count in enumerate(self._bins):
             seen += count
             if count and seen >= wanted:
-                return min(
-                    1e-6 * _LOWEST * 2.0 ** ((i + 1) / _BINS_PER_OCTAVE), 1e-6 * self.longest
-                )
+                upper = _LOWEST * math.exp2((i + 1) / _BINS_PER_OCTAVE)
+                return 1e-6 * min(upper, float(self.longest))
         return math.nan
 
 

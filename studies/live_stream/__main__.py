@@ -22,7 +22,7 @@ def main() -> None:
     """Run the study."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
-    parser.add_argument("--rate", type=float, default=50.0)
+    parser.add_argument("--rate", type=float, default=5.0)
     parser.add_argument("--only", choices=("long", "faults", "latency"))
     parser.add_argument("--out", type=Path, default=RESULT)
     given = parser.parse_args()

