@@ -240,6 +240,7 @@ def _lines(result: Result, data: Path) -> list[str]:
         "Aims were: constant gain 8 kB of code, 1 kB of memory, 50 us; EKF or UKF 40 kB, 16 kB, "
         "1 ms.",
         "",
-        made_by("python -m studies.export_c", ())
-        + f" Data: `docs/{data.parent.name}/{data.name}`.",
+        made_by("python -m studies.export_c", [result["commit"]]),
+        "",
+        f"[The numbers of this page]({data.parent.name}/{data.name}).",
     ]

@@ -73,7 +73,7 @@ def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
     assert worst["status"] == 0.0
     # now and then a NIS comes so near to a bound that the two decide differently, and agree again
     # later: the page counts how often
-    assert worst["over"] < 0.01
+    assert worst["over"] < 0.03
 
 
 @pytest.mark.parametrize("estimator", ["ekf", "ukf"])
