@@ -6,6 +6,7 @@ import select
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from typing import Any
 
@@ -34,7 +35,7 @@ def measure(seconds: float = 20.0, view: bool = False, record: bool = False) -> 
     words = [f"udp-json://127.0.0.1:{port}?reply=1", "--vehicle", "ardrone2", "--wait", "60"]
     words += ["--json", "--rate", "200", "--seconds", str(seconds - 0.5)]
     words += ["--view", "--port", "0"] if view else []
-    log = f"/tmp/windwrench-latency-{os.getpid()}.csv"
+    log = os.path.join(tempfile.gettempdir(), f"windwrench-latency-{os.getpid()}.csv")
     words += ["--record", log] if record else []
     ours = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ours.settimeout(0.0)
