@@ -96,7 +96,7 @@ class DiagnosisSettings:
 DIAGNOSIS = DiagnosisSettings()
 FILTERED_NAMES = (
     "the pose was filtered before the log was written. Whether the named effects act on the "
-    "vehicle, or follow from the flight loop's answer to disturbances, shows only in the sensors' "
+    "vehicle, or follow from feedback-induced correlation, shows only in the sensors' "
     "own noise, so all names are tentative. Log the pose as it was measured"
 )
 
