@@ -64,6 +64,12 @@ def _forget(f: Record) -> None:
         for j in range(COMPANIONS):
             imu.rest[i, j] = 0.0
         imu.rest[i, i] = imu.prior[i] if i < BIASES else 1.0
+    # a bias is in its sensor from the first sample on; what a step's noise does there, the first
+    # step says
+    for i in range(BIASES):
+        for j in range(COMPANIONS):
+            imu.sensitivity[i, j] = 0.0
+        imu.sensitivity[i, i] = 1.0
     _uncorrelate(f)
     _keep_bias_covariance(f, imu.rest)
 

@@ -16,7 +16,7 @@ import numpy as np
 from numba import carray
 from numpy.typing import ArrayLike
 
-from ..dynamics.rotation import attitude_error, quaternion_to_matrix
+from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
@@ -26,7 +26,7 @@ from .filter_record import FILTER, N, drive, propagate
 from .recovery import Recovery, remember, start_over_if_broken
 from .sample import check_sample, undo_sensing
 from .tuning import UKFTuning
-from .ukf import WrenchUKF, carry, correct_parts
+from .ukf import WrenchUKF, carry_on, correct_parts
 from .ukf import step as ukf_step
 
 _MEASURED = [0, 1, 2, 6, 7, 8]  # rows of (rho, x) in the error state
@@ -115,13 +115,11 @@ def _leave_steady_state(f: Record) -> None:
     x, position_gap, attitude_gap, refused = f.x, f.gap[0], f.gap[1], f.gap[2]
     f.steady = 0
     # the covariance after a correction, carried over the time that has not been measured since
-    quaternion_to_matrix(f.centre[3:7], f.rotation)
-    for i in range(NIS):
-        x[i], f.next[i] = f.centre[i], f.centre[i]
+    held = f.centre[:NIS].copy()
+    x[:NIS] = held
     for _ in range(max(1, round(max(position_gap, attitude_gap) / f.period))):
-        carry(f, f.period)
-        for i in range(NIS):
-            x[i] = f.next[i]
+        carry_on(f, f.period)
+        x[:NIS] = held
         f.gap[0], f.gap[1], f.gap[2] = position_gap, attitude_gap, refused
     start_over_if_broken(f)
     x[NIS] = math.nan

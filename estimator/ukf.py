@@ -87,19 +87,25 @@ def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weigh
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(27)."""
     drive(f, rotor_speeds, dt, voltage)
+    carry_on(f, dt)
+    f.time += dt
+
+
+@compiled
+def carry_on(f: Record, dt: float) -> None:
+    """Carry a filter ahead, with its effects, its rotors' wrench being known."""
     if f.wrench_count == 0:
         quaternion_to_matrix(f.x[3:7], f.rotation)
         carry(f, dt)
-    else:
-        spread, weight, scale = _spread_of(f)
-        root_of_twelve(f)
-        propagate(f, f.x, dt, f.centre)
-        _carry_linear(f, dt)
-        _pairs_with_effects(f, dt, spread, scale, weight)
-        add_pairs(f)
-        add_more_pairs(f)
-        _gather(f, dt)
-    f.time += dt
+        return
+    spread, weight, scale = _spread_of(f)
+    root_of_twelve(f)
+    propagate(f, f.x, dt, f.centre)
+    _carry_linear(f, dt)
+    _pairs_with_effects(f, dt, spread, scale, weight)
+    add_pairs(f)
+    add_more_pairs(f)
+    _gather(f, dt)
 
 
 @compiled

@@ -166,3 +166,18 @@ def test_bad_input_is_named_and_changes_nothing():
         ConstantGainFilter(VEHICLE, period=0.0)
     with pytest.raises(InputError, match="correct_imu"):
         f.correct_imu(gyro=[0, 0, 0])
+
+
+def test_a_gap_widens_its_covariance_with_the_declared_effects():
+    """Drag holds a velocity that nobody measures: without it the deviation would be larger."""
+    vehicle = VEHICLE.with_effects(EffectSetting("body_drag", {"dx": 10.0, "dy": 10.0}))
+    deviations = []
+    for f in (WrenchUKF(vehicle), ConstantGainFilter(vehicle)):
+        f.reset([0, 0, 1], [1, 0, 0, 0])
+        speeds = np.full(4, vehicle.hover_rate)
+        for _ in range(1200):
+            f.step(speeds, [0, 0, 1], [1, 0, 0, 0])
+        for _ in range(25):  # longer than it coasts with a constant gain
+            e = f.step(speeds)
+        deviations.append(np.sqrt(np.diag(e.covariance))[9:11])
+    np.testing.assert_allclose(deviations[1], deviations[0], rtol=1e-3)

@@ -318,6 +318,17 @@ def test_biases_are_found_and_cost_nothing():
     np.testing.assert_allclose(f.estimate.force, g.estimate.force, atol=0.003)
 
 
+@pytest.mark.parametrize("posed", [True, False])
+def test_the_first_gyro_sample_has_a_bias_whenever_it_comes(posed):
+    """A rate is known no better than the bias of the gyro, whether or not a pose came before."""
+    f = WrenchUKF(VEHICLE, UKFTuning(gyro_noise=GYRO, gyro_bias_std=0.1), PERIOD)
+    pose = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
+    f.reset(*pose)
+    f.step(np.full(4, VEHICLE.hover_rate), *(pose if posed else (None, None)))
+    e = f.correct_imu(np.zeros(3), None)
+    assert np.all(np.sqrt(np.diag(e.covariance)[3:6]) > 0.09)
+
+
 def test_an_accelerometer_says_nothing_while_the_rotors_are_unknown():
     for flown in (False, True):
         f = WrenchUKF(VEHICLE)
