@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from windwrench.runtime.whole_files import replaced
+from windwrench.runtime.page_files import write_json
 from windwrench.studies.live_stream.latency import measure
 from windwrench.studies.live_stream.long_stream import Faults, run_long
 
@@ -48,8 +48,7 @@ def main() -> None:
     if wanted("long"):
         found["long"] = run_long(given.hours, given.rate, Faults(), report=report)
     given.out.parent.mkdir(parents=True, exist_ok=True)
-    with replaced(given.out) as partial:
-        partial.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    write_json(found, given.out)
     print(json.dumps(found, indent=1))
 
 

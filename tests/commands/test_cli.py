@@ -224,7 +224,7 @@ def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
         (("fly", "--effect", "rotor_drag:kdx=-1"), "between"),
         (("fly", "--seed", "-1"), "--seed"),
         (("fly", "--nothing"), "No such option"),
-        (("flie",), "Did you mean 'fly'"),
+        (("flyy",), "Did you mean 'fly'"),
         (("fly", "--sceanrio", "base"), "--scenario"),
         (("benchmark", "--controllers", "hovre"), "Did you mean 'hover'"),
         (("benchmark", "--scenarios", "bsae"), "Did you mean 'base'"),

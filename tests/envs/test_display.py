@@ -42,5 +42,6 @@ def test_a_window_without_a_display_raises(display):
         check=True,
     )
     lines = done.stdout.splitlines()
-    assert len(lines) == 3
+    # without a name of a display the checker does not ask for a window
+    assert len(lines) == (3 if display else 2)
     assert all(line.startswith("render: no window without a display (") for line in lines)

@@ -11,7 +11,7 @@ from windwrench.identification.motion.residual import acting_wrench
 from windwrench.identification.motion.smoothing import low_pass
 from windwrench.studies.fast_flight.flights import gyro_delay, read_flight
 from windwrench.studies.fast_flight.force_fit import Regression
-from windwrench.studies.fast_flight.page import BEGIN, END, write_tables
+from windwrench.studies.fast_flight.page import tables
 from windwrench.studies.fast_flight.study import (
     FULL,
     MODELS,
@@ -21,6 +21,7 @@ from windwrench.studies.fast_flight.study import (
     read_flights,
     rmse,
 )
+from windwrench.studies.page_tables import BEGIN, END, put_between
 
 VEHICLE = load_vehicle("ardrone2")
 TRUTH = {
@@ -165,7 +166,8 @@ def test_the_page_holds_a_figure_for_each_flight_and_model(tmp_path, monkeypatch
     assert found["pose"][0]["seconds"] == pytest.approx(16.0, abs=0.01)
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\n{END}\nafter\n")
-    text = write_tables(found, page)
+    text = tables(found)
+    put_between(text, page)
     assert text in page.read_text()
     assert page.read_text().startswith("before\n")
     assert page.read_text().endswith("\nafter\n")
@@ -174,5 +176,5 @@ def test_the_page_holds_a_figure_for_each_flight_and_model(tmp_path, monkeypatch
         if row["model"] == FULL:
             assert f"{row['rmse']:.3f}" in text
     page.write_text("no marks")
-    with pytest.raises(InputError, match="expected one line"):
-        write_tables(found, page)
+    with pytest.raises(InputError, match="expected a page with one line"):
+        put_between(text, page)
