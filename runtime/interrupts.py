@@ -1,5 +1,6 @@
 """Interrupts of the command, which come in the middle of anything: imports above all."""
 
+import _thread
 import os
 import signal
 import sys
@@ -7,8 +8,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 INTERRUPTED = 130  # exit code
+_AGAIN = 0.02  # s until an interrupt that was lost comes again
 # what ``sys.argv`` begins with while ``python -m`` looks for the package, and as a program
 _COMMAND = ("-m", "windwrench", "windwrench.exe", "windwrench-script.py")
 
@@ -41,9 +44,17 @@ def leaving_at_once(active: bool = True) -> Iterator[None]:
 def noted() -> Iterator[Callable[[], bool]]:
     """Give a function that says whether an interrupt came in the block.
 
-    One that comes within the import of a module in C ends as an error of that import.
+    One that comes within the import of a module in C ends as an error of that import. One within a
+    callback of Python's own, as every import has them, is lost there, and comes again.
     """
     came: list[int] = []
+    told = sys.unraisablehook
+
+    def again(lost: Any) -> None:
+        if lost.exc_type is KeyboardInterrupt:
+            threading.Timer(_AGAIN, _thread.interrupt_main).start()
+        else:
+            told(lost)
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(number)
@@ -54,10 +65,12 @@ def noted() -> Iterator[Callable[[], bool]]:
     )
     if usual:
         signal.signal(signal.SIGINT, note)
+        sys.unraisablehook = again
     try:
         yield lambda: bool(came)
     finally:
         if usual:
+            sys.unraisablehook = told
             signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
