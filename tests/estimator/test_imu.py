@@ -76,7 +76,7 @@ def test_with_an_imu_a_position_is_enough():
 
 
 def test_a_linear_measurement_is_a_kalman_update():
-    """A gyro's sigma points must come to the closed form."""
+    """A gyro's sigma points must come to the closed form; its bias has its prior."""
     ukf = WrenchUKF(VEHICLE, UKFTuning(), PERIOD)
     ukf.reset([0, 0, 1], [1, 0, 0, 0])
     for _ in range(20):
@@ -84,7 +84,7 @@ def test_a_linear_measurement_is_a_kalman_update():
     P, before = ukf.covariance, ukf.estimate
     z = np.array([0.1, -0.2, 0.3])
     after = ukf.correct_imu(gyro=z)
-    S = P[3:6, 3:6] + 0.005**2 * np.eye(3)
+    S = P[3:6, 3:6] + (0.005**2 + np.square(UKFTuning().gyro_bias_std)) * np.eye(3)
     K = P[:, 3:6] @ np.linalg.inv(S)
     innovation = z - before.angular_velocity
     np.testing.assert_allclose(
