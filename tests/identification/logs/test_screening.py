@@ -449,6 +449,18 @@ def test_a_gap_in_which_the_vehicle_flew_on_is_no_jump_of_the_clock():
     screen_log(rows(log, np.abs(log.t - 10.0) > 0.5), VEHICLE)
 
 
+def test_a_file_cut_within_its_last_number_is_refused(tmp_path):
+    """As many fields as there should be, and the last one empty: no line that was left out."""
+    path = tmp_path / "flight.csv"
+    write_log(rows(flight(), flight().t < 0.1), path)
+    path.write_text(path.read_text()[:-20])
+    with pytest.raises(
+        InputError,
+        match=r"flight.csv: .*row 20 \(line 21\) (has \d+ field\(s\); expected 19|is empty)",
+    ):
+        read_log(path)
+
+
 @pytest.mark.parametrize("cut", [60, 150])
 def test_a_file_cut_within_its_last_line_says_so(tmp_path, cut):
     path = tmp_path / "flight.csv"
