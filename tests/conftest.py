@@ -1,5 +1,6 @@
 """What holds for the whole suite."""
 
+import signal
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ def pytest_configure(config):
     """Compile what most files need before workers start, or each of them compiles it; a part of
     the suite compiles what it needs.
     """
+    hear_interrupts()
     whole = config.args == ["tests"]
     if (
         whole
@@ -30,3 +32,12 @@ def pytest_configure(config):
         ]
         for process in running:
             process.wait()  # a failure is no answer here: the tests that need it give theirs
+
+
+def hear_interrupts():
+    """Take interrupts as at a terminal, here and in the programs that tests start.
+
+    What a shell starts in the background ignores them, and so would all that it starts.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

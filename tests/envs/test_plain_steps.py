@@ -171,6 +171,13 @@ def fly_once(seed):
     return env.step(np.zeros(1, np.float32))[0]
 
 
+def notes(capfd):
+    """Return what was said of plain steps; a busy machine says that it compiles, too."""
+    return [
+        found for line in capfd.readouterr().err.splitlines() if (found := NOTE.fullmatch(line))
+    ]
+
+
 def test_it_is_said_once_by_however_many_environments_threads_and_workers(plain, capfd):
     with ThreadPoolExecutor(4) as pool:
         seen = list(pool.map(fly_once, [1] * 8))
@@ -179,8 +186,8 @@ def test_it_is_said_once_by_however_many_environments_threads_and_workers(plain,
     envs = FanTrackingVectorEnv(2, scenario="static")
     envs.reset(seed=1)
     np.testing.assert_array_equal(seen, np.tile(envs.step(np.zeros((2, 1)))[0][0], (10, 1)))
-    (note,) = capfd.readouterr().err.splitlines()
-    assert NOTE.fullmatch(note).groups() == ("WINDWRENCH_PLAIN_STEPS is set", "MuJoCo and NumPy")
+    (note,) = notes(capfd)
+    assert note.groups() == ("WINDWRENCH_PLAIN_STEPS is set", "MuJoCo and NumPy")
 
 
 @pytest.mark.parametrize("value", ["", "0"])
@@ -189,7 +196,7 @@ def test_nothing_is_said_where_nothing_is_missing(value, monkeypatch, capfd):
     choose_anew()
     fly_once(0)
     assert plain_steps._choose() == (False, False)
-    assert not capfd.readouterr().err
+    assert not notes(capfd)
 
 
 def without_library(patch, tmp_path):
