@@ -66,12 +66,14 @@ for name, tuning in tunings.items():
 # %% [markdown]
 # ## What it found
 #
-# Between 3.5 and 5 s both should say 0.3 N. The quick one is there sooner, and noisier.
+# The true force holds the pull and the weak turbulence of every flight. The quick filter is
+# there sooner, and noisier.
 
 # %%
 settled = (flight["t"] > 3.5) & (flight["t"] < 5.0)
 figure, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
-ax.plot(flight["t"], [0.3 * (2.0 < t < 5.0) for t in flight["t"]], "k", lw=1, label="what pulls")
+ax.plot(flight["t"], flight["force"][:, 1], color="0.6", lw=0.8, label="true force")
+print(f"true force: {flight['force'][settled, 1].mean():.2f} N")
 for name, force in estimates.items():
     ax.plot(flight["t"], force, lw=1.2, label=f"estimate, {name}")
     print(f"{name}: {force[settled].mean():.2f} N")
