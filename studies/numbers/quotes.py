@@ -84,6 +84,7 @@ def prose(text: str) -> str:
     text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"\]\([^)]*\)", "]", text)
+    text = re.sub(r"<[a-z/][^>]*>", "", text)
     text = re.sub(r"^\s*\d+\.\s", "", text, flags=re.MULTILINE)
     return " ".join(text.split())
 

@@ -1,11 +1,11 @@
 """Pages beside the code that they speak of: which was changed later."""
 
 import re
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 from windwrench import __version__
+from windwrench.runtime.provenance import git
 from windwrench.studies.numbers.rendering import DOCS
 
 ROOT = DOCS.parent
@@ -58,7 +58,7 @@ def remarks() -> list[Remark]:
                 found.append(Remark(page, f"made by code that no commit holds ({since})"))
             found += _changed(page, since.removesuffix("-dirty"), named | _code(match["command"]))
         if not made and named:
-            found += _changed(page, _git("log", "-1", "--format=%h", "--", page), named)
+            found += _changed(page, git(ROOT, "log", "-1", "--format=%h", "--", page), named)
     return found
 
 
@@ -84,20 +84,9 @@ def _changed(page: str, since: str, sources: set[str]) -> list[Remark]:
     there = sorted(source for source in sources if (ROOT / source).exists())
     if not (since and there):
         return []
-    later = _git("log", "--format=", "--name-only", f"{since}..HEAD", "--", *there).split()
+    later = git(ROOT, "log", "--format=", "--name-only", f"{since}..HEAD", "--", *there).split()
     names = ", ".join(sorted(set(later)))
     return [Remark(page, f"since {since} changed: {names}")] if names else []
-
-
-def _git(*words: str) -> str:
-    return subprocess.run(
-        ["git", "--no-optional-locks", *words],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=30,
-    ).stdout.strip()
 
 
 def in_a_checkout(root: Path = ROOT) -> bool:
