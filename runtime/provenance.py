@@ -24,14 +24,20 @@ def commit(root: Path = _ROOT) -> str | None:
     if not (root / ".git").exists():  # an installed package may lie inside another's checkout
         return None
     try:
-        name = _git(root, "rev-parse", "--short", "HEAD")
-        changed = _git(root, "diff", "--name-only", "HEAD", "--", ".", ":!docs", ":!*.md")
+        name = git(root, "rev-parse", "--short", "HEAD")
+        changed = git(root, "diff", "--name-only", "HEAD", "--", ".", ":!docs", ":!*.md")
     except (OSError, subprocess.SubprocessError):
         return None
     return f"{name}-dirty" if changed else name
 
 
-def _git(root: Path, *words: str) -> str:
+def git(root: Path, *words: str) -> str:
+    """Return what a git command prints in a checkout, without taking a lock.
+
+    Raises:
+        OSError: there is no git.
+        subprocess.SubprocessError: it failed, or took longer than 30 s.
+    """
     done = subprocess.run(
         ["git", "--no-optional-locks", *words],
         cwd=root,

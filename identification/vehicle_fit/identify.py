@@ -136,7 +136,7 @@ def identify(
 
 
 def _lag_of(motors: MotorResponse) -> Estimate:
-    how = f"rotor speeds against commands, {100 * motors.left:.0f} % of their swing left over"
+    how = f"rotor speeds against commands, {100 * motors.left:.0f} % of their variation left over"
     name = effect_of(Role.LAG)
     return Estimate(name, motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
 

@@ -44,14 +44,7 @@ def write_page(
     Raises:
         InputError: the results do not hold hover, oracle, admittance and ratio.
     """
-    lines, rows = lines_of(results, plan), rows_of(results, plan)
-    if not rows:
-        raise InputError(
-            f"{places.results}: holds no scores of hover, oracle, admittance and ratio; "
-            "windwrench leaderboard --train --only designed makes them"
-        )
-    worlds = list(dict.fromkeys(row.world for row in rows))
-    scenarios = [w for w in worlds if plan["worlds"][w] == {"scenario": w}]
+    lines, rows = _scored(results, plan, places)
     folder = path.with_suffix("")
     policies = {
         name: file
@@ -61,26 +54,67 @@ def write_page(
     pictures = [folder / f"{name}.png" for name in ("curves", "intervals", "profiles", "tracking")]
     draw_curves(results, lines, pictures[0])
     draw_intervals([row for row in rows if row.world in _MAIN], pictures[1])
-    draw_profiles(lines, scenarios, pictures[2])
+    draw_profiles(lines, _scenarios(rows, plan), pictures[2])
     draw_tracking(policies, pictures[3])
+    write_text(_text(results, plan, places, folder.name, lines, rows), path)
+    return [path, *pictures]
+
+
+def page_text(
+    results: Sequence[Result], plan: Mapping[str, Any], places: Places, folder: str
+) -> str:
+    """Return the page, in Markdown, whose pictures lie in ``folder``.
+
+    Raises:
+        InputError: the results do not hold hover, oracle, admittance and ratio.
+    """
+    return _text(results, plan, places, folder, *_scored(results, plan, places))
+
+
+def _text(
+    results: Sequence[Result],
+    plan: Mapping[str, Any],
+    places: Places,
+    folder: str,
+    lines: list[Line],
+    rows: list[Row],
+) -> str:
     parts = [
         _head(plan),
         _verdict(rows),
-        _answers(rows, lines),
         _tables(rows),
+        _pictures(folder),
         _limit(results, rows, plan),
         _overview(rows, lines, plan),
-        _aggregates(lines, scenarios),
+        _aggregates(lines, _scenarios(rows, plan)),
         _losses(rows),
-        _pictures(folder.name),
         _ablations(results, plan),
         _training(results, lines),
         _tuning(),
+        _answers(rows, lines),
         _how(plan, results, places),
         made_by("windwrench leaderboard", [commit()]),
     ]
-    write_text("\n\n".join(part for part in parts if part) + "\n", path)
-    return [path, *pictures]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _scored(
+    results: Sequence[Result], plan: Mapping[str, Any], places: Places
+) -> tuple[list[Line], list[Row]]:
+    """Return the lines and rows of the results."""
+    lines, rows = lines_of(results, plan), rows_of(results, plan)
+    if not rows:
+        raise InputError(
+            f"{places.results}: holds no scores of hover, oracle, admittance and ratio; "
+            "windwrench leaderboard --train --only designed makes them"
+        )
+    return lines, rows
+
+
+def _scenarios(rows: Sequence[Row], plan: Mapping[str, Any]) -> list[str]:
+    """Return the worlds that are plain scenarios."""
+    worlds = dict.fromkeys(row.world for row in rows)
+    return [world for world in worlds if plan["worlds"][world] == {"scenario": world}]
 
 
 def _middle_policy(rows: Sequence[Row], name: str, places: Places) -> Path | None:

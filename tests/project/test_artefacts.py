@@ -85,6 +85,8 @@ def test_every_picture_and_data_file_is_used(tracked):
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
         if "://" not in target
     }
+    site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    linked |= {ROOT / "docs" / name for name in re.findall(r"[\w/]+\.css", site)}
     folders = {ROOT / "docs" / "results" / "learning"}  # `windwrench leaderboard` reads it
     text = (ROOT / "commands" / "from_checkout.py").read_text(encoding="utf-8")
     assert all(f'Path("{folder.relative_to(ROOT).as_posix()}")' in text for folder in folders)

@@ -1,0 +1,187 @@
+"""The pages that are made of kept results, made again from these alone."""
+
+import difflib
+import gzip
+import json
+import re
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from windwrench.runtime.provenance import made_by
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def kept(name: str) -> Any:
+    """Return what a results file below docs/ holds."""
+    path = DOCS / name
+    data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    return json.loads(data)
+
+
+def _written(name: str, write: Callable[[Any, Path, Path], Any], data: str) -> str:
+    """Return what ``write(result, file of the results, page)`` writes, in a folder of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / f"{name}.md"
+        results = Path(folder) / data
+        results.parent.mkdir()
+        write(kept(data), results, page)
+        return page.read_text(encoding="utf-8")
+
+
+def _between_marks(name: str, tables: str) -> str:
+    """Return a page with its tables made anew."""
+    from windwrench.studies.page_tables import put_between
+
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / f"{name}.md"
+        page.write_bytes((DOCS / f"{name}.md").read_bytes())
+        put_between(tables, page)
+        return page.read_text(encoding="utf-8")
+
+
+def _export_c() -> str:
+    from windwrench.studies.export_c.page import write_page
+
+    return _written("export-c", write_page, "export-c/results.json")
+
+
+def _faults() -> str:
+    from windwrench.studies.faults.page import write_page
+
+    return _written("faults", write_page, "faults/results.json")
+
+
+def _real_faults() -> str:
+    from windwrench.studies.real_faults.page import write_page
+
+    return _written("real-faults", write_page, "real-faults/results.json")
+
+
+def _imu() -> str:
+    from windwrench.studies.inertial.page import write_page
+
+    return _written(
+        "imu",
+        lambda result, data, page: write_page(result, data, data.with_name("rise_time.png"), page),
+        "imu/results.json",
+    )
+
+
+def _log_estimates() -> str:
+    from windwrench.studies.log_estimates.page import write_page
+
+    return _written(
+        "log-estimates",
+        lambda result, data, page: write_page(result, data, data.with_name("errors.png"), page),
+        "log-estimates/results.json",
+    )
+
+
+def _real_flights() -> str:
+    from windwrench.studies.measured_flights.measured_flights import page
+
+    return page(kept("real-flights/real_flights.json"), "real-flights")
+
+
+def _trials() -> str:
+    from windwrench.studies.trials.page import page_text
+    from windwrench.studies.trials.scores import judge
+
+    found = kept("diagnosis-trials/trials.json.gz")
+    judged = [one for outcome in found["trials"] for one in judge(outcome)]
+    made = made_by(
+        f"windwrench trials --seed {found['seed']} --seeds {found['seeds']}",
+        [found["commit"]],
+        found["version"],
+    )
+    return page_text(found["trials"], judged, made, "diagnosis-trials")
+
+
+def _close_loop() -> str:
+    from windwrench.studies.closed_loop.page import write_page
+
+    text = (DOCS / "close-loop.md").read_text(encoding="utf-8")
+    names = [path.name for path in (DOCS / "close-loop").glob("*.json")]
+    names.sort(key=lambda name: text.index(f"/{name})"))  # in the order of the flights
+    results = [kept(f"close-loop/{name}") for name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "close-loop.md"
+        write_page(results, page.with_suffix(""), page)
+        return page.read_text(encoding="utf-8")
+
+
+def _fleets() -> str:
+    from windwrench.studies.fleet.page import write_page
+
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "fleets.md"
+        page.write_bytes((DOCS / "fleets.md").read_bytes())
+        write_page(kept("fleets/study.json"), DOCS / "fleets", page)
+        return page.read_text(encoding="utf-8")
+
+
+def _leaderboard() -> str:
+    from windwrench.studies.learning.leaderboard_page import page_text
+    from windwrench.studies.learning.study import Places, load_plan, read_results
+
+    root = DOCS.parent
+    places = Places(root, DOCS / "results" / "learning", root / "training" / "policies")
+    return page_text(read_results(places), load_plan(), places, "leaderboard")
+
+
+def _filtered_logs() -> str:
+    from windwrench.studies.filtered_logs.page import tables
+
+    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json")))
+
+
+def _imu_logs() -> str:
+    from windwrench.studies.imu_logs.page import tables
+
+    return _between_marks("imu-logs", tables(kept("imu-logs/imu_logs.json")))
+
+
+def _identify() -> str:
+    from windwrench.studies.identified_vehicles.page import tables
+
+    return _between_marks("identify", tables(kept("identify/identified_vehicles.json")))
+
+
+# made by results whose sentences have other words by now: their numbers are compared
+NUMBERS_ALONE = ("diagnosis-trials",)
+NUMBER = re.compile(r"(?<![\w.])[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
+PAGES: Mapping[str, Callable[[], str]] = {
+    "diagnosis-trials": _trials,
+    "leaderboard": _leaderboard,
+    "close-loop": _close_loop,
+    "fleets": _fleets,
+    "real-flights": _real_flights,
+    "real-faults": _real_faults,
+    "imu-logs": _imu_logs,
+    "filtered-logs": _filtered_logs,
+    "identify": _identify,
+    "log-estimates": _log_estimates,
+    "imu": _imu,
+    "faults": _faults,
+    "export-c": _export_c,
+}
+
+
+def differing_lines(name: str) -> list[str]:
+    """Return the lines of a page that its results do not give, or give otherwise.
+
+    Args:
+        name: one of ``PAGES``. The line that says what made the page is left out: its commit is
+            that of the results.
+    """
+
+    def lines(text: str) -> list[str]:
+        found = [line for line in text.splitlines() if not line.startswith("Made by `")]
+        return [" ".join(NUMBER.findall(x)) for x in found] if name in NUMBERS_ALONE else found
+
+    page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    found = difflib.unified_diff(lines(PAGES[name]()), lines(page), "results", "page", n=0)
+    return [line for line in found if line[0] in "+-" and not line.startswith(("+++", "---"))]

@@ -1,0 +1,92 @@
+"""Every page that is made of kept results says what they say, and figures in prose are those of
+results.
+"""
+
+import json
+
+import pytest
+
+from tests.support.paths import ROOT
+from windwrench.studies.numbers import quotes as quoting
+from windwrench.studies.numbers import rendering
+from windwrench.studies.numbers.staleness import in_a_checkout, missing_sources, remarks
+
+SLOW = {"leaderboard", "diagnosis-trials"}  # bootstraps thousands of episodes, judges 768 diagnoses
+QUOTES, NOT_RESULTS = quoting.read_quotes()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in rendering.PAGES],
+)
+def test_a_page_holds_what_its_results_say(name):
+    assert rendering.differing_lines(name) == []
+
+
+def test_a_number_that_is_changed_on_a_page_is_seen(tmp_path, monkeypatch):
+    text = (rendering.DOCS / "faults.md").read_text(encoding="utf-8")
+    row = next(line for line in text.splitlines() if line.startswith("| ") and "0" in line)
+    changed = row.replace("0", "1", 1)
+    (tmp_path / "faults").mkdir()
+    for name in ("faults.md", "faults/results.json"):
+        (tmp_path / name).write_bytes((rendering.DOCS / name).read_bytes())
+    (tmp_path / "faults.md").write_text(text.replace(row, changed), encoding="utf-8")
+    monkeypatch.setattr(rendering, "DOCS", tmp_path)
+    assert rendering.differing_lines("faults") == [f"-{row}", f"+{changed}"]
+
+
+def test_every_page_with_kept_results_is_made_again_from_them():
+    """But those whose tables the paper's, the tasks' and the speed's own commands write."""
+    others = {"reproduction", "live", "map-guesses", "results"}
+    kept = {path.parent.name for path in (ROOT / "docs").glob("*/*.json*")}
+    assert kept - others <= set(rendering.PAGES)
+
+
+def test_figures_in_prose_are_those_of_their_results():
+    assert quoting.wrong_quotes(QUOTES) == []
+    assert len({quote.page for quote in QUOTES}) > 1
+
+
+@pytest.mark.parametrize("page", NOT_RESULTS)
+def test_every_number_in_prose_has_a_source(page):
+    assert quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page]) == []
+
+
+def test_an_exception_that_is_not_needed_goes():
+    for page, passages in NOT_RESULTS.items():
+        text = quoting.prose((ROOT / page).read_text(encoding="utf-8"))
+        assert [passage for passage in passages if passage not in text] == []
+
+
+def test_a_figure_without_a_source_and_a_wrong_one_are_seen():
+    page, said = QUOTES[0].page, QUOTES[0].says
+    text = (ROOT / page).read_text(encoding="utf-8") + "\nIt is 17 % better.\n"
+    found = quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page], text)
+    assert len(found) == 1
+    assert "It is 17 % better." in found[0]
+    wrong = quoting.Quote(page, said + " of 1000", ())
+    assert quoting.wrong_quotes([wrong]) == [f"{page}: expected {wrong.says!r}"]
+
+
+def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
+    value = {"from": "docs/results/leaderboard.json", "where": {"controller": "none"}, "key": "x"}
+    listed = {
+        "quotes": {"README.md": [{"says": "{}", "values": [value]}]},
+        "not results": {},
+    }
+    path = tmp_path / "quotes.yaml"
+    path.write_text(json.dumps(listed), encoding="utf-8")
+    with pytest.raises(LookupError, match="0 rows with"):
+        quoting.read_quotes(path)
+
+
+def test_modules_that_pages_name_are_there():
+    assert missing_sources() == []
+
+
+def test_old_pages_are_listed_with_what_changed():
+    if not in_a_checkout():
+        pytest.skip("needs a checkout: its history says what changed")
+    for remark in remarks():
+        assert (ROOT / remark.page).exists()
+        assert remark.why
