@@ -255,9 +255,11 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
         define("WEIGHT", 0.5 / (N + NOISE + kappa), "of a sigma point")
     if estimator == "constant-gain":
         define("LONGEST_GAP", _LONGEST_GAP, "s that the constant gain coasts over")
-        array("gain", f["gain"], "facing along x")
-        array("information", f["information"], "inverse covariance of the innovation")
-        array("converged", f["converged"][np.tril_indices(N)], "covariance, lower half, by rows")
+        array(
+            "converged",
+            f["converged"][np.tril_indices(N)],
+            "covariance after a correction, facing along x; lower half, by rows",
+        )
     else:
         first = np.diag(default_covariance(made.vehicle, made.tuning))
         array("first_variance", first, "after ww_init")
