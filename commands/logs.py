@@ -7,7 +7,7 @@ import sys
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -35,8 +35,10 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
+    from ..envs.replay import Flight
     from ..identification.findings import Diagnosis
     from ..identification.logs.flight_log import FlightLog
+    from ..identification.wrench_series import WrenchSeries
 
 LogVehicleOption = Annotated[
     str | None,
@@ -437,6 +439,28 @@ def _rotor_faults(
     return {"rotor_faults": [fault_data(fault) for fault, _ in found]}
 
 
+def flight_to_draw(
+    log: "FlightLog", model: "Vehicle", progress: Callable[[float], None] = lambda share: None
+) -> tuple["Flight", "WrenchSeries"]:
+    """Return what ``replay`` draws of a log, and the estimate behind it: where motion capture lost
+    the vehicle, the filter's own pose goes on.
+    """
+    from ..envs.replay import Flight
+    from ..identification.wrench_series import estimate_log
+
+    series = estimate_log(log, model, report=progress)
+    drawn = Flight(
+        series.t,
+        series.position,
+        series.quaternion,
+        series.force,
+        series.torque,
+        log.force,
+        log.torque,
+    )
+    return drawn, series
+
+
 def replay(
     log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
     reader: ReaderOption = None,
@@ -474,9 +498,8 @@ def replay(
     import numpy as np
 
     from ..envs.drawing import Viewer
-    from ..envs.replay import Flight, pictures
+    from ..envs.replay import pictures
     from ..envs.video import FPS, Film, save_picture
-    from ..identification.wrench_series import estimate_log
 
     (flight,), model = _read([log], reader, vehicle, map)
     length = float(flight.t[-1] - flight.t[0])
@@ -486,7 +509,7 @@ def replay(
         )
     folder = results_folder(out)
     with working("estimating") as progress:
-        series = estimate_log(flight, model, report=progress)
+        whole, series = flight_to_draw(flight, model, progress)
     shown = np.flatnonzero(
         (flight.t - flight.t[0] >= begin) & (flight.t - flight.t[0] <= begin + film_seconds)
     )
@@ -495,16 +518,6 @@ def replay(
             f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected a "
             f"longer duration"
         )
-    # where motion capture lost the vehicle, the filter's own pose goes on
-    whole = Flight(
-        series.t,
-        series.position,
-        series.quaternion,
-        series.force,
-        series.torque,
-        flight.force,
-        flight.torque,
-    )
     part = whole.part(shown)
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     written, last = [], None

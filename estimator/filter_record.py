@@ -54,6 +54,7 @@ FILTER = np.dtype(
         ("doubted", "f8", (7,)),  # and those refused last
         ("refused", "f8"),  # measurements in a row
         ("lasting", "f8"),  # s for which those refused have agreed with each other
+        ("returning", "f8"),  # 1: the last of them left those before, and is as likely as any
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made

@@ -217,14 +217,11 @@ def _forget_mass(f: Record, P: Array, first: Array, learned: Array) -> None:
             P[i, j] -= P[i, N] * P[j, N] / variance
     for i in range(N):
         P[i, N], P[N, i] = 0.0, 0.0
-    # force per mass at one acceleration: that and gravity
-    share = np.zeros(3)
-    if f.status == RESTARTED:  # an acceleration that was contradicted
-        share[2] = f.body.gravity
-    else:
-        for i in range(3):
-            thrust = f.centre_rotation[i, 2] * f.rotor_wrench[0]
-            share[i] = (thrust + f.effect_wrench[i] + f.x[_FORCE + i]) / f.body.mass
+    # force per mass at one acceleration: gravity alone. What the estimated acceleration was when it
+    # was contradicted says nothing of the one that is flown from now on, and a force that is known
+    # for another one would, with the next samples, tell a mass that nothing has shown. Nor does it
+    # say that the force is right for any mass: it is doubted by as much on its own
+    share = np.array([0.0, 0.0, f.body.gravity])
     for i in range(3):
         force = f.x[_FORCE + i] + share[i] * (first[0] - f.body.mass)
         if f.status == RESTARTED and force * force > f.reason[3 + i]:
@@ -232,6 +229,7 @@ def _forget_mass(f: Record, P: Array, first: Array, learned: Array) -> None:
         f.x[_FORCE + i] = force
         P[_FORCE_ROW + i, N] = share[i] * first[1]
         P[N, _FORCE_ROW + i] = P[_FORCE_ROW + i, N]
+        P[_FORCE_ROW + i, _FORCE_ROW + i] += share[2] * share[2] * first[1]
         for j in range(3):
             P[_FORCE_ROW + i, _FORCE_ROW + j] += share[i] * share[j] * first[1]
     f.body.mass = first[0]

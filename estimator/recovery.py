@@ -8,7 +8,9 @@ by what each of them breaks:
 * A *gap* makes the covariance grow. What is not known better than nothing is *lost*: pose and twist
   are then held, with a prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: it is far from what the filter expects and from the pose just
-  before it, by more than a vehicle can move in the time. A gate refuses it.
+  before it, by more than a vehicle can move in the time. A gate refuses it, and what goes on from
+  it: a filter that has not seen for a while would else take those for likely. After several in a
+  row a pose is believed again once the next one goes on from it.
 * A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
   is continuous, and the wrench is wrong. It is taken in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
@@ -254,11 +256,20 @@ def judge(
     jumped = choose(alarming, choose(pushed, 0.0, 1.0), 0.0)
     aliased = with_attitude & turns_between(f)
     contradicted = alarming & (pushed & ((nis > f.restart_at) | aliased))
-    refused = choose(lost, 0.0, jumped)
     if f.gated > 0:
         agreed = continues(
             f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
         )
+        # likely in itself, after others that were refused: one of those, or back from them?
+        likely = choose(taken, 1.0, 0.0) * choose(alarming, 0.0, 1.0) * choose(first, 0.0, 1.0)
+        among = choose(
+            _nearer_to_doubted(f, position, quaternion, with_position, with_attitude), 1.0, 0.0
+        )
+        back = choose(f.refused < 1.5, 1.0 - among, choose(agreed, f.returning, 0.0))
+        jumped = jumped + likely * (1.0 - back)
+        f.returning = likely * (1.0 - among)
+    refused = choose(lost, 0.0, jumped)
+    if f.gated > 0:
         lasting = choose(first, 0.0, choose(agreed, f.lasting + gap[2], 0.0))
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
         for i in range(3):
@@ -287,6 +298,28 @@ def judge(
     remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)
     plain: bool = taken & (choose(restarted, 1.0, refused) < 0.5)
     return plain
+
+
+@compiled
+def _nearer_to_doubted(
+    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+) -> bool:
+    """Return whether a pose lies nearer to where the refused ones went on to than to the predicted
+    one, in the measurement's standard deviations.
+    """
+    x, error = f.x, f.mean
+    attitude_error(quaternion, f.doubted[3:7], error[0:3])
+    attitude_error(quaternion, x[3:7], error[3:6])
+    nearer = choose(with_position, 0.0, 0.0)
+    for i in range(3):
+        gained = (error[3 + i] * error[3 + i] - error[i] * error[i]) / f.noise[i]
+        nearer += choose(with_attitude, gained, 0.0)
+        predicted = position[i] - x[i]
+        doubted = position[i] - f.doubted[i] - f.gap[2] * x[7 + i]
+        gained = (predicted * predicted - doubted * doubted) / f.noise[3 + i]
+        nearer += choose(with_position, gained, 0.0)
+    among: bool = nearer > 0.0
+    return among
 
 
 @compiled

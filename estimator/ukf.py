@@ -212,7 +212,7 @@ def believable(
     alarm, gap = f.alarm, f.gap
     alarming = taken & (nis > choose(with_position & with_attitude, alarm[1], alarm[0]))
     late = (with_position & (gap[0] > f.patience)) | (with_attitude & (gap[1] > f.patience))
-    if any_of(alarming | late):
+    if any_of(alarming | late | (f.refused > 0.5)):
         taken = judge(f, position, quaternion, with_position, with_attitude, nis, alarming)
     f.status = choose(taken, TRACKING, f.status)
     remember(f, position, quaternion, taken & with_position, taken & with_attitude)
@@ -448,7 +448,7 @@ class WrenchUKF:
         reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
-        for name in ("status", "restarts", "gap", "refused", "lasting"):
+        for name in ("status", "restarts", "gap", "refused", "lasting", "returning"):
             f[name] = 0.0
         f["seen"] = f["x"][:7]
 

@@ -30,6 +30,7 @@ _KEPT = (  # what a filter must not forget from one step to the next
     "doubted",
     "refused",
     "lasting",
+    "returning",
 )
 _SHARED = (
     "body",
@@ -117,6 +118,7 @@ def _move_estimate(source: Record, target: Record) -> None:
         target.gap[i] = source.gap[i]
     target.status, target.restarts = source.status, source.restarts
     target.refused, target.lasting = source.refused, source.lasting
+    target.returning = source.returning
 
 
 @compiled_without_gil

@@ -14,7 +14,7 @@ decides nothing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import permutations
+from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ _BAD = 0.5  # share left unexplained from which on the log as declared fits badl
 _CONTRADICTS = 1.2  # share of one torque alone that does, be the two others right
 _GOOD_FORCE, _GOOD = 0.5, 0.4  # shares of force and of torque up to which another reading fits well
 _CLEAR = 0.5  # of the share as declared: leaving less is a clear win
+# share of the force as declared, and of that share what another reading leaves at most, where the
+# win is decisive: undeclared effects may leave the first, and cannot undo nine tenths of it
+_SOME_FORCE, _DECISIVE = 0.2, 0.1
 _WORSE = 0.15  # share by which another reading may be worse in the other balance
 _WORST = 2.0  # a share beyond says no more
 # a share as declared beyond it cannot be made worse: rotor speeds from commands leave such torques
@@ -300,6 +303,40 @@ POSE_READINGS = (
     ),
 )
 
+
+def _axes_readings() -> tuple[Reading, ...]:
+    """Return what is left of the 48 ways in which the columns px, py, pz may lie along the axes of
+    the attitude's world, or against them.
+    """
+    plain = Reading("", "")
+    named = [plain.position] + [
+        reading.position
+        for reading in POSE_READINGS
+        if replace(reading, position=_I, kind="", says="") == replace(plain, position=_I)
+    ]
+    out = []
+    for columns in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            turn = np.diag(signs) @ _I[list(columns)]
+            if any(np.array_equal(turn, other) for other in named):
+                continue
+            axes = ", ".join(
+                f"{'-' if sign < 0 else ''}p{'xyz'[column]}"
+                for sign, column in zip(signs, columns, strict=True)
+            )
+            out.append(
+                Reading(
+                    "position along other axes",
+                    "px, py, pz lie along other axes than the attitude's world; expected both in "
+                    f"one world frame: p = ({axes})",
+                    position=turn,
+                )
+            )
+    return tuple(out)
+
+
+AXES_READINGS = _axes_readings()  # less usual than the others
+
 # rotors (1 front-left, 2 rear-left, 3 rear-right, 4 front-right) in the order in which others count
 # them
 _KNOWN_ORDERS = {
@@ -481,6 +518,17 @@ class Balances:
             upright,
         )
 
+    def fit_position(self, declared: Fit, reading: Reading) -> Fit:
+        """Return the fit of a reading of the position alone; other shares are as declared."""
+        motion = self.motion()
+        force = motion.acceleration @ reading.position.T  # shares know no mean, nor gravity
+        thrust = motion.thrust_frame[:, :, 2]
+        return replace(
+            declared,
+            force=_share(force, thrust, _FORCE_GAIN),
+            vertical=_share(force[:, 2:], thrust[:, 2:], _FORCE_GAIN),
+        )
+
     def needed_torque(self, reading: Reading) -> Array:
         """Return the torque (n, 3) in Nm, body, that the motion needs."""
         motion = self.motion(reading.quaternion)
@@ -651,6 +699,7 @@ def recognise(balances: Balances) -> tuple[Reading, ...]:
         (reading, replace(declared, torques=balances.torques(needed, reading)))
         for reading in ROTOR_READINGS
     ]
+    fits += [(reading, balances.fit_position(declared, reading)) for reading in AXES_READINGS]
     winners = [(reading, fit) for reading, fit in fits if _wins(fit, declared)]
     if any(_only_mirrored(reading) for reading, _ in winners):
         pulled = balances.pulled_back(needed)
@@ -667,6 +716,8 @@ def recognise(balances: Balances) -> tuple[Reading, ...]:
 
     limit = _TIE[0] * min(left(fit) for _, fit in winners) + _TIE[1]
     alike = [reading for reading, fit in winners if left(fit) <= limit]
+    # the usual readings first
+    alike = [reading for reading in alike if reading not in AXES_READINGS] or alike
     # a vehicle seldom flies below its origin
     above = [reading for reading in alike if (reading.position[2, 2] < 0) == (balances.height < 0)]
     return tuple(above if above else alike)
@@ -712,6 +763,7 @@ def _wins(fit: Fit, declared: Fit) -> bool:
     if declared.upright < _NOT_UPRIGHT and fit.force <= _BAD:
         return True
     by_force = declared.force >= _BAD and fit.force <= min(_GOOD_FORCE, _CLEAR * declared.force)
+    by_force |= declared.force >= _SOME_FORCE and fit.force <= _DECISIVE * declared.force
     by_height = declared.vertical >= _UPSIDE_DOWN and fit.vertical <= _GOOD
     contradicted = declared.torque >= _BAD or max(declared.torques) >= _CONTRADICTS
     by_torque = (

@@ -21,7 +21,7 @@ from ...dynamics.effects.base import PARAMETERS, ROTORS_SIZE, STATE_SIZE, Effect
 from ...dynamics.motion import LONG_TURN
 from ...dynamics.vehicle import Vehicle
 from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, WrenchUKF
-from ...estimator.constant_gain import _LONGEST_GAP
+from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
@@ -255,9 +255,12 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
         define("WEIGHT", 0.5 / (N + NOISE + kappa), "of a sigma point")
     if estimator == "constant-gain":
         define("LONGEST_GAP", _LONGEST_GAP, "s that the constant gain coasts over")
-        array("gain", f["gain"], "facing along x")
-        array("information", f["information"], "inverse covariance of the innovation")
-        array("converged", f["converged"][np.tril_indices(N)], "covariance, lower half, by rows")
+        define("NEAR", _NEAR, "of the converged variances: converged again")
+        array(
+            "converged",
+            f["converged"][np.tril_indices(N)],
+            "covariance after a correction, facing along x; lower half, by rows",
+        )
     else:
         first = np.diag(default_covariance(made.vehicle, made.tuning))
         array("first_variance", first, "after ww_init")

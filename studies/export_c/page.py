@@ -26,10 +26,9 @@ def _agreement(rows: list[Mapping[str, Any]]) -> list[str]:
         "|---|---|" + "---:|" * (len(PARTS) + 3),
     ]
     for row in rows:
-        flight = row["flight"] + ("" if row["faults"] else " (without faults)")
         cells = [_percent(row[p]) for p in (*PARTS, "std")]
         out.append(
-            f"| {row['estimator']} | {flight} | {' | '.join(cells)} | {row['restarts']:.0f} "
+            f"| {row['estimator']} | {row['flight']} | {' | '.join(cells)} | {row['restarts']:.0f} "
             f"| {_percent(row['over'])} |"
         )
     return out
@@ -118,11 +117,12 @@ def _lines(result: Result, data: Path) -> list[str]:
         f"* **Now and then C and Python decide differently.** On {len(apart)} of "
         f"{len(result['agreement'])} flights below some estimate differed by more than 1 % of its "
         f"standard deviation, in at most {_percent(max(row['over'] for row in result['agreement']))} "
-        f"% of a flight's steps; the most was {_percent(worst)} %. Two things do that: a NIS so near "
-        "to the gate that the constant gain gives way a step sooner or later, and an attitude that is "
-        "not measured for so long (0.6 rad of standard deviation) that sigma points lie half a turn "
-        "apart, where rounding grows from step to step. Both filters agree again once poses are whole. "
-        "Statuses and counts of restarts "
+        f"% of a flight's steps; the most was {_percent(worst)} %. Two things do that: rounding "
+        "decides when the covariance of a restarted filter is near enough to the converged one for the "
+        "constant gain to take over, and in brisk flight, where the covariance follows the attitude, "
+        "that may be seconds apart; and an attitude that is not measured for so long (0.6 rad of "
+        "standard deviation) that rounding grows from step to step. Both filters agree again once "
+        "poses are whole. Statuses and counts of restarts "
         + ("never differed." if not other else f"differed on {other:.0f} flights."),
         size,
         f"* **Its memory is {small['ram']:,} bytes, but its stack is {small['stack_with_faults']:,} "
@@ -147,11 +147,6 @@ def _lines(result: Result, data: Path) -> list[str]:
         "sum of single-precision steps is not exact.",
         "* Positions are single precision: 100 m from the origin a step of the number is 8 um. Keep "
         "the origin where the vehicle flies.",
-        "* The constant gain with declared effects carries its covariance over a gap with them; the "
-        "Python one leaves them out, and its standard deviations are some 10 % larger for a while. "
-        "That flight is compared without faults.",
-        "* The first gyro sample counts with its bias in doubt, also where no prediction came right "
-        "before it; in Python it then counts as if it had none.",
         "",
         "## How to call it",
         "",

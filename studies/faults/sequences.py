@@ -90,10 +90,13 @@ class Flight:
         """Raise AssertionError where a number is not finite or the covariance is no covariance."""
         assert np.isfinite(estimate.state[:19]).all()
         P = estimate.covariance
-        scale = 1.0 / np.sqrt(np.diag(P))
         assert np.isfinite(P).all()
         # of the correlations: variances of 1e-9 and 1e4 stand side by side
-        assert np.linalg.eigvalsh(P * scale[:, None] * scale)[0] > 0.0
+        scale = 1.0 / np.sqrt(np.diag(P))
+        try:
+            np.linalg.cholesky(P * scale[:, None] * scale)
+        except np.linalg.LinAlgError as error:
+            raise AssertionError("the covariance is not positive definite") from error
 
     def suffer(self, kind: str, samples: int, size: float, seed: int) -> None:
         """Feed one fault."""

@@ -3,12 +3,14 @@
 import time
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest
 
 from windwrench import __version__
+from windwrench.runtime.code_digest import code_digest
 from windwrench.runtime.provenance import commit
 from windwrench.studies.faults.sequences import (
     FILTERS,
@@ -24,9 +26,11 @@ from windwrench.studies.faults.sequences import (
     Flight,
     outcome,
 )
+from windwrench.studies.resumed_tasks import Task, run_tasks
 
 Result = dict[str, Any]
 
+_OWN = ("studies/faults/sequences.py", "studies/faults/study.py")  # code of this study
 PERIOD = 0.005  # s, of the long flight
 LONGEST = 60.0  # s, of a fault in it
 
@@ -123,21 +127,30 @@ def soak(kind: str, steps: int, seed: int, progress: Callable[[float], None]) ->
     }
 
 
-def run(count: int, steps: int, seed: int, progress: Callable[[str, float], None]) -> Result:
-    """Return everything that the page says."""
+def part(stamp: str, what: str, kind: str, size: int, seed: int) -> Result:
+    """Return one estimator's outcome of ``sequences`` or of ``soak``; ``stamp`` names the code."""
+    return (soak if what == "soak" else sequences)(kind, size, seed, lambda share: None)
+
+
+def run(count: int, steps: int, seed: int, folder: Path, jobs: int = 1) -> Result:
+    """Return everything that the page says; what is done is kept in the folder's ``parts.jsonl``,
+    and done again only by other code.
+    """
+    stamp = code_digest(("runtime", "dynamics", "estimator"), _OWN)
+    wanted: list[Task] = [
+        (stamp, what, kind, size, seed)
+        for what, size in (("soak", steps), ("sequences", count))
+        for kind in FILTERS
+    ]
     made = commit()
+    done = run_tasks(part, wanted, folder / "parts.jsonl", jobs)
     return {
         "commit": made,
         "version": __version__,
         "count": count,
         "steps": steps,
         "seed": seed,
-        "sequences": [
-            sequences(kind, count, seed, lambda share, kind=kind: progress(kind, share))  # type: ignore[misc]
-            for kind in FILTERS
-        ],
-        "soak": [
-            soak(kind, steps, seed, lambda share, kind=kind: progress(f"{kind}, long", share))  # type: ignore[misc]
-            for kind in FILTERS
-        ],
+    } | {
+        what: [found for task, found in done.items() if task[1] == what]
+        for what in ("sequences", "soak")
     }

@@ -3,9 +3,9 @@ says so.
 
 ``python -m tests.fuzz.answers --flights 60 --seed 0`` spoils flights of 20 s by what loggers and
 people do: rotors swapped, units, clocks, signs, frames, columns, samples that are lost, frozen or
-jump. Each spoiled log goes through ``estimate`` (that is what ``replay`` shows) or ``diagnose``.
-It must be refused, or carry a note that names the fault, or give the answer of the log that was not
-spoiled; anything else is a wrong answer given calmly.
+jump. Each spoiled log goes through ``estimate``, through ``replay`` up to what it draws, or through
+``diagnose``. It must be refused, or carry a note that names the fault, or give the answer of the
+log that was not spoiled; anything else is a wrong answer given calmly.
 """
 
 import argparse
@@ -21,11 +21,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import binomtest
 
+from windwrench.commands.logs import flight_to_draw
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import parse_setting
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.envs.recording import record_flight
+from windwrench.envs.replay import arrow_scales
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.wrench_series import WrenchSeries, estimate_log
@@ -250,10 +252,6 @@ def flight(number: int) -> FlightLog:
     return FlightLog(**recorded, name="flight", source="flight.csv")
 
 
-def _numbers(series: WrenchSeries) -> tuple[Array, Array, Array]:
-    return series.t, series.force, series.torque
-
-
 @cache
 def _clean_estimate(number: int) -> WrenchSeries:
     with warnings.catch_warnings():
@@ -261,16 +259,17 @@ def _clean_estimate(number: int) -> WrenchSeries:
         return estimate_log(flight(number), vehicle())
 
 
-def _same_estimate(series: WrenchSeries, number: int) -> bool:
+def _same_wrench(
+    t: Array, force: Array, torque: Array, status: NDArray[np.int64], number: int
+) -> bool:
     """Return whether the wrench is that of the flight that was not spoiled, but where it says
     itself that it does not know (rows that were not tracked, and a rise time after them).
     """
-    t, force, torque = _numbers(series)
     clean = _clean_estimate(number)
     sure = t - t[0] > _SETTLED
-    for row in np.flatnonzero(series.status == 3):
+    for row in np.flatnonzero(status == 3):
         sure &= (t < t[row]) | (t > t[row] + _SETTLED)
-    sure &= series.status != 1
+    sure &= status != 1
     sure &= (t >= clean.t[0]) & (t <= clean.t[-1])
     if sure.sum() < 100:
         return False
@@ -302,9 +301,31 @@ def estimate_of(number: int, fault: Fault, seed: int) -> tuple[str, str]:
             series = estimate_log(fault.spoil(flight(number), rng), vehicle())
         except InputError as error:
             return "refused", str(error)
+    return _judged(series, series.force, series.torque, number, fault)
+
+
+def replay_of(number: int, fault: Fault, seed: int) -> tuple[str, str]:
+    """Return the same of one that is replayed: the wrench is that of the arrows."""
+    rng = np.random.default_rng([seed, number, 2])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            drawn, series = flight_to_draw(fault.spoil(flight(number), rng), vehicle())
+        except InputError as error:
+            return "refused", str(error)
+    arrows = arrow_scales(drawn, vehicle().arm_l)
+    shown = np.column_stack([drawn.position, drawn.quaternion, drawn.force, drawn.torque])
+    if not (np.isfinite(shown).all() and np.isfinite(arrows).all()):
+        return "wrong", "what is drawn is not finite"
+    return _judged(series, drawn.force, drawn.torque, number, fault)
+
+
+def _judged(
+    series: WrenchSeries, force: Array, torque: Array, number: int, fault: Fault
+) -> tuple[str, str]:
     if _names_it(series.notes, _clean_estimate(number).notes, fault):
         return "noted", "; ".join(series.notes)
-    if _same_estimate(series, number):
+    if _same_wrench(series.t, force, torque, series.status, number):
         return "same", ""
     return "wrong", "; ".join(series.notes)
 
@@ -343,23 +364,22 @@ def main() -> int:
     parser.add_argument("--diagnoses", type=int, default=0, help="spoiled logs that are diagnosed")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    total: Counter[str] = Counter()
-    print("| fault | refused | noted | same | wrong |\n| --- | ---: | ---: | ---: | ---: |")
-    for fault in FAULTS:
-        row: Counter[str] = Counter()
-        for number in range(given.flights):
-            outcome, words = estimate_of(number, fault, given.seed)
-            row[outcome] += 1
-            if outcome == "wrong":
-                print(f"estimate, flight {number}, {fault.name}: {words}", file=sys.stderr)
-        total.update(row)
+    for what, outcome_of in (("estimate", estimate_of), ("replay", replay_of)):
+        total: Counter[str] = Counter()
         print(
-            f"| {fault.name} | "
-            + " | ".join(str(row[k]) for k in ("refused", "noted", "same", "wrong"))
-            + " |",
-            flush=True,
+            f"| {what} of | refused | noted | same | wrong |\n| --- | ---: | ---: | ---: | ---: |"
         )
-    _sum_up("estimates", total)
+        for fault in FAULTS:
+            row: Counter[str] = Counter()
+            for number in range(given.flights):
+                outcome, words = outcome_of(number, fault, given.seed)
+                row[outcome] += 1
+                if outcome == "wrong":
+                    print(f"{what}, flight {number}, {fault.name}: {words}", file=sys.stderr)
+            total.update(row)
+            counts = " | ".join(str(row[k]) for k in ("refused", "noted", "same", "wrong"))
+            print(f"| {fault.name} | {counts} |", flush=True)
+        _sum_up(f"spoiled flights by {what}", total)
     asked: Counter[str] = Counter()
     for number in range(given.diagnoses):
         fault = FAULTS[number % len(FAULTS)]
@@ -368,7 +388,7 @@ def main() -> int:
         if outcome == "wrong":
             print(f"diagnose, flight {number % 4}, {fault.name}: {words}", file=sys.stderr)
     if given.diagnoses:
-        _sum_up("diagnoses", asked)
+        _sum_up("spoiled flights by diagnose", asked)
     return 0
 
 

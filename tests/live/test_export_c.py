@@ -43,9 +43,6 @@ def assert_same(worst):
         assert name in ("restarts", "over") or value < LARGEST, (name, worst)
 
 
-# the Python constant gain carries its covariance over a gap without declared effects, C with them:
-# there the two are compared without gaps
-WITHOUT_FAULTS = ("constant-gain", "ardrone2, four effects")
 COMBINATIONS = [(estimator, name) for estimator in ESTIMATORS for name in FLIGHTS]
 
 
@@ -56,7 +53,7 @@ COMBINATIONS = [(estimator, name) for estimator in ESTIMATORS for name in FLIGHT
 def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, tmp_path):
     needs("gcc")
     exported = export_c(vehicle_of(name), estimator)
-    flown = flight(name, QUICK, faults=(estimator, name) != WITHOUT_FAULTS)
+    flown = flight(name, QUICK)
     worst = compare(CompiledFilter(exported, tmp_path), exported.filter, flown, 10)
     assert worst["restarts"] > 0 or "brisk" not in name
     assert_same(worst)
@@ -68,7 +65,7 @@ def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
     needs("gcc")
     exported = export_c(vehicle_of(name), estimator)
     c = CompiledFilter(exported, tmp_path)
-    flown = flight(name, SLOW, seed=1, faults=(estimator, name) != WITHOUT_FAULTS)
+    flown = flight(name, SLOW, seed=1)
     worst = compare(c, exported.filter, flown, 4)
     assert worst["status"] == 0.0
     # now and then a NIS comes so near to a bound that the two decide differently, and agree again

@@ -265,6 +265,32 @@ def test_rotors_that_work_against_a_cord_turn_as_declared():
     assert screen_log(flown.log, flown.vehicle) == ()
 
 
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ((2, 1, 0), "px and pz are swapped"),
+        ((0, 2, 1), "py and pz are swapped"),
+        ((1, 0, 2), "px and py are swapped"),
+        ((1, 2, 0), r"p = \(pz, px, py\)"),
+        ((2, 0, 1), r"p = \(py, pz, px\)"),
+    ],
+)
+@pytest.mark.parametrize("trajectory", EXCITED)
+def test_position_columns_in_any_order_are_named(trajectory, columns, expected):
+    """Brisk motion along x alone still agrees with thrust where the two other columns are
+    exchanged.
+    """
+    log = flight(trajectory)
+    with pytest.raises(InputError, match=expected):
+        screen_log(replace(log, position=log.position[:, list(columns)]), VEHICLE)
+
+
+def test_a_mirrored_turn_of_the_position_is_named():
+    log = flight(EXCITED[0])
+    with pytest.raises(InputError, match=r"p = \(-py, -px, pz\)"):
+        screen_log(replace(log, position=log.position[:, [1, 0, 2]] * [-1.0, -1.0, 1.0]), VEHICLE)
+
+
 def test_a_negated_height_is_named():
     with pytest.raises(InputError, match="position's z points down; expected z up: negate pz"):
         screen_log(turned(flight("excite"), np.diag([1.0, 1.0, -1.0])), VEHICLE)
