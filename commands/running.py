@@ -18,7 +18,9 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from .. import __version__
+from ..runtime.compile_watch import watch
 from ..runtime.whole_files import replaced
+from .bars import show_compiling
 from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
@@ -69,6 +71,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     def command(*, as_json: bool, quiet: bool, dry_run: bool = False, **options: Any) -> None:
         run.begin(dry_run)
         console.quiet, errors.quiet = as_json or quiet, quiet
+        watch.sink = _show_compiling
         try:
             outcome: dict[str, Any] = {"result": work(**options)}
             if run.record is not None:
@@ -114,6 +117,10 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     )
     command.__annotations__ = {**work.__annotations__, **shared}
     return command
+
+
+def _show_compiling(text: str | None) -> None:
+    show_compiling(text, errors)
 
 
 def _words(value: object) -> str:

@@ -15,6 +15,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    SpinnerColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -24,6 +25,7 @@ from rich.segment import Segment
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
+from .bars import Bars
 
 
 class _Terminal(Console):
@@ -203,14 +205,15 @@ def progress_bar() -> Progress:
     """Return a bar that counts what is done and says how long the rest will take; it goes when the
     work is over.
     """
-    return Progress(
+    return Bars(
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
         TimeRemainingColumn(),
         console=errors,
-        transient=True,
-        disable=errors.quiet,
     )
 
 
@@ -218,14 +221,12 @@ def share_bars() -> Progress:
     """Return bars for shares of work between 0 and 1, with the time that is left; they go when the
     work is over.
     """
-    return Progress(
+    return Bars(
         TextColumn("{task.description:18}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
         console=errors,
-        transient=True,
-        disable=errors.quiet,
     )
 
 
@@ -249,13 +250,14 @@ def working(text: str) -> Iterator[Callable[..., None]]:
     both.
     """
     columns = (
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=errors, transient=True, disable=errors.quiet) as progress:
+    with Bars(*columns, console=errors) as progress:
         task = progress.add_task(text, total=None)
 
         def report(share: float | None = None, text: str | None = None) -> None:
