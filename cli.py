@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
+from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
@@ -75,6 +76,7 @@ def windwrench(
 
 
 _COMMANDS: tuple[Callable[..., Any], ...] = (
+    demo,
     fly,
     benchmark,
     check,

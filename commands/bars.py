@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn, TaskID
 
-from ..runtime.compile_watch import Lines
+from ..runtime.compile_watch import Lines, watch
 
 LINE_EVERY = 10.0  # s between two lines where bars cannot move
 
@@ -27,15 +27,17 @@ class Bars(Progress):
     def __init__(
         self, *columns: ProgressColumn, console: Console, every: float = LINE_EVERY
     ) -> None:
-        super().__init__(*columns, console=console, transient=True, disable=console.quiet)
+        moving = console.is_terminal and not console.quiet
+        super().__init__(*columns, console=console, transient=True, disable=not moving)
         self._every, self._over = every, threading.Event()
+        self._in_lines = not (moving or console.quiet)
         self._compiling: TaskID | None = None
 
     def start(self) -> None:
         """Show the bars."""
         super().start()
         self._open.append(self)
-        if not (self.disable or self.console.is_terminal):
+        if self._in_lines:
             self._over.clear()
             threading.Thread(target=self._write_lines, name="progress", daemon=True).start()
 
@@ -48,6 +50,8 @@ class Bars(Progress):
 
     def _write_lines(self) -> None:
         while not self._over.wait(self._every):
+            if watch.is_busy:
+                continue  # and said on lines of its own
             for task in self.tasks:
                 if not task.finished and task.id != self._compiling:
                     self.console.print(_line(task), highlight=False, markup=False, soft_wrap=True)

@@ -49,7 +49,7 @@ LogVehicleOption = Annotated[
 ]
 
 # of a diagnosis' time, where its stages begin
-_STAGES = {
+STAGES = {
     "looking at the logs": 0.0,
     "asking whether every effect is needed": 0.45,
     "asking what else it could be": 0.75,
@@ -308,7 +308,7 @@ def diagnose(
     folder = results_folder(out)
     with working("looking at the logs") as progress:
         found = run(
-            flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
+            flights, model, unseen, without or (), lambda text: progress(STAGES.get(text), text)
         )
     found = _with_rotor_faults(found, logs, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results

@@ -25,7 +25,7 @@ from rich.segment import Segment
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
-from .bars import Bars
+from .bars import LINE_EVERY, Bars
 
 
 class _Terminal(Console):
@@ -245,9 +245,9 @@ def share_bars_by_part() -> Iterator[Callable[[str, float], None]]:
 
 
 @contextmanager
-def working(text: str) -> Iterator[Callable[..., None]]:
+def working(text: str, every: float = LINE_EVERY) -> Iterator[Callable[..., None]]:
     """Show what is being done; give a function that takes the share done so far, another text, or
-    both.
+    both. Where there is no terminal a line comes ``every`` so many s.
     """
     columns = (
         SpinnerColumn(),
@@ -257,7 +257,7 @@ def working(text: str) -> Iterator[Callable[..., None]]:
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with Bars(*columns, console=errors) as progress:
+    with Bars(*columns, console=errors, every=every) as progress:
         task = progress.add_task(text, total=None)
 
         def report(share: float | None = None, text: str | None = None) -> None:

@@ -16,8 +16,8 @@ from .scene_shapes import MARKS
 Picture = NDArray[np.uint8]
 
 FPS = 12.5  # of an episode: a picture a decision
-_GIF_WIDTH = 480  # pixels
-_GIF_COLOURS = 192
+_GIF_WIDTH = 960  # pixels
+_GIF_COLOURS = 96
 _GIF_SAMPLES = 6  # pictures from which colours are chosen
 _SWATCH, _SHADES = (
     8,

@@ -54,6 +54,11 @@ class CompileWatch:
         self._begun = self._ended = 0.0
         self._told = False  # that it happens once
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is compiled now."""
+        return bool(self._names)
+
     def begin(self, name: str) -> None:
         """Note that something of this name is compiled from now on."""
         with self._lock:
