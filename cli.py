@@ -18,9 +18,10 @@ from .commands.identifying import identify
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.live import live
-from .commands.logs import diagnose, estimate, replay
+from .commands.logs import diagnose, estimate
 from .commands.output import prepare_output
 from .commands.paper import reproduce
+from .commands.replaying import replay
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name

@@ -140,8 +140,8 @@ def _tell(number: int, count: int, step: Any) -> None:
 
 def _board_command(episodes: int, seed: int, out: Path) -> str:
     return (
-        f"windwrench benchmark --controllers {','.join(_BOARD)} --episodes {episodes} --seed {seed} "
-        f"--out {out}"
+        f"windwrench benchmark --controllers {','.join(_BOARD)} --episodes {episodes} "
+        f"--seed {seed} --out {out}"
     )
 
 

@@ -66,17 +66,22 @@ def films(
     seconds: float,
     every: int = 1,
     fps: float = FPS,
+    still: str = "scene.png",
 ) -> Iterator[Callable[[Callable[[], Any], Callable[[], Caption]], None]]:
     """Give what films a decision: it takes what draws, and what tells the caption after that.
 
     Args:
-        folder: for the films ``name.gif``, ``name.mp4`` and the last picture, ``name.scene.png``.
+        folder: for the films ``name.gif`` and ``name.mp4``, and the last picture.
         name: of the films.
         kinds: ``gif``, ``mp4`` or both.
         seconds: after which nothing is filmed.
-        every: so many decisions there is a picture.
-        fps: pictures a second.
+        every: so many decisions there is a picture; a GIF alone, which is large, has half of
+            them.
+        fps: decisions a second.
+        still: ending of the last picture's name.
     """
+    every *= 2 if kinds == ["gif"] else 1
+    fps /= every
     last: list[Any] = []
     count = 0
     with ExitStack() as stack:
@@ -97,10 +102,10 @@ def films(
 
         yield add
     if last:
-        save_picture(last[0], folder / f"{name}.scene.png")
+        save_picture(last[0], folder / f"{name}.{still}")
 
 
-def written(folder: Path, name: str, kinds: list[str]) -> list[Path]:
+def written(folder: Path, name: str, kinds: list[str], still: str = "scene.png") -> list[Path]:
     """Return the paths of what was filmed."""
     made = [folder / f"{name}.{kind}" for kind in kinds]
-    return [*made, folder / f"{name}.scene.png"] if kinds else made
+    return [*made, folder / f"{name}.{still}"] if kinds else made

@@ -12,7 +12,6 @@ from .terminal import console, progress_bar, results_folder, say
 
 _DEFAULT = {"FanTracking2D": "admittance"}  # controller; else the one below
 _IN_WIND = "pid-force"
-_EVERY = {"FanTracking2D": 1}  # decisions a picture; else two
 
 
 def fly_task_once(
@@ -38,6 +37,8 @@ def fly_task_once(
     import numpy as np
 
     from ..envs.drawing import SCALES
+    from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..envs.video import FPS
     from ..envs.wind_drawing import WIND_SCALES
     from ..evaluation.pictures import draw_task_episode
     from ..evaluation.task_benchmark import check_task_request, fly_task_episode, task_of
@@ -56,11 +57,13 @@ def fly_task_once(
     )
     folder = results_folder(out)
     in_wind = task != "FanTracking2D"
+    rate = known.decisions / EPISODE_SECONDS
+    every = max(1, round(rate / FPS))
     tally = Tally("error")
     rows: list[list[float]] = []
     with (
         progress_bar() as progress,
-        films(folder, "fly", kinds, film_seconds, _EVERY.get(task, 2)) as film,
+        films(folder, "fly", kinds, film_seconds, every, rate) as film,
     ):
         bar = progress.add_task("flying", total=known.decisions)
 

@@ -17,7 +17,10 @@ from .display import need_display
 from .fan import jet_at
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 
-_TRACERS = 260
+_TRACERS = 220
+_FIELD = (
+    48.0  # degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
+)
 SCALES = (1.6, 25.0)  # m per N, m per Nm
 
 
@@ -82,6 +85,9 @@ class Viewer:
                     -22,
                 )
             else:
+                across = math.tan(math.radians(_FIELD) / 2) * 4 / 3
+                widest = across * self.height / self.width
+                model.cam_fovy[:] = math.degrees(2 * math.atan(min(widest, across * 3 / 4)))
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
         except (
             Exception

@@ -60,9 +60,9 @@ def arrow_scales(flight: Flight, arm: float) -> tuple[float, float]:
 
 def pictures(
     flight: Flight, vehicle: Vehicle, viewer: Viewer, fps: float
-) -> Iterator[NDArray[np.uint8] | None]:
-    """Yield a picture of each 1 / ``fps`` s of a flight, or show it in the viewer's window until
-    that is closed.
+) -> Iterator[tuple[int, NDArray[np.uint8] | None]]:
+    """Yield a sample's row and its picture for each 1 / ``fps`` s of a flight, or show it in the
+    viewer's window until that is closed.
 
     Raises:
         InputError: this machine cannot draw.
@@ -114,4 +114,4 @@ def pictures(
                 scene, at, flight.force[k], flight.torque[k, 2], scales, 0.22 * size, size=size
             )
 
-        yield viewer.show(data, mark, camera)
+        yield int(k), viewer.show(data, mark, camera)
