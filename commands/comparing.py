@@ -10,6 +10,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.whole_files import replaced
+from .durations import duration_words
 from .running import expensive
 from .terminal import (
     Out,
@@ -84,6 +85,7 @@ def benchmark(
         count_flights,
         fly_all,
         leaderboard,
+        sampled_seconds,
         short_names,
         write_leaderboard,
     )
@@ -97,6 +99,7 @@ def benchmark(
         scenarios=worlds,
         flights=count_flights(names, worlds, episodes),
         jobs=jobs,
+        takes=lambda: _sampled(sampled_seconds(names, worlds, episodes, jobs)),
     )
     with progress_bar() as progress:
         bar = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
@@ -146,6 +149,17 @@ def benchmark(
     )
     say(path, folder / "leaderboard.png")
     return {"leaderboard": rows}
+
+
+def _sampled(seconds: float | None) -> str | None:
+    if seconds is None:
+        return (
+            "not known: nothing is compiled yet, which takes about a minute of its own; after a "
+            "first flight a dry run can tell"
+        )
+    return (
+        f"about {duration_words(seconds)} at the present load, by 2 s of flight of each controller"
+    )
 
 
 def _task_benchmark(
