@@ -49,7 +49,7 @@ def replay(
 
     from ..envs.captions import Caption, with_caption
     from ..envs.drawing import Viewer
-    from ..envs.replay import Flight, arrow_scales, pictures
+    from ..envs.replay import Flight, arrow_scales, drawn_arm, pictures
     from ..envs.video import FPS, save_picture
     from ..identification.wrench_series import estimate_log
     from .filming import SIZE, films
@@ -83,7 +83,9 @@ def replay(
     )
     part = whole.part(shown)
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
-    scales = arrow_scales(part, model.arm_l)
+    arm = drawn_arm(part, model)
+    scales = arrow_scales(part, arm)
+    larger = arm / model.arm_l
     viewer = Viewer("human" if view else "rgb_array", *SIZE)
     total = max(1, int((part.t[-1] - part.t[0]) * FPS))
 
@@ -99,7 +101,11 @@ def replay(
             float(part.torque[k, 2]),
             part.true_force[k] if true and part.true_force is not None else None,
             float(part.true_torque[k, 2]) if true and part.true_torque is not None else None,
-            (f"height {part.position[k, 2]:.2f} m", f"speed {speed:.1f} m/s"),
+            (
+                f"height {part.position[k, 2]:.2f} m",
+                f"speed {speed:.1f} m/s",
+                *([f"vehicle drawn {larger:.1f} times as large"] if larger > 1.05 else []),
+            ),
             viewer.pixels_per_metre(part.position[k]),
             scales,
         )

@@ -37,6 +37,8 @@ class Viewer:
             has no way to do it.
     """
 
+    _close = True  # a wide picture shows as much from side to side as one of 4:3
+
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         if mode == "human":
             need_display()
@@ -85,9 +87,10 @@ class Viewer:
                     -22,
                 )
             else:
-                across = math.tan(math.radians(_FIELD) / 2) * 4 / 3
-                widest = across * self.height / self.width
-                model.cam_fovy[:] = math.degrees(2 * math.atan(min(widest, across * 3 / 4)))
+                if self._close:
+                    up = math.tan(math.radians(_FIELD) / 2)
+                    across = up * 4 / 3 * self.height / self.width
+                    model.cam_fovy[:] = math.degrees(2 * math.atan(min(up, across)))
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
         except (
             Exception

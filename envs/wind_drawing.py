@@ -22,6 +22,8 @@ _AWAY = (0.0, 0.0, -50.0)  # m, where a fan is that is not there
 class WindViewer(Viewer):
     """Draws a flight in winds."""
 
+    _close = False  # a trajectory goes from side to side
+
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         super().__init__(mode, width, height)
         self._drops = self._new_drops(_DROPS)
