@@ -250,6 +250,12 @@ def speed(
         typer.Option("--hour", help="Also time the diagnosis of a one-hour log (takes minutes)."),
     ] = False,
     markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON file to which the medians are appended, with version, commit and machine."
+        ),
+    ] = None,
 ) -> dict[str, Any]:
     """Measure speed beside other packages. A filter step, a simulated flight, start-up, and how
     they grow. Packages that are not installed are left out.
@@ -268,7 +274,10 @@ def speed(
     from ..speed.environment_profile import profiles
     from ..speed.flight_speed import flights
     from ..speed.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
+    from ..speed.history import append_history, read_history
 
+    if history is not None:
+        read_history(history)  # refused before anything is measured
     with progress_bar() as progress:
         task = progress.add_task("measuring", total=None)
         contenders = [*filters(), *flights(), *starts()]
@@ -298,6 +307,9 @@ def speed(
         console.print(section.words, highlight=False)
     if markdown is not None:
         say(markdown)
+    if history is not None:
+        append_history(figures, rounds, history)
+        say(history)
     return {
         "figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
         "sections": {

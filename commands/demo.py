@@ -56,7 +56,10 @@ def demo(
 
     Example: windwrench demo --no-open
     """
+    from ..dynamics.effects import parse_setting
+
     begun = time.monotonic()
+    parse_setting(effect)  # refused before anything is made
     folder = results_folder(out)
     console.print(
         "A vehicle flies in a fan's jet, is diagnosed, and flies better. The first start also "
@@ -66,7 +69,6 @@ def demo(
     with working("loading", every=EVERY):
         from ..demo import story
         from ..demo.page import write_page
-        from ..dynamics.effects import parse_setting
         from ..dynamics.vehicle_file import load_vehicle
 
         model = load_vehicle(vehicle)

@@ -121,8 +121,8 @@ def with_caption(picture: Picture, caption: Caption) -> Picture:
     write(
         margin,
         below - 8 * size,
-        f"{length:g} m at the vehicle; as an arrow {length / caption.scales[0]:.2g} N or "
-        f"{1e3 * length / caption.scales[1]:.2g} mNm",
+        f"{length:g} m at the vehicle; as an arrow {length / caption.scales[0]:.3g} N or "
+        f"{1e3 * length / caption.scales[1]:.3g} mNm",
         small,
         "lb",
     )
@@ -134,4 +134,6 @@ def _newtons(force: Array) -> str:
 
 
 def _millis(torque: float) -> str:
-    return f"{1e3 * torque:+.0f} mNm"
+    size = abs(1e3 * torque)
+    digits = 0 if size >= 10.0 else 1 if size >= 1.0 else 2
+    return f"{round(1e3 * torque, digits) + 0.0:+.{digits}f} mNm"

@@ -21,7 +21,7 @@ _DRAWN_ARM = 0.1262  # m, arm_l of the vehicle that the model shows
 _LONGEST_ARROW = (
     0.6  # m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
 )
-_FARTHEST = 7.0  # m, from where a vehicle of that size is still seen well
+_FARTHEST = 4.0  # m, from where a vehicle of that size is still seen well
 _TRAIL = 2.0  # s of path behind the vehicle that are drawn closely
 _PATH_POINTS = 300
 _AWAY = (0.0, 0.0, -50.0)  # where the fan stands that a log knows nothing of
