@@ -51,7 +51,7 @@ def expected_duration(command: str, plan: Mapping[str, Any]) -> str:
     """Return how long a plan takes, by the command's last run on this machine, with how that is
     known.
     """
-    last = _kept().get(command)
+    last: Any = _kept().get(command)
     try:
         seconds, before = float(last["seconds"]), dict(last["plan"])
     except (KeyError, TypeError, ValueError):

@@ -203,6 +203,7 @@ def fly_task(
         for chunk in chunks:
             take(chunk, _fly_chunk(chunk))
     else:
+        _environment(task, scenarios[0]).reset(seed=0)  # compiles here, where it is told, and once
         with workers(jobs) as pool:
             for chunk, flown in zip(chunks, pool.map(_fly_chunk, chunks), strict=True):
                 take(chunk, flown)
