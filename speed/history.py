@@ -9,7 +9,7 @@ from typing import Any
 
 from .. import __version__
 from ..runtime.errors import InputError
-from ..runtime.page_files import write_text
+from ..runtime.page_files import write_json
 from ..runtime.provenance import commit
 from .contenders import Figure
 
@@ -57,7 +57,7 @@ def append_history(figures: Sequence[Figure], rounds: int, path: Path) -> dict[s
             for f in figures
         },
     }
-    write_text(json.dumps([*read_history(path), entry], indent=1) + "\n", path)
+    write_json([*read_history(path), entry], path)
     return entry
 
 
