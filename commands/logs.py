@@ -287,10 +287,10 @@ def diagnose(
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
     if example:
-        given = {"LOGS": logs, "--vehicle": vehicle, "--reader": reader, "--map": map}
-        given |= {"--test": test, "--against": against, "--fleet": fleet}
-        for option, value in {**given, "--rotor-faults": rotor_faults}.items():
-            if value:
+        given: dict[str, Any] = {"LOGS": logs, "--vehicle": vehicle, "--reader": reader}
+        given |= {"--map": map, "--test": test, "--against": against, "--fleet": fleet}
+        for option, is_given in {**given, "--rotor-faults": rotor_faults}.items():
+            if is_given:
                 raise InputError(f"--example: has a log of its own; expected it without {option}")
         return _example(without or (), out, no_open)
     if not logs:
