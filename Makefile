@@ -6,8 +6,7 @@ BIN := $(VENV)/bin
 .PHONY: demo test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
 
 demo: $(VENV)/.installed
-	$(BIN)/windwrench benchmark --episodes 10 --out results/demo
-	$(BIN)/windwrench fly --scenario static --out results/demo
+	$(BIN)/windwrench demo --out results/demo
 
 # one thread of linear algebra for each worker, or they wait for one another
 PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile

@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
+from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
@@ -17,9 +18,10 @@ from .commands.identifying import identify
 from .commands.learning import imitate, train, tune
 from .commands.library import effects
 from .commands.live import live
-from .commands.logs import diagnose, estimate, replay
+from .commands.logs import diagnose, estimate
 from .commands.output import prepare_output
 from .commands.paper import reproduce
+from .commands.replaying import replay
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name
@@ -75,6 +77,7 @@ def windwrench(
 
 
 _COMMANDS: tuple[Callable[..., Any], ...] = (
+    demo,
     fly,
     benchmark,
     check,

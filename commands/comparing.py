@@ -10,6 +10,7 @@ from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.whole_files import replaced
+from .durations import duration_words
 from .running import expensive
 from .terminal import (
     Out,
@@ -84,6 +85,7 @@ def benchmark(
         count_flights,
         fly_all,
         leaderboard,
+        sampled_seconds,
         short_names,
         write_leaderboard,
     )
@@ -97,6 +99,7 @@ def benchmark(
         scenarios=worlds,
         flights=count_flights(names, worlds, episodes),
         jobs=jobs,
+        takes=lambda: _sampled(sampled_seconds(names, worlds, episodes, jobs)),
     )
     with progress_bar() as progress:
         bar = progress.add_task("flying episodes", total=count_flights(names, worlds, episodes))
@@ -146,6 +149,17 @@ def benchmark(
     )
     say(path, folder / "leaderboard.png")
     return {"leaderboard": rows}
+
+
+def _sampled(seconds: float | None) -> str | None:
+    if seconds is None:
+        return (
+            "not known: nothing is compiled yet, which takes about a minute of its own; after a "
+            "first flight a dry run can tell"
+        )
+    return (
+        f"about {duration_words(seconds)} at the present load, by 2 s of flight of each controller"
+    )
 
 
 def _task_benchmark(
@@ -236,6 +250,12 @@ def speed(
         typer.Option("--hour", help="Also time the diagnosis of a one-hour log (takes minutes)."),
     ] = False,
     markdown: Annotated[Path | None, typer.Option(help="Markdown file for the results.")] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            help="JSON file to which the medians are appended, with version, commit and machine."
+        ),
+    ] = None,
 ) -> dict[str, Any]:
     """Measure speed beside other packages. A filter step, a simulated flight, start-up, and how
     they grow. Packages that are not installed are left out.
@@ -254,7 +274,10 @@ def speed(
     from ..speed.environment_profile import profiles
     from ..speed.flight_speed import flights
     from ..speed.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
+    from ..speed.history import append_history, read_history
 
+    if history is not None:
+        read_history(history)  # refused before anything is measured
     with progress_bar() as progress:
         task = progress.add_task("measuring", total=None)
         contenders = [*filters(), *flights(), *starts()]
@@ -284,6 +307,9 @@ def speed(
         console.print(section.words, highlight=False)
     if markdown is not None:
         say(markdown)
+    if history is not None:
+        append_history(figures, rounds, history)
+        say(history)
     return {
         "figures": [dict(zip(HEADER, row, strict=True)) for row in rows_of(figures)],
         "sections": {

@@ -1,6 +1,5 @@
 """Flying: one episode in the jet, or a log of a flight."""
 
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,6 +8,7 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError
+from .task_flying import fly_task_once
 from .terminal import (
     Out,
     VehicleOption,
@@ -21,28 +21,47 @@ from .terminal import (
     run,
     say,
     scenario_names,
+    task_names,
+    vehicle_names,
     working,
 )
 
 
 def fly(
+    task: Annotated[
+        str,
+        typer.Option(
+            help="Task: FanTracking, FanTracking2D, WindHover or WindTrajectory; each has "
+            "controllers and scenarios of its own.",
+            autocompletion=offering(task_names),
+        ),
+    ] = "FanTracking",
     scenario: Annotated[
         str,
         typer.Option(
-            help="Scenario: static, base, fast, slow-filter, noisy, gusty, far or varied.",
+            help="Scenario: static, base, fast, slow-filter, noisy, gusty, far or varied; of a "
+            "wind task base, turbulent and so on (docs/tasks.md).",
             autocompletion=offering(scenario_names),
         ),
     ] = "base",
     controller: Annotated[
-        str,
+        str | None,
         typer.Option(
-            help="Controller: admittance, lead, tracker, sac-0 ..., the path of a trained policy, "
-            "or FILE.py:CLASS.",
+            help="Controller; default: admittance, or pid-force in the wind. Others: lead, "
+            "tracker, sac-0 ..., the path of a trained policy, or FILE.py:CLASS.",
             autocompletion=offering(controller_names),
         ),
-    ] = "admittance",
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
     vehicle: VehicleOption = "ardrone2",
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            help="Simulated vehicle, where it is another than the model of --vehicle: an amended "
+            "model flies the vehicle that it was made for.",
+            autocompletion=offering(vehicle_names),
+        ),
+    ] = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -76,62 +95,88 @@ def fly(
     view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
-    """Fly one episode in the jet; write a picture of it.
+    """Fly one episode in the jet or in the wind; write a picture of it.
 
     Example: windwrench fly --scenario static --controller admittance --gif
     """
     import numpy as np
 
     from ..dynamics.effects import parse_setting
+    from ..envs.drawing import SCALES
     from ..envs.fan_tracking import FanTrackingEnv
-    from ..envs.video import Film, save_picture
     from ..evaluation.benchmark import make_pilot, short_names
     from ..evaluation.episodes import DECISIONS, fly_episode
     from ..evaluation.pictures import draw_episode
+    from .filming import SIZE, Tally, caption_of, films, written
 
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
+    effects = [parse_setting(e) for e in effect or []]
     if view and kinds:
         raise InputError(
             "--view shows the flight in a window; expected it without --video and --gif"
         )
+    if task != "FanTracking":
+        return fly_task_once(
+            task,
+            scenario,
+            controller,
+            seed,
+            vehicle,
+            truth,
+            effects,
+            kinds,
+            film_seconds,
+            csv,
+            view,
+            rrd,
+            out,
+        )
+    controller = controller or "admittance"
     pilot = make_pilot(controller)
     mode = "rgb_array" if kinds else "human" if view else None
     env = FanTrackingEnv(
-        scenario, mode, vehicle, [parse_setting(e) for e in effect or []], width=960, height=640
+        scenario,
+        mode,
+        vehicle,
+        effects,
+        width=SIZE[0],
+        height=SIZE[1],
+        truth=truth,
     )
     folder = results_folder(out)
     poses: list[Any] = []
-    with progress_bar() as progress, ExitStack() as films:
-        task = progress.add_task("flying", total=DECISIONS)
-        open_films = [
-            films.enter_context(
-                Film(folder / f"fly.{kind}", env.width, env.height, longest=film_seconds)
-            )
-            for kind in kinds
-        ]
+    tally = Tally("offset from the axis")
+    title = f"{task}, {scenario}: {short_names([controller])[controller]}"
+    with (
+        progress_bar() as progress,
+        films(folder, "fly", kinds, film_seconds) as film,
+    ):
+        bar = progress.add_task("flying", total=DECISIONS)
 
         def each() -> None:
-            progress.advance(task)
-            if (rrd or csv) and env.loop is not None:
-                poses.append((*env.loop.position, *env.loop.quaternion))
-            wanted = [film for film in open_films if not film.is_full]
-            if wanted:
-                picture = env.render()
-                for film in wanted:
-                    film.add(picture)
+            progress.advance(bar)
+            loop, now = env.loop, env.episode["outcome"][0]
+            assert loop is not None
+            if rrd or csv:
+                poses.append((*loop.position, *loop.quaternion))
+            if kinds:
+                tally.add(float(now["offset"]), float(now["reward_tracking"]))
+                film(
+                    env.render,
+                    lambda: caption_of(
+                        loop, env.viewer, title, float(now["time"]), tally.lines(), SCALES
+                    ),
+                )
 
         episode = fly_episode(env, pilot, seed, each)
-        written = [folder / "fly.png", *(folder / f"fly.{kind}" for kind in kinds)]
-        if kinds and (last := env.render()) is not None:
-            save_picture(last, folder / "fly.scene.png")
-            written.append(folder / "fly.scene.png")
+    paths = [folder / "fly.png", *written(folder, "fly", kinds)]
     env.close()
     if csv:
         from ..evaluation.episodes import time_series
         from ..identification.logs.tables import write_csv
 
         write_csv(time_series(episode, np.array(poses)), folder / "fly.csv")
-        written.append(folder / "fly.csv")
+        paths.append(folder / "fly.csv")
     if rrd:
         from ..envs.replay import Flight
         from ..envs.rerun_export import write_rrd
@@ -148,7 +193,7 @@ def fly(
             episode.fan_y,
         )
         write_rrd(flight, env.truth, folder / "fly.rrd")
-        written.append(folder / "fly.rrd")
+        paths.append(folder / "fly.rrd")
     shown = short_names([controller])[controller]
     draw_episode(episode, f"{shown}, {scenario}", folder / "fly.png")
     table = Table(
@@ -163,7 +208,7 @@ def fly(
         f"{episode.total_reward:.1f}",
     )
     console.print(table)
-    say(*written)
+    say(*paths)
     return {
         "controller": controller,
         "scenario": scenario,

@@ -143,7 +143,8 @@ def real_flights(
     from ..studies.measured_flights.measured_flights import page, plan, run
 
     sources = data / "nanobench", data / "crazyswarm2_payload" / "csv"
-    folder = results_folder(markdown.with_suffix(""), **plan(*sources))
+    parts: dict[str, Any] = plan(*sources)
+    folder = results_folder(markdown.with_suffix(""), **parts)
     with working("diagnosing") as progress:
         result: dict[str, Any] = run(folder, *sources, progress)
     with replaced(markdown) as partial:

@@ -4,11 +4,9 @@ flight drawn again.
 
 import shlex
 import sys
-import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -35,10 +33,8 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
-    from ..envs.replay import Flight
     from ..identification.findings import Diagnosis
     from ..identification.logs.flight_log import FlightLog
-    from ..identification.wrench_series import WrenchSeries
 
 LogVehicleOption = Annotated[
     str | None,
@@ -51,7 +47,7 @@ LogVehicleOption = Annotated[
 ]
 
 # of a diagnosis' time, where its stages begin
-_STAGES = {
+STAGES = {
     "looking at the logs": 0.0,
     "asking whether every effect is needed": 0.45,
     "asking what else it could be": 0.75,
@@ -60,7 +56,7 @@ _STAGES = {
 }
 
 
-def _read(
+def read_flights(
     paths: Sequence[Path], reader: str | None, vehicle: str | None, log_map: str | None = None
 ) -> "tuple[list[FlightLog], Vehicle]":
     """Read flights of one vehicle, the one given or the one that the logs name.
@@ -95,7 +91,7 @@ def _read(
     return flights, load_vehicle(flights[0].vehicle)
 
 
-def _notes(texts: Iterable[str]) -> None:
+def log_notes(texts: Iterable[str]) -> None:
     """Say notes on standard error, each once, and how often where that was more than once."""
     for text, count in Counter(texts).items():
         note(text if count == 1 else f"{text} ({count} times)")
@@ -148,7 +144,7 @@ def estimate(
         gate = GATE
     elif gate != 0.0 and not 0.5 <= gate < 1.0:
         raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
-    (flight,), model = _read([log], reader, vehicle, map)
+    (flight,), model = read_flights([log], reader, vehicle, map)
     folder = results_folder(out)
     if smooth is None:
         smooth = (flight.gyro is None) == (flight.accelerometer is None)
@@ -163,7 +159,7 @@ def estimate(
         )
     path = write_wrench(series, folder)
     picture = plot_wrench(series, flight, folder / "wrench.png")
-    _notes(series.notes)
+    log_notes(series.notes)
     console.print(
         f"{flight.name}: {len(flight.t)} samples, {flight.t[-1] - flight.t[0]:.1f} s, vehicle "
         f"{model.name}",
@@ -203,12 +199,24 @@ def estimate(
 
 def diagnose(
     logs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             help="Flight logs of one vehicle: tables, or of autopilots or bags; with --fleet, logs "
             "of any vehicles and folders of them."
         ),
-    ],
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example",
+            help="Diagnose a measured flight that comes with the kit, beside what is known of it, "
+            "and open the report.",
+        ),
+    ] = False,
+    no_open: Annotated[
+        bool,
+        typer.Option("--no-open", help="With --example: do not open the report in a browser."),
+    ] = False,
     test: Annotated[
         list[Path] | None,
         typer.Option(
@@ -278,6 +286,15 @@ def diagnose(
 
     Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
     """
+    if example:
+        given: dict[str, Any] = {"LOGS": logs, "--vehicle": vehicle, "--reader": reader}
+        given |= {"--map": map, "--test": test, "--against": against, "--fleet": fleet}
+        for option, is_given in {**given, "--rotor-faults": rotor_faults}.items():
+            if is_given:
+                raise InputError(f"--example: has a log of its own; expected it without {option}")
+        return _example(without or (), out, no_open)
+    if not logs:
+        raise InputError("diagnose: expected at least one flight log, or --example")
     if rotor_faults:
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
@@ -296,6 +313,33 @@ def diagnose(
             raise InputError(f"{option}: expected --fleet with it")
     if against:
         return _compare(logs, against, reader, vehicle, out, map)
+    return _diagnose(logs, test or [], reader, vehicle, map, without or (), out)
+
+
+def _example(without: Sequence[str], out: Path, no_open: bool) -> dict[str, Any]:
+    """Diagnose the flight that comes with the kit."""
+    from ..identification.logs.example import example_flight
+    from .example import conclude, introduce
+    from .opening import show_page
+
+    with example_flight() as flight:
+        introduce(flight)
+        result = _diagnose([flight.log], [], None, flight.vehicle, None, without, out)
+    result["known"] = conclude(flight, result["effects"])
+    show_page(out / "report.html", not no_open)
+    return result
+
+
+def _diagnose(
+    logs: Sequence[Path],
+    test: Sequence[Path],
+    reader: str | None,
+    vehicle: str | None,
+    log_map: str | None,
+    without: Sequence[str],
+    out: Path,
+) -> dict[str, Any]:
+    """Find the effects that a vehicle's model lacks; write the report."""
     from ..identification.diagnosis import diagnose as run
     from ..identification.report.files import report_data, write_report
     from ..identification.report.words import (
@@ -305,17 +349,15 @@ def diagnose(
         remainder_sentence,
     )
 
-    every, model = _read([*logs, *(test or [])], reader, vehicle, map)
+    every, model = read_flights([*logs, *test], reader, vehicle, log_map)
     flights, unseen = every[: len(logs)], every[len(logs) :]
     folder = results_folder(out)
     with working("looking at the logs") as progress:
-        found = run(
-            flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
-        )
+        found = run(flights, model, unseen, without, lambda text: progress(STAGES.get(text), text))
     found = _with_rotor_faults(found, logs, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
-    _notes(found.notes)
+    log_notes(found.notes)
     console.print(f"vehicle: {model.name}", highlight=False, markup=False)
     faults = [data["headline"] for data in found.rotor_faults if data["rotor"] is not None]
     sentences = (headline(found), *error_sentences(found), remainder_sentence(found), *faults)
@@ -370,12 +412,12 @@ def _compare(
     from ..identification.comparison.trim import trim_of_log
     from ..identification.comparison.words import change_data, headline, write_change
 
-    every, model = _read([*logs, *against], reader, vehicle, log_map)
+    every, model = read_flights([*logs, *against], reader, vehicle, log_map)
     folder = results_folder(out)
     trims = [trim_of_log(log, model) for log in every]
     change = compare(trims[: len(logs)], trims[len(logs) :])
     written = write_change(change, folder)
-    _notes(text for log in every for text in log.notes)
+    log_notes(text for log in every for text in log.notes)
     console.print(f"vehicle: {model.name}", highlight=False, markup=False)
     console.print(headline(change), highlight=False, markup=False)
     table = Table("where something changed", "probability", box=box.SIMPLE_HEAD)
@@ -428,7 +470,7 @@ def _rotor_faults(
             progress(i / len(read))
             found.append((find_fault(channels), sample(channels)))
     written = write_faults(found, folder)
-    _notes(text for _, notes in read for text in notes)
+    log_notes(text for _, notes in read for text in notes)
     for fault, samples in found:
         ended = f"; nothing later: {samples.ended}" if samples.ended else ""
         console.print(
@@ -437,123 +479,3 @@ def _rotor_faults(
         console.print(headline(fault), highlight=False, markup=False)
     say(*written)
     return {"rotor_faults": [fault_data(fault) for fault, _ in found]}
-
-
-def flight_to_draw(
-    log: "FlightLog", model: "Vehicle", progress: Callable[[float], None] = lambda share: None
-) -> tuple["Flight", "WrenchSeries"]:
-    """Return what ``replay`` draws of a log, and the estimate behind it: where motion capture lost
-    the vehicle, the filter's own pose goes on.
-    """
-    from ..envs.replay import Flight
-    from ..identification.wrench_series import estimate_log
-
-    series = estimate_log(log, model, report=progress)
-    drawn = Flight(
-        series.t,
-        series.position,
-        series.quaternion,
-        series.force,
-        series.torque,
-        log.force,
-        log.torque,
-    )
-    return drawn, series
-
-
-def replay(
-    log: Annotated[Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")],
-    reader: ReaderOption = None,
-    map: MapOption = None,
-    vehicle: LogVehicleOption = None,
-    video: Annotated[
-        bool, typer.Option("--video", help="Also write a video, replay.mp4 (video extra).")
-    ] = False,
-    gif: Annotated[
-        bool, typer.Option("--gif", help="Also write an animation, replay.gif.")
-    ] = False,
-    rrd: Annotated[
-        bool,
-        typer.Option(
-            "--rrd", help="Also write a recording for the Rerun viewer, replay.rrd (rerun extra)."
-        ),
-    ] = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
-    begin: Annotated[
-        float,
-        typer.Option(
-            "--from", min=0.0, help="Start time of the replay, s from the start of the log."
-        ),
-    ] = 0.0,
-    film_seconds: Annotated[
-        float, typer.Option(min=0.1, help="Longest duration of the replay, s.")
-    ] = 30.0,
-    out: Out = Path("results/replay"),
-) -> dict[str, Any]:
-    """Draw a logged flight and its wrench. The external wrench is drawn as arrows; write the last
-    frame, and video or animation on request.
-
-    Example: windwrench replay flight.csv --vehicle crazyflie --gif
-    """
-    import numpy as np
-
-    from ..envs.drawing import Viewer
-    from ..envs.replay import pictures
-    from ..envs.video import FPS, Film, save_picture
-
-    (flight,), model = _read([log], reader, vehicle, map)
-    length = float(flight.t[-1] - flight.t[0])
-    if begin >= length:
-        raise InputError(
-            f"--from {begin:g}: {log} ends after {length:.6g} s; expected a time before that"
-        )
-    folder = results_folder(out)
-    with working("estimating") as progress:
-        whole, series = flight_to_draw(flight, model, progress)
-    shown = np.flatnonzero(
-        (flight.t - flight.t[0] >= begin) & (flight.t - flight.t[0] <= begin + film_seconds)
-    )
-    if len(shown) < 2:
-        raise InputError(
-            f"--film-seconds {film_seconds:g}: {log} has {len(shown)} sample(s) there; expected a "
-            f"longer duration"
-        )
-    part = whole.part(shown)
-    kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
-    written, last = [], None
-    viewer = Viewer("human" if view else "rgb_array", 960, 640)
-    total = max(1, int((part.t[-1] - part.t[0]) * FPS))
-    try:
-        with working("drawing") as progress, ExitStack() as films:
-            open_films = [
-                films.enter_context(Film(folder / f"replay.{kind}", 960, 640)) for kind in kinds
-            ]
-            for count, picture in enumerate(pictures(part, model, viewer, FPS)):
-                if view:
-                    time.sleep(1.0 / FPS)
-                for film in open_films:
-                    film.add(picture)
-                last = picture
-                progress(min(1.0, (count + 1) / total))
-        written += [folder / f"replay.{kind}" for kind in kinds]
-    finally:
-        viewer.close()
-    if last is not None:
-        save_picture(last, folder / "replay.png")
-        written.append(folder / "replay.png")
-    if rrd:
-        from ..envs.rerun_export import write_rrd
-
-        write_rrd(whole, model, folder / "replay.rrd")
-        written.append(folder / "replay.rrd")
-    _notes(series.notes)
-    console.print(f"{flight.name}: vehicle {model.name}", highlight=False, markup=False)
-    say(*written)
-    return {
-        "log": flight.name,
-        "vehicle": model.name,
-        "samples": len(flight.t),
-        "seconds": length,
-        "largest_force_N": np.linalg.norm(part.force, axis=1).max(),
-        "largest_torque_Nm": np.linalg.norm(part.torque, axis=1).max(),
-    }

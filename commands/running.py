@@ -9,6 +9,7 @@ import math
 import platform
 import shlex
 import sys
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from importlib import metadata
@@ -18,7 +19,10 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from .. import __version__
+from ..runtime.compile_watch import watch
 from ..runtime.whole_files import replaced
+from .bars import show_compiling
+from .durations import expected_duration, keep_duration
 from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
@@ -32,7 +36,10 @@ JsonOption = Annotated[
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 DryRunOption = Annotated[
     bool,
-    typer.Option("--dry-run", help="Check the request and print the plan; run and write nothing."),
+    typer.Option(
+        "--dry-run",
+        help="Check the request; print the plan and how long it takes here; write nothing.",
+    ),
 ]
 
 # what a result depends on
@@ -69,19 +76,31 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     def command(*, as_json: bool, quiet: bool, dry_run: bool = False, **options: Any) -> None:
         run.begin(dry_run)
         console.quiet, errors.quiet = as_json or quiet, quiet
+        watch.sink = _show_compiling
+        begun = time.monotonic()
         try:
             outcome: dict[str, Any] = {"result": work(**options)}
+            if can_stop:
+                keep_duration(name, run.plan, time.monotonic() - begun)
             if run.record is not None:
                 write_run(run.record, name, options)
         except DryRun as stopped:
-            outcome = {"dry_run": True, "would": stopped.plan, "out": stopped.out}
+            takes = stopped.takes or expected_duration(name, stopped.plan)
+            outcome = {"dry_run": True, "would": stopped.plan, "takes": takes, "out": stopped.out}
             lines = [
                 f"  {key}: {_words(value)}"
                 for key, value in stopped.plan.items()
                 if value is not None
             ]
             console.print(
-                "\n".join([f"{name} would do", *lines, f"  and write to {stopped.out}"]),
+                "\n".join(
+                    [
+                        f"{name} would do",
+                        *lines,
+                        f"  and write to {stopped.out}",
+                        f"  it takes: {takes}",
+                    ]
+                ),
                 highlight=False,
                 markup=False,
                 soft_wrap=True,
@@ -114,6 +133,10 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     )
     command.__annotations__ = {**work.__annotations__, **shared}
     return command
+
+
+def _show_compiling(text: str | None) -> None:
+    show_compiling(text, errors)
 
 
 def _words(value: object) -> str:

@@ -15,6 +15,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    SpinnerColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -24,6 +25,7 @@ from rich.segment import Segment
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
+from .bars import LINE_EVERY, Bars
 
 
 class _Terminal(Console):
@@ -48,6 +50,7 @@ class Run:
     """What the command that runs now has done so far."""
 
     dry: bool = False
+    plan: dict[str, Any] = field(default_factory=dict)  # what the work consists of
     written: list[Path] = field(default_factory=list)
     record: Path | None = None  # where it is noted how the results came about
     made: list[Path] = field(default_factory=list)  # folders, innermost first
@@ -56,6 +59,7 @@ class Run:
     def begin(self, dry: bool = False) -> None:
         """Forget the command before."""
         self.dry, self.written, self.record, self.made, self.code = dry, [], None, [], 0
+        self.plan = {}
 
     def undo(self) -> None:
         """Take the folders away again that were made for results and are empty."""
@@ -70,9 +74,9 @@ run = Run()
 class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error
     """Ends a dry run where the work would begin."""
 
-    def __init__(self, plan: Mapping[str, Any], out: Path) -> None:
+    def __init__(self, plan: Mapping[str, Any], out: Path, takes: str | None = None) -> None:
         super().__init__("dry run")
-        self.plan, self.out = plan, out
+        self.plan, self.out, self.takes = plan, out, takes
 
 
 def offering(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
@@ -170,7 +174,9 @@ MapOption = Annotated[
 ]
 
 
-def results_folder(out: Path, **plan: object) -> Path:
+def results_folder(
+    out: Path, *, takes: Callable[[], str | None] | None = None, **plan: object
+) -> Path:
     """Make the results' folder, before the work starts, so that no result is lost for want of it.
 
     Every command calls this once its request is checked and before its work begins: here a dry run
@@ -178,6 +184,7 @@ def results_folder(out: Path, **plan: object) -> Path:
 
     Args:
         out: the folder.
+        takes: says how long the work takes here, by a short sample of it; only a dry run asks.
         plan: what is about to be done, for a dry run.
 
     Raises:
@@ -185,7 +192,9 @@ def results_folder(out: Path, **plan: object) -> Path:
         DryRun: the command is not to do its work.
     """
     if run.dry:
-        raise DryRun(plan, out)
+        sampled = takes() if takes is not None else None
+        raise DryRun(plan, out, sampled)
+    run.plan = run.plan or dict(plan)
     try:
         run.made = [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)
@@ -203,14 +212,15 @@ def progress_bar() -> Progress:
     """Return a bar that counts what is done and says how long the rest will take; it goes when the
     work is over.
     """
-    return Progress(
+    return Bars(
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
         TimeRemainingColumn(),
         console=errors,
-        transient=True,
-        disable=errors.quiet,
     )
 
 
@@ -218,14 +228,12 @@ def share_bars() -> Progress:
     """Return bars for shares of work between 0 and 1, with the time that is left; they go when the
     work is over.
     """
-    return Progress(
+    return Bars(
         TextColumn("{task.description:18}"),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
         TimeRemainingColumn(),
         console=errors,
-        transient=True,
-        disable=errors.quiet,
     )
 
 
@@ -244,18 +252,19 @@ def share_bars_by_part() -> Iterator[Callable[[str, float], None]]:
 
 
 @contextmanager
-def working(text: str) -> Iterator[Callable[..., None]]:
+def working(text: str, every: float = LINE_EVERY) -> Iterator[Callable[..., None]]:
     """Show what is being done; give a function that takes the share done so far, another text, or
-    both.
+    both. Where there is no terminal a line comes ``every`` so many s.
     """
     columns = (
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=errors, transient=True, disable=errors.quiet) as progress:
+    with Bars(*columns, console=errors, every=every) as progress:
         task = progress.add_task(text, total=None)
 
         def report(share: float | None = None, text: str | None = None) -> None:

@@ -24,7 +24,6 @@ from ..estimator.ukf import WrenchUKF, correct_parts
 from ..runtime.addresses import address_of, call_at, call_step, numbers_at, pointer_to
 from ..runtime.compiled import (
     Record,
-    announced,
     compiled,
     compiled_meanwhile,
     compiled_without_gil,
@@ -216,12 +215,11 @@ class ClosedLoop:
         self._load = load
         self._body_id = self.model.body("vehicle").id
         first = run_address.cache_info().currsize == 0
-        with announced() if first else nullcontext():
-            with compiled_meanwhile(tick, compile_run) if first else nullcontext():
-                self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-                loop["step"] = self.ukf.step_address
-            self._run = run_address()
-            self._call = specialised(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
+        with compiled_meanwhile(tick, compile_run) if first else nullcontext():
+            self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
+            loop["step"] = self.ukf.step_address
+        self._run = run_address()
+        self._call = specialised(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
         loop["filter"] = self.ukf.record[0]
         self._views()
 

@@ -17,8 +17,11 @@ from .display import need_display
 from .fan import jet_at
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
 
-_TRACERS = 260
-_SCALES = (1.6, 25.0)  # m per N, m per Nm
+_TRACERS = 220
+_FIELD = (
+    48.0  # degrees that a picture of 4:3 shows from top to bottom; a wider one shows less there
+)
+SCALES = (1.6, 25.0)  # m per N, m per Nm
 
 
 class Viewer:
@@ -33,6 +36,8 @@ class Viewer:
         InputError: a window where there is no display; when it is to draw, also that this machine
             has no way to do it.
     """
+
+    _close = True  # a wide picture shows as much from side to side as one of 4:3
 
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         if mode == "human":
@@ -82,6 +87,10 @@ class Viewer:
                     -22,
                 )
             else:
+                if self._close:
+                    up = math.tan(math.radians(_FIELD) / 2)
+                    across = up * 4 / 3 * self.height / self.width
+                    model.cam_fovy[:] = math.degrees(2 * math.atan(min(up, across)))
                 self._renderer = mujoco.Renderer(model, self.height, self.width)
         except (
             Exception
@@ -134,6 +143,14 @@ class Viewer:
         picture: NDArray[np.uint8] = self._renderer.render()
         return picture
 
+    def pixels_per_metre(self, at: NDArray[np.float64]) -> float:
+        """Return how many pixels of the last picture a metre across it takes at a place (3,) m."""
+        view = self._renderer.scene.camera[0]
+        ahead = np.asarray(at) - np.asarray(view.pos)
+        depth = float(ahead @ np.asarray(view.forward))
+        across = float(view.frustum_top - view.frustum_bottom) / float(view.frustum_near)
+        return self.height / max(across * depth, 1e-6)
+
     @property
     def is_open(self) -> bool:
         """Whether there is a window that nobody has closed, or a renderer."""
@@ -172,8 +189,8 @@ class Viewer:
         at = loop.position
         add_shadow(scene, at, 0.22)
         add_path(scene, self._path)
-        add_wrench(scene, at, loop.external[:3], loop.external[5], _SCALES, 0.22, true=True)
-        add_wrench(scene, at, loop.state[16:19], loop.state[15], _SCALES, 0.22)
+        add_wrench(scene, at, loop.external[:3], loop.external[5], SCALES, 0.22, true=True)
+        add_wrench(scene, at, loop.state[16:19], loop.state[15], SCALES, 0.22)
 
     def close(self) -> None:
         """Close the window or free the renderer."""

@@ -171,7 +171,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.view = View(observe, normalize)
         bound = self.view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
-        self._viewer: Any = None
+        self.viewer: Any = None
         self.loop: ClosedLoop | None = None
         self.fan_motion = ""
         self.episode = np.zeros(1, dtype=EPISODE)
@@ -363,20 +363,20 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 "FanTracking: render needs a render_mode ('human' or 'rgb_array') and a reset "
                 "before it"
             )
-        if self._viewer is None:
+        if self.viewer is None:
             from .drawing import Viewer
 
-            self._viewer = Viewer(self.render_mode, self.width, self.height)
-        picture: NDArray[np.uint8] | None = self._viewer.draw(
+            self.viewer = Viewer(self.render_mode, self.width, self.height)
+        picture: NDArray[np.uint8] | None = self.viewer.draw(
             self.loop, float(self.episode["outcome"]["fan_y"][0])
         )
         return picture
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self.viewer is not None:
+            self.viewer.close()
+            self.viewer = None
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

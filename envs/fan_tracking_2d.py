@@ -169,7 +169,7 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.motions = ("", "")
         self._path: Array = np.zeros((1, 2))
         self._command, self._distance = np.zeros(2), DISTANCE
-        self._viewer: Any = None
+        self.viewer: Any = None
 
     def _make_flight(self, vehicle: Vehicle, fan: Fan) -> WindyFlight:
         scenario = self.scenario
@@ -318,18 +318,18 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 "FanTracking2D: render needs a render_mode ('human' or 'rgb_array') and a reset "
                 "before it"
             )
-        if self._viewer is None:
+        if self.viewer is None:
             from .drawing import Viewer
 
-            self._viewer = Viewer(self.render_mode, self.width, self.height)
+            self.viewer = Viewer(self.render_mode, self.width, self.height)
         k = min(max(self.flight.ticks - 1, 0), len(self._path) - 1)
-        picture: NDArray[np.uint8] | None = self._viewer.draw(
+        picture: NDArray[np.uint8] | None = self.viewer.draw(
             self.flight.loop, float(self._path[k, 0])
         )
         return picture
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self.viewer is not None:
+            self.viewer.close()
+            self.viewer = None

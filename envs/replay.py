@@ -21,6 +21,7 @@ _DRAWN_ARM = 0.1262  # m, arm_l of the vehicle that the model shows
 _LONGEST_ARROW = (
     0.6  # m, at the 99th percentile of the flight's force or torque, for a vehicle of that size
 )
+_FARTHEST = 4.0  # m, from where a vehicle of that size is still seen well
 _TRAIL = 2.0  # s of path behind the vehicle that are drawn closely
 _PATH_POINTS = 300
 _AWAY = (0.0, 0.0, -50.0)  # where the fan stands that a log knows nothing of
@@ -58,17 +59,34 @@ def arrow_scales(flight: Flight, arm: float) -> tuple[float, float]:
     return longest / max(force, 1e-9), longest / max(torque, 1e-12)
 
 
+def _distance(flight: Flight, size: float) -> float:
+    """Return how far the camera is away, m, that sees the whole flight of a vehicle ``size`` times
+    that of the model.
+    """
+    extent = flight.position.max(axis=0) - flight.position.min(axis=0)
+    return 1.1 * float(np.linalg.norm(extent)) + 1.3 * size
+
+
+def drawn_arm(flight: Flight, vehicle: Vehicle) -> float:
+    """Return the arm length, m, that a vehicle is drawn with: its own, or more where it would be
+    lost in the picture of its flight.
+    """
+    size = vehicle.arm_l / _DRAWN_ARM
+    return _DRAWN_ARM * max(size, _distance(flight, size) / _FARTHEST)
+
+
 def pictures(
     flight: Flight, vehicle: Vehicle, viewer: Viewer, fps: float
-) -> Iterator[NDArray[np.uint8] | None]:
-    """Yield a picture of each 1 / ``fps`` s of a flight, or show it in the viewer's window until
-    that is closed.
+) -> Iterator[tuple[int, NDArray[np.uint8] | None]]:
+    """Yield a sample's row and its picture for each 1 / ``fps`` s of a flight, or show it in the
+    viewer's window until that is closed.
 
     Raises:
         InputError: this machine cannot draw.
     """
     model, data = load_world(vehicle)
-    size = vehicle.arm_l / _DRAWN_ARM
+    arm = drawn_arm(flight, vehicle)
+    size = arm / _DRAWN_ARM
     shown = model.geom_bodyid == model.body("vehicle").id
     model.geom_size[shown] *= size
     model.geom_pos[shown] *= size
@@ -78,9 +96,9 @@ def pictures(
     low, high = flight.position.min(axis=0), flight.position.max(axis=0)
     camera = mujoco.MjvCamera()
     camera.lookat[:] = 0.5 * (low + high)
-    camera.distance = 1.1 * float(np.linalg.norm(high - low)) + 1.3 * size
+    camera.distance = _distance(flight, size)
     camera.azimuth, camera.elevation = 130.0, -22.0
-    scales = arrow_scales(flight, vehicle.arm_l)
+    scales = arrow_scales(flight, arm)
     frames = np.arange(flight.t[0], flight.t[-1], 1.0 / fps)
     rows = np.searchsorted(flight.t, frames)
     thin = max(1, len(rows) // _PATH_POINTS)
@@ -114,4 +132,4 @@ def pictures(
                 scene, at, flight.force[k], flight.torque[k, 2], scales, 0.22 * size, size=size
             )
 
-        yield viewer.show(data, mark, camera)
+        yield int(k), viewer.show(data, mark, camera)

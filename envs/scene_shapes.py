@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ESTIMATED, TRUE = np.array([0.90, 0.15, 0.10, 1.0]), np.array([0.10, 0.55, 0.20, 0.8])
-TURNING, TURNING_TRUE = np.array([0.45, 0.15, 0.75, 1.0]), np.array([0.10, 0.45, 0.75, 0.8])
+# true: wide and light; estimated: narrow and dark
+ESTIMATED, TRUE = np.array([0.80, 0.08, 0.06, 1.0]), np.array([0.25, 0.72, 0.35, 1.0])
+TURNING, TURNING_TRUE = np.array([0.38, 0.08, 0.62, 1.0]), np.array([0.20, 0.60, 0.90, 1.0])
+_WIDTH, _WIDTH_TRUE = 0.012, 0.022  # m, of an arrow
+_APART = 0.1  # m, that the estimate stands above the truth: neither hides the other
 _PATH = np.array([0.95, 0.45, 0.10, 1.0])
 MARKS = (ESTIMATED, TRUE, TURNING, TURNING_TRUE, _PATH)
 _SHADOW = np.array([0.0, 0.0, 0.0, 0.25])
@@ -70,11 +73,12 @@ def add_wrench(
     The torque stands ``above`` m over the vehicle as an arrow along y, the way in which it says
     that the jet's axis lies.
     """
-    # the estimate stands a little higher: neither hides the other
-    at = position + np.array([0.0, 0.0, 0.0 if true else 0.05 * size])
-    width = 0.022 * size
+    width = (_WIDTH_TRUE if true else _WIDTH) * size
+    up = np.array([0.0, 0.0, 1.0])
+    # from where no hull hides it
+    at = position + (0.2 * above + (0.0 if true else _APART * size)) * up
     add_arrow(scene, at, at + scales[0] * force, width, TRUE if true else ESTIMATED)
-    top = at + np.array([0.0, 0.0, above])
+    top = at + 1.1 * above * up
     add_arrow(
         scene,
         top,

@@ -16,13 +16,10 @@ from .scene_shapes import MARKS
 Picture = NDArray[np.uint8]
 
 FPS = 12.5  # of an episode: a picture a decision
-_GIF_WIDTH = 480  # pixels
-_GIF_COLOURS = 192
+_GIF_WIDTH = 960  # pixels
+_GIF_COLOURS = 96
 _GIF_SAMPLES = 6  # pictures from which colours are chosen
-_SWATCH, _SHADES = (
-    8,
-    3,
-)  # pixels, and shades, of a mark's colour on the sheet that colours are chosen from
+_SHADES, _DARKEST = 4, 0.4  # of a mark's colour in the light, and the darkest one's share of it
 
 
 class Film:
@@ -122,24 +119,19 @@ def _reduced(images: list[Any]) -> list[Any]:
 
     width, height = images[0].size
     some = images[:: max(1, len(images) // _GIF_SAMPLES)]
-    sheet = Image.new("RGB", (width, height * len(some) + _SWATCH * len(MARKS)))
+    sheet = Image.new("RGB", (width, height * len(some)))
     for i, image in enumerate(some):
         sheet.paste(image, (0, i * height))
-    # arrows are small, and colours are chosen by the area that they cover
-    for i, colour in enumerate(MARKS):
-        for j in range(_SHADES):
-            shade = tuple(int(255 * c * (0.45 + 0.55 * (j + 1) / _SHADES)) for c in colour[:3])
-            left = j * width // _SHADES
-            sheet.paste(
-                shade,
-                (
-                    left,
-                    len(some) * height + i * _SWATCH,
-                    left + width // _SHADES,
-                    len(some) * height + (i + 1) * _SWATCH,
-                ),
-            )
-    palette = sheet.quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
+    # arrows are small, and colours are chosen by the area that they cover: theirs are given
+    marks = [
+        round(255 * float(c) * (_DARKEST + (1.0 - _DARKEST) * (i + 1) / _SHADES))
+        for colour in MARKS
+        for i in range(_SHADES)
+        for c in colour[:3]
+    ]
+    few = sheet.quantize(_GIF_COLOURS - len(marks) // 3, dither=Image.Dither.NONE)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*(few.getpalette() or []), *marks])
     return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
 
 

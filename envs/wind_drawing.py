@@ -14,13 +14,15 @@ from .windy_flight import WindyFlight
 
 _DROPS = 300
 _LOW, _HIGH = np.array([0.2, -1.6, 0.2]), np.array([4.4, 1.6, 2.8])  # m, where drops are
-_SCALES = (0.5, 8.0)  # m per N, m per Nm
+WIND_SCALES = (0.5, 8.0)  # m per N, m per Nm
 _FRAME = 0.04  # s
 _AWAY = (0.0, 0.0, -50.0)  # m, where a fan is that is not there
 
 
 class WindViewer(Viewer):
     """Draws a flight in winds."""
+
+    _close = False  # a trajectory goes from side to side
 
     def __init__(self, mode: str, width: int = 640, height: int = 480) -> None:
         super().__init__(mode, width, height)
@@ -62,8 +64,8 @@ class WindViewer(Viewer):
             add_shadow(scene, loop.position, 0.22)
             add_path(scene, self._path[-120:])
             at = loop.position
-            add_wrench(scene, at, loop.external[:3], loop.external[5], _SCALES, 0.22, true=True)
-            add_wrench(scene, at, loop.state[16:19], loop.state[15], _SCALES, 0.22)
+            add_wrench(scene, at, loop.external[:3], loop.external[5], WIND_SCALES, 0.22, true=True)
+            add_wrench(scene, at, loop.state[16:19], loop.state[15], WIND_SCALES, 0.22)
 
         return self.show(loop.data, mark, "chase")
 

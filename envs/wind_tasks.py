@@ -187,7 +187,7 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._looks = specialised(_look, np.zeros(1, dtype=WINDY), self.outcome, self._change)
         self._begun = False
         self.preview = 0.0  # s; above 0, ``info["force_ahead"]`` is the true force to come
-        self._viewer: Any = None
+        self.viewer: Any = None
 
     def _make_flight(self, vehicle: Vehicle, fan: Fan) -> WindyFlight:
         scenario = self.scenario
@@ -344,22 +344,22 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 f"{self.name}: render needs a render_mode ('human' or 'rgb_array') and a reset "
                 f"before it"
             )
-        if self._viewer is None:
+        if self.viewer is None:
             from .wind_drawing import WindViewer
 
-            self._viewer = WindViewer(self.render_mode, self.width, self.height)
+            self.viewer = WindViewer(self.render_mode, self.width, self.height)
         walls = [wind for wind in self.blowing if isinstance(wind, FanWall)]
         out = self.outcome[0]
-        picture: NDArray[np.uint8] | None = self._viewer.draw_winds(
+        picture: NDArray[np.uint8] | None = self.viewer.draw_winds(
             self.flight, self.blowing, walls, out["reference"], float(out["time"])
         )
         return picture
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self.viewer is not None:
+            self.viewer.close()
+            self.viewer = None
 
 
 __all__ = ["WIND_DECISIONS", "WIND_DECISION_TICKS", "WIND_EPISODE_SECONDS", "WIND_LOST", "WindEnv"]

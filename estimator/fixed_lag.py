@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..runtime.compiled import announced, compiled, is_compiled
+from ..runtime.compiled import compiled
 from ..runtime.errors import InputError
 from .estimate import STATE_SIZE, Array, WrenchEstimate
 from .filter_record import N
@@ -101,12 +101,7 @@ class FixedLagSmoother:
             numbers[:STATE_SIZE],
             numbers[STATE_SIZE:].reshape(N, N),
         )
-        if is_compiled(_step):
-            usable = _step(*arguments)
-        else:
-            with announced():
-                usable = _step(*arguments)
-        if usable < 0:
+        if _step(*arguments) < 0:
             raise ukf._sample.bad_quaternion()
         self._steps += 1
         return WrenchEstimate(numbers)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import announced, compiled
+from ..runtime.compiled import compiled
 from ..runtime.errors import InputError
 from .estimate import (
     FORCE,
@@ -146,9 +146,8 @@ class FilterInputs:
             raise InputError("FilterInputs: the first event must be a start of the filter")
         states, std = np.empty((events, STATE_SIZE)), np.empty((events, N))
         full = np.empty((events if covariance else 0, N, N))
-        with announced():
-            for begin, end in zip(begins, [*begins[1:], events], strict=True):
-                self._smooth_segment(begin, end, states, std, full)
+        for begin, end in zip(begins, [*begins[1:], events], strict=True):
+            self._smooth_segment(begin, end, states, std, full)
         bad = ~np.isfinite(states[:, :NIS]).all(axis=1) | ~np.isfinite(std).all(axis=1)
         if bad.any():
             raise InputError(

@@ -7,14 +7,13 @@ stepped one after the other in a compiled loop.
 
 import math
 from collections.abc import Sequence
-from contextlib import nullcontext
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
-from ..runtime.compiled import announced, compiled_without_gil
+from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
 from .estimate import (
     FORCE,
@@ -181,7 +180,6 @@ class WrenchUKFBatch:
         self._filters = [WrenchUKF(vehicle, tuning, period, gate, recovery) for vehicle in given]
         self.period = self._filters[0].period
         self._memory = self._new_memory()
-        self._compiled = False  # as far as this one knows
         self._voltage = np.resize([vehicle.voltage_ref for vehicle in given], self.count).astype(
             np.float64
         )
@@ -309,9 +307,7 @@ class WrenchUKFBatch:
             )
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
         out = np.empty((self.count, STATE_SIZE + 2))
-        with nullcontext() if self._compiled else announced():
-            self._memory.step(z, parts, self.period, volts, out)
-        self._compiled = True
+        self._memory.step(z, parts, self.period, volts, out)
         return WrenchEstimates(out)
 
 

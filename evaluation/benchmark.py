@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,14 +14,18 @@ from ..controllers import CONTROLLERS, Controller, make_controller
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.shipped import shipped_policies
 from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
+from ..envs.closed_loop import tick
+from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.scenarios import get_scenario
 from ..envs.watched_fan_tracking import scenario_env
+from ..runtime.compiled import is_on_disk
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from ..runtime.workers import workers
-from .episodes import Episode, benchmark_seeds, fly_episode
+from .episodes import DECISIONS, FIRST_TEST_SEED, Episode, benchmark_seeds, fly_episode
 
 _CHUNK = 5  # episodes that a worker flies at a time
+_SAMPLE = 25  # decisions by which a duration is told
 # what scores, wins and shares are relative to
 _REFERENCES = ("hover", "admittance", "limit", "oracle")
 _SEEDS = 2**32
@@ -137,6 +142,9 @@ def fly_all(
         for controller in wanted
         for i in range(0, episodes, _CHUNK)
     ]
+    # one episode first, so that soon there is something to count
+    name, world, first = tasks[0]
+    tasks[:1] = [(name, world, first[:1]), *([(name, world, first[1:])] if first[1:] else [])]
     results: Results = {(c, s): [] for s in scenarios for c in wanted}
     jobs = min(jobs or os.cpu_count() or 1, len(tasks))
 
@@ -153,10 +161,33 @@ def fly_all(
         for task in tasks:
             take(task, _fly_chunk(task))
     else:
+        if not is_on_disk(tick):  # here, where it is told, and once for all workers
+            scenario_env(scenarios[0]).reset(seed=0)
         with workers(jobs) as pool:
             for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
                 take(task, flown)
     return results
+
+
+def sampled_seconds(
+    controllers: Sequence[str], scenarios: Sequence[str], episodes: int, jobs: int | None = None
+) -> float | None:
+    """Return about how many s ``fly_all`` takes on this machine, by a part of an episode of each
+    controller; None where nothing is compiled yet.
+    """
+    if not is_on_disk(tick):
+        return None
+    wanted = list(dict.fromkeys([*controllers, *_REFERENCES]))
+    seconds = 0.0
+    for name in wanted:
+        controller = make_pilot(name)
+        env = _environment_for(controller, scenarios[0])
+        fly_episode(env, controller, FIRST_TEST_SEED, decisions=1)  # loads its code
+        begun = time.perf_counter()
+        fly_episode(env, controller, FIRST_TEST_SEED, decisions=_SAMPLE)
+        seconds += (time.perf_counter() - begun) * DECISIONS / _SAMPLE
+    flights = len(set(scenarios)) * episodes
+    return seconds * flights / min(jobs or os.cpu_count() or 1, flights)
 
 
 def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes: int) -> int:
@@ -164,13 +195,17 @@ def count_flights(controllers: Sequence[str], scenarios: Sequence[str], episodes
     return len({*controllers, *_REFERENCES}) * len(set(scenarios)) * episodes
 
 
-def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
-    name, scenario, seeds = task
-    controller = make_pilot(name)
-    env = scenario_env(
+def _environment_for(controller: Controller, scenario: str) -> FanTrackingEnv:
+    return scenario_env(
         scenario,
         controller.features.sources if isinstance(controller, TrainedPolicy) else frozenset(),
     )
+
+
+def _fly_chunk(task: tuple[str, str, list[int]]) -> list[Episode]:
+    name, scenario, seeds = task
+    controller = make_pilot(name)
+    env = _environment_for(controller, scenario)
     return [fly_episode(env, controller, seed) for seed in seeds]
 
 

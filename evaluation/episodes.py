@@ -48,9 +48,14 @@ class Episode:
 
 
 def fly_episode(
-    env: FanTrackingEnv, controller: Controller, seed: int, each: Callable[[], None] = lambda: None
+    env: FanTrackingEnv,
+    controller: Controller,
+    seed: int,
+    each: Callable[[], None] = lambda: None,
+    decisions: int = DECISIONS,
 ) -> Episode:
-    """Fly one episode and return it; ``each`` is called after every decision.
+    """Fly one episode, or its first ``decisions``, and return it; ``each`` is called after every
+    decision.
 
     A controller that has ``brief`` is told what the environment says of itself, first of all.
     """
@@ -62,7 +67,7 @@ def fly_episode(
     rows: list[tuple[float, float, float, float]] = []
     observations, forces, torques = [], [], []
     total = 0.0
-    for _ in range(DECISIONS):
+    for _ in range(decisions):
         action = controller(observation, info)
         observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))
         total += float(reward)

@@ -1,6 +1,6 @@
 """Pictures of flown episodes and of a leaderboard."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..runtime.whole_files import replaced
 from .benchmark import Results, Row, short_names
-from .episodes import DECISIONS, Episode
+from .episodes import DECISIONS, Array, Episode
 
 COLOURS = {
     "hover": "#8c8c8c",
@@ -68,6 +68,34 @@ def draw_episode(episode: Episode, title: str, path: Path) -> None:
     command.set_ylabel("command (m/s)")
     command.set_xlabel("time (s)")
     for axes in (top, torque, force, command):
+        axes.spines[["top", "right"]].set_visible(False)
+    with replaced(path) as partial:
+        figure.savefig(partial, dpi=120, format="png")
+
+
+def draw_task_episode(columns: Mapping[str, Array], title: str, path: Path) -> None:
+    """Draw one episode of a task: the error, and the true and the estimated force, over time.
+
+    Args:
+        columns: ``t`` s, ``error`` m, ``fx`` to ``fz`` and ``true_fx`` to ``true_fz`` N, (n,) each.
+        title: of the picture.
+        path: of the PNG.
+    """
+    figure = Figure(figsize=(9, 7.5), layout="constrained")
+    top, *forces = figure.subplots(4, 1, sharex=True, height_ratios=[1.6, 1, 1, 1])
+    t = columns["t"]
+    top.plot(t, columns["error"], color=COLOURS["admittance"], lw=2)
+    top.set_title(title)
+    top.set_ylabel("error (m)")
+    top.set_ylim(bottom=0)
+    for axes, name in zip(forces, ("fx", "fy", "fz"), strict=True):
+        axes.plot(t, columns[f"true_{name}"], color="#9a9a9a", lw=1, label="true")
+        axes.plot(t, columns[name], color=COLOURS["oracle"], lw=1.8, label="estimated")
+        axes.axhline(0, color="black", lw=0.5)
+        axes.set_ylabel(f"force ${name[0]}_{name[1]}$ (N)")
+    forces[0].legend(loc="upper left", ncols=2, frameon=False)
+    forces[-1].set_xlabel("time (s)")
+    for axes in (top, *forces):
         axes.spines[["top", "right"]].set_visible(False)
     with replaced(path) as partial:
         figure.savefig(partial, dpi=120, format="png")

@@ -112,8 +112,12 @@ def make_task_pilot(name: str, task: str) -> Any:
     return load_controller(name) if is_file_name(name) else make_task_law(name, task)
 
 
-def fly_task_episode(env: Any, law: Any, seed: int, task: Task) -> TaskEpisode:
-    """Fly one episode of a task and return it."""
+def fly_task_episode(
+    env: Any, law: Any, seed: int, task: Task, each: Callable[[Any], None] = lambda info: None
+) -> TaskEpisode:
+    """Fly one episode of a task and return it; ``each`` is called with the ``info`` of every
+    decision.
+    """
     law.reset()
     if hasattr(env, "preview"):
         env.preview = getattr(law, "preview", 0.0)
@@ -123,6 +127,7 @@ def fly_task_episode(env: Any, law: Any, seed: int, task: Task) -> TaskEpisode:
         observation, reward, lost, _, info = env.step(law(observation, info))
         total += float(reward)
         errors.append(info["error"])
+        each(info)
         if lost:
             break
     error = np.array(errors)
@@ -198,6 +203,7 @@ def fly_task(
         for chunk in chunks:
             take(chunk, _fly_chunk(chunk))
     else:
+        _environment(task, scenarios[0]).reset(seed=0)  # compiles here, where it is told, and once
         with workers(jobs) as pool:
             for chunk, flown in zip(chunks, pool.map(_fly_chunk, chunks), strict=True):
                 take(chunk, flown)

@@ -1,9 +1,9 @@
 """How this kit's inner loops are compiled: one decorator for each purpose."""
 
+import multiprocessing
 import os
 import subprocess
 import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import NumbaExperimentalFeatureWarning, njit, typeof
+from numba.core import event
+
+from .compile_watch import compiling, watch
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -18,6 +21,20 @@ F = TypeVar("F", bound=Callable[..., Any])
 warnings.filterwarnings(
     "ignore", category=NumbaExperimentalFeatureWarning, message=r"(\x1b\[\d+m)*Record"
 )
+
+
+class _Listener(event.Listener):  # type: ignore[misc]  # numba states no types
+    """Hears from Numba what it compiles; what it loads from the disk is no such event."""
+
+    def on_start(self, event: Any) -> None:
+        watch.begin(str(event.data["dispatcher"].__name__))
+
+    def on_end(self, event: Any) -> None:
+        watch.end()
+
+
+if multiprocessing.parent_process() is None:  # workers leave the telling to who started them
+    event.register("numba:compile", _Listener())
 
 # One record of a structured array: compiled code reads its fields as attributes.
 Record = Any
@@ -67,25 +84,12 @@ def is_compiled(function: Callable[..., Any]) -> bool:
     return bool(cast(Any, function).signatures)
 
 
-@contextmanager
-def announced(patience: float = 2.0) -> Iterator[None]:
-    """Say on stderr what takes so long if the block, a first call of compiled code, lasts longer
-    than ``patience`` s.
-    """
-    timer = threading.Timer(
-        patience,
-        lambda: print(
-            "windwrench: compiling its inner loops, once for this installation (about 20 s) ...",
-            file=sys.stderr,
-            flush=True,
-        ),
+def is_on_disk(function: Callable[..., Any]) -> bool:
+    """Return whether machine code of a compiled function is in memory or on disk."""
+    code = cast(Any, function)
+    return is_compiled(function) or any(
+        Path(code.stats.cache_path).glob(f"*.{code.__name__}-*.nbi")
     )
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 @contextmanager
@@ -102,11 +106,7 @@ def compiled_meanwhile(
         function: a compiled one.
         compile_it: compiles it; a function without arguments, found by its module and name.
     """
-    code = cast(Any, function)
-    known = is_compiled(function) or any(
-        Path(code.stats.cache_path).glob(f"*.{code.__name__}-*.nbi")
-    )
-    if known or len(os.sched_getaffinity(0)) < 2:
+    if is_on_disk(function) or len(os.sched_getaffinity(0)) < 2:
         yield
         return
     module, name = compile_it.__module__, compile_it.__name__
@@ -122,3 +122,5 @@ def compiled_meanwhile(
         except BaseException:
             other.kill()
             raise
+        with compiling(function.__name__):
+            other.wait()

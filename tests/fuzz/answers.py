@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import binomtest
 
-from windwrench.commands.logs import flight_to_draw
+from windwrench.commands.replaying import flight_to_draw
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import parse_setting
 from windwrench.dynamics.vehicle import Vehicle

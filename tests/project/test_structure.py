@@ -17,7 +17,7 @@ FLOORS = (
     {"estimator", "controllers"},
     {"envs", "identification"},
     {"evaluation", "live"},
-    {"training", "paper", "speed"},
+    {"training", "paper", "speed", "demo"},
     {"studies"},
     {"cli", "commands", "__main__"},
 )

@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.support.paths import ROOT
+from windwrench.dynamics import InputError
 from windwrench.runtime.provenance import commit, made_by
 from windwrench.speed.contenders import (
     HEADER,
@@ -15,6 +17,7 @@ from windwrench.speed.contenders import (
 from windwrench.speed.environment_profile import profile
 from windwrench.speed.flight_speed import flights
 from windwrench.speed.growth import over_formats, over_logs, over_steps, over_threads, over_vehicles
+from windwrench.speed.history import append_history, read_history
 
 
 def test_medians_and_ratios_are_taken_round_by_round(tmp_path):
@@ -35,6 +38,37 @@ def test_medians_and_ratios_are_taken_round_by_round(tmp_path):
     assert made_by(command, [commit()]) in page.splitlines()
     assert "| two | 10.00 s | 10.00 - 60.00 | 10 (5 - 20) | y |" in page
     assert all(len(row) == len(HEADER) for row in rows_of(figures))
+
+
+def test_a_history_grows_and_a_spoiled_one_is_refused(tmp_path):
+    figures = measure([Contender("one", "s", "x", lambda: 2.0, reference=True)], rounds=1)
+    path = tmp_path / "history.json"
+    for count in (1, 2):
+        append_history(figures, 1, path)
+        entries = read_history(path)
+        assert len(entries) == count
+    assert entries[0]["figures"]["one"] == {
+        "unit": "s",
+        "median": 2.0,
+        "least": 2.0,
+        "largest": 2.0,
+        "ratio": 1.0,
+    }
+    path.write_text("{}")
+    with pytest.raises(InputError, match="expected a JSON list"):
+        append_history(figures, 1, path)
+    assert path.read_text() == "{}"
+
+
+def test_the_kept_history_has_the_figures_of_the_page():
+    page = (ROOT / "docs/speed.md").read_text(encoding="utf-8")
+    entries = read_history(ROOT / "docs/speed-history.json")
+    of_page = [e for e in entries if f"commit {e['commit']}" in page]
+    assert of_page
+    for name in ("WrenchUKF", "FanTracking, 1 environment"):
+        figure = of_page[-1]["figures"][name]
+        digits = 1 if figure["median"] < 100 else 0
+        assert f"| {name} | {figure['median']:.{digits}f} {figure['unit']} |" in page
 
 
 def test_every_contender_runs():

@@ -14,6 +14,7 @@ import pytest
 from tests.support.paths import ROOT
 
 EXCERPTS = ROOT / "tests" / "data"
+EXAMPLE = ROOT / "identification" / "logs" / "example"
 DATA = Path(os.environ.get("WINDWRENCH_DATA") or ROOT.parent / "shared" / "data")
 NANOBENCH = (
     "B2_circle_fast_rep3",
@@ -67,8 +68,9 @@ def missing(relative: str) -> str:
 
 
 def excerpt(relative: str) -> Path:
-    """Return the path of an excerpt that comes with the checkout."""
-    return EXCERPTS / relative
+    """Return the path of an excerpt that comes with the checkout, one of them with the package."""
+    shipped = EXAMPLE / Path(relative).name
+    return shipped if shipped.exists() else EXCERPTS / relative
 
 
 def crazyswarm2_file(number: int | str) -> Path:

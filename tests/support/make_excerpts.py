@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pyulog import ULog
 
-from tests.support.data_paths import DATA, EXCERPTS
+from tests.support.data_paths import DATA, EXAMPLE, EXCERPTS, excerpt
 from windwrench.identification.logs.readers import nanobench
 
 # flight: seconds of the log's own clock, counted from its first row
@@ -75,8 +75,11 @@ def cut_ulog(source: Path, target: Path, span: tuple[float, float]) -> None:
 def main() -> None:
     """Write all excerpts and the notices of their licences."""
     for name, span in NANOBENCH.items():
-        target = EXCERPTS / "nanobench" / f"{name}.csv.gz"
-        cut_table(DATA / "nanobench" / f"{name}.csv", target, "t", span, NANOBENCH_COLUMNS)
+        target = excerpt(f"nanobench/{name}.csv.gz")
+        # the one in the package is smaller by the column that only tests look at
+        left_out = ("imu_acc_z",) if target.parent == EXAMPLE else ()
+        source = DATA / "nanobench" / f"{name}.csv"
+        cut_table(source, target, "t", span, NANOBENCH_COLUMNS, left_out)
     for name, span in CRAZYSWARM2.items():
         target = EXCERPTS / "crazyswarm2" / f"{name}.csv.gz"
         source = DATA / "crazyswarm2_payload" / "csv" / f"{name}.csv"
@@ -93,6 +96,7 @@ def main() -> None:
         ("px4/LICENSE.upstream.md", "px4"),
     ):
         shutil.copyfile(DATA / notice, EXCERPTS / folder / "LICENSE")
+    shutil.copyfile(EXCERPTS / "nanobench" / "LICENSE", EXAMPLE / "LICENSE")
     for path in sorted(EXCERPTS.glob("*/*")):
         assert path.stat().st_size <= MOST_BYTES, path
         print(f"{path.relative_to(EXCERPTS)}: {path.stat().st_size:,} bytes")

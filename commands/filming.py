@@ -1,0 +1,111 @@
+"""Films of a flight: what each picture says, and where it goes."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..envs.captions import Caption, with_caption
+from ..envs.video import FPS, Film, save_picture
+
+SIZE = 960, 540  # pixels
+
+
+@dataclass
+class Tally:
+    """What a film's corner says: the distance from where the vehicle should be, and the score.
+
+    Attributes:
+        what: the distance is called.
+    """
+
+    what: str
+    squares: list[float] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+
+    def add(self, distance: float, reward: float) -> None:
+        """Count a decision: m, and the reward for it, at most 1."""
+        self.squares.append(distance * distance)
+        self.rewards.append(reward)
+
+    def lines(self) -> tuple[str, ...]:
+        """Return what to say now."""
+        return (
+            f"{self.what} {np.sqrt(self.squares[-1]):.2f} m",
+            f"RMSE so far {np.sqrt(np.mean(self.squares)):.2f} m",
+            f"score {np.mean(self.rewards):.2f} (mean reward, best 1)",
+        )
+
+
+def caption_of(
+    loop: Any, viewer: Any, title: str, time: float, lines: tuple[str, ...], scales: Any
+) -> Caption:
+    """Return what a picture of a closed loop says."""
+    state, external = loop.state, loop.external
+    return Caption(
+        title,
+        time,
+        state[16:19].copy(),
+        float(state[15]),
+        external[:3].copy(),
+        float(external[5]),
+        lines,
+        viewer.pixels_per_metre(loop.position),
+        scales,
+    )
+
+
+@contextmanager
+def films(
+    folder: Path,
+    name: str,
+    kinds: list[str],
+    seconds: float,
+    every: int = 1,
+    fps: float = FPS,
+    still: str = "scene.png",
+) -> Iterator[Callable[[Callable[[], Any], Callable[[], Caption]], None]]:
+    """Give what films a decision: it takes what draws, and what tells the caption after that.
+
+    Args:
+        folder: for the films ``name.gif`` and ``name.mp4``, and the last picture.
+        name: of the films.
+        kinds: ``gif``, ``mp4`` or both.
+        seconds: after which nothing is filmed.
+        every: so many decisions there is a picture; a GIF alone, which is large, has half of
+            them.
+        fps: decisions a second.
+        still: ending of the last picture's name.
+    """
+    every *= 2 if kinds == ["gif"] else 1
+    fps /= every
+    last: list[Any] = []
+    count = 0
+    with ExitStack() as stack:
+        made = [
+            stack.enter_context(Film(folder / f"{name}.{kind}", *SIZE, fps, seconds))
+            for kind in kinds
+        ]
+
+        def add(draw: Callable[[], Any], caption: Callable[[], Caption]) -> None:
+            nonlocal count
+            count += 1
+            wanted = [film for film in made if not film.is_full]
+            if wanted and count % every == 0:
+                picture = with_caption(draw(), caption())
+                last[:] = [picture]
+                for film in wanted:
+                    film.add(picture)
+
+        yield add
+    if last:
+        save_picture(last[0], folder / f"{name}.{still}")
+
+
+def written(folder: Path, name: str, kinds: list[str], still: str = "scene.png") -> list[Path]:
+    """Return the paths of what was filmed."""
+    made = [folder / f"{name}.{kind}" for kind in kinds]
+    return [*made, folder / f"{name}.{still}"] if kinds else made

@@ -1,0 +1,139 @@
+"""What a film says beside its picture: time, what the arrows are, numbers, score, and a scale."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene_shapes import ESTIMATED, TRUE, TURNING, TURNING_TRUE
+
+Picture = NDArray[np.uint8]
+Array = NDArray[np.float64]
+
+_HEIGHT = 540  # pixels, of the picture that sizes below are for
+_MARGIN, _LINE = 14, 21
+_FONT, _SMALL = 16, 14
+_INK, _PAPER = (28, 36, 48), (255, 255, 255)
+_STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # m, of a scale
+_WIDTHS = (8, 3)  # pixels of a line in the legend: true, estimated
+
+
+@dataclass(frozen=True)
+class Caption:
+    """What is said of one picture.
+
+    Attributes:
+        title: of the film.
+        time: s.
+        force: (3,) N, estimated.
+        torque_z: Nm, estimated, about the vertical.
+        true_force: (3,) N, or None where nobody knows it.
+        true_torque_z: Nm, or None.
+        lines: what else is said, such as the offset and the score.
+        pixels_per_metre: at the vehicle.
+        scales: m that 1 N and 1 Nm are drawn as.
+    """
+
+    title: str
+    time: float
+    force: Array
+    torque_z: float
+    true_force: Array | None
+    true_torque_z: float | None
+    lines: tuple[str, ...]
+    pixels_per_metre: float
+    scales: tuple[float, float]
+
+
+@cache
+def _font(size: int, bold: bool) -> Any:
+    from matplotlib import get_data_path
+    from PIL import ImageFont
+
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/{name}", size)
+
+
+def _colour(mark: Array) -> tuple[int, int, int]:
+    red, green, blue = (round(255 * float(c)) for c in mark[:3])
+    return red, green, blue
+
+
+def scale_of(pixels_per_metre: float, longest: float) -> float:
+    """Return the length, m, of a scale of a round number that is at most ``longest`` pixels
+    long.
+    """
+    fitting = [step for step in _STEPS if step * pixels_per_metre <= longest]
+    return fitting[-1] if fitting else _STEPS[0]
+
+
+def with_caption(picture: Picture, caption: Caption) -> Picture:
+    """Return a picture (height, width, 3) with its caption."""
+    from PIL import Image, ImageDraw
+
+    height, width = picture.shape[:2]
+    size = height / _HEIGHT
+    image = Image.fromarray(picture)
+    draw = ImageDraw.Draw(image)
+    margin, line = round(_MARGIN * size), round(_LINE * size)
+    plain, small, bold = (
+        _font(max(8, round(points * size)), heavy)
+        for points, heavy in ((_FONT, False), (_SMALL, False), (_FONT, True))
+    )
+
+    def write(x: float, y: float, text: str, font: Any, anchor: str = "la") -> None:
+        draw.text((x, y), text, _INK, font, anchor, stroke_width=2, stroke_fill=_PAPER)
+
+    write(margin, margin, caption.title, bold)
+    write(width - margin, margin, f"{caption.time:.1f} s", bold, "ra")
+
+    # the legend: a wide pale arrow is the truth, a narrow dark one the estimate, as in the picture
+    rows: list[tuple[str, int, Array, str]] = []
+    if caption.true_force is not None:
+        rows.append(("true force", 0, TRUE, _newtons(caption.true_force)))
+    rows.append(("estimated force", 1, ESTIMATED, _newtons(caption.force)))
+    if caption.true_torque_z is not None:
+        rows.append(("true yaw torque", 0, TURNING_TRUE, _millis(caption.true_torque_z)))
+    rows.append(("estimated yaw torque", 1, TURNING, _millis(caption.torque_z)))
+    y = margin + 1.5 * line
+    for label, kind, mark, number in rows:
+        middle = y + 0.5 * line
+        draw.line(
+            (margin, middle, margin + 34 * size, middle),
+            _colour(mark),
+            max(1, round(_WIDTHS[kind] * size)),
+        )
+        write(margin + 44 * size, middle, label, small, "lm")
+        write(margin + 285 * size, middle, number, small, "rm")
+        y += line
+    y = margin + 1.5 * line
+    for text in caption.lines:
+        write(width - margin, y + 0.5 * line, text, plain, "rm")
+        y += line
+
+    length = scale_of(caption.pixels_per_metre, 0.2 * width)
+    right, below = margin + length * caption.pixels_per_metre, height - margin - 0.4 * line
+    draw.line((margin, below, right, below), _INK, max(1, round(3 * size)))
+    for x in (margin, right):
+        draw.line((x, below - 5 * size, x, below + 5 * size), _INK, max(1, round(2 * size)))
+    write(
+        margin,
+        below - 8 * size,
+        f"{length:g} m at the vehicle; as an arrow {length / caption.scales[0]:.3g} N or "
+        f"{1e3 * length / caption.scales[1]:.3g} mNm",
+        small,
+        "lb",
+    )
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _newtons(force: Array) -> str:
+    return f"{float(np.linalg.norm(force)):.2f} N"
+
+
+def _millis(torque: float) -> str:
+    size = abs(1e3 * torque)
+    digits = 0 if size >= 10.0 else 1 if size >= 1.0 else 2
+    return f"{round(1e3 * torque, digits) + 0.0:+.{digits}f} mNm"

@@ -1,0 +1,97 @@
+"""The demonstration and the example: what a new user sees first."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from windwrench.cli import main
+from windwrench.commands.example import confronted
+from windwrench.identification.logs.example import example_flight
+from windwrench.identification.logs.reading import read_log
+
+
+@pytest.fixture
+def call(capsys, monkeypatch, tmp_path):
+    """Run a command in an empty folder, with no browser; give its exit code and what it says."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+    def run(*arguments):
+        monkeypatch.setattr("sys.argv", ["windwrench", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code or 0, *capsys.readouterr()
+
+    return run
+
+
+def test_the_demo_tells_its_story_on_one_offline_page(call):
+    code, out, _ = call("demo", "--episodes", 1, "--out", "demo", "--json")
+    assert code == 0
+    result = json.loads(out)["result"]
+    assert result["found"] == ["constant_torque"]
+    assert result["verdict"] == "explained"
+    assert len(result["steps"]) == 6
+    assert {row["controller"] for row in result["leaderboard"]} >= {"hover", "admittance", "oracle"}
+    page = Path(result["page"]).read_text(encoding="utf-8")
+    assert not re.findall(r"(?:src|href)=\"https?:", page)
+    assert page.count("data:image/png;base64,") == 3
+    for step in result["steps"]:
+        assert step["title"] in page
+        assert step["command"].startswith("windwrench ")
+    assert "diagnose/report.html" in page
+    assert Path("demo/diagnose/report.html").is_file()
+    # the log holds no truth that would give the effect away
+    assert "fx" not in Path("demo/flight.csv").read_text().splitlines()[0].split(",")
+
+
+def test_an_effect_that_is_unknown_is_refused_at_once(call, tmp_path):
+    code, _, err = call("demo", "--effect", "constant_torqe", "--out", "demo")
+    assert code == 2
+    assert "Did you mean 'constant_torque'" in err
+    assert not (tmp_path / "demo").exists()
+
+
+def test_the_example_is_a_measured_flight_with_its_licence():
+    with example_flight() as example:
+        log = read_log(example.log)
+        assert log.t[-1] == pytest.approx(18.0, abs=0.05)
+        assert log.voltage[-1] < log.voltage[0]  # as is said to be known
+        notice = example.log.with_name("LICENSE").read_text()
+        assert "Syed Izzat Ullah" in notice
+        assert "BSD 3-Clause" in example.source
+        assert example.log.stat().st_size < 150_000
+
+
+def test_what_is_known_is_set_beside_what_was_named():
+    with example_flight() as example:
+        rows = confronted(
+            example,
+            [
+                {"name": "battery_sag", "indistinguishable_from": []},
+                {"name": "constant_force", "indistinguishable_from": ["mass"]},
+            ],
+        )
+    assert [row["named"] for row in rows] == [["battery_sag"], ["constant_force"], []]
+
+
+def test_the_example_is_diagnosed_beside_what_is_known(call):
+    code, out, _ = call("diagnose", "--example", "--no-open", "--out", "example")
+    assert code == 0
+    assert "Known before the diagnosis:" in out
+    assert "battery_sag: known, and found" in out
+    assert "page: file://" in out
+    assert json.loads(Path("example/report.json").read_text())["effects"]
+
+
+def test_the_example_takes_no_log(call):
+    code, _, err = call("diagnose", "mine.csv", "--example")
+    assert code == 2
+    assert "expected it without LOGS" in err
+    code, _, err = call("diagnose")
+    assert code == 2
+    assert "expected at least one flight log, or --example" in err
