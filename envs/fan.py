@@ -90,17 +90,21 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 
 @compiled
-def _look_up(table: Array, row: float, column: float) -> float:
-    """Return what a table says between its entries, linear in both directions."""
-    i, j = int(row), int(column)
-    a, b = row - i, column - j
-    value: float = (1 - a) * ((1 - b) * table[i, j] + b * table[i, j + 1]) + a * (
-        (1 - b) * table[i + 1, j] + b * table[i + 1, j + 1]
-    )
+def _entry(table: Array, row: float, column: float) -> float:
+    value: float = table[int(row), int(column)]
     return value
 
 
-_between = in_each_lane(_look_up)
+_entry_of = in_each_lane(_entry)
+
+
+@compiled
+def _between(table: Array, i: float, j: float, a: float, b: float) -> float:
+    """Return what a table says shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
+    value: float = (1 - a) * ((1 - b) * _entry_of(table, i, j) + b * _entry_of(table, i, j + 1)) + (
+        a * ((1 - b) * _entry_of(table, i + 1, j) + b * _entry_of(table, i + 1, j + 1))
+    )
+    return value
 
 
 @compiled
@@ -117,7 +121,9 @@ def jet_at(
         return
     # where there is no jet any place of the table will do
     row, column = choose(inside, row, 0.0), choose(inside, column, 0.0)
-    u, v = _between(axial, row, column), _between(radial, row, column)
+    i, j = math.floor(row), math.floor(column)
+    a, b = row - i, column - j
+    u, v = _between(axial, i, j, a, b), _between(radial, i, j, a, b)
     wind[0] = choose(inside, f.speed * u, 0.0)
     off = inside & (r > 1e-9)
     scale = choose(off, f.speed * v / choose(off, r, 1.0), 0.0)

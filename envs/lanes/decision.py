@@ -6,6 +6,7 @@ from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import BLOCK_SIZE, STATE, put_down, take_up
 from ...runtime.addresses import call_at, numbers_at
 from ...runtime.compiled import compiled, compiled_without_gil
+from ...runtime.pcg_normals import draw_normals
 from ...runtime.vector_lanes import WIDTH
 from ...runtime.work_sharing import next_task, stop_looking, task_done, tasks_open
 from ..decision import look, reward, take_command
@@ -31,6 +32,7 @@ def _fly(
     axial: Array,
     radial: Array,
     episodes: np.ndarray,
+    states: np.ndarray,
     commands: Array,
     resting: np.ndarray,
     ticks: int,
@@ -52,6 +54,9 @@ def _fly(
             e = episodes[n]
             path = numbers_at(e.path, (e.path_count,))
             fan_y[n] = path[min(e.ticks + k, e.path_count - 1)]
+            if states[n] != 0:
+                draw_normals(states[n], e.normals, e.bits, noise[:, n])
+                continue
             where = e.drawn if e.drawn != 0 else drawn.ctypes.data
             call_at(e.normals, e.bits, NOISE, where)
             normals = numbers_at(where, (NOISE,))
@@ -97,6 +102,7 @@ def fly_blocks(
     axial: Array,
     radial: Array,
     episodes: np.ndarray,
+    states: np.ndarray,
     commands: Array,
     resting: np.ndarray,
     ticks: int,
@@ -113,6 +119,7 @@ def fly_blocks(
         axial: of the jet's table.
         radial: likewise.
         episodes: (n,) of ``EPISODE``; a resting one may be anything.
+        states: (n,) addresses of their generators' states (``pcg_state``), or 0.
         commands: (n,) m/s.
         resting: (n,) booleans.
         ticks: of ``TICK`` s; with none the episodes are only looked at.
@@ -134,6 +141,7 @@ def fly_blocks(
                     axial,
                     radial,
                     episodes[first:last],
+                    states[first:last],
                     commands[first:last],
                     resting[first:last],
                     ticks,

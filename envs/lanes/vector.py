@@ -11,6 +11,7 @@ from gymnasium.utils.seeding import np_random
 from ...estimator.ukf_lanes import estimates_of, new_work
 from ...runtime.compiled import announced, specialised
 from ...runtime.errors import InputError
+from ...runtime.pcg_normals import pcg_state
 from ...runtime.vector_lanes import WIDTH
 from ...runtime.work_sharing import PATIENCE
 from ..closed_loop import ClosedLoop
@@ -58,6 +59,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._like = like
         self._works: deque[np.ndarray] = deque()
         self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._states = np.zeros(num_envs, np.int64)  # addresses of the generators'
         self._kept: list[Any] = [None] * num_envs  # what the episodes have the addresses of
         self._views = [View(first.view.observe, first.view.normalize) for _ in range(num_envs)]
         self._alone = np.zeros(3, dtype=np.int64)  # tasks of this thread alone
@@ -84,6 +86,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         given = (
             *self._flying.given(),
             self._episodes,
+            self._states,
             self._commands,
             self._resting,
             DECISION_TICKS,
@@ -97,17 +100,18 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         if blocks > len(self._settling):
             self._settling = Blocks(blocks, self._like)
         settling, resting = np.zeros(blocks * WIDTH, EPISODE), np.ones(blocks * WIDTH, np.bool_)
+        states = np.zeros(blocks * WIDTH, np.int64)
         for i, (block, lane) in places.items():
             n = block * WIDTH + lane
             self._hover(i, None if seeds is None else seeds[i], block, lane)
-            settling[n] = self._episodes[i]
+            settling[n], states[n] = self._episodes[i], self._states[i]
             settling[n]["path_count"], resting[n] = 1, False  # the fan stands still
         still = np.zeros(blocks * WIDTH)
 
         def settle(block: int) -> None:
             part = slice(block * WIDTH, (block + 1) * WIDTH)
-            given = settling[part], still[part], resting[part], SETTLE_TICKS, np.zeros(3, np.int64)
-            self._entry((*self._settling.given(block), *given), 0)
+            given = settling[part], states[part], still[part], resting[part], SETTLE_TICKS
+            self._entry((*self._settling.given(block), *given, np.zeros(3, np.int64)), 0)
 
         self._spread(settle, blocks)
         for i, (block, lane) in places.items():
@@ -140,13 +144,15 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._motions[i] = first.fan_motion
         e["loop"] = self._flying.loops[i // WIDTH :].ctypes.data
         e["normals"], e["bits"], e["drawn"] = normals[:3]
+        self._states[i] = 0 if normals.fixed else pcg_state(generator)
         e["path"], e["path_count"] = path.ctypes.data, len(path)
         e["ticks"], e["distance"], e["height"] = 0, distance, first.fan.height
         e["command"], e["power"] = 0.0, 2.0
 
     def _look(self, which: Flags) -> None:
         """Write what there is to see at the start of these episodes."""
-        given = self._episodes, np.zeros(self.num_envs), ~which, 0, self._alone
+        still = np.zeros(self.num_envs)
+        given = self._episodes, self._states, still, ~which, 0, self._alone
         self._alone[:] = 0
         self._entry((*self._flying.given(), *given), 0)
         for name in ("reward_tracking", "reward_change", "lost"):
