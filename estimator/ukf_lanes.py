@@ -1,9 +1,9 @@
 """Wrench filters side by side: the single filter's own functions, compiled for lanes
 (``runtime.vector_lanes``).
 
-Filters of one vehicle without effects, as many as there are lanes, make a block. Between steps a block is its estimates
-and covariances; what it works on in a step lies in one record for all blocks, so that a few hundred
-filters stay in a core's cache.
+Filters of one vehicle without effects, as many as there are lanes, make a block. Between steps a
+block is its estimates and covariances; what it works on in a step lies in one record for all
+blocks, so that a few hundred filters stay in a core's cache.
 """
 
 import math

@@ -23,9 +23,10 @@ from .compiled import compiled, compiled_without_gil
 from .random_normals import bits_address, normals_address
 
 try:  # numba's own normals are NumPy's, and so is its ziggurat
-    from numba.np.random._constants import ki_double as _INSIDE
-    from numba.np.random._constants import wi_double as _WIDTHS
-except ImportError:
+    from numba.np.random import _constants as _ziggurat
+
+    _INSIDE, _WIDTHS = _ziggurat.ki_double, _ziggurat.wi_double
+except (ImportError, AttributeError):
     _INSIDE, _WIDTHS = np.zeros(256, np.uint64), np.zeros(256)
 _MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645
 

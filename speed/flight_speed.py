@@ -249,6 +249,7 @@ for line in sys.stdin:
 
 
 def crazyflow(count: int = 1024) -> Contender:
+    """Return crazyflow's batch of vehicles; it must be installed."""
     worker: list[subprocess.Popen[str]] = []
 
     def run() -> float:

@@ -19,12 +19,12 @@ from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.lanes.flight import tick_lanes
 from ..envs.lanes.memory import Blocks
 from ..envs.plant import NOISE
-from ..estimator.ukf_lanes import new_work, step_address, take_up
+from ..estimator.ukf_lanes import new_work, take_up
 from ..runtime.addresses import address_of, call_at
 from ..runtime.compiled import compiled_without_gil
+from ..runtime.page_files import write_text
 from ..runtime.pcg_normals import draw_normals, pcg_state
 from ..runtime.random_normals import bits_address, normals_address
-from ..runtime.page_files import write_text
 from ..runtime.vector_lanes import WIDTH
 from .contenders import HEADER, Contender, Section, measure, rows_of
 from .flight_speed import UNIT, crazyflow, in_lanes, many

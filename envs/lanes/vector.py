@@ -34,8 +34,8 @@ class FanTrackingLanes(FanTrackingVectorEnv):
     the one free body there is. It is the same bit for bit for any ``num_envs`` and ``threads``.
     Observation, reward, ``infos`` and autoreset modes are those of ``FanTrackingVectorEnv``.
 
-    All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path`` and view.
-    What does not, and is refused: effects other than those of the rigid body (mass, inertia,
+    All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path`` and
+    view. What does not, and is refused: effects other than those of the rigid body (mass, inertia,
     com_offset), declared or not; ``estimator="constant-gain"``; ``render_mode``.
 
     Args:
