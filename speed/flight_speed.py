@@ -110,16 +110,21 @@ def _single(estimator: str) -> Callable[[], float]:
     return run
 
 
-def many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], float]:
+def many(
+    count: int,
+    threads: int = 1,
+    estimator: str = "ukf",
+    clock: Callable[[], float] = time.perf_counter,
+) -> Callable[[], float]:
     """Return what flies ``count`` environments together and returns how many times faster than real
-    time.
+    time, by a clock in s.
     """
     from ..envs.vector import FanTrackingVectorEnv
 
     envs = FanTrackingVectorEnv(
         count, max_episode_steps=10**9, threads=threads, scenario="static", estimator=estimator
     )
-    return _flying(envs, max(2, _TOGETHER // count), time.perf_counter)
+    return _flying(envs, max(2, _TOGETHER // count), clock)
 
 
 def in_lanes(
@@ -238,25 +243,25 @@ command[..., 3] = 0.3
 def run():
     world.attitude_control(command)
     jax.block_until_ready(world.data.states.pos)
-    begin = time.perf_counter()
+    begin = time.{clock}()
     world.step(ticks)
     jax.block_until_ready(world.data.states.pos)
-    return count * ticks / float(world.freq) / (time.perf_counter() - begin)
+    return count * ticks / float(world.freq) / (time.{clock}() - begin)
 run()  # compiles
 for line in sys.stdin:
     print("measured", run(), flush=True)
 """
 
 
-def crazyflow(count: int = 1024) -> Contender:
-    """Return crazyflow's batch of vehicles; it must be installed."""
+def crazyflow(count: int = 1024, clock: str = "perf_counter") -> Contender:
+    """Return crazyflow's batch of vehicles, by a clock of ``time``; it must be installed."""
     worker: list[subprocess.Popen[str]] = []
 
     def run() -> float:
         if not worker:
             worker.append(
                 subprocess.Popen(
-                    [sys.executable, "-c", _CRAZYFLOW.format(count=count)],
+                    [sys.executable, "-c", _CRAZYFLOW.format(count=count, clock=clock)],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,

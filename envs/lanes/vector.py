@@ -57,6 +57,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             self._flying = Blocks(self._parts, like)
         self._settling = Blocks(0, like)
         self._like = like
+        self._compiled: Callable[..., None] | None = None
         self._works: deque[np.ndarray] = deque()
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._states = np.zeros(num_envs, np.int64)  # addresses of the generators'
@@ -76,9 +77,10 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             work = new_work(self._like.ukf.record)
         try:
             arguments = *given, work.ctypes.data, patience
-            with announced():
-                entry = specialised(fly_blocks, *arguments)
-            entry(*arguments)
+            if self._compiled is None:
+                with announced():
+                    self._compiled = specialised(fly_blocks, *arguments)
+            self._compiled(*arguments)
         finally:
             self._works.append(work)
 

@@ -58,7 +58,8 @@ def work(f):
         out[10] += 2
     f.b[1:][0] = 3.0
     more, shift = f.inner.more, f.inner.shift
-    more[0], more[1], more[2] = min(a, b), abs(a), math.floor(b)
+    finite = choose(math.isfinite(b), b, 0.0)  # of another, a single number has no floor
+    more[0], more[1], more[2] = min(a, b), abs(a), math.floor(finite)
     more[3] = math.atan2(a, b) + shift
     more[4] = choose(a == b, 1.0, 0.0)
     inside = (abs(a) < 2.0) & (abs(b) < 3.0)
