@@ -14,7 +14,11 @@ with leaving_at_once(is_command()):
 __version__ = "0.1.0"
 
 _TASKS = {  # pytest imports this file a second time, as a folder's
-    "FanTracking": ("fan_tracking:FanTrackingEnv", "vector:FanTrackingVectorEnv", 250),
+    "FanTracking": (
+        "fan_tracking:FanTrackingEnv",
+        "fan_tracking_vector:make_fan_tracking_vector",
+        250,
+    ),
     "FanTracking2D": ("fan_tracking_2d:FanTracking2DEnv", None, 250),
     "WindHover": ("wind_hover:WindHoverEnv", None, 500),
     "WindTrajectory": ("wind_trajectory:WindTrajectoryEnv", None, 500),

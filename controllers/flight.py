@@ -14,6 +14,7 @@ from ..dynamics.motion import BODY, Array, body_record
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
+from ..runtime.vector_lanes import any_of, choose
 
 # set point: position 0-2, velocity 3-5, acceleration 6-8, yaw 9, yaw rate 10
 SETPOINT_SIZE = 11
@@ -77,8 +78,8 @@ def move_setpoint(c: Record, position: Array, dt: float) -> None:
     for i in range(3):
         step = dt * c.setpoint[3 + i]
         ahead = c.setpoint[i] + step - position[i]
-        if abs(ahead) <= c.leash or ahead * step <= 0.0:
-            c.setpoint[i] += step
+        moves = (abs(ahead) <= c.leash) | (ahead * step <= 0.0)
+        c.setpoint[i] = choose(moves, c.setpoint[i] + step, c.setpoint[i])
     c.setpoint[9] += dt * c.setpoint[10]
 
 
@@ -111,9 +112,11 @@ def fly(c: Record, x: Array, dt: float) -> None:
     a2 = max(a2 + c.body.gravity, 0.3 * c.body.gravity)
     lateral = math.sqrt(a0 * a0 + a1 * a1)
     limit = a2 * math.tan(c.tilt_limit)
-    if lateral > limit:
-        a0 *= limit / lateral
-        a1 *= limit / lateral
+    steep = lateral > limit
+    if any_of(steep):
+        share = choose(steep, limit / choose(steep, lateral, 1.0), 1.0)
+        a0 *= share
+        a1 *= share
     thrust = c.body.mass * (a0 * R[0, 2] + a1 * R[1, 2] + a2 * R[2, 2])
     length = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
     ux, uy, uz = a0 / length, a1 / length, a2 / length

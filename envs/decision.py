@@ -65,14 +65,21 @@ EPISODE = np.dtype(
 
 
 @compiled
-def look(loop: Record, episode: Record) -> None:
-    """Write what there is to see now into ``episode.outcome``, all but the reward."""
-    e, out, x, external = episode, episode.outcome, loop.filter.x, loop.plant.external
-    qpos, qvel, path = (
-        numbers_at(loop.qpos, (7,)),
-        numbers_at(loop.qvel, (6,)),
-        numbers_at(e.path, (e.path_count,)),
-    )
+def look(
+    x: Array, external: Array, qpos: Array, qvel: Array, started_over: bool, episode: Record
+) -> None:
+    """Write what there is to see now into ``episode.outcome``, all but the reward.
+
+    Args:
+        x: estimated state (20,).
+        external: true external wrench (6,), world.
+        qpos: true position and quaternion (7,).
+        qvel: true velocity, world, and body rate (6,).
+        started_over: whether the simulator could not go on.
+        episode: of ``EPISODE``.
+    """
+    e, out = episode, episode.outcome
+    path = numbers_at(e.path, (e.path_count,))
     for i in range(OBSERVATION_SIZE):
         value = x[16 + i] if i < 3 else x[10 + i] if i < 6 else x[8] if i == 6 else e.command
         out.observation[i] = min(max(value, -LIMITS[i]), LIMITS[i]) if math.isfinite(value) else 0.0
@@ -92,7 +99,7 @@ def look(loop: Record, episode: Record) -> None:
     for i in range(6):
         flying = flying and abs(qvel[i]) < FASTEST
     # all of them such that a number that is none counts as lost
-    out.lost = has_been_reset(loop) or not (
+    out.lost = started_over or not (
         flying
         and abs(out.offset) <= LOST_OFFSET
         and abs(qpos[0] - e.distance) <= _AWAY
@@ -101,20 +108,35 @@ def look(loop: Record, episode: Record) -> None:
 
 
 @compiled
+def take_command(e: Record, command: float) -> float:
+    """Let an episode go on at a command in m/s, clipped; return how it changes."""
+    value = min(max(command, -MAX_COMMAND), MAX_COMMAND)
+    change: float = value - e.command
+    e.command = value
+    return change
+
+
+@compiled
+def reward(e: Record, change: float) -> None:
+    """Write the reward's terms into the outcome that ``look`` wrote."""
+    out = e.outcome
+    out.reward_tracking = 1.0 / (1.0 + (out.offset / TRACKING_WIDTH) ** e.power)
+    out.reward_change = -CHANGE_COST * change * change
+
+
+@compiled
 def _decide(e: Record, command: float, ticks: int, noise: Array) -> None:
     loop = carray(pointer_to(e.loop), 1, LOOP)[0]
-    value = min(max(command, -MAX_COMMAND), MAX_COMMAND)
-    change = value - e.command
-    e.command = loop.flight.setpoint[4] = value
+    change = take_command(e, command)
+    loop.flight.setpoint[4] = e.command
     if ticks > 0:
         drawn = e.drawn if e.drawn != 0 else noise.ctypes.data
         call_at(e.normals, e.bits, noise.size, drawn)
         call_at(e.run, e.loop, drawn, ticks, e.path, e.path_count, e.ticks)
         e.ticks += ticks
-    look(loop, e)
-    out = e.outcome
-    out.reward_tracking = 1.0 / (1.0 + (out.offset / TRACKING_WIDTH) ** e.power)
-    out.reward_change = -CHANGE_COST * change * change
+    qpos, qvel = numbers_at(loop.qpos, (7,)), numbers_at(loop.qvel, (6,))
+    look(loop.filter.x, loop.plant.external, qpos, qvel, has_been_reset(loop), e)
+    reward(e, change)
 
 
 @compiled_without_gil

@@ -20,6 +20,7 @@ from ..dynamics.mean_jet import (
     jet_table,
 )
 from ..runtime.compiled import Record, compiled
+from ..runtime.vector_lanes import any_of, choose, in_each_lane
 
 Array = NDArray[np.float64]
 
@@ -89,30 +90,44 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 
 @compiled
+def _entry(table: Array, row: float, column: float) -> float:
+    value: float = table[int(row), int(column)]
+    return value
+
+
+_entry_of = in_each_lane(_entry)
+
+
+@compiled
+def _between(table: Array, i: float, j: float, a: float, b: float) -> float:
+    """Return what a table says shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
+    value: float = (1 - a) * ((1 - b) * _entry_of(table, i, j) + b * _entry_of(table, i, j + 1)) + (
+        a * ((1 - b) * _entry_of(table, i + 1, j) + b * _entry_of(table, i + 1, j + 1))
+    )
+    return value
+
+
+@compiled
 def jet_at(
     f: Record, axial: Array, radial: Array, x: float, y: float, z: float, wind: Array
 ) -> None:
     """Write the mean wind (3,) m/s at a point of the world into ``wind``."""
-    if f.speed == 0.0:
-        wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
-        return
     dy, dz = y - f.y, z - f.height
     r = math.sqrt(dy * dy + dz * dz)
     row, column = (x - FIRST_X) / STEP_X, r / STEP_R
-    if row < 0.0 or row >= COUNT_X - 1 or column >= COUNT_R - 1:
+    inside = (row >= 0.0) & (row < COUNT_X - 1) & (column < COUNT_R - 1) & (f.speed > 0.0)
+    if not any_of(inside):
         wind[0], wind[1], wind[2] = 0.0, 0.0, 0.0
         return
-    i, j = int(row), int(column)
+    # where there is no jet any place of the table will do
+    row, column = choose(inside, row, 0.0), choose(inside, column, 0.0)
+    i, j = math.floor(row), math.floor(column)
     a, b = row - i, column - j
-    u = (1 - a) * ((1 - b) * axial[i, j] + b * axial[i, j + 1]) + a * (
-        (1 - b) * axial[i + 1, j] + b * axial[i + 1, j + 1]
-    )
-    v = (1 - a) * ((1 - b) * radial[i, j] + b * radial[i, j + 1]) + a * (
-        (1 - b) * radial[i + 1, j] + b * radial[i + 1, j + 1]
-    )
-    wind[0] = f.speed * u
-    scale = f.speed * v / r if r > 1e-9 else 0.0
-    wind[1], wind[2] = scale * dy, scale * dz
+    u, v = _between(axial, i, j, a, b), _between(radial, i, j, a, b)
+    wind[0] = choose(inside, f.speed * u, 0.0)
+    off = inside & (r > 1e-9)
+    scale = choose(off, f.speed * v / choose(off, r, 1.0), 0.0)
+    wind[1], wind[2] = choose(inside, scale * dy, 0.0), choose(inside, scale * dz, 0.0)
 
 
 @compiled

@@ -216,6 +216,22 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
         super().reset(seed=seed)
         rng = self.np_random
+        distance, loop, _ = self.hover(rng)
+        loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y[:1])
+        self._begin(distance)
+        if self.render_mode == "human":
+            self.render()
+        return self.observation(), self._info()
+
+    def flight(self) -> ClosedLoop:
+        """Return a closed loop as an episode has one, of the true vehicle and the fan as stated."""
+        return self._make_loop(self.truth, self.fan)
+
+    def hover(self, rng: np.random.Generator) -> tuple[float, ClosedLoop, NDArray[np.float64]]:
+        """Draw an episode and let the vehicle hover at its start, before the filter settles.
+
+        Returns its distance from the fan, m, the closed loop, and the fan's path (n,), m.
+        """
         scenario, distance = self.scenario, DISTANCE
         if scenario.varied:
             drawn = scenario.variation.draw(rng)
@@ -233,7 +249,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
             self.loop = self._make_loop(vehicle, fan)
         elif self.loop is None:
-            self.loop = self._make_loop(self.truth, self.fan)
+            self.loop = self.flight()
         loop = self.loop
         ticks = round(EPISODE_SECONDS / TICK)
         t = TICK * np.arange(ticks + 2, dtype=np.float64)
@@ -249,11 +265,7 @@ class FanTrackingEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 )
         offset = float(rng.uniform(*scenario.offset) * rng.choice([-1.0, 1.0]))
         loop.reset(rng, np.array([distance, self._fan_y[0] + offset, self.fan.height]), math.pi)
-        loop.run(rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y[:1])
-        self._begin(distance)
-        if self.render_mode == "human":
-            self.render()
-        return self.observation(), self._info()
+        return distance, loop, self._fan_y
 
     def step(
         self, action: NDArray[np.float32]

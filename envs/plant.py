@@ -30,6 +30,7 @@ from ..dynamics.rotation import (
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
+from ..runtime.vector_lanes import any_of, choose
 from .fan import STATIONS, gust, jet_wrench
 from .suspended_load import SuspendedLoad, add_load
 
@@ -220,64 +221,76 @@ def sense(p: Record, qpos: Array, noise: Array) -> int:
     for i in range(7):
         p.sample[4 + i] = qpos[i]
     rewrite_sample(p, 0.0, 3, 1.0)
-    for i in range(3):
-        p.z[4 + i] = p.sample[4 + i] + p.sigma_position * noise[_POSE + i]
-        p.rho[i] = 0.25 * p.sigma_attitude * noise[_POSE + 3 + i]
-    quaternion_from_mrp(p.rho, p.q)
-    quaternion_multiply(p.q, p.sample[7:11], p.z[7:11])
-    normalise(p.z[7:11])
-    if p.z[7] < 0.0:
-        for i in range(7, 11):
-            p.z[i] = -p.z[i]
+    measure(p, p.sample[4:11], noise)
     return 0 if noise[_DROPOUT] < p.dropout else 3
 
 
 @compiled
-def actuate(
-    p: Record,
-    command: Array,
-    fan: Record,
-    axial: Array,
-    radial: Array,
-    qpos: Array,
-    qvel: Array,
-    noise: Array,
-    xfrc: Array,
-) -> None:
-    """Let the motors follow their commands for one tick and write the wrench that acts in it into
-    ``xfrc`` (6,).
-    """
-    load = 0.0
+def measure(p: Record, pose: Array, noise: Array) -> None:
+    """Write a pose (7,) and its noise into ``p.z``."""
+    for i in range(3):
+        p.z[4 + i] = pose[i] + p.sigma_position * noise[_POSE + i]
+        p.rho[i] = 0.25 * p.sigma_attitude * noise[_POSE + 3 + i]
+    quaternion_from_mrp(p.rho, p.q)
+    quaternion_multiply(p.q, pose[3:7], p.z[7:11])
+    normalise(p.z[7:11])
+    sign = choose(p.z[7] < 0.0, -1.0, 1.0)
+    for i in range(7, 11):
+        p.z[i] *= sign
+
+
+@compiled
+def lose_pose(p: Record, noise: Array) -> None:
+    """Write NaN for the pose in ``p.z`` where it is lost: what ``sense`` returns, as numbers."""
+    lost = noise[_DROPOUT] < p.dropout
+    for i in range(4, 11):
+        p.z[i] = choose(lost, math.nan, p.z[i])
+
+
+@compiled
+def follow(p: Record, command: Array) -> None:
+    """Let the motors follow their commands (4,) rad/s for one tick."""
     for i in range(4):
         p.speeds[i] = command[i] + p.motor_keep * (p.speeds[i] - command[i])
         p.speeds[i] = min(max(p.speeds[i], 0.0), p.omega_max)
-        load += p.body.k[i] * p.speeds[i] * p.speeds[i]
-        p.sample[i] = p.speeds[i]
-    rewrite_sample(p, TICK, 4, 1.0)
+
+
+@compiled
+def log_speeds(p: Record, speeds: Array) -> None:
+    """Write rotor speeds (4,) rad/s into ``p.z``, rounded as they are logged."""
     for i in range(4):
-        p.z[i] = (
-            p.sample[i]
-            if p.omega_lsb == 0.0
-            else p.omega_lsb * math.floor(p.sample[i] / p.omega_lsb + 0.5)
-        )
-    if p.voltage_ref > 0.0:
-        # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
-        full = (
-            1.05
-            - 0.1 * p.time / p.battery_life
-            - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
-        )
-        p.battery += 0.05 * (full * p.voltage_ref - p.battery)
-    drive(p, p.speeds, TICK, p.battery)
-    R = p.rotation
-    quaternion_to_matrix(qpos[3:7], R)
-    apply_effects(p, qpos[0:3], R, qvel[0:3], qvel[3:6])
-    if fan.speed > 0.0:
+        if p.omega_lsb == 0.0:
+            p.z[i] = speeds[i]
+        else:
+            p.z[i] = p.omega_lsb * math.floor(speeds[i] / p.omega_lsb + 0.5)
+
+
+@compiled
+def blow(
+    p: Record, fan: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, noise: Array
+) -> None:
+    """Let the gusts age by one tick and write the jet's wrench at ``p.rotation`` into ``p.jet``."""
+    blows = any_of(fan.speed > 0.0)
+    if blows:
         gust(fan, noise[_GUSTS:_DROPOUT])
-    if fan.speed > 0.0 or fan.blown > 0:
+    if blows or fan.blown > 0:
         jet_wrench(
-            fan, axial, radial, qpos[0:3], R, qvel[0:3], qvel[3:6], p.body.com, p.scratch, p.jet
+            fan,
+            axial,
+            radial,
+            qpos[0:3],
+            p.rotation,
+            qvel[0:3],
+            qvel[3:6],
+            p.body.com,
+            p.scratch,
+            p.jet,
         )
+
+
+@compiled
+def disturb(p: Record, noise: Array) -> None:
+    """Let the unmodelled disturbance age by one tick."""
     fresh = math.sqrt(1.0 - p.disturbance_keep * p.disturbance_keep)
     for i in range(3):
         p.disturbance[i] = (
@@ -288,6 +301,14 @@ def actuate(
             p.disturbance_keep * p.disturbance[3 + i]
             + fresh * p.disturbance_torque * noise[_DISTURBANCE + 3 + i]
         )
+
+
+@compiled
+def add_up(p: Record, xfrc: Array) -> None:
+    """Write the wrench on the vehicle at ``p.rotation`` into ``xfrc`` (6,), and its external part
+    into ``p.external``.
+    """
+    R = p.rotation
     for i in range(3):
         p.external[i] = p.effect_wrench[i] + p.jet[i] + p.disturbance[i] + p.applied[i]
         p.external[3 + i] = (
@@ -305,4 +326,42 @@ def actuate(
             + R[i, 1] * p.rotor_wrench[2]
             + R[i, 2] * p.rotor_wrench[3]
         )
+
+
+@compiled
+def actuate(
+    p: Record,
+    command: Array,
+    fan: Record,
+    axial: Array,
+    radial: Array,
+    qpos: Array,
+    qvel: Array,
+    noise: Array,
+    xfrc: Array,
+) -> None:
+    """Let the motors follow their commands for one tick and write the wrench that acts in it into
+    ``xfrc`` (6,).
+    """
+    follow(p, command)
+    load = 0.0
+    for i in range(4):
+        load += p.body.k[i] * p.speeds[i] * p.speeds[i]
+        p.sample[i] = p.speeds[i]
+    rewrite_sample(p, TICK, 4, 1.0)
+    log_speeds(p, p.sample[0:4])
+    if p.voltage_ref > 0.0:
+        # falls by a tenth over the battery's life, and by a twentieth under twice the hover load
+        full = (
+            1.05
+            - 0.1 * p.time / p.battery_life
+            - 0.05 * (load / (p.body.mass * p.body.gravity) - 1.0)
+        )
+        p.battery += 0.05 * (full * p.voltage_ref - p.battery)
+    drive(p, p.speeds, TICK, p.battery)
+    quaternion_to_matrix(qpos[3:7], p.rotation)
+    apply_effects(p, qpos[0:3], p.rotation, qvel[0:3], qvel[3:6])
+    blow(p, fan, axial, radial, qpos, qvel, noise)
+    disturb(p, noise)
+    add_up(p, xfrc)
     p.time += TICK

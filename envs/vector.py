@@ -60,12 +60,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             if value < 1:
                 raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
         self.autoreset_mode = _mode(autoreset_mode)
-        self.envs = [FanTrackingEnv(**kwargs) for _ in range(num_envs)]
         self.num_envs, self.max_episode_steps, self.threads = (
             num_envs,
             max_episode_steps,
             min(threads, num_envs),
         )
+        self._episodes = np.zeros(num_envs, dtype=EPISODE)
+        self.envs = self._make_envs(kwargs)
         first = self.envs[0]
         self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
@@ -77,15 +78,13 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._episodes = np.zeros(num_envs, dtype=EPISODE)
         self._outcomes = self._episodes["outcome"]
         self._motions = np.full(num_envs, "", dtype=object)
-        for i, env in enumerate(self.envs):
-            env.episode = self._episodes[i : i + 1]
         self._all = np.ones(num_envs, dtype=np.bool_)
         # what threads read; one that comes late works for the step that it finds
         self._commands, self._resting = np.zeros(num_envs), np.zeros(num_envs, dtype=np.bool_)
         self._tasks = np.array([0, 0, self.threads])  # all of them have left
+        self._parts = num_envs  # tasks of a decision
         self._call: Callable[[], None] | None = None
         self._help: Callable[[], None] | None = None  # the same, and to look for more
         self._helpers: list[Future[None]] = []
@@ -117,7 +116,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
                 f"got {len(seeds)} and {mask!r}"
             )
 
-        self._spread(lambda first, last: self._start(first, last, mask, seeds))
+        self._start_all(mask, seeds)
         self._decisions[mask], self._over[mask] = 0, False
         return self._frames(), self._infos()
 
@@ -138,7 +137,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         self._commands[:], self._resting[:] = actions[:, 0], self._over
         self._fly()
         if self._over.any():
-            self._spread(lambda first, last: self._start(first, last, self._resting))
+            self._start_all(self._resting)
         self._decisions = np.where(self._over, 0, self._decisions + 1)
         out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
         lost, rewards = out["lost"].copy(), out["reward_tracking"] + out["reward_change"]
@@ -150,18 +149,29 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         final = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
             final[i] = last[i]
-        self._spread(lambda first, end: self._start(first, end, over))
+        self._start_all(over)
         self._decisions[over] = 0
         masks = {"_final_obs": over.copy(), "_final_info": over.copy()}
         infos = self._infos() | {"final_obs": final, "final_info": ended} | masks
         return self._frames(), rewards, lost, truncated, infos
 
+    def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
+        """Return the environments, whose episodes are those of ``_episodes``."""
+        envs = [FanTrackingEnv(**kwargs) for _ in range(self.num_envs)]
+        for i, env in enumerate(envs):
+            env.episode = self._episodes[i : i + 1]
+        return envs
+
+    def _calls(self) -> tuple[Callable[[], None], Callable[[], None]]:
+        """Return what flies a decision, and the same for a thread that helps."""
+        given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._tasks
+        entry = specialised(decide, *given, PATIENCE)
+        return partial(entry, *given, 0), partial(entry, *given, PATIENCE)
+
     def _fly(self) -> None:
         """Fly a decision of all environments that do not rest."""
         if self._call is None or self._help is None:
-            given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._tasks
-            entry = specialised(decide, *given, PATIENCE)
-            self._call, self._help = partial(entry, *given, 0), partial(entry, *given, PATIENCE)
+            self._call, self._help = self._calls()
         left = open_tasks(self._tasks) - 1  # without this thread
         if left:
             self._helpers = [
@@ -170,7 +180,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             ]
         try:
             self._call()
-            while not all_done(self._tasks, self.num_envs):
+            while not all_done(self._tasks, self._parts):
                 for helper in self._helpers:
                     if helper.done():
                         helper.result()
@@ -185,28 +195,26 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             self._pool = ThreadPoolExecutor(self.threads - 1)
         return [self._pool.submit(work) for _ in range(count)] if self._pool else []
 
-    def _start(
-        self, first: int, last: int, which: Flags, seeds: Sequence[int | None] | None = None
-    ) -> None:
-        """Start an episode in those environments from ``first`` to before ``last`` that ``which``
-        (num_envs,) names.
-        """
-        for i in (first + np.flatnonzero(which[first:last])).tolist():
-            self.envs[i].reset(seed=None if seeds is None else seeds[i])
-            self._motions[i] = self.envs[i].fan_motion
+    def _start_all(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
+        """Start an episode in all environments that ``which`` (num_envs,) names."""
 
-    def _spread(self, work: Callable[[int, int], None]) -> None:
-        """Call ``work`` with the bounds of some environments, until all were in hand; this thread
-        works, too.
+        def start(i: int) -> None:
+            if which[i]:
+                self.envs[i].reset(seed=None if seeds is None else seeds[i])
+                self._motions[i] = self.envs[i].fan_motion
 
-        Whoever is done takes the next few, so that nobody waits for a thread that the machine held
-        up.
+        self._spread(start, self.num_envs)
+
+    def _spread(self, work: Callable[[int], None], count: int) -> None:
+        """Call ``work`` with 0 to ``count - 1``, once each; this thread works, too.
+
+        Whoever is done takes the next, so that nobody waits for a thread that the machine held up.
         """
-        firsts = iter(range(self.num_envs))
+        numbers = iter(range(count))
 
         def take_tasks() -> None:
-            for n in firsts:
-                work(n, n + 1)
+            for n in numbers:
+                work(n)
 
         others = self._call_others(take_tasks, self.threads - 1)
         try:

@@ -10,11 +10,11 @@ with ``if``.
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba import from_dtype, types
 from numba.core import cgutils
 from numba.core.datamodel import models
@@ -25,7 +25,9 @@ from numba.core.typing import signature
 from numba.core.typing.templates import ConcreteTemplate, infer_global
 from numba.extending import intrinsic, overload
 
-WIDTH = 8  # lanes: 512 bits of doubles; a processor with less takes each operation in parts
+# lanes: what a register of the processor holds, 512 or 256 bits of doubles; machine code on disk is
+# kept for each kind of processor
+WIDTH = 8 if binding.get_host_cpu_features().get("avx512f", False) else 4
 
 _ALIGNMENT = 8 * WIDTH
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -132,6 +134,9 @@ for _name, _sign in (("lt", "<"), ("le", "<="), ("gt", ">"), ("ge", ">=")):
         (LANES, LANES),
         lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
     )
+_define(
+    operator.eq, ANSWERS, (LANES, LANES), lambda builder, a, b: builder.fcmp_ordered("==", a, b)
+)
 _define(operator.and_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.and_(a, b))
 _define(operator.or_, ANSWERS, (ANSWERS, ANSWERS), lambda builder, a, b: builder.or_(a, b))
 _define(
@@ -146,25 +151,44 @@ def _intrinsic_of(builder: Any, name: str, kind: Any) -> Any:
     return cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
 
 
-_define(
-    math.sqrt,
-    LANES,
-    (LANES,),
-    lambda builder, a: builder.call(_intrinsic_of(builder, f"llvm.sqrt.v{WIDTH}f64", _VECTOR), [a]),
-)
-for _function in (math.cos, math.sin):
+for _function, _name in ((math.sqrt, "sqrt"), (math.floor, "floor"), (abs, "fabs")):
+    _define(
+        _function,
+        LANES,
+        (LANES,),
+        lambda builder, a, name=_name: builder.call(
+            _intrinsic_of(builder, f"llvm.{name}.v{WIDTH}f64", _VECTOR), [a]
+        ),
+    )
 
-    def _each(builder: Any, a: Any, name: str = _function.__name__) -> Any:
-        """Lane by lane with the function of single numbers: rare, and so with its digits."""
-        out, one = a, _intrinsic_of(builder, f"llvm.{name}.f64", ir.DoubleType())
-        for lane in range(WIDTH):
-            place = ir.Constant(ir.IntType(32), lane)
-            out = builder.insert_element(
-                out, builder.call(one, [builder.extract_element(a, place)]), place
-            )
-        return out
 
-    _define(_function, LANES, (LANES,), _each)
+def _lane_by_lane(builder: Any, function: Callable[..., Any], *given: Any) -> Any:
+    """Generate ``function`` of single numbers for each lane of those given."""
+    out = given[0]
+    for lane in range(WIDTH):
+        place = ir.Constant(ir.IntType(32), lane)
+        numbers = [builder.extract_element(values, place) for values in given]
+        out = builder.insert_element(out, function(*numbers), place)
+    return out
+
+
+def _of_library(name: str) -> Callable[..., Any]:
+    """Return what generates a function of C's library lane by lane: rare, and so with the digits of
+    single numbers.
+    """
+
+    def generate(builder: Any, *given: Any) -> Any:
+        one = ir.DoubleType()
+        kind = ir.FunctionType(one, [one] * len(given))
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        return _lane_by_lane(builder, lambda *a: builder.call(function, a), *given)
+
+    return generate
+
+
+_define(math.cos, LANES, (LANES,), _of_library("llvm.cos.f64"))
+_define(math.sin, LANES, (LANES,), _of_library("llvm.sin.f64"))
+_define(math.atan2, LANES, (LANES, LANES), _of_library("atan2"))
 # finite: less than infinity in size, which NaN is not
 _define(
     math.isfinite,
@@ -176,12 +200,13 @@ _define(
     ),
 )
 # as numba orders single numbers
-_define(
-    max,
-    LANES,
-    (LANES, LANES),
-    lambda builder, a, b: builder.select(builder.fcmp_ordered(">", b, a), b, a),
-)
+for _function, _sign in ((max, ">"), (min, "<")):
+    _define(
+        _function,
+        LANES,
+        (LANES, LANES),
+        lambda builder, a, b, sign=_sign: builder.select(builder.fcmp_ordered(sign, b, a), b, a),
+    )
 
 
 @intrinsic
@@ -240,6 +265,38 @@ def _any_of(condition: Any) -> Any:
     return lambda condition: bool(condition)
 
 
+def in_each_lane(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what compiled code calls a compiled ``function(table, a, b)`` by, with single numbers
+    or lanes: a question that lanes cannot answer together, such as where to look in a table.
+    """
+
+    @intrinsic
+    def lanes(_context: Any, table: Any, a: Any, b: Any) -> Any:
+        def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+            kind = signature(types.float64, given.args[0], types.float64, types.float64)
+
+            def one(*numbers: Any) -> Any:
+                return context.compile_internal(builder, singly, kind, [arguments[0], *numbers])
+
+            return _lane_by_lane(builder, one, *arguments[1:])
+
+        return LANES(table, a, b), generate
+
+    def singly(table: Any, a: Any, b: Any) -> Any:
+        return function(table, a, b)
+
+    def call(table: Any, a: Any, b: Any) -> Any:
+        return function(table, a, b)
+
+    @overload(call, strict=False)
+    def _call(table: Any, a: Any, b: Any) -> Any:
+        if LANES in (a, b):
+            return lambda table, a, b: lanes(table, a, b)
+        return lambda table, a, b: function(table, a, b)
+
+    return call
+
+
 class _LaneRecord(types.Record):
     """A record some of whose fields are lanes."""
 
@@ -260,27 +317,31 @@ class LaneRecord:
         lanes: names of the fields that become lanes; their numbers stand in the last axis,
             ``WIDTH`` of them.
         shared: names of the fields that stay single numbers, for all lanes.
+        nested: layouts of the fields that are records with lanes themselves.
     """
 
-    def __init__(self, single: np.dtype, lanes: Sequence[str], shared: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        single: np.dtype,
+        lanes: Sequence[str],
+        shared: Sequence[str] = (),
+        nested: Mapping[str, "LaneRecord"] | None = None,
+    ) -> None:
+        self._lanes, self._shared, self._nested = tuple(lanes), tuple(shared), dict(nested or {})
+        nested = self._nested
         forms: dict[str, Any] = {}
         fields, offset = [], 0
-        for name in (
-            *lanes,
-            *shared,
-        ):  # lanes first: they are loaded from addresses that are multiples of their size
+        # lanes first: they are loaded from addresses that are multiples of their size
+        for name in (*nested, *lanes, *shared):
             kind = single[name]
-            element = LANES if name in lanes else from_dtype(kind.base)
-            form = np.dtype((np.float64, (*kind.shape, WIDTH)) if name in lanes else kind)
-            fields.append(
-                (
-                    name,
-                    {
-                        "type": types.NestedArray(element, kind.shape) if kind.shape else element,
-                        "offset": offset,
-                    },
-                )
-            )
+            if name in nested:
+                form, element = nested[name].dtype, nested[name].record
+            elif name in lanes:
+                form, element = np.dtype((np.float64, (*kind.shape, WIDTH))), LANES
+            else:
+                form, element = kind, from_dtype(kind.base)
+            whole = types.NestedArray(element, kind.shape) if kind.shape else element
+            fields.append((name, {"type": whole, "offset": offset}))
             forms[name] = (form, offset)
             offset += form.itemsize
         size = -(-offset // _ALIGNMENT) * _ALIGNMENT
@@ -292,7 +353,7 @@ class LaneRecord:
                 "itemsize": size,
             }
         )
-        record = _LaneRecord(fields, size, True)
+        self.record = record = _LaneRecord(fields, size, True)
 
         @intrinsic
         def at(_context: Any, address: Any) -> Any:
@@ -309,6 +370,31 @@ class LaneRecord:
         room = np.zeros(size + _ALIGNMENT, np.uint8)
         first = -room.ctypes.data % _ALIGNMENT
         return room[first : first + size].view(self.dtype)
+
+    def write(self, records: Any, which: Any, lanes: Any, single: Any) -> None:
+        """Write the numbers of a ``single`` record into some lanes of ``records[which]``."""
+        for name in self._lanes:
+            records[name][which][..., lanes] = np.asarray(single[name])[..., np.newaxis]
+        for name, layout in self._nested.items():
+            layout.write(records[name], which, lanes, single[name])
+
+    def share(self, records: Any, single: Any) -> None:
+        """Write what all lanes share of a ``single`` record into all ``records``."""
+        for name in self._shared:
+            records[name] = single[name]
+        for name, layout in self._nested.items():
+            layout.share(records[name], single[name])
+
+    def offset(self, *names: str) -> int:
+        """Return how many bytes from a record's start a field lies, or a nested record's field."""
+        first: int = self.dtype.fields[names[0]][1]  # type: ignore[index]
+        return first + (self._nested[names[0]].offset(*names[1:]) if names[1:] else 0)
+
+    def columns(self, records: np.ndarray) -> np.ndarray:
+        """Return records (n,) as numbers (n, m, WIDTH): those of a lane in one column, beside some
+        of those that all share.
+        """
+        return records.view(np.float64).reshape(len(records), -1, WIDTH)
 
     def like(self, records: np.ndarray) -> np.ndarray:
         """Return a copy of records (n,) where lanes may be loaded; NumPy's own

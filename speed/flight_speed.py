@@ -17,12 +17,13 @@ import numpy as np
 from ..dynamics import load_vehicle
 from .contenders import Contender
 
-_UNIT = "x real time"
+UNIT = "x real time"
 _EVERYTHING = (
     "jet at 12 stations, gusts, motors, sensors, 200 Hz UKF, flight loop, MuJoCo at 400 Hz"
 )
 _DECISIONS = 128  # of a run of one environment
 _TOGETHER = 512  # of a run of many, over all of them
+_IN_LANES = 4096  # likewise, in lanes
 
 
 def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
@@ -33,13 +34,13 @@ def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
     """
     cores = os.cpu_count() or 1
     out = [
-        Contender("FanTracking, 1 environment", _UNIT, _EVERYTHING, _single("ukf"), reference=True)
+        Contender("FanTracking, 1 environment", UNIT, _EVERYTHING, _single("ukf"), reference=True)
     ]
     for count in counts:
         out.append(
             Contender(
                 f"FanTracking, {count} in one process",
-                _UNIT,
+                UNIT,
                 "the same, all of them together",
                 many(count),
             )
@@ -48,27 +49,45 @@ def flights(counts: tuple[int, ...] = (16, 256)) -> list[Contender]:
             out.append(
                 Contender(
                     f"FanTracking, {count} on {cores} threads",
-                    _UNIT,
+                    UNIT,
                     "the same",
                     many(count, threads=cores),
                 )
             )
+    together = counts[-1]
+    out.append(
+        Contender(
+            f"FanTracking in lanes, {together} in one process",
+            UNIT,
+            "the same, MuJoCo's integrator in lanes",
+            in_lanes(together),
+        )
+    )
+    if cores > 1:
+        out.append(
+            Contender(
+                f"FanTracking in lanes, {together} on {cores} threads",
+                UNIT,
+                "the same",
+                in_lanes(together, threads=cores),
+            )
+        )
     out += [
         Contender(
             "constant gain, 1 environment",
-            _UNIT,
+            UNIT,
             "the same, with a filter of constant gain",
             _single("constant-gain"),
         ),
         Contender(
             f"constant gain, {counts[0]} in one process",
-            _UNIT,
+            UNIT,
             "the same, all of them together",
             many(counts[0], estimator="constant-gain"),
         ),
         _ant(),
     ]
-    for name, peer in (("rotorpy", _rotorpy), ("PyFlyt", _pyflyt), ("crazyflow", _crazyflow)):
+    for name, peer in (("rotorpy", _rotorpy), ("PyFlyt", _pyflyt), ("crazyflow", crazyflow)):
         if importlib.util.find_spec(name):
             out.append(peer())
     return out
@@ -91,26 +110,49 @@ def _single(estimator: str) -> Callable[[], float]:
     return run
 
 
-def many(count: int, threads: int = 1, estimator: str = "ukf") -> Callable[[], float]:
+def many(
+    count: int,
+    threads: int = 1,
+    estimator: str = "ukf",
+    clock: Callable[[], float] = time.perf_counter,
+) -> Callable[[], float]:
     """Return what flies ``count`` environments together and returns how many times faster than real
-    time.
+    time, by a clock in s.
     """
-    from ..envs.fan_tracking import DECISION_TICKS
-    from ..envs.plant import TICK
     from ..envs.vector import FanTrackingVectorEnv
 
-    # a fan that stands still never leaves the vehicle behind: no reset falls into a run
     envs = FanTrackingVectorEnv(
         count, max_episode_steps=10**9, threads=threads, scenario="static", estimator=estimator
     )
-    actions, steps = np.zeros((count, 1), dtype=np.float32), max(2, _TOGETHER // count)
+    return _flying(envs, max(2, _TOGETHER // count), clock)
+
+
+def in_lanes(
+    count: int, threads: int = 1, clock: Callable[[], float] = time.perf_counter
+) -> Callable[[], float]:
+    """Return the same of environments in the lanes of a vector unit."""
+    from ..envs.lanes.vector import FanTrackingLanes
+
+    envs = FanTrackingLanes(count, 10**9, threads, scenario="static")
+    return _flying(envs, max(2, _IN_LANES // count), clock)
+
+
+def _flying(envs: Any, steps: int, clock: Callable[[], float]) -> Callable[[], float]:
+    """Return what flies environments of which the fan stands still: it never leaves the vehicle
+    behind, so that no reset falls into a run.
+    """
+    from ..envs.fan_tracking import DECISION_TICKS
+    from ..envs.plant import TICK
+
+    count = envs.num_envs
+    actions = np.zeros((count, 1), dtype=np.float32)
     envs.reset(seed=0)
 
     def run() -> float:
-        begin = time.perf_counter()
+        begin = clock()
         for _ in range(steps):
             envs.step(actions)
-        return count * steps * DECISION_TICKS * TICK / (time.perf_counter() - begin)
+        return float(count * steps * DECISION_TICKS * TICK / (clock() - begin))
 
     return run
 
@@ -138,7 +180,7 @@ def _ant() -> Contender:
             ant.step(action)
         return steps * float(ant.unwrapped.dt) / (time.perf_counter() - begin)  # type: ignore[attr-defined]
 
-    return Contender("Gymnasium Ant-v5", _UNIT, "MuJoCo at 100 Hz with contacts", run)
+    return Contender("Gymnasium Ant-v5", UNIT, "MuJoCo at 100 Hz with contacts", run)
 
 
 def _rotorpy() -> Contender:
@@ -156,7 +198,7 @@ def _rotorpy() -> Contender:
         return steps * 0.01 / (time.perf_counter() - begin)
 
     return Contender(
-        f"RotorPy {version('rotorpy')}", _UNIT, "rigid body, motors and aerodynamics at 100 Hz", run
+        f"RotorPy {version('rotorpy')}", UNIT, "rigid body, motors and aerodynamics at 100 Hz", run
     )
 
 
@@ -182,7 +224,7 @@ def _pyflyt() -> Contender:
 
     return Contender(
         f"PyFlyt {version('PyFlyt')}",
-        _UNIT,
+        UNIT,
         "PyBullet at 240 Hz, motors, a position controller",
         run,
     )
@@ -201,24 +243,25 @@ command[..., 3] = 0.3
 def run():
     world.attitude_control(command)
     jax.block_until_ready(world.data.states.pos)
-    begin = time.perf_counter()
+    begin = time.{clock}()
     world.step(ticks)
     jax.block_until_ready(world.data.states.pos)
-    return count * ticks / float(world.freq) / (time.perf_counter() - begin)
+    return count * ticks / float(world.freq) / (time.{clock}() - begin)
 run()  # compiles
 for line in sys.stdin:
     print("measured", run(), flush=True)
 """
 
 
-def _crazyflow(count: int = 1024) -> Contender:
+def crazyflow(count: int = 1024, clock: str = "perf_counter") -> Contender:
+    """Return crazyflow's batch of vehicles, by a clock of ``time``; it must be installed."""
     worker: list[subprocess.Popen[str]] = []
 
     def run() -> float:
         if not worker:
             worker.append(
                 subprocess.Popen(
-                    [sys.executable, "-c", _CRAZYFLOW.format(count=count)],
+                    [sys.executable, "-c", _CRAZYFLOW.format(count=count, clock=clock)],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,
@@ -239,7 +282,7 @@ def _crazyflow(count: int = 1024) -> Contender:
 
     return Contender(
         f"crazyflow {version('crazyflow')}, {count} vehicles",
-        _UNIT,
+        UNIT,
         "its default dynamics and attitude controller at 500 Hz in JAX, on all cores",
         run,
     )

@@ -112,10 +112,9 @@ def _check(config: Config) -> None:
         raise InputError(
             f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"
         )
-    if config["estimator"] not in ("ukf", "constant-gain"):
-        raise unknown_name(
-            "estimator", config["estimator"], ("ukf", "constant-gain"), config["algorithm"]
-        )
+    known = ("ukf", "constant-gain", "ukf-lanes")[: 2 if config["algorithm"] == "imitation" else 3]
+    if config["estimator"] not in known:
+        raise unknown_name("estimator", config["estimator"], known, config["algorithm"])
     features_of(config)
 
 

@@ -9,6 +9,7 @@ from gymnasium.wrappers import TimeLimit
 from numpy.typing import NDArray
 
 from ..envs.fan_tracking import FanTrackingEnv
+from ..envs.lanes.vector import FanTrackingLanes
 from ..envs.scenarios import SCENARIOS
 from ..envs.vector import FanTrackingVectorEnv
 from ..envs.watched_fan_tracking import TRUTH, scenario_env
@@ -17,6 +18,7 @@ from ..runtime.errors import InputError, unknown_name
 
 Frame = NDArray[np.float32]
 
+LANES = "ukf-lanes"
 # a scenario that comes twice is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
     "wide": (
@@ -129,13 +131,32 @@ def make_training_envs(
 ) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Return ``count`` training environments side by side; whoever steps them resets those whose
     episode has ended.
+
+    Args:
+        name: scenario or tier.
+        count: how many.
+        estimator: of the environments: ``ukf``, ``constant-gain``, or ``ukf-lanes``: the full
+            filter, with plant and flight loop beside it in the lanes of a vector unit.
+        repeat: decisions for which a command is held.
+        sources: as of ``make_training_env``.
+
+    Raises:
+        InputError: a name that does not exist, or ``ukf-lanes`` with what does not fly in lanes.
     """
     if DECISIONS % repeat:
         raise InputError(
             f"training: repeat must divide the {DECISIONS} decisions of an episode, got {repeat}"
         )
     check_training_env(name)
-    if name in SCENARIOS and repeat == 1 and not sources - TRUTH:
+    plain = name in SCENARIOS and repeat == 1 and not sources - TRUTH
+    if estimator == LANES:
+        if not plain:
+            raise InputError(
+                f"training: {LANES} flies one scenario, with repeat 1 and features of the filter's "
+                f"estimate, got {name!r}"
+            )
+        return FanTrackingLanes(count, DECISIONS, scenario=name)
+    if plain:
         return FanTrackingVectorEnv(count, DECISIONS, scenario=name, estimator=estimator)
 
     def make() -> gym.Env[Frame, Frame]:

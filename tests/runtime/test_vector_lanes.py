@@ -8,12 +8,36 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from windwrench.runtime.vector_lanes import WIDTH, LaneRecord, all_of, any_of, choose
+from windwrench.runtime.vector_lanes import (
+    WIDTH,
+    LaneRecord,
+    all_of,
+    any_of,
+    choose,
+    in_each_lane,
+)
 
 SINGLE = np.dtype(
-    [("a", "f8"), ("b", "f8", (2,)), ("out", "f8", (12,)), ("gain", "f8"), ("count", "i8")]
+    [
+        ("a", "f8"),
+        ("b", "f8", (2,)),
+        ("out", "f8", (12,)),
+        ("gain", "f8"),
+        ("count", "i8"),
+        ("inner", [("more", "f8", (7,)), ("shift", "f8")]),
+    ]
 )
-RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"))
+INNER = LaneRecord(SINGLE["inner"], ("more",), ("shift",))
+RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"), {"inner": INNER})
+TABLE = np.arange(12.0).reshape(3, 4)
+
+
+@njit
+def entry(table, a, b):
+    return table[int(a), int(b)]
+
+
+entry_of = in_each_lane(entry)
 _at = RECORD.at
 
 
@@ -33,6 +57,14 @@ def work(f):
         out[9] -= total
         out[10] += 2
     f.b[1:][0] = 3.0
+    more, shift = f.inner.more, f.inner.shift
+    finite = choose(math.isfinite(b), b, 0.0)  # of another, a single number has no floor
+    more[0], more[1], more[2] = min(a, b), abs(a), math.floor(finite)
+    more[3] = math.atan2(a, b) + shift
+    more[4] = choose(a == b, 1.0, 0.0)
+    inside = (abs(a) < 2.0) & (abs(b) < 3.0)
+    more[5] = entry_of(TABLE, choose(inside, abs(a), 0.0), choose(inside, abs(b), 0.0))
+    more[6] = min(a, 0.5)
     if any_of(a > 5.0):
         out[11] = 1.0
     if all_of(a > 5.0):
@@ -62,12 +94,14 @@ def test_each_lane_is_a_single_number(a, b):
     lanes, singles = RECORD.zeros(1), np.zeros(WIDTH, SINGLE)
     for records in (lanes, singles):
         records["gain"], records["count"] = 0.7, 2
+        records["inner"]["shift"] = 0.25
     lanes["a"], singles["a"] = a, a
     lanes["b"][0, 0], singles["b"][:, 0] = b, b
     work_at(lanes.ctypes.data)
     work_singly(singles)
     np.testing.assert_array_equal(lanes["b"][0].T, singles["b"])
     np.testing.assert_array_equal(lanes["out"][0, :11].T, singles["out"][:, :11])
+    np.testing.assert_array_equal(lanes["inner"]["more"][0].T, singles["inner"]["more"])
     large = [x > 5.0 for x in a]
     assert set(lanes["out"][0, 11]) == {2.0 if all(large) else float(any(large))}
 
@@ -82,6 +116,24 @@ def test_memory_lies_where_lanes_may_be_loaded(count):
         again = RECORD.like(records[:1].copy())
         assert again.ctypes.data % (8 * WIDTH) == 0
         assert again["gain"][0] == 2.0
+
+
+def test_single_records_are_written_into_lanes_and_read_as_columns():
+    records, single = RECORD.zeros(2), np.zeros(1, SINGLE)[0]
+    single["a"], single["b"], single["inner"]["more"] = 1.0, [2.0, 3.0], 4.0
+    single["gain"], single["inner"]["shift"] = 5.0, 6.0
+    RECORD.share(records, single)
+    RECORD.write(records, 1, slice(2, 3), single)
+    assert records["gain"].tolist() == [5.0, 5.0]
+    assert records["inner"]["shift"].tolist() == [6.0, 6.0]
+    assert records["b"][1, :, 2].tolist() == [2.0, 3.0]
+    assert records["inner"]["more"][1, :, 2].tolist() == [4.0] * 7
+    assert records["a"].sum() == 1.0
+    RECORD.columns(records)[0, :, 2] = RECORD.columns(records)[1, :, 2]
+    assert records["a"][:, 2].tolist() == [1.0, 1.0]
+    assert records["inner"]["shift"].tolist() == [6.0, 6.0]
+    where = RECORD.offset("inner", "more") // 8
+    assert records[1:].view(np.float64)[where + 2] == 4.0
 
 
 def test_in_python_a_condition_is_one_truth():

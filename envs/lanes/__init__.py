@@ -1,0 +1,1 @@
+"""Fan-tracking environments side by side in the lanes of a vector unit."""

@@ -1,0 +1,1 @@
+"""Do environments in lanes have the statistics of those on MuJoCo?"""

@@ -1,0 +1,180 @@
+"""Environments in lanes fly what MuJoCo's fly."""
+
+import math
+from dataclasses import replace
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from numba import njit
+
+import windwrench  # noqa: F401  registers the environment
+from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs.closed_loop import ClosedLoop
+from windwrench.envs.lanes.flight import LOOPS, fly_freely
+from windwrench.envs.lanes.memory import Blocks
+from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
+from windwrench.envs.scenarios import SCENARIOS
+from windwrench.runtime.vector_lanes import WIDTH
+
+NAME = "windwrench/FanTracking-v0"
+NUMBERS = ("reward_tracking", "reward_change", "fan_y", "y", "offset", "force", "torque", "time")
+
+
+def make(num_envs, plant="lanes", **kwargs):
+    return gym.make_vec(
+        NAME, num_envs=num_envs, vectorization_mode="vector_entry_point", plant=plant, **kwargs
+    )
+
+
+def fly(envs, decisions, seed=3, law=None):
+    """Everything that the first decisions return, as one array (decisions, n, .)."""
+    rng, rows = np.random.default_rng(seed), []
+    seen, infos = envs.reset(seed=seed)
+    for _ in range(decisions):
+        drawn = rng.uniform(-1, 1, (100, 1)).astype(np.float32)[: envs.num_envs]
+        seen, rewards, lost, over, infos = envs.step(drawn if law is None else law(seen))
+        numbers = [infos[name].reshape(envs.num_envs, -1) for name in NUMBERS]
+        rows.append(np.column_stack([seen, rewards, lost, over, *numbers]))
+    envs.close()
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_second_is_mujocos(name):
+    lanes, reference = (fly(make(3, plant, scenario=name), 13) for plant in ("lanes", "mujoco"))
+    assert np.abs(lanes - reference).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"settings": PlantSettings(dropout=0.2)},
+        {"vehicle": "crazyflie"},
+        {"effects": [EffectSetting("com_offset", {"cx": 0.01, "cy": -0.02, "cz": 0.005})]},
+        {"observe": "pose"},
+        {"observe": "history", "normalize": True},
+        {"fan_path": lambda t: 0.3 * np.sin(t)},
+    ],
+    ids=lambda given: next(iter(given)),
+)
+def test_so_it_is_with_what_can_be_set(given):
+    lanes, reference = (fly(make(2, plant, **given), 6) for plant in ("lanes", "mujoco"))
+    assert np.abs(lanes - reference).max() < 1e-6  # numbers that are seen are rounded to 32 bits
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_episodes_end_and_begin_as_mujocos(mode):
+    given = {"scenario": "fast", "max_episode_steps": 7, "autoreset_mode": mode}
+    lanes, reference = (fly(make(WIDTH + 1, plant, **given), 20) for plant in ("lanes", "mujoco"))
+    assert np.abs(lanes - reference).max() < 1e-9
+
+
+def test_whole_episodes_in_closed_loop_have_the_same_error():
+    def law(seen):
+        return np.clip(-18.0 * seen[:, 5:6], -1.0, 1.0)
+
+    lanes, reference = (fly(make(8, plant), 250, law=law) for plant in ("lanes", "mujoco"))
+    offset = 8 + 3 + 4
+    rmse, expected = (
+        np.sqrt(np.mean(rows[:, :, offset] ** 2, axis=0)) for rows in (lanes, reference)
+    )
+    assert expected.min() > 0.01
+    np.testing.assert_allclose(rmse, expected, atol=1e-6)
+
+
+def test_the_bits_depend_on_neither_number_nor_threads():
+    given = {"scenario": "varied", "max_episode_steps": 5}
+    many = fly(make(2 * WIDTH + 1, **given), 12)
+    for other in (make(2, **given), make(2 * WIDTH + 1, threads=3, **given)):
+        count = other.num_envs
+        np.testing.assert_array_equal(fly(other, 12), many[:, :count])
+
+
+def test_a_lost_vehicle_starts_anew_and_the_others_fly_on():
+    envs = make(2, scenario="static", max_episode_steps=1000)
+    twin = make(2, "mujoco", scenario="static", max_episode_steps=1000)
+    _, infos = envs.reset(seed=0)
+    twin.reset(seed=0)
+    away = np.array([[np.sign(infos["offset"][0])], [0.0]], np.float32)
+    for _ in range(80):
+        seen, _, lost, _, infos = envs.step(away)
+        same, _, expected, _, _ = twin.step(away)
+        np.testing.assert_array_equal(lost, expected)
+        np.testing.assert_allclose(seen, same, atol=1e-6)
+        if lost.any():
+            break
+    assert lost.tolist() == [True, False]
+    then = infos["time"][1]
+    infos = envs.step(away)[4]
+    assert infos["time"].tolist() == [0.0, pytest.approx(then + 0.08)]
+
+
+def test_a_number_that_is_none_loses_one_vehicle_alone():
+    envs, twin = make(3), make(3)
+    for one in (envs, twin):
+        one.reset(seed=1)
+    envs._flying.loops["qvel"][0, 0, 1] = math.nan
+    seen, rewards, lost, _, infos = envs.step(np.zeros((3, 1)))
+    expected = twin.step(np.zeros((3, 1)))[0]
+    assert lost.tolist() == [False, True, False]
+    np.testing.assert_array_equal(seen[[0, 2]], expected[[0, 2]])
+    assert np.isfinite(rewards).all()
+    assert np.isfinite(seen).all()
+    assert np.isfinite(infos["offset"]).all()
+
+
+@njit
+def fly_on(address, steps, dt):
+    loop = LOOPS_AT(address)
+    for _ in range(steps):
+        fly_freely(loop, dt)
+
+
+LOOPS_AT = LOOPS.at
+
+
+def test_a_body_that_tumbles_moves_as_in_mujoco():
+    """Centre of mass off the centre, inertia with products, another turn in each lane."""
+    inertia = np.array([[2.2, 0.3, -0.2], [0.3, 3.0, 0.1], [-0.2, 0.1, 4.0]]) * 1e-3
+    vehicle = replace(load_vehicle("ardrone2"), inertia=inertia, com=np.array([0.02, -0.03, 0.01]))
+    blocks = Blocks(1, ClosedLoop(vehicle))
+    rng = np.random.default_rng(0)
+    start, wrench = rng.normal(0, 5, (6, WIDTH)), rng.normal(0, 0.02, (6, WIDTH))
+    blocks.loops["qpos"][0], blocks.loops["qpos"][0, 3] = 0.0, 1.0
+    blocks.loops["qvel"][0], blocks.loops["xfrc"][0] = start, wrench
+    fly_on(blocks.loops.ctypes.data, round(SUBSTEPS / TICK), TICK / SUBSTEPS)
+    model, data = load_world(vehicle, drawn=False)
+    for lane in range(WIDTH):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = [0, 0, 0, 1, 0, 0, 0]
+        data.qvel[:] = start[:, lane]
+        data.xfrc_applied[model.body("vehicle").id] = wrench[:, lane]
+        for _ in range(round(SUBSTEPS / TICK)):
+            mujoco.mj_step(model, data)
+        np.testing.assert_allclose(blocks.loops["qpos"][0, :, lane], data.qpos, atol=1e-9)
+        np.testing.assert_allclose(blocks.loops["qvel"][0, :, lane], data.qvel, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        ({"estimator": "constant-gain"}, "constant-gain"),
+        ({"render_mode": "rgb_array"}, "render_mode"),
+        ({"effects": [EffectSetting("rotor_drag", {"kdx": 1e-4})]}, "effects"),
+        ({"plant": "vectors"}, "lanes"),
+        ({"num_envs": 0}, "num_envs"),
+    ],
+    ids=lambda given: next(iter(given)) if isinstance(given, dict) else "",
+)
+def test_what_does_not_fly_in_lanes_is_refused(given, word):
+    with pytest.raises(InputError, match=word) as refusal:
+        make(**{"num_envs": 2} | given)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_reset_comes_first():
+    with pytest.raises(InputError, match="reset"):
+        make(2).step(np.zeros((2, 1)))
