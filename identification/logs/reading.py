@@ -45,7 +45,6 @@ from .readers.recognise import (
 from .sample_gaps import GAPS, bridged
 from .tables import SUFFIXES, Table, open_table
 
-
 OWN_MAP = "windwrench"  # of this kit's own columns in a table of several rates
 
 

@@ -1,4 +1,4 @@
-"""Coefficients of named effects, by regularised least squares on the measured force of some flights.
+"""Coefficients of named effects, by regularised least squares on the force of some flights.
 
 The model is the one that plant, filter and diagnosis run. What is compared passes one low-pass:
 the force of these logs was filtered before it was written, by how much is fitted with the
