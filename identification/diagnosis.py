@@ -288,7 +288,8 @@ def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:
     rates = [pose_rate(log) for log in flights.logs]
     notes = [
         "the log has no pose: the motion is read from gyro and accelerometer. Horizontal axes are "
-        "those in which the vehicle pointed at the start, and drift with the gyro"
+        f"those in which the vehicle pointed at t = {flights.logs[0].t[0]:.4g} s, where its flight "
+        "begins, and drift with the gyro"
         if not any(rates)
         else f"the log has {min(rates):.3g} positions a second: fast motion is read from gyro and "
         "accelerometer, slow motion from the positions"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import Role, get, names, playing
 from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.inference.commanded_rotors import in_flight_by_thrust
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
 from windwrench.studies.imu_logs.sensors import LOGS
@@ -59,7 +60,8 @@ def fly_and_diagnose(effect: str, trajectory: str, seed: int, kind_of_log: str) 
         return {**outcome, **refused(error), "needs_pose": []}
     truth = truth_of(flown)
     if not np.isfinite(log.position).any():
-        truth = in_axes_of_start(truth, flown.log.quaternion[0])
+        begun = in_flight_by_thrust(log, flown.vehicle).t[0]
+        truth = in_axes_of_start(truth, flown.log.quaternion[np.searchsorted(log.t, begun)])
     return {
         **outcome,
         **scored(found, truth),
@@ -70,7 +72,7 @@ def fly_and_diagnose(effect: str, trajectory: str, seed: int, kind_of_log: str) 
 
 def in_axes_of_start(truth: Truth, quaternion: NDArray[np.float64]) -> dict[str, dict[str, float]]:
     """Return coefficients with a steady force along the horizontal axes in which the vehicle
-    pointed at the start, with an attitude (4,): a log without a pose knows no others.
+    pointed where its flight began, with an attitude (4,): a log without a pose knows no others.
     """
     w, x, y, z = quaternion
     heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
