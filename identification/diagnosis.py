@@ -43,6 +43,7 @@ from .inference.equivalence import (
     unidentifiable_rivals,
     unlisted_equivalent_doubts,
 )
+from .inference.imu_limits import hidden_by_bias, with_errors_of_fusion
 from .inference.innovations import Innovations, contradicted_by_innovations
 from .inference.likelihood_refit import (
     delay_alternatives,
@@ -178,6 +179,8 @@ def diagnose(
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     # an IMU's own noise is far below the disturbances that count for none
     least_seen = np.hypot(floor, calm[[0, 3]]) if flights.inertial else np.array(floor)
+    hidden = hidden_by_bias(search, fit)
+    fit = with_errors_of_fusion(search, fit)
     noisy = (
         flights.filtered
         or error_after[0] > DIAGNOSIS.most_floor_ratio * least_seen[0]
@@ -256,7 +259,7 @@ def diagnose(
                 sorted(flights.not_identifiable - flights.needs_pose),
                 remainder,
                 flights.filtered,
-                sorted(flights.needs_pose),
+                sorted(flights.needs_pose | hidden),
             )
         ),
         notes=tuple(dict.fromkeys(notes)),
@@ -274,7 +277,7 @@ def diagnose(
         seconds=float(sum(log.t[-1] - log.t[0] for log in (*logs, *test))),
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
-        needs_pose=tuple(sorted(flights.needs_pose)),
+        needs_pose=tuple(sorted(flights.needs_pose | hidden)),
     )
 
 
@@ -285,7 +288,8 @@ def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:
     rates = [pose_rate(log) for log in flights.logs]
     notes = [
         "the log has no pose: the motion is read from gyro and accelerometer. Horizontal axes are "
-        "those in which the vehicle pointed at the start, and drift with the gyro"
+        f"those in which the vehicle pointed at t = {flights.logs[0].t[0]:.4g} s, where its flight "
+        "begins, and drift with the gyro"
         if not any(rates)
         else f"the log has {min(rates):.3g} positions a second: fast motion is read from gyro and "
         "accelerometer, slow motion from the positions"

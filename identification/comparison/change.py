@@ -5,11 +5,13 @@ diagonals, each in parts of the total, and the total itself, as a logarithm. Bet
 unchanged vehicle they scatter, for a battery is never put in twice at the same place. Of that
 scatter little is known from two or three flights, so its covariance has an inverse-Wishart prior,
 and the difference of two sets is a multivariate Student's t (Gelman and others, *Bayesian Data
-Analysis*, third edition, section 3.6). To it comes what one flight's means are off by themselves,
-from the batches of each flight, and what the battery does to the total: a rotor's thrust for a
-request follows the voltage by a power that depends on the vehicle's motor controllers and on
-whether its firmware makes up for the battery, so that a difference of voltage makes the total less
-certain.
+Analysis*, third edition, section 3.6). How much more or less than usual one vehicle's flights
+scatter, all four numbers alike, is unknown too: it has a log-normal prior, is told by how the
+flights of each set agree (the evidence of the inverse-Wishart), and is summed over. No flight
+scatters by less than its own mean is off, from its batches. To it comes what the battery does to
+the total: a rotor's thrust for a request follows the voltage by a power that depends on the
+vehicle's motor controllers and on whether its firmware makes up for the battery, so that a
+difference of voltage makes the total less certain.
 
 What may have changed, each by an amount that is integrated over:
 
@@ -50,6 +52,7 @@ _ROTORS = {
 _SIDES = {"left": (1.0, 0.0), "rear": (0.0, -1.0), "right": (-1.0, 0.0), "front": (0.0, 1.0)}
 
 _AMOUNTS = 80  # of a change, over which its evidence is summed
+_SCALES = np.linspace(-3.0, 3.0, 13)  # standard deviations of the scatter's logarithm, likewise
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,9 @@ class ChangeSettings:
     # balance hangs on each rotor's drag, and of the total's logarithm (battery and air)
     scatter: tuple[float, float, float, float] = (0.01, 0.01, 0.015, 0.02)
     prior_flights: float = 8.0  # degrees of freedom of that scatter: how many flights it is worth
+    # standard deviation of the logarithm by which one vehicle's scatter is larger or smaller than
+    # that, all four numbers alike: a factor of two, since places for batteries differ
+    scatter_spread: float = 0.7
     # share of the weight, or of one rotor's thrust, by which something that changed has changed:
     # the scale of a half-normal prior
     amount: float = 0.15
@@ -119,32 +125,40 @@ def compare(
     if not (len(after) and len(before)):
         raise InputError("compare: expected at least one flight in each of the two sets")
     a, b = (np.array([trim.features for trim in group]) for group in (after, before))
-    scatter, freedom = _scatter(a, b, use)
     difference = a.mean(axis=0) - b.mean(axis=0)
-    unchanged = (1.0 / len(a) + 1.0 / len(b)) * scatter
-    for group in (after, before):
-        unchanged = unchanged + sum(trim.noise for trim in group) / len(group) ** 2
-    unchanged[3, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
+    scatters, scale_logs, freedom = _scatters(a, b, after, before, use)
+    unchanged = (1.0 / len(a) + 1.0 / len(b)) * scatters
+    unchanged[:, 3, 3] += (use.voltage_power * _voltage_ratio(after, before)) ** 2
     shares = np.mean([trim.thrust / trim.total for trim in before], axis=0)
-    nothing = float(_log_t(difference, np.zeros((1, 4)), unchanged[None], freedom)[0])
+
+    def logs_of(means: Array, spread: Array) -> Array:
+        """Logarithms (scales, n) of how likely the difference is, for changes whose ``means`` (n,
+        4) and standard deviations beside the scatter, ``spread`` (n, 4), are given.
+        """
+        return np.array(
+            [
+                log + _log_t(difference, means, one + spread[:, :, None] ** 2 * np.eye(4), freedom)
+                for log, one in zip(scale_logs, unchanged, strict=True)
+            ]
+        )
+
+    nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
+    amounts, prior = _amounts(use)
     found: list[tuple[str, str, float, float, float]] = []  # place, kind, evidence, amount, spread
     for place, kind in _hypotheses():
-        amounts, prior = _amounts(use)
         means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
         size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
-        scales = unchanged + size[:, :, None] ** 2 * np.eye(4)
-        logs = _log_t(difference, means, scales, freedom)
-        weights = prior * np.exp(logs - logs.max())
-        total = weights.sum()
-        middle = float(amounts @ weights / total)
-        spread = math.sqrt(float(np.square(amounts - middle) @ weights / total))
-        found.append((place, kind, float(logs.max() + math.log(total)), middle, spread))
-    amounts, prior = _amounts(use)
-    wide = unchanged + (amounts**2)[:, None, None] * np.eye(4)
-    logs = _log_t(difference, np.zeros((_AMOUNTS, 4)), wide, freedom)
-    anything = float(np.logaddexp.reduce(logs + np.log(prior)))
-    found.append((SOMETHING_ELSE, "", anything, 0.0, 0.0))
-    return _weigh(after, before, difference, unchanged, nothing, found, use)
+        logs = np.logaddexp.reduce(logs_of(means, size), axis=0) + np.log(prior)
+        evidence = float(np.logaddexp.reduce(logs))
+        weights = np.exp(logs - evidence)
+        middle = float(amounts @ weights)
+        spread = math.sqrt(float(np.square(amounts - middle) @ weights))
+        found.append((place, kind, evidence, middle, spread))
+    wide = np.repeat(amounts[:, None], 4, axis=1)
+    logs = np.logaddexp.reduce(logs_of(np.zeros_like(wide), wide), axis=0) + np.log(prior)
+    found.append((SOMETHING_ELSE, "", float(np.logaddexp.reduce(logs)), 0.0, 0.0))
+    usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
+    return _weigh(after, before, difference, usual, nothing, found, use)
 
 
 def _amounts(use: ChangeSettings) -> tuple[Array, Array]:
@@ -191,14 +205,26 @@ def _moved(place: str, kind: str, amount: float, shares: Array) -> Array:
     return np.array([way * left, way * front, 0.0, math.log1p(amount)])
 
 
-def _scatter(a: Array, b: Array, use: ChangeSettings) -> tuple[Array, float]:
-    """Return the scale (4, 4) and the degrees of freedom of one flight's scatter."""
-    freedom = use.prior_flights + len(a) + len(b) - 2
-    total = use.prior_flights * np.diag(np.square(use.scatter))
+def _scatters(
+    a: Array, b: Array, after: Sequence[Trim], before: Sequence[Trim], use: ChangeSettings
+) -> tuple[Array, Array, float]:
+    """Return the scale (scales, 4, 4) of one flight's scatter where it is so much larger or smaller
+    than usual, the logarithm of how likely each is (scales,), and the degrees of freedom.
+    """
+    more = len(a) + len(b) - 2
+    freedom = use.prior_flights + more
+    own = np.mean([trim.noise for trim in (*after, *before)], axis=0)  # of a flight's own mean
+    apart = np.zeros((4, 4))
     for group in (a, b):
-        apart = group - group.mean(axis=0)
-        total = total + apart.T @ apart
-    return total / freedom, freedom
+        off = group - group.mean(axis=0)
+        apart = apart + off.T @ off
+    factors = np.exp(2.0 * use.scatter_spread * _SCALES)
+    prior = use.prior_flights * (factors[:, None, None] * np.diag(np.square(use.scatter)) + own)
+    logs = -0.5 * _SCALES**2 + 0.5 * (
+        use.prior_flights * np.linalg.slogdet(prior)[1]
+        - freedom * np.linalg.slogdet(prior + apart)[1]
+    )
+    return (prior + apart) / freedom, logs - np.logaddexp.reduce(logs), freedom
 
 
 def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:

@@ -287,14 +287,7 @@ class Flights:
         whose column is noise to a large part is not identifiable; fitted all the same, it would
         come out too small, or explain the noise of the residual by removing it from the pose.
         """
-        noisy = copy(self)  # the same rows of louder logs
-        noisy._pieces, noisy._columns, noisy._needs, noisy._offset_signals, noisy._residuals = (
-            {},
-            {},
-            {},
-            {},
-            {},
-        )
+        noisy = self._with_nothing_kept()  # the same rows of louder logs
         noisy.logs = tuple(noisy_logs(self.logs, self.vehicle))
         floor = noisy.residual({}) - self.residual({})
         self.visible_noise = floor
@@ -344,6 +337,20 @@ class Flights:
             np.var(rates, axis=0), 1e-30
         )
         return floor, frozenset(not_identifiable), {c: loud[c] - quiet[c] for c in smooth}, rounded
+
+    def with_drift(self, rng: np.random.Generator) -> "Flights":
+        """Return the same flights with other errors of what an IMU does not know, as large as its
+        fusion states them.
+        """
+        out = self._with_nothing_kept()
+        out._drift = rng
+        return out
+
+    def _with_nothing_kept(self) -> "Flights":
+        out = copy(self)
+        out._pieces, out._columns, out._needs = {}, {}, {}
+        out._offset_signals, out._residuals = {}, {}
+        return out
 
     def _noise_shares(
         self,

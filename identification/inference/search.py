@@ -401,13 +401,11 @@ class Search:
         """
         own = [c for c in wanted if c[0] == effect]
         shape = change[[wanted.index(c) for c in own]]
-        deviance = _unexplained_deviance(
-            g, total, own, shape, [c for c in wanted if c[0] != effect]
-        )
+        deviance = unexplained_deviance(g, total, own, shape, [c for c in wanted if c[0] != effect])
         others = [c for c in wanted if c[0] not in (effect, "")]
-        if others and _unexplained_deviance(
+        if others and unexplained_deviance(
             g, total, own, shape, others
-        ) < SEARCH.least_independent_share * _unexplained_deviance(g, total, own, shape, []):
+        ) < SEARCH.least_independent_share * unexplained_deviance(g, total, own, shape, []):
             return True
         return bool(
             max(self._noise(dict(zip(own, shape, strict=True))))
@@ -492,7 +490,7 @@ class Gain:
     fit: FittedEffects  # with it added, before it is refitted
 
 
-def _unexplained_deviance(
+def unexplained_deviance(
     g: Gram, total: Array, own: Sequence[Column], shape: Array, others: Sequence[Column]
 ) -> float:
     """Return the deviance of columns, each multiplied by its ``shape``, that the other columns

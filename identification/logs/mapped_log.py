@@ -327,12 +327,12 @@ def _pose(samples: _Samples, log_map: LogMap) -> tuple[Mask, Array, Array, list[
                 f"{', '.join(getattr(log_map, name).columns)}; expected some"
             )
     both = placed & turned
-    if int(both.sum()) < 0.5 * int(placed.sum()):  # logged in rows of their own
+    if (alone := int(np.sum(placed & ~turned))) > 0:  # logged in rows of their own, or lost
         attitude = _slerp(samples.t, attitude, turned, placed)
         both = placed & np.isfinite(attitude).all(axis=1)
         notes.append(
-            f"the attitude ({int(turned.sum())} rows) stands in other rows than the position "
-            f"({int(placed.sum())}), and was interpolated to the position's times"
+            f"{alone} of {int(placed.sum())} positions stand in rows without an attitude, which "
+            "was interpolated to their times where it has samples close by"
         )
         if not both.any():
             raise InputError(

@@ -42,8 +42,10 @@ from .readers.recognise import (
     reader_by_content,
     unknown_content,
 )
-from .sample_gaps import bridged
+from .sample_gaps import GAPS, bridged
 from .tables import SUFFIXES, Table, open_table
+
+OWN_MAP = "windwrench"  # of this kit's own columns in a table of several rates
 
 
 def read_log(
@@ -157,6 +159,8 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
 
     nothing = np.full(table.rows, np.nan)
     pose = np.column_stack([columns.get(name, nothing) for name in POSE])
+    if POSE[3] in columns and _has_several_rates(pose):
+        return read_mapped(path, load_map(OWN_MAP), vehicle)
     lost: Mask = np.all(np.isnan(pose), axis=1)
     for name in names:
         check_finite(table, name, columns[name], ~lost if name in POSE else None)
@@ -206,6 +210,15 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
         valid=attitude,
         vehicle=_vehicle_name(table),
     )
+
+
+def _has_several_rates(pose: Array) -> bool:
+    """Return whether the positions or the attitudes of a pose (N, 7) are slower than the table, and
+    not in the same rows: where a pose is lost, both are.
+    """
+    placed, turned = (np.isfinite(part).all(axis=1) for part in (pose[:, :3], pose[:, 3:]))
+    share = min(placed.mean(), turned.mean())
+    return bool(0.0 < share < GAPS.dense and np.any(placed != turned))
 
 
 def _check_commands(table: Table, columns: Mapping[str, Array], names: Sequence[str]) -> None:

@@ -1,9 +1,14 @@
-"""Coefficients of named effects, by least squares on the measured force of some flights.
+"""Coefficients of named effects, by regularised least squares on the force of some flights.
 
 The model is the one that plant, filter and diagnosis run. What is compared passes one low-pass:
 the force of these logs was filtered before it was written, by how much is fitted with the
 coefficients. A nuisance is fitted with them: a share of thrust of each flight's own, of mean zero
 over the flights. A flight that the fit did not see is predicted without one.
+
+Each coefficient has a normal prior about zero, of the library's typical size. What a flight hardly
+shows so stays small, where free least squares would take it as far as noise goes. How much data
+weighs against the prior follows from the residual itself: its variance over blocks longer than it
+remembers, which is far more than that of independent samples.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +32,9 @@ Rows = tuple[Flight, slice]
 CUTOFFS_HZ = (5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 15.0)
 _ITERATIONS = 3  # of Gauss-Newton: the models are nearly linear in their coefficients
 _STEP = 0.1  # of a coefficient's typical size, for the derivative by it
+_NOTHING = 1e-9  # typical sizes
+_BLOCK = 2.0  # s: longer than the residual remembers
+_WEIGHINGS = 5  # of the prior against what the residual shows of its own noise; the fourth settles
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,17 @@ def _thrust(flight: Flight, vehicle: Vehicle) -> Array:
 
 def _filtered(flight: Flight, x: Array, cutoff_hz: float | None) -> Array:
     return x if cutoff_hz is None else low_pass(x, cutoff_hz, flight.signals.period)
+
+
+def _block_sums(x: Array, period: float) -> Array:
+    """Return the sums over blocks of samples, axis by axis, of rows (3 n, c) that hold the three
+    axes of one sample after the other; each over the root of the block's samples.
+    """
+    samples = len(x) // 3
+    length = min(max(1, round(_BLOCK / period)), max(1, samples))
+    count = samples // length
+    blocks = x[: 3 * count * length].reshape(count, length, 3, x.shape[1])
+    return np.asarray(blocks.sum(axis=1).reshape(3 * count, x.shape[1]) / np.sqrt(length))
 
 
 class Regression:
@@ -138,6 +157,7 @@ class Regression:
         names = list(dict.fromkeys(flight.name for flight, _ in rows))
         p, own = len(self._at), len(names) - 1
         G, h, whole, count = np.zeros((p + own, p + own)), np.zeros(p + own), 0.0, 0
+        sums = []  # over each block: of the force that is left, and of its derivatives
         for flight, part in rows:
             left, slopes = self._filtered(flight, cutoff_hz)
             A = slopes[part].reshape(-1, p + 1)
@@ -147,6 +167,23 @@ class Regression:
             signs = -np.ones(own) if place == own else np.eye(own)[place]
             A = np.hstack([A[:, :p], A[:, p:] * signs])
             G, h, whole, count = G + A.T @ A, h + A.T @ y, whole + float(y @ y), count + len(y)
+            sums.append(_block_sums(np.column_stack([A, y]), flight.signals.period))
+        parts = np.concatenate(sums)
+        x, noise = np.zeros(p + own), 0.0
+        for _ in range(_WEIGHINGS):
+            x = self._bounded(G, h, noise, p)
+            # of one sample, were its neighbours independent of it
+            noise = float(np.mean(np.square(parts[:, -1] - parts[:, :-1] @ x)))
+        shares = [*x[p:], -float(np.sum(x[p:]))]
+        loss = (whole - 2.0 * float(x @ h) + float(x @ G @ x)) / count
+        return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, loss
+
+    def _bounded(self, G: Array, h: Array, noise: float, p: int) -> Array:
+        """Return the likeliest coefficients over their typical sizes and shares of thrust within
+        their ranges, at a variance (N2) of the noise.
+        """
+        own = len(h) - p
+        G = G + np.diag(np.repeat([noise, 0.0], [p, own]))
         size = np.sqrt(np.diag(G)) + 1e-12
         root = np.linalg.cholesky(G / np.outer(size, size) + 1e-10 * np.eye(p + own))
         free = np.full(own, np.inf)
@@ -159,9 +196,7 @@ class Regression:
             ),
         )
         x = np.asarray(found.x) / size
-        shares = [*x[p:], -float(np.sum(x[p:]))]
-        loss = (whole - 2.0 * float(x @ h) + float(x @ G @ x)) / count
-        return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, loss
+        return np.where(np.abs(x) < _NOTHING, 0.0, x)  # a bound that is nearly reached is reached
 
     def fit(
         self, rows: Sequence[Rows], cutoffs_hz: Sequence[float | None] = CUTOFFS_HZ

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .study import FULL, MODELS, PUBLISHED
+from .study import FULL, MODELS, PUBLISHED, SETTINGS
 
 _WAYS = {
     "others": "all other flights",
@@ -114,14 +114,21 @@ def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
                 row["vehicle"],
                 "smoothed" if row["smooth"] else "the past alone",
                 _figure(row),
+                f"{row['rmse_slow']:.3f} / {row['rmse_fast']:.3f}",
                 "–" if published is None else f"{published:.3f}",
                 "–" if published is None else f"{row['rmse'] / published:.2f}",
             ]
         )
-    return _table(
-        ["flight", "vehicle", "estimate", "N, total force (95 %)", "published estimator", "ratio"],
-        rows,
-    )
+    head = [
+        "flight",
+        "vehicle",
+        "estimate",
+        "N, total force (95 %)",
+        f"below / above {SETTINGS.split_hz:g} Hz",
+        "published estimator",
+        "ratio",
+    ]
+    return _table(head, rows)
 
 
 def _pose(flights: Sequence[Mapping[str, Any]]) -> str:

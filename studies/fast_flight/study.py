@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
+from windwrench.dynamics.effects import Role, playing
 from windwrench.identification.motion.residual import acting_wrench
 from windwrench.identification.motion.smoothing import CUTOFFS, derivative, low_pass
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
@@ -56,6 +57,7 @@ MODELS: Mapping[str, tuple[tuple[Coefficient, ...], bool]] = {
     "and the effects of fast flight": ((*_SLOW, *_PLACE, *_FAST), True),
 }
 FULL = "and the effects of fast flight"
+_OFF_CENTRE = frozenset(playing(Role.CENTRE_OF_MASS))
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,8 @@ class StudySettings:
     resample: float = 2.0  # s, of the blocks of the bootstrap: longer than the residual remembers
     draws: int = 2000
     hover: float = 1.0  # s at a flight's start, for a thrust scale of its own
+    # Hz, at which the filter's error is split: the force of these files has little above it
+    split_hz: float = 8.0
     settled: float = 1.0  # s after the filter's start that do not count
 
 
@@ -209,8 +213,9 @@ def filter_study(
     fits: Mapping[str, Mapping[str, float]],
     report: Callable[[str], None],
 ) -> list[dict[str, Any]]:
-    """Return the error of the filter's total force on each flight: with the declared vehicle and
-    with the effects fitted on the other flights, of the past alone and smoothed.
+    """Return the error of the filter's total force on each flight: with the declared vehicle, with
+    the effects fitted on the other flights, and with those but the centre of mass; of the past
+    alone and smoothed. Beside the whole error stand its parts below and above a frequency.
 
     Total force is what rotors and declared effects give plus the estimated external force. The
     filter sees pose and rotor speeds alone: the accelerometer is what it is compared with.
@@ -218,21 +223,30 @@ def filter_study(
     rows = []
     for flight in flights:
         log = replace(flight.log, accelerometer=None, gyro=None)
-        for label, known in (("declared vehicle", vehicle), ("with named effects", None)):
-            flown = known or _with_fit(vehicle, fits[flight.name])
+        named = fits[flight.name]
+        centred = {key: x for key, x in named.items() if key.partition(".")[0] not in _OFF_CENTRE}
+        for label, flown in (
+            ("declared vehicle", vehicle),
+            ("with named effects", _with_fit(vehicle, named)),
+            ("but the centre of mass", _with_fit(vehicle, centred)),
+        ):
             report(f"filtering: {flight.name}, {label}")
             tuning = tune_to_log(log, flown).tuning
             for smooth in (False, True):
                 series = estimate_log(log, flown, tuning, smooth=smooth)
                 total = _total(flight, flown, series.force)
                 kept = flight.signals.t >= flight.signals.t[0] + SETTINGS.settled
-                residual = (total - flight.force)[kept]
+                error = total - flight.force
+                slow = low_pass(error, SETTINGS.split_hz, flight.signals.period)
+                residual = error[kept]
                 rows.append(
                     {
                         "flight": flight.name,
                         "vehicle": label,
                         "smooth": smooth,
                         "rmse": rmse(residual),
+                        "rmse_slow": rmse(slow[kept]),
+                        "rmse_fast": rmse((error - slow)[kept]),
                         "interval": interval(
                             residual, flight.signals.period, np.random.default_rng(0)
                         ),

@@ -56,8 +56,14 @@ def flown(name: str, seed: int, commanded: bool) -> tuple[Vehicle, float, list[F
         lag = LAG[name] * float(rng.uniform(0.6, 1.6)) if commanded else 0.0
         effects = (EffectSetting("motor_lag", {"tau": lag}),) if commanded else ()
         try:
-            own = len(VEHICLES) * seed + VEHICLES.index(name)  # of its own, for each vehicle
-            return vehicle, lag, [_log(vehicle, effects, t, own) for t in TRAJECTORIES]
+            # its own for each vehicle and each flight: flights with the same disturbances and
+            # sensor noise would be the same noise twice, which no interval can know
+            own = len(TRAJECTORIES) * (len(VEHICLES) * seed + VEHICLES.index(name))
+            return (
+                vehicle,
+                lag,
+                [_log(vehicle, effects, t, own + i) for i, t in enumerate(TRAJECTORIES)],
+            )
         except InputError:
             continue
     raise InputError(f"{name}: none of {_ATTEMPTS} drawn vehicles flew; expected one that does")

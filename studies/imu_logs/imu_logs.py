@@ -5,14 +5,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.effects import names
+from windwrench.dynamics.effects import Role, get, names, playing
 from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.inference.commanded_rotors import in_flight_by_thrust
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_json
 from windwrench.studies.imu_logs.sensors import LOGS
 from windwrench.studies.resumed_tasks import run_tasks
-from windwrench.studies.scored_flights import fly, refused, scored, truth_of
+from windwrench.studies.scored_flights import Truth, fly, refused, scored, truth_of
 from windwrench.studies.trials.practice_flights import shown_in
 
 VEHICLE = "ardrone2"
@@ -54,12 +58,33 @@ def fly_and_diagnose(effect: str, trajectory: str, seed: int, kind_of_log: str) 
         found = diagnose([log], flown.vehicle)
     except InputError as error:
         return {**outcome, **refused(error), "needs_pose": []}
+    truth = truth_of(flown)
+    if not np.isfinite(log.position).any():
+        begun = in_flight_by_thrust(log, flown.vehicle).t[0]
+        truth = in_axes_of_start(truth, flown.log.quaternion[np.searchsorted(log.t, begun)])
     return {
         **outcome,
-        **scored(found, truth_of(flown)),
+        **scored(found, truth),
         "needs_pose": list(found.needs_pose),
         "seconds": round(time.perf_counter() - begun, 1),
     }
+
+
+def in_axes_of_start(truth: Truth, quaternion: NDArray[np.float64]) -> dict[str, dict[str, float]]:
+    """Return coefficients with a steady force along the horizontal axes in which the vehicle
+    pointed where its flight began, with an attitude (4,): a log without a pose knows no others.
+    """
+    w, x, y, z = quaternion
+    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    out = {effect: dict(values) for effect, values in truth.items()}
+    for effect in playing(Role.STEADY_FORCE, among=truth):
+        along, across = (c.name for c in get(effect).coefficients[:2])
+        fx, fy = (truth[effect].get(name, 0.0) for name in (along, across))
+        out[effect] |= {
+            along: float(np.cos(heading) * fx + np.sin(heading) * fy),
+            across: float(np.cos(heading) * fy - np.sin(heading) * fx),
+        }
+    return out
 
 
 def can_show(outcome: Mapping[str, Any]) -> bool:

@@ -1,6 +1,6 @@
 """The page of real faults: every number from the results, losses first."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,10 @@ def write_page(result: Result, data: Path, page: Path) -> None:
     write_text("\n".join(lines), page)
 
 
+def _named(rows: Sequence[Mapping[str, Any]]) -> str:
+    return f" ({', '.join(row['flight'] for row in rows)})" if rows else ""
+
+
 def _comparisons(result: Result) -> list[str]:
     rows = result["crazypad"]
     changed = [row for row in rows if row["truth"] != NOWHERE]
@@ -64,9 +68,9 @@ def _comparisons(result: Result) -> list[str]:
         "vehicle, one or two.",
         "",
         f"* **Missed**: on {len(small)} of {len(changed)} changed flights *nothing* is likelier "
-        "than any place. They are the lighter weight and one cut propeller, whose mark is one to "
-        "three times what an unchanged vehicle varies by from flight to flight (a battery is "
-        "never put in twice at the same place).",
+        f"than any place{_named(small)}. A light weight's mark is one to three times what an "
+        "unchanged vehicle usually varies by from flight to flight (a battery is never put in "
+        "twice at the same place).",
         f"* The likeliest of all answers is right: "
         f"{share(sum(row['right'] for row in changed), len(changed))}.",
         f"* The likeliest place, if something changed, is right: "
@@ -76,7 +80,9 @@ def _comparisons(result: Result) -> list[str]:
         f"{share(sum(not row['right'] for row in normal), len(normal))}.",
         "",
         "The intervals are wide: these are all flights that were at hand, and the scatter between "
-        "unchanged flights (`ChangeSettings.scatter`) was set with them known.",
+        "unchanged flights (`ChangeSettings.scatter`) was set with them known. That one vehicle's "
+        "flights may scatter by more or less than that, as its own unchanged flights show, came "
+        "later and with them known, too; the drawn trims below are what it was held to.",
         "",
         "| flight | truth | likeliest | probability | likeliest place if something changed | "
         "left - right | front - rear | diagonals | total |",

@@ -215,6 +215,24 @@ def test_lost_poses_are_not_valid(path, rows, missing):
     assert "3 of 20 rows without a pose" in log.notes[0]
 
 
+@pytest.mark.parametrize("every", [{"p": 5, "q": 2}, {"p": 4, "q": 1}, {"p": 1, "q": 3}])
+def test_positions_and_attitudes_of_rates_of_their_own(path, every):
+    rows = hover_rows(200)
+    for k, row in enumerate(rows):
+        half = 0.005 * k  # a turn about z at 2 rad/s
+        row |= {"px": f"{0.01 * k:.6f}", "qw": f"{np.cos(half):.9f}", "qz": f"{np.sin(half):.9f}"}
+        for name in (name for name in POSE if k % every[name[0]]):
+            row[name] = ""
+    log = read_log(write_text(path, rows))
+    t = log.t[log.valid]
+    assert len(t) >= len(rows) // every["p"] - every["q"]
+    np.testing.assert_allclose(np.diff(t), 0.005 * every["p"], atol=1e-9)
+    np.testing.assert_allclose(log.position[log.valid, 0], 2.0 * t, atol=1e-6)
+    turned = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True).as_rotvec()[:, 2]
+    np.testing.assert_allclose(turned, 2.0 * t, atol=1e-6)
+    assert any("columns: by the map windwrench" in note for note in log.notes)
+
+
 def test_a_gap_in_time_is_a_note(path, rows):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

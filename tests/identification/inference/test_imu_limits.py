@@ -1,0 +1,50 @@
+"""What an accelerometer's bias hides, and what the errors of a fusion add to deviations."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.imu_flights import imu_flight, pose_removed
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.identification.inference.imu_limits import hidden_by_bias, with_errors_of_fusion
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.search import FittedEffects, Search
+
+VEHICLE = load_vehicle("ardrone2")
+FORCE = {"fx": 0.2, "fy": 0.2}
+
+
+def search_on(log, library, fit):
+    search = Search(Flights([log], VEHICLE), library)
+    search.set_noise(fit, search.linearise(fit))
+    return search
+
+
+@pytest.mark.parametrize(("trajectory", "hidden"), [("yaw", True), ("excite", False)])
+def test_a_tilted_thrust_axis_shows_where_thrust_changes(trajectory, hidden):
+    """A bias does the same as long as thrust is steady. Torques and inertia it does not touch."""
+    log = pose_removed(imu_flight(VEHICLE, trajectory=trajectory, turbulence=1.0))
+    nothing = FittedEffects({})
+    search = search_on(log, ["thrust_axis_tilt", "com_offset", "rate_damping"], nothing)
+    assert hidden_by_bias(search, nothing) == ({"thrust_axis_tilt"} if hidden else set())
+
+
+def test_an_unknown_heading_is_in_the_deviation_of_a_steady_force():
+    flown = imu_flight(VEHICLE, (EffectSetting("constant_force", FORCE),), trajectory="yaw")
+    begun = FittedEffects({"constant_force": {**FORCE, "fz": 0.0}})
+    search = search_on(pose_removed(flown), ["constant_force", "com_offset"], begun)
+    fit = search.refit(begun)
+    wider = with_errors_of_fusion(search, fit)
+    assert wider.setting == fit.setting
+    first = np.searchsorted(flown.t, search.flights.logs[0].t[0])
+    start = Rotation.from_quat(flown.quaternion[first], scalar_first=True).as_euler("ZYX")[0]
+    truth = Rotation.from_euler("z", -start).apply([0.2, 0.2, 0.0])
+    found = np.array([fit.setting["constant_force"][name] for name in ("fx", "fy")])
+    error = np.abs(found - truth[:2])
+    std, more = (
+        np.array([of.std["constant_force", name] for name in ("fx", "fy")]) for of in (fit, wider)
+    )
+    assert error.max() > 3.0 * std.max()  # what the balance alone says
+    assert np.all(error < 3.0 * more)
+    assert np.all(more < 0.1)
