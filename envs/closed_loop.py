@@ -11,7 +11,14 @@ import mujoco
 import numpy as np
 from numba import carray, types
 
-from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint, reset_flight
+from ..controllers.flight import (
+    FLIGHT,
+    FlightGains,
+    flight_record,
+    fly,
+    move_setpoint,
+    reset_flight,
+)
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
