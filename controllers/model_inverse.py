@@ -20,9 +20,9 @@ from ..runtime.compiled import Record, compiled
 # and of the estimate's noise.
 HORIZON = 0.02
 _PROBE = 1.02  # of a rotor speed, at which its effect on the delivered speed is tried
-# least change of a delivered speed with its command that is inverted: what arrives only after the
-# horizon, as behind a latency, has none
+# a delivered speed that changes less than this with its command is led no further: five times
 _LEAST_SLOPE = 0.2
+_NO_SLOPE = 1e-3  # what arrives only after the horizon, as behind a latency, cannot be led
 _ROUNDS = 2  # of Newton's method: one is exact where the delivered speed is linear in the command
 
 
@@ -98,5 +98,6 @@ def through_the_rotors(c: Record, model: Record) -> None:
         for i in range(4):
             gained = c.rotors[i] - (c.wanted[i] - c.missing[i])
             slope = gained / (c.probe[i] - c.command[i])
-            if slope > _LEAST_SLOPE:
-                c.command[i] = min(max(c.command[i] + c.missing[i] / slope, 0.0), c.omega_max)
+            if slope > _NO_SLOPE:
+                lead = c.missing[i] / max(slope, _LEAST_SLOPE)
+                c.command[i] = min(max(c.command[i] + lead, 0.0), c.omega_max)
