@@ -182,13 +182,13 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
     lines = [
         "# The loop closed in flight",
         "",
+        *wind_section(folder, where),
         made_by(
             f"{command(results)} --out {out} --markdown {markdown}",
             [r.get("commit") for r in results],
             results[0]["request"]["version"],
         ),
         "",
-        *wind_section(folder, where),
         *_what_was_done(results[0]["request"]),
         f"![Wrench error and tracking before and after]({where}/close_loop.png)",
         "",

@@ -7,7 +7,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from windwrench import __version__
 from windwrench.runtime.page_files import write_figure
+from windwrench.runtime.provenance import made_by
 from windwrench.studies.closed_loop.closed_loop import MARGIN
 from windwrench.studies.closed_loop.wind_tasks import (
     ADAPTIVE,
@@ -48,9 +50,15 @@ def wind_section(folder: Path, where: str) -> list[str]:
     lines = [
         "## The amended model in the flight loop",
         "",
-        f"`python -m windwrench.studies.closed_loop.wind_tasks --episodes {request['episodes']} "
-        f"--seed {request['seed']}` flies `WindTrajectory` and `WindHover` on what the diagnosis "
-        "found (the results below). There the flight loop uses the model that its vehicle "
+        made_by(
+            f"python -m studies.closed_loop.wind_tasks --episodes {request['episodes']} "
+            f"--seed {request['seed']}",
+            [result["commit"] for _, result in found],
+            __version__,
+        ),
+        "",
+        "It flies `WindTrajectory` and `WindHover` on what the diagnosis found (further down). "
+        "In these tasks the flight loop uses the model that its vehicle "
         "declares: the wrench of the effects at the reference is taken off what the rotors have "
         "to make, commands go through the inverse of what the rotors deliver (a lag is led, as if "
         "the command were held for 20 ms), mass, inertia and centre of mass are the model's, and "

@@ -1,7 +1,7 @@
 """The amended model in the flight loop: the tasks in the wind flown before and after an effect was
 found, and with laws that adapt without knowing it.
 
-``python -m windwrench.studies.closed_loop.wind_tasks``. What was found is read from the results of
+``python -m studies.closed_loop.wind_tasks``. What was found is read from the results of
 ``windwrench close-loop``; nothing is diagnosed here. The true vehicle has the effect each time, and
 the episodes are paired.
 """
