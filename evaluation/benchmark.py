@@ -1,10 +1,8 @@
 """The leaderboard: controllers on the same episodes, scored between hover (0) and oracle (1)."""
 
-import json
 import math
-import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +14,8 @@ from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_pol
 from ..envs.scenarios import get_scenario
 from ..envs.watched_fan_tracking import scenario_env
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.whole_files import replaced
-from ..runtime.workers import workers
 from .episodes import Episode, benchmark_seeds, fly_episode
+from .side_by_side import each_flown
 
 _CHUNK = 5  # episodes that a worker flies at a time
 # what scores, wins and shares are relative to
@@ -138,24 +135,9 @@ def fly_all(
         for i in range(0, episodes, _CHUNK)
     ]
     results: Results = {(c, s): [] for s in scenarios for c in wanted}
-    jobs = min(jobs or os.cpu_count() or 1, len(tasks))
-
-    def take(task: tuple[str, str, list[int]], flown: list[Episode]) -> None:
-        results[task[0], task[1]].extend(flown)
+    for (name, scenario, _), flown in each_flown(_fly_chunk, tasks, jobs, cluster):
+        results[name, scenario].extend(flown)
         advance(len(flown))
-
-    if cluster is not None:
-        from ..runtime.cluster import spread
-
-        for task, flown in zip(tasks, spread(_fly_chunk, tasks, cluster), strict=True):
-            take(task, flown)
-    elif jobs == 1:
-        for task in tasks:
-            take(task, _fly_chunk(task))
-    else:
-        with workers(jobs) as pool:
-            for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
-                take(task, flown)
     return results
 
 
@@ -217,17 +199,3 @@ def _interval(values: np.ndarray) -> tuple[float, float]:
     means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
     low, high = np.quantile(means, [0.025, 0.975])
     return float(low), float(high)
-
-
-def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
-    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing
-    is null.
-    """
-    path = folder / "leaderboard.json"
-    data = [
-        {key: None if value != value else value for key, value in asdict(row).items()}
-        for row in rows
-    ]
-    with replaced(path) as partial:
-        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    return path

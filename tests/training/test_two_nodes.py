@@ -3,25 +3,15 @@
 import threading
 import time
 
-import numpy as np
 import pytest
 
+from tests.support.cluster_runs import TINY, assert_same_flights, assert_same_runs
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
 pytestmark = pytest.mark.slow
 
 _PATIENCE = 300.0  # s, until a node has work
-_TINY = [
-    "steps=240",
-    "environments=2",
-    "net=[8]",
-    "learner.learning_starts=40",
-    "learner.batch_size=16",
-    "checkpoint=60",
-    "validation.every=120",
-    "validation.episodes=1",
-]
 
 
 class TwoNodes:
@@ -66,7 +56,7 @@ def test_training_survives_the_loss_of_a_node(two_nodes, tmp_path):
         "stable_baselines3",
         reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
     )
-    jobs = jobs_of("sac", "base", range(2), _TINY, [])
+    jobs = jobs_of("sac", "base", range(2), TINY, [])
 
     def kill():
         deadline = time.monotonic() + _PATIENCE
@@ -84,13 +74,7 @@ def test_training_survives_the_loss_of_a_node(two_nodes, tmp_path):
     killer.join()
     assert two_nodes.lost
     here = [run_job(job, tmp_path / "here") for job in jobs]
-    assert [r["run"] for r in there] == [r["run"] for r in here]
-    assert [r["validation_rmse_m"] for r in there] == [r["validation_rmse_m"] for r in here]
-    for job in jobs:
-        for name in ("best.npz", "last.npz"):
-            assert (tmp_path / "there" / job.name / name).read_bytes() == (
-                tmp_path / "here" / job.name / name
-            ).read_bytes()
+    assert_same_runs(jobs, there, here, tmp_path)
 
 
 def test_benchmarking_survives_the_loss_of_a_node(two_nodes):
@@ -101,8 +85,4 @@ def test_benchmarking_survives_the_loss_of_a_node(two_nodes):
     there = fly_all(["admittance"], ["base"], 20, seed=0, advance=kill, cluster=two_nodes.address)
     assert two_nodes.lost
     here = fly_all(["admittance"], ["base"], 20, seed=0, jobs=1)
-    assert list(there) == list(here)
-    for key, flown in here.items():
-        for a, b in zip(flown, there[key], strict=True):
-            np.testing.assert_array_equal(a.y, b.y)
-            assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
+    assert_same_flights(there, here)
