@@ -15,7 +15,6 @@ from typing import Annotated, Any
 
 import typer
 
-from windwrench.commands.terminal import share_bars_by_part
 from windwrench.controllers.flight import FlightGains
 from windwrench.controllers.task_laws import make_task_law
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
@@ -218,9 +217,15 @@ def main(
         if name not in known:
             raise unknown_name("setting", name, known)
     if not page_only:
-        with share_bars_by_part() as report:
-            for name in wanted:
-                study(results, known[name], episodes, seed, jobs, report)
+        for name in wanted:
+            study(
+                results,
+                known[name],
+                episodes,
+                seed,
+                jobs,
+                lambda setting, share: print(f"{setting}: {100 * share:.0f} %", flush=True),
+            )
     write_wind_picture(results)
     closed = [
         read_json(results / f"{name}.json", "a result of windwrench close-loop")
