@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from windwrench import __version__
 from windwrench.runtime.page_files import write_figure
 from windwrench.runtime.provenance import made_by
-from windwrench.studies.closed_loop.closed_loop import MARGIN
+from windwrench.studies.closed_loop.closed_loop import DEFAULT_EFFECTS, MARGIN
 from windwrench.studies.closed_loop.wind_tasks import (
     ADAPTIVE,
     LAWS,
@@ -28,12 +28,13 @@ _COLOURS = ("#d1495b", "#30638e")
 
 
 def _results(folder: Path) -> list[tuple[Setting, Mapping[str, Any]]]:
-    """Return the settings whose results lie in a folder."""
-    return [
+    """Return the settings in which all effects were flown, with their results from a folder."""
+    found = [
         (setting, json.loads(result_path(folder, setting).read_text(encoding="utf-8")))
         for setting in SETTINGS
         if result_path(folder, setting).exists()
     ]
+    return [(s, result) for s, result in found if set(result["effects"]) >= set(DEFAULT_EFFECTS)]
 
 
 def wind_section(folder: Path, where: str) -> list[str]:
@@ -51,7 +52,7 @@ def wind_section(folder: Path, where: str) -> list[str]:
         "## The amended model in the flight loop",
         "",
         made_by(
-            f"python -m studies.closed_loop.wind_tasks --episodes {request['episodes']} "
+            f"python -m studies.closed_loop.in_flight --episodes {request['episodes']} "
             f"--seed {request['seed']}",
             [result["commit"] for _, result in found],
             __version__,

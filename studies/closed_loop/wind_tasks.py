@@ -1,7 +1,7 @@
 """The amended model in the flight loop: the tasks in the wind flown before and after an effect was
 found, and with laws that adapt without knowing it.
 
-``python -m studies.closed_loop.wind_tasks``. What was found is read from the results of
+What was found is read from the results of
 ``windwrench close-loop``; nothing is diagnosed here. The true vehicle has the effect each time, and
 the episodes are paired.
 """
@@ -11,9 +11,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from windwrench.controllers.flight import FlightGains
 from windwrench.controllers.task_laws import make_task_law
@@ -21,7 +19,6 @@ from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.evaluation.episodes import benchmark_seeds
 from windwrench.evaluation.task_benchmark import TASKS, fly_task_episode
-from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit
 from windwrench.runtime.regular_files import read_json
@@ -190,49 +187,3 @@ def _job(folder: Path, setting: Setting, name: str, seeds: tuple[int, ...]) -> _
         load_vehicle(added["vehicle"]),
         seeds,
     )
-
-
-def main(
-    episodes: Annotated[int, typer.Option(min=1, help="Paired, of each law and model.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, help="Of the benchmark.")] = 0,
-    setting: Annotated[
-        list[str] | None, typer.Option(help="Only these settings are flown; default: all.")
-    ] = None,
-    results: Annotated[
-        Path, typer.Option(help="Folder of the results of close-loop; these go there, too.")
-    ] = Path("docs/close-loop"),
-    markdown: Annotated[Path, typer.Option(help="Page to write.")] = Path("docs/close-loop.md"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes.")] = None,
-    page_only: Annotated[
-        bool, typer.Option("--page-only", help="Write picture and page from results there.")
-    ] = False,
-) -> None:
-    """Fly WindTrajectory and WindHover with every effect of the closed loop, before and after."""
-    from windwrench.studies.closed_loop.page import write_page
-    from windwrench.studies.closed_loop.wind_section import write_wind_picture
-
-    known = {s.name: s for s in SETTINGS}
-    wanted = setting or list(known)
-    for name in wanted:
-        if name not in known:
-            raise unknown_name("setting", name, known)
-    if not page_only:
-        for name in wanted:
-            study(
-                results,
-                known[name],
-                episodes,
-                seed,
-                jobs,
-                lambda setting, share: print(f"{setting}: {100 * share:.0f} %", flush=True),
-            )
-    write_wind_picture(results)
-    closed = [
-        read_json(results / f"{name}.json", "a result of windwrench close-loop")
-        for name in DEFAULT_EFFECTS
-    ]
-    write_page(closed, results, markdown)
-
-
-if __name__ == "__main__":
-    typer.run(main)
