@@ -1,4 +1,4 @@
-"""``python -m studies.closed_loop.in_flight``: the amended model flown, and its part of the page."""
+"""``python -m studies.closed_loop.in_flight``: the amended model flown, and its page."""
 
 from pathlib import Path
 from typing import Annotated
