@@ -58,8 +58,8 @@ def wind_section(folder: Path, where: str) -> list[str]:
             __version__,
         ),
         "",
-        "It flies `WindTrajectory` and `WindHover` on what the diagnosis found (further down). "
-        "In these tasks the flight loop uses the model that its vehicle "
+        "It flies the settings below on what the diagnosis found (further down). "
+        "In the tasks in the wind the flight loop uses the model that its vehicle "
         "declares: the wrench of the effects at the reference is taken off what the rotors have "
         "to make, commands go through the inverse of what the rotors deliver (a lag is led, as if "
         "the command were held for 20 ms), mass, inertia and centre of mass are the model's, and "
