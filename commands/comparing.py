@@ -87,9 +87,9 @@ def benchmark(
         leaderboard,
         sampled_seconds,
         short_names,
-        write_leaderboard,
     )
     from ..evaluation.pictures import draw_leaderboard
+    from ..evaluation.side_by_side import write_leaderboard
 
     names, worlds = names_in(controllers, "--controllers"), names_in(scenarios, "--scenarios")
     check_request(names, worlds, episodes, seed)
@@ -175,6 +175,7 @@ def _task_benchmark(
     """Fly the laws of another task; what is not named is all that the task has."""
     from ..controllers.task_laws import TASK_LAWS
     from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..evaluation.side_by_side import write_leaderboard
     from ..evaluation.task_benchmark import (
         check_task_request,
         draw_task_leaderboard,
@@ -183,7 +184,6 @@ def _task_benchmark(
         task_leaderboard,
         task_of,
         wanted_laws,
-        write_task_leaderboard,
     )
 
     known = task_of(task)
@@ -202,7 +202,7 @@ def _task_benchmark(
             task, names, worlds, episodes, seed, jobs, lambda count: progress.advance(bar, count)
         )
     rows = task_leaderboard(task, results, names, seed)
-    path = write_task_leaderboard(rows, folder)
+    path = write_leaderboard(rows, folder)
     period = EPISODE_SECONDS / known.decisions
     draw_task_leaderboard(rows, results, folder / "leaderboard.png", period)
     with replaced(folder / "leaderboard.md") as partial:

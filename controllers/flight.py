@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dynamics.effects.base import ROTORS_SIZE, STATE_SIZE
+from ..dynamics.model import MAX_EFFECTS, MEMORY
 from ..dynamics.motion import BODY, Array, body_record
 from ..dynamics.rotation import quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
@@ -43,12 +45,22 @@ FLIGHT = np.dtype(
         ("body", BODY),
         ("unmixing", "f8", (4, 4)),
         ("omega_max", "f8"),
+        ("hover_rate", "f8"),
         *[(name, "f8") for name in FlightGains.__dataclass_fields__],
         ("setpoint", "f8", (SETPOINT_SIZE,)),
         ("sum", "f8", (3,)),
         ("yaw_sum", "f8"),
         ("rotation", "f8", (3, 3)),
         ("command", "f8", (4,)),  # rotor speeds, rad/s
+        # of ``model_inverse``; all zero where no model is in the loop
+        ("foreseen", "f8", (6,)),  # wrench of the model's effects: force world, torque body
+        ("wanted", "f8", (4,)),  # rotor speeds to deliver
+        ("still", "f8", (3,)),
+        ("effect_state", "f8", (STATE_SIZE,)),
+        ("rotors", "f8", (ROTORS_SIZE,)),
+        ("missing", "f8", (4,)),
+        ("probe", "f8", (4,)),
+        ("memory", "f8", (MAX_EFFECTS, MEMORY)),
     ]
 )
 
@@ -66,8 +78,15 @@ def flight_record(vehicle: Vehicle, gains: FlightGains | None = None) -> np.ndar
     )
     for name in FlightGains.__dataclass_fields__:
         c[name] = getattr(gains, name)
-    c["command"] = vehicle.hover_rate
+    c["hover_rate"] = vehicle.hover_rate
+    reset_flight(c)
     return record
+
+
+def reset_flight(c: np.void) -> None:
+    """Forget the last flight."""
+    c["sum"], c["yaw_sum"], c["foreseen"] = 0.0, 0.0, 0.0
+    c["command"] = c["wanted"] = c["hover_rate"]
 
 
 @compiled
@@ -109,6 +128,10 @@ def fly(c: Record, x: Array, dt: float) -> None:
             a1 = a
         else:
             a2 = a
+    # what the model's effects push, the rotors need not
+    a0 -= c.foreseen[0] / c.body.mass
+    a1 -= c.foreseen[1] / c.body.mass
+    a2 -= c.foreseen[2] / c.body.mass
     a2 = max(a2 + c.body.gravity, 0.3 * c.body.gravity)
     lateral = math.sqrt(a0 * a0 + a1 * a1)
     limit = a2 * math.tan(c.tilt_limit)
@@ -140,6 +163,9 @@ def fly(c: Record, x: Array, dt: float) -> None:
     tx = J[0, 0] * alpha_x + J[0, 1] * alpha_y + J[0, 2] * alpha_z + wy * hz - wz * hy
     ty = J[1, 0] * alpha_x + J[1, 1] * alpha_y + J[1, 2] * alpha_z + wz * hx - wx * hz
     tz = J[2, 0] * alpha_x + J[2, 1] * alpha_y + J[2, 2] * alpha_z + wx * hy - wy * hx
+    tx -= c.foreseen[3]
+    ty -= c.foreseen[4]
+    tz -= c.foreseen[5]
     # what a declared centre of mass off the rotors' centre makes of the thrust is balanced here
     tx += c.body.com[1] * thrust
     ty -= c.body.com[0] * thrust

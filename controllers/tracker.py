@@ -9,6 +9,7 @@ disturbed as a rule. The random numbers come from a generator of the controller'
 anew with every episode.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -33,7 +34,7 @@ _FEWEST = 8  # particles of a kind of motion whose covariance means something
 _SMALLEST = 1e-12 * np.eye(3)  # of a covariance
 
 
-class _Belief:
+class _Belief(ABC):
     """What the trackers share: particles with weights, and the command that follows from them.
 
     After a decision ``mean`` holds what is believed: the fan's place from the vehicle (m) and its
@@ -74,17 +75,17 @@ class _Belief:
         self.mean, self.deviation = (0.0, 0.0), float("nan")
         self._begin()
 
+    @abstractmethod
     def _begin(self) -> None:
         """Draw particles for the first observation."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _move(self) -> None:
         """Carry particles on by one decision."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _choose(self, chosen: NDArray[np.int64]) -> None:
         """Let the particles be those chosen (n,)."""
-        raise NotImplementedError
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None

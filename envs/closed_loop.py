@@ -11,7 +11,14 @@ import mujoco
 import numpy as np
 from numba import carray, types
 
-from ..controllers.flight import FLIGHT, FlightGains, flight_record, fly, move_setpoint
+from ..controllers.flight import (
+    FLIGHT,
+    FlightGains,
+    flight_record,
+    fly,
+    move_setpoint,
+    reset_flight,
+)
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
@@ -303,7 +310,7 @@ class ClosedLoop:
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
-        loop["flight"]["sum"], loop["flight"]["yaw_sum"] = 0.0, 0.0
+        reset_flight(loop["flight"])
         loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal(
             (len(loop["fan"]["gusts"]), 3)
         )

@@ -84,6 +84,8 @@ class WindHoverEnv(WindEnv):
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts        |
     | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain             |
     | `normalize`   | `False`      | whether observations and actions are divided by the scales above      |
+    | `model_in_loop` | `True`     | whether the flight loop counters the effects that `vehicle` declares    |
+    | `gains`       | `None`       | a `FlightGains`: of the flight loop                                    |
     | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                          |
 
     ``reset`` knows no ``options`` and refuses any.

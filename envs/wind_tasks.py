@@ -12,6 +12,7 @@ import numpy as np
 from numba import carray
 from numpy.typing import NDArray
 
+from ..controllers.flight import FlightGains
 from ..controllers.wind_observation import (
     LAST_ACTION,
     MAX_ACCELERATION,
@@ -140,6 +141,8 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         settings: PlantSettings | None = None,
         estimator: str = "ukf",
         normalize: bool = False,
+        model_in_loop: bool = True,
+        gains: FlightGains | None = None,
         width: int = 640,
         height: int = 480,
     ) -> None:
@@ -169,6 +172,7 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for wind in self.winds or ():
             check_compiled(wind, f"{self.name}: winds")
         self.settings, self.estimator = settings, estimator
+        self.model_in_loop, self.gains = bool(model_in_loop), gains
         self.render_mode, self.width, self.height = render_mode, width, height
         self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
         self._scales = np.array(OBSERVATION_SCALES, dtype=np.float32)
@@ -199,9 +203,11 @@ class WindEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             fan,
             UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
             self.settings or PlantSettings.for_vehicle(self.truth),
+            self.gains,
             drawn=self.render_mode is not None,
             estimator=self.estimator,
             accelerometer=ACCELEROMETER,
+            model_in_loop=self.model_in_loop,
         )
 
     def reset(

@@ -11,6 +11,7 @@ import numpy as np
 from numba import carray, types
 
 from ..controllers.flight import FlightGains, fly, move_setpoint
+from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
 from ..dynamics.rotation import quaternion_to_matrix
@@ -40,6 +41,7 @@ WINDY = np.dtype(
         ("air", "f8", (3, STATIONS)),
         ("rotation", "f8", (3, 3)),
         ("action", "f8", (3,)),  # m/s2, beside the flight loop's own
+        ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
         ("sigma", "f8"),  # m/s2, of the accelerometer, a tick
         ("bias", "f8", (3,)),  # m/s2, of the accelerometer, body axes
         # m/s2, world, mean over the last run: specific force as the accelerometer has it, and that
@@ -100,7 +102,11 @@ def _windy_tick(
         move_setpoint(flight, ukf.x, TICK)
     for i in range(3):
         flight.setpoint[6 + i] += w.action[i]
+    if w.model_in_loop > 0:
+        foresee(flight, ukf, ukf.x)
     fly(flight, ukf.x, TICK)
+    if w.model_in_loop > 0:
+        through_the_rotors(flight, ukf)
     for i in range(3):
         flight.setpoint[6 + i] -= w.action[i]
     if w.path_count > 0:
@@ -169,6 +175,7 @@ class WindyFlight:
         drawn: whether the world has what is there for the eye alone.
         estimator: ``ukf`` or ``constant-gain``.
         accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias.
+        model_in_loop: whether the flight loop counters the effects that ``declared`` has.
     """
 
     def __init__(
@@ -182,6 +189,7 @@ class WindyFlight:
         drawn: bool = False,
         estimator: str = "ukf",
         accelerometer: tuple[float, float] = (0.0, 0.0),
+        model_in_loop: bool = False,
     ) -> None:
         self.loop = ClosedLoop(
             declared,
@@ -198,6 +206,7 @@ class WindyFlight:
         w = self.record[0]
         w["loop"] = self.loop.address
         w["sigma"], self._sigma_bias = accelerometer
+        w["model_in_loop"] = model_in_loop
         self.action: Array = w["action"]
         self.specific: Array = w["specific"]
         self.thrust: Array = w["thrust"]

@@ -1,11 +1,10 @@
 """The leaderboard: controllers on the same episodes, scored between hover (0) and oracle (1)."""
 
-import json
 import math
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +19,8 @@ from ..envs.scenarios import get_scenario
 from ..envs.watched_fan_tracking import scenario_env
 from ..runtime.compiled import is_on_disk
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.whole_files import replaced
-from ..runtime.workers import workers
 from .episodes import DECISIONS, FIRST_TEST_SEED, Episode, benchmark_seeds, fly_episode
+from .side_by_side import each_flown
 
 _CHUNK = 5  # episodes that a worker flies at a time
 _SAMPLE = 25  # decisions by which a duration is told
@@ -146,26 +144,15 @@ def fly_all(
     name, world, first = tasks[0]
     tasks[:1] = [(name, world, first[:1]), *([(name, world, first[1:])] if first[1:] else [])]
     results: Results = {(c, s): [] for s in scenarios for c in wanted}
-    jobs = min(jobs or os.cpu_count() or 1, len(tasks))
 
-    def take(task: tuple[str, str, list[int]], flown: list[Episode]) -> None:
-        results[task[0], task[1]].extend(flown)
-        advance(len(flown))
-
-    if cluster is not None:
-        from ..runtime.cluster import spread
-
-        for task, flown in zip(tasks, spread(_fly_chunk, tasks, cluster), strict=True):
-            take(task, flown)
-    elif jobs == 1:
-        for task in tasks:
-            take(task, _fly_chunk(task))
-    else:
-        if not is_on_disk(tick):  # here, where it is told, and once for all workers
+    def compile_first() -> None:
+        if not is_on_disk(tick):
             scenario_env(scenarios[0]).reset(seed=0)
-        with workers(jobs) as pool:
-            for task, flown in zip(tasks, pool.map(_fly_chunk, tasks), strict=True):
-                take(task, flown)
+
+    chunks = each_flown(_fly_chunk, tasks, jobs, cluster, compile_first)
+    for (name, scenario, _), flown in chunks:
+        results[name, scenario].extend(flown)
+        advance(len(flown))
     return results
 
 
@@ -252,17 +239,3 @@ def _interval(values: np.ndarray) -> tuple[float, float]:
     means = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
     low, high = np.quantile(means, [0.025, 0.975])
     return float(low), float(high)
-
-
-def write_leaderboard(rows: Sequence[Row], folder: Path) -> Path:
-    """Write ``leaderboard.json`` at once or not at all; return its path. A score that means nothing
-    is null.
-    """
-    path = folder / "leaderboard.json"
-    data = [
-        {key: None if value != value else value for key, value in asdict(row).items()}
-        for row in rows
-    ]
-    with replaced(path) as partial:
-        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    return path

@@ -2,11 +2,9 @@
 hover (0) and oracle (1).
 """
 
-import json
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,8 +22,8 @@ from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_trajectory import WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
-from ..runtime.workers import workers
 from .episodes import FIRST_TEST_SEED, benchmark_seeds
+from .side_by_side import each_flown
 
 Array = NDArray[np.float64]
 
@@ -193,20 +191,14 @@ def fly_task(
         for i in range(0, episodes, _CHUNK)
     ]
     results: TaskResults = {(law, scenario): [] for scenario in scenarios for law in wanted}
-    jobs = min(jobs or os.cpu_count() or 1, len(chunks))
 
-    def take(chunk: tuple[str, str, str, list[int]], flown: list[TaskEpisode]) -> None:
-        results[chunk[1], chunk[2]].extend(flown)
+    def compile_first() -> None:
+        _environment(task, scenarios[0]).reset(seed=0)
+
+    flown_chunks = each_flown(_fly_chunk, chunks, jobs, compile_first=compile_first)
+    for (_, law, scenario, _), flown in flown_chunks:
+        results[law, scenario].extend(flown)
         advance(len(flown))
-
-    if jobs == 1:
-        for chunk in chunks:
-            take(chunk, _fly_chunk(chunk))
-    else:
-        _environment(task, scenarios[0]).reset(seed=0)  # compiles here, where it is told, and once
-        with workers(jobs) as pool:
-            for chunk, flown in zip(chunks, pool.map(_fly_chunk, chunks), strict=True):
-                take(chunk, flown)
     return results
 
 
@@ -270,20 +262,6 @@ def _resampled(values: Array) -> Array:
     rng = np.random.default_rng(0)
     means: Array = values[rng.integers(len(values), size=(_RESAMPLES, len(values)))].mean(axis=1)
     return means
-
-
-def write_task_leaderboard(rows: Sequence[TaskRow], folder: Path) -> Path:
-    """Write ``leaderboard.json`` at once or not at all; return its path. A number that means
-    nothing is null.
-    """
-    path = folder / "leaderboard.json"
-    data = [
-        {key: None if value != value else value for key, value in asdict(row).items()}
-        for row in rows
-    ]
-    with replaced(path) as partial:
-        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    return path
 
 
 def markdown(rows: Sequence[TaskRow]) -> str:
@@ -376,5 +354,4 @@ __all__ = [
     "task_leaderboard",
     "task_of",
     "wanted_laws",
-    "write_task_leaderboard",
 ]

@@ -11,6 +11,7 @@ from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
 from windwrench.studies.closed_loop.closed_loop import DEFAULT_EFFECTS, MARGIN, MEASURES, Measure
+from windwrench.studies.closed_loop.wind_section import wind_section
 
 Result = Mapping[str, Any]  # as ``close_loop`` returns it
 
@@ -181,6 +182,7 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
     lines = [
         "# The loop closed in flight",
         "",
+        *wind_section(folder, where),
         made_by(
             f"{command(results)} --out {out} --markdown {markdown}",
             [r.get("commit") for r in results],
@@ -210,7 +212,7 @@ def write_page(results: Sequence[Result], folder: Path, page: Path) -> None:
 
 def _what_was_done(request: Mapping[str, Any]) -> list[str]:
     return [
-        "Every number and picture on this page was written by this command. For each effect:",
+        "For each effect:",
         "",
         f"1. A vehicle ({request['vehicle']}) that has the effect and does not declare it flies "
         f"{request['seconds']:g} s in "

@@ -17,9 +17,9 @@ from windwrench.evaluation.benchmark import (
     leaderboard,
     make_pilot,
     short_names,
-    write_leaderboard,
 )
 from windwrench.evaluation.episodes import DECISIONS, FIRST_TEST_SEED, benchmark_seeds, fly_episode
+from windwrench.evaluation.side_by_side import write_leaderboard
 
 NAMES = ["hover", "admittance", "ratio", "oracle"]
 EPISODES = 6

@@ -11,6 +11,7 @@ from windwrench.controllers.task_laws import TASK_LAWS, make_task_law, task_gain
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithForce, WindOracle
 from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import FIRST_TEST_SEED
+from windwrench.evaluation.side_by_side import write_leaderboard
 from windwrench.evaluation.task_benchmark import (
     TASKS,
     draw_task_leaderboard,
@@ -18,7 +19,6 @@ from windwrench.evaluation.task_benchmark import (
     fly_task_episode,
     markdown,
     task_leaderboard,
-    write_task_leaderboard,
 )
 from windwrench.evaluation.task_tuning import FIRST_VALIDATION_SEED, tune_task
 
@@ -60,7 +60,7 @@ def test_laws_that_know_the_wind_better_hold_better(results):
 
 def test_the_file_has_the_documented_keys_and_pages_have_losses(tmp_path, results):
     rows = task_leaderboard("WindHover", results, LAWS, 0)
-    path = write_task_leaderboard(rows, tmp_path)
+    path = write_leaderboard(rows, tmp_path)
     written = json.loads(path.read_text(encoding="utf-8"))
     assert len(written) == len(LAWS)
     for row in written:

@@ -8,25 +8,14 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from tests.support.cluster_runs import TINY, assert_same_flights, assert_same_runs
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.runtime.cluster import spread
 from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
-
-TINY = [
-    "steps=240",
-    "environments=2",
-    "net=[8]",
-    "learner.learning_starts=40",
-    "learner.batch_size=16",
-    "checkpoint=60",
-    "validation.every=120",
-    "validation.episodes=1",
-]
 
 
 def test_a_sweep_is_every_value_with_every_seed():
@@ -114,13 +103,7 @@ def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster,
     killer.join()
     assert killed
     here = [run_job(job, tmp_path / "here") for job in jobs]
-    assert [r["run"] for r in there] == [r["run"] for r in here]
-    assert [r["validation_rmse_m"] for r in there] == [r["validation_rmse_m"] for r in here]
-    for job in jobs:
-        for name in ("best.npz", "last.npz"):
-            assert (tmp_path / "there" / job.name / name).read_bytes() == (
-                tmp_path / "here" / job.name / name
-            ).read_bytes()
+    assert_same_runs(jobs, there, here, tmp_path)
 
 
 def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
@@ -138,11 +121,7 @@ def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
     there = fly_all(["admittance"], ["base"], 4, seed=0, cluster=cluster)
     here = fly_all(["admittance"], ["base"], 4, seed=0, jobs=1)
-    assert list(there) == list(here)
-    for key, flown in here.items():
-        for a, b in zip(flown, there[key], strict=True):
-            np.testing.assert_array_equal(a.y, b.y)
-            assert (a.rmse, a.seed, a.lost) == (b.rmse, b.seed, b.lost)
+    assert_same_flights(there, here)
 
 
 def test_rllib_knows_the_environment_after_one_line(cluster):

@@ -1,0 +1,132 @@
+"""The declared model in the flight loop: it takes off what effects push, and inverts what rotors
+deliver.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from windwrench.controllers.flight import flight_record
+from windwrench.controllers.model_inverse import HORIZON, foresee, through_the_rotors
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import get, names, parse_setting
+from windwrench.dynamics.effects.call import deliver
+from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
+from windwrench.dynamics.rotation import quaternion_of_yaw
+from windwrench.envs.wind_hover import WindHoverEnv
+from windwrench.envs.wind_trajectory import WindTrajectoryEnv
+
+VEHICLE = load_vehicle("ardrone2")
+_SPEEDS = np.array([380.0, 370.0, 390.0, 375.0])
+_LATE = ("latency", "motor_lag")
+
+
+def made(*texts):
+    """A flight loop and a model that flies at ``_SPEEDS`` and has effects."""
+    declared = VEHICLE.with_effects(*[parse_setting(text, VEHICLE) for text in texts])
+    model = np.zeros(1, dtype=MODEL_FIELDS)
+    amended = load_model(model[0], declared)
+    for _ in range(40):
+        drive(model[0], _SPEEDS, 0.005, 0.95 * VEHICLE.voltage_ref)
+    return flight_record(amended)[0:1][0], model[0]
+
+
+def commanded(wanted, *texts):
+    flight, model = made(*texts)
+    flight["command"] = wanted
+    through_the_rotors(flight, model)
+    return flight["command"].copy(), flight, model
+
+
+STATIC = [n for n in names() if get(n).kind == "rotor input" and n not in _LATE]
+
+
+@pytest.mark.parametrize("name", STATIC)
+def test_commands_deliver_the_wanted_rotor_speeds(name):
+    wanted = _SPEEDS * np.array([1.05, 0.97, 1.02, 0.9])
+    command, flight, model = commanded(wanted, name)
+    rotors = flight["rotors"].copy()
+    rotors[:4] = command
+    count = int(model["rotor_count"])
+    assert count == 1
+    deliver(
+        model["rotor_models"][:count],
+        model["rotor_coefficients"],
+        model["constants"],
+        model["memory"].copy(),
+        HORIZON,
+        float(model["voltage"]),
+        rotors,
+    )
+    np.testing.assert_allclose(rotors[:4], wanted, rtol=1e-6)
+
+
+def test_a_lag_is_led_by_what_remains_after_the_horizon():
+    wanted = _SPEEDS + 10.0
+    command, _, model = commanded(wanted, "motor_lag:tau=0.035")
+    share = 1.0 - math.exp(-HORIZON / 0.035)
+    np.testing.assert_allclose(command, _SPEEDS + 10.0 / share, rtol=1e-9)
+    # and looking ahead has not moved the model's own rotors
+    np.testing.assert_allclose(model["rotors"][:4], _SPEEDS, rtol=1e-3)
+
+
+def test_what_comes_after_the_horizon_cannot_be_led():
+    wanted = _SPEEDS + 10.0
+    command, _, _ = commanded(wanted, "latency:d=0.06")
+    np.testing.assert_array_equal(command, wanted)
+
+
+def test_commands_stay_what_motors_can_do():
+    command, flight, _ = commanded(np.full(4, 1e4), "motor_lag:tau=0.2")
+    assert np.all(command <= flight["omega_max"])
+
+
+def test_drag_is_foreseen_at_the_reference_and_not_at_the_vehicle():
+    flight, model = made("rotor_drag:kdx=0.0001,kdy=0.0001")
+    flight["setpoint"][3:6] = 1.5, 0.0, 0.0
+    flight["wanted"] = _SPEEDS
+    state = np.zeros(20)
+    state[3:7] = quaternion_of_yaw(0.4)
+    state[7:10] = -3.0, 2.0, 1.0
+    foresee(flight, model, state)
+    np.testing.assert_allclose(
+        flight["foreseen"][:3], [-1e-4 * _SPEEDS.sum() * 1.5, 0.0, 0.0], atol=1e-12
+    )
+
+
+def test_without_effects_the_flight_is_the_same_bit_for_bit():
+    def flown(model_in_loop):
+        env = WindTrajectoryEnv("fan-wall", model_in_loop=model_in_loop)
+        env.reset(seed=3)
+        return [env.step(np.array([0.3, -0.2, 0.1]))[0] for _ in range(25)]
+
+    np.testing.assert_array_equal(flown(True), flown(False))
+
+
+@pytest.mark.parametrize("text", ["com_offset", "mass", "constant_torque", "rotor_efficiency"])
+def test_a_declared_effect_no_longer_pushes_the_vehicle_off(text):
+    setting = parse_setting(text, VEHICLE)
+
+    def error(model):
+        env = WindHoverEnv("calm", vehicle=model, truth=VEHICLE, effects=(setting,))
+        env.reset(seed=700_000)
+        some = [env.step(np.zeros(3))[4]["error"] for _ in range(150)]
+        return math.sqrt(np.mean(np.square(some)))
+
+    assert error(VEHICLE.with_effects(setting)) < 0.9 * error(VEHICLE)
+
+
+def test_the_same_seed_is_the_same_episode_after_another():
+    declared = VEHICLE.with_effects(parse_setting("rotor_drag", VEHICLE))
+    env = WindTrajectoryEnv("calm", vehicle=declared)
+
+    def flown():
+        env.reset(seed=5)
+        return [env.step(np.zeros(3))[0] for _ in range(20)]
+
+    first = flown()
+    env.reset(seed=6)
+    for _ in range(20):
+        env.step(np.zeros(3))
+    np.testing.assert_array_equal(flown(), first)
