@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..runtime.errors import InputError, unknown_name
 from .observation import (
+    DECISION_PERIOD,
     FORCE_X,
     FORCE_Y,
     FORCE_Z,
@@ -26,9 +27,10 @@ Array = NDArray[np.float32]
 class Quantity:
     """Where a quantity stands, and the size that becomes 1."""
 
-    scale: float  # N, Nm or m/s
+    scale: float  # N, Nm, m/s or m
     column: int
     source: str = "observation"  # or the entry of the environment's ``info``
+    summed: bool = False  # over the decisions since the episode's start, times their period
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -40,6 +42,8 @@ QUANTITIES: dict[str, Quantity] = {
     "force_z": Quantity(0.5, FORCE_Z),
     "velocity_y": Quantity(0.5, VELOCITY_Y),
     "command": Quantity(1.0, LAST_COMMAND),
+    # how far it has flown along y since the episode's start, by its own estimated velocity
+    "path_y": Quantity(1.0, VELOCITY_Y, summed=True),
     # what only a simulator knows, or an estimator beside the filter: for ablations (see
     # ``sensing``)
     "true_torque_z": Quantity(0.03, 2, "torque"),
@@ -106,16 +110,23 @@ class Features:
             for name in self.frame
         ]
         scaled = np.stack(columns, axis=1) / np.array(self.scale)
+        scaled[:, self.summed] *= DECISION_PERIOD  # what one decision adds
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
+
+    @property
+    def summed(self) -> list[int]:
+        """Columns of a frame that a ``History`` adds up."""
+        return [i for i, name in enumerate(self.frame) if QUANTITIES[name].summed]
 
 
 class History:
     """The last frames of n environments, oldest first; an episode begins with its first frame
-    repeated.
+    repeated, and sums begin at 0.
     """
 
     def __init__(self, features: Features, count: int) -> None:
+        self._summed = features.summed
         self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
 
     def restart(self, frames: Array, which: Sequence[int] | NDArray[np.bool_]) -> None:
@@ -123,11 +134,15 @@ class History:
         quantities).
         """
         self._frames[which] = frames[which][:, None, :]
+        for column in self._summed:
+            self._frames[which, :, column] = 0.0
 
     def push(self, frames: Array) -> None:
         """Add one frame (n, quantities) each."""
+        sums = self._frames[:, -1, self._summed]
         self._frames[:, :-1] = self._frames[:, 1:]
         self._frames[:, -1] = frames
+        self._frames[:, -1, self._summed] += sums
 
     def flat(self) -> Array:
         """Return a copy (n, history * quantities)."""

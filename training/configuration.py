@@ -15,7 +15,7 @@ from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
-ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation")
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation", "recurrent-imitation")
 
 
 def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:

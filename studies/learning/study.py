@@ -160,11 +160,9 @@ def train_entry(
     config = load_config(entry.algorithm, entry.overrides)
     done = read_progress(folder)
     if done is None or not done.steps or done.steps[-1] < config["steps"]:
-        from windwrench.training.imitate import imitate
-        from windwrench.training.train import train
+        from windwrench.training.algorithms import run_training
 
-        work = imitate if entry.algorithm == "imitation" else train
-        work(
+        run_training(
             config,
             entry.scenario,
             entry.seed,
