@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from ..controllers.features import Features
+from ..controllers.features import QUANTITIES, Features
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
@@ -91,7 +91,7 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    for key in ("steps", "environments", "repeat"):
+    for key in ("steps", "environments", "repeat", "rounds", "gru", "ahead"):
         if config.get(key, 1) < 1:
             raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
     for key in ("every", "episodes"):
@@ -116,7 +116,24 @@ def _check(config: Config) -> None:
         raise unknown_name(
             "estimator", config["estimator"], ("ukf", "constant-gain"), config["algorithm"]
         )
-    features_of(config)
+    features = features_of(config)
+    if config["algorithm"] == "recurrent-imitation":
+        _check_memory(config, features)
+
+
+def _check_memory(config: Config, features: Features) -> None:
+    name = config["algorithm"]
+    if config["says"] not in ("motion", "command"):
+        raise unknown_name("word", config["says"], ("motion", "command"), f"{name}: says")
+    if config["repeat"] != 1:
+        raise InputError(f"{name}: repeat must be 1, got {config['repeat']}")
+    for key in ("gains", "dampings"):
+        numbers = all(isinstance(x, int | float) for x in config[key])
+        if not config[key] or not numbers:
+            raise InputError(f"{name}: {key} must list numbers, got {config[key]}")
+    for quantity in features.frame:
+        if QUANTITIES[quantity].source not in ("observation", "force", "torque"):
+            raise InputError(f"{name}: sees {quantity}, which the vector environment does not tell")
 
 
 def features_of(config: Config) -> Features:

@@ -64,8 +64,8 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
         known = QUANTITIES[quantity]
         if known.source != "observation" or known.summed:
             raise InputError(
-                f"--policy {name}: sees {quantity}, which is not in the estimate of an instant; such a policy "
-                "cannot be exported"
+                f"--policy {name}: sees {quantity}, which is not in an estimate by itself; "
+                "such a policy cannot be exported"
             )
         frame.append({"c": _COLUMNS[known.column], "scale": literal(scale, name)})
     layers = []

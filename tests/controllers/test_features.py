@@ -35,6 +35,26 @@ def test_a_history_is_oldest_first_and_starts_with_its_first_frame():
     np.testing.assert_array_equal(history.flat(), [[1, 1, 3], [8, 8, 8]])
 
 
+def test_a_path_is_the_sum_of_the_velocities_since_the_start():
+    features = Features(("path_y", "velocity_y"), 2)
+    history = History(features, 2)
+
+    def frames(*speeds):
+        observations = np.zeros((2, 8))
+        observations[:, 6] = speeds
+        return features.frames(observations, {})
+
+    history.restart(frames(0.5, 0.2), [0, 1])
+    history.push(frames(0.3, -0.1))
+    history.push(frames(0.1, 0.1))
+    # 80 ms at 0.3 and 0.1 m/s; velocities are seen in halves of a m/s
+    np.testing.assert_allclose(
+        history.flat(), [[0.024, 0.6, 0.032, 0.2], [-0.008, -0.2, 0.0, 0.2]], atol=1e-7
+    )
+    history.restart(frames(0.4, 0.4), np.array([False, True]))
+    np.testing.assert_allclose(history.flat()[:, 2], [0.032, 0.0], atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("frame", "history", "scale", "words"),
     [
