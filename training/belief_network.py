@@ -1,5 +1,6 @@
 """A recurrent network that says what a tracker would believe, and how it is fitted to episodes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +85,7 @@ def fit(
     batch_size: int,
     rates: tuple[float, float],
     generator: torch.Generator,
+    advance: Callable[[float], None] = lambda share: None,
 ) -> float:
     """Fit means and deviations to what is taught, over whole episodes; return the last epoch's
     mean loss.
@@ -100,6 +102,7 @@ def fit(
         batch_size: episodes.
         rates: learning rate at first and in the end; it falls as a cosine.
         generator: of the order.
+        advance: called after each epoch with the share of them that is done.
     """
     seen, truth, counts = (
         torch.from_numpy(x) for x in (episodes.seen, episodes.truth, episodes.counts)
@@ -109,7 +112,7 @@ def fit(
     optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
     losses: list[float] = []
-    for _ in range(epochs):
+    for epoch in range(epochs):
         losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
             mean, deviation, _ = network(seen[:, batch])
@@ -123,4 +126,5 @@ def fit(
             optimiser.step()
             schedule.step()
             losses.append(loss.item())
+        advance((epoch + 1) / epochs)
     return float(np.mean(losses))

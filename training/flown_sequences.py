@@ -51,6 +51,11 @@ class Flights:
         """How many were flown."""
         return self._episodes * DECISIONS
 
+    @property
+    def decisions_a_round(self) -> int:
+        """How many a round has."""
+        return sum(env.num_envs for env in self._envs) * DECISIONS
+
     def sequences(self) -> Sequences:
         """Return all that were flown."""
         return Sequences(

@@ -66,7 +66,8 @@ def recurrent_imitation(
     flights = Flights(config, scenario, seed, rng)
     validated, rate = 0, config["learning_rate"]
     for number in range(config["rounds"]):
-        flights.fly(None if number == 0 else network, shares, advance)
+        flying, fitting = _halves(advance, flights.decisions, flights.decisions_a_round)
+        flights.fly(None if number == 0 else network, shares, flying)
         last = number == config["rounds"] - 1
         fit(
             network,
@@ -75,6 +76,7 @@ def recurrent_imitation(
             config["batch_size"],
             (rate, 0.0 if last else _LEAST_RATE * rate),
             order,
+            fitting,
         )
         if not last and flights.decisions // config["validation"]["every"] == validated:
             continue
@@ -91,6 +93,18 @@ def recurrent_imitation(
         write_json(asdict(progress), folder / "progress.json")
         report(progress)
     return folder / "best.npz"
+
+
+def _halves(
+    advance: Callable[[int], None], start: int, count: int
+) -> tuple[Callable[[int], None], Callable[[float], None]]:
+    """Return what tells ``advance`` of a round from decision ``start`` on: of the decisions flown
+    so far, which are its first half, and of the share of the fit that is done.
+    """
+    return (
+        lambda flown: advance(start + (flown - start) // 2),
+        lambda share: advance(start + round(count * (1.0 + share) / 2.0)),
+    )
 
 
 def _shares(config: Config, gain: float, damping: float) -> NDArray[np.float32]:
