@@ -91,7 +91,7 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    for key in ("steps", "environments", "repeat", "rounds", "gru", "ahead"):
+    for key in ("steps", "environments", "repeat", "rounds", "state", "ahead"):
         if config.get(key, 1) < 1:
             raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
     for key in ("every", "episodes"):
@@ -125,6 +125,8 @@ def _check_memory(config: Config, features: Features) -> None:
     name = config["algorithm"]
     if config["says"] not in ("motion", "command"):
         raise unknown_name("word", config["says"], ("motion", "command"), f"{name}: says")
+    if config["cell"] not in ("lstm", "gru"):
+        raise unknown_name("cell", config["cell"], ("lstm", "gru"), name)
     if config["repeat"] != 1:
         raise InputError(f"{name}: repeat must be 1, got {config['repeat']}")
     for key in ("gains", "dampings"):

@@ -6,8 +6,8 @@ moved next (privileged supervision, as of Chen and others, *Learning by cheating
 network is fitted to whole episodes of that. What it says then is close to the mean of the posterior
 under the motions that it was trained on. The command is what a tracker makes of such a mean: the
 fan's velocity, a gain on the offset and a damping of the difference of velocities. All of it is
-linear in what the network says, so it is folded into the last layer, and what flies is a GRU with
-one output. Gain and damping are chosen on the validation episodes.
+linear in what the network says, so it is folded into the last layer, and what flies is a recurrent
+cell with one output. Gain and damping are chosen on the validation episodes.
 """
 
 import itertools
@@ -58,7 +58,9 @@ def recurrent_imitation(
     torch.manual_seed(seed)
     order, rng = torch.Generator().manual_seed(seed), np.random.default_rng(seed)
     size, taught = features_of(config).size, 1 if config["says"] == "command" else 3
-    network = BeliefNetwork(size, taught, config["gru"], config["net"], config["activation"])
+    network = BeliefNetwork(
+        size, taught, config["cell"], config["state"], config["net"], config["activation"]
+    )
     judge = make_training_env(scenario)
     seeds = validation_seeds(config["validation"]["episodes"])
     pairs = list(itertools.product(config["gains"], config["dampings"]))

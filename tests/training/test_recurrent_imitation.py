@@ -23,7 +23,7 @@ from windwrench.training.flown_sequences import Flights
 from windwrench.training.seeds import training_seed
 from windwrench.training.train import card_of, read_progress
 
-SHORT = ["rounds=2", "epochs=1", "last_epochs=1", "gru=4", "net=[8]", "gains=[2.0, 3.0]"]
+SHORT = ["rounds=2", "epochs=1", "last_epochs=1", "state=4", "net=[8]", "gains=[2.0, 3.0]"]
 SHORT += ["dampings=[0.2]", "validation.episodes=1"]
 
 
@@ -31,10 +31,11 @@ def config_of(*more):
     return load_config("recurrent-imitation", [*SHORT, *more])
 
 
-def test_a_policy_commands_its_shares_of_what_the_network_says():
+@pytest.mark.parametrize("cell", ["lstm", "gru"])
+def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     config = config_of()
     torch.manual_seed(1)
-    network = BeliefNetwork(6, 3, 5, [7], "relu")
+    network = BeliefNetwork(6, 3, cell, 5, [7], "relu")
     shares = np.array([2.0, 1.0, 0.3], dtype=np.float32)
     policy = TrainedPolicy(card_of(config, "base", 0, 0, False), network.policy_weights(shares))
     frames = np.random.default_rng(0).normal(size=(9, 6)).astype(np.float32)
@@ -87,7 +88,7 @@ def test_the_mean_of_what_is_hidden_is_learned():
     walk = np.cumsum(0.3 * rng.normal(size=(60, 256, 1)), axis=0).astype(np.float32)
     seen = walk + rng.normal(size=walk.shape).astype(np.float32)
     torch.manual_seed(0)
-    network = BeliefNetwork(1, 1, 16, [16], "relu")
+    network = BeliefNetwork(1, 1, "lstm", 16, [16], "relu")
     episodes = Sequences(seen, walk, np.ones((60, 256), dtype=np.float32))
     fit(network, episodes, 25, 32, (0.01, 0.0), torch.Generator().manual_seed(0))
     with torch.no_grad():
@@ -125,6 +126,7 @@ def test_a_command_can_be_taught_in_place_of_the_motion(tmp_path):
     ("override", "words"),
     [
         ("says=place", "unknown word 'place'"),
+        ("cell=rnn", "unknown cell"),
         ("rounds=0", "rounds must be at least 1"),
         ("ahead=0", "ahead must be at least 1"),
         ("repeat=2", "repeat must be 1"),

@@ -56,7 +56,7 @@ TINY = {
         "rounds=2",
         "epochs=1",
         "last_epochs=1",
-        "gru=4",
+        "state=4",
         "gains=[2.0]",
     ],
 }
