@@ -31,29 +31,30 @@ class Quantity:
     column: int
     source: str = "observation"  # or the entry of the environment's ``info``
     summed: bool = False  # over the decisions since the episode's start, times their period
+    odd: bool = False  # changes its sign where left and right change places
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "torque_x": Quantity(0.03, TORQUE_X),
+    "torque_x": Quantity(0.03, TORQUE_X, odd=True),
     "torque_y": Quantity(0.03, TORQUE_Y),
-    "torque_z": Quantity(0.03, TORQUE_Z),
+    "torque_z": Quantity(0.03, TORQUE_Z, odd=True),
     "force_x": Quantity(0.5, FORCE_X),
-    "force_y": Quantity(0.5, FORCE_Y),
+    "force_y": Quantity(0.5, FORCE_Y, odd=True),
     "force_z": Quantity(0.5, FORCE_Z),
-    "velocity_y": Quantity(0.5, VELOCITY_Y),
-    "command": Quantity(1.0, LAST_COMMAND),
+    "velocity_y": Quantity(0.5, VELOCITY_Y, odd=True),
+    "command": Quantity(1.0, LAST_COMMAND, odd=True),
     # how far it has flown along y since the episode's start, by its own estimated velocity
-    "path_y": Quantity(1.0, VELOCITY_Y, summed=True),
+    "path_y": Quantity(1.0, VELOCITY_Y, summed=True, odd=True),
     # what only a simulator knows, or an estimator beside the filter: for ablations (see
     # ``sensing``)
-    "true_torque_z": Quantity(0.03, 2, "torque"),
+    "true_torque_z": Quantity(0.03, 2, "torque", odd=True),
     "true_force_x": Quantity(0.5, 0, "force"),
-    "true_force_y": Quantity(0.5, 1, "force"),
+    "true_force_y": Quantity(0.5, 1, "force", odd=True),
     "std_torque_z": Quantity(0.005, 2, "std_torque"),
     "std_force_x": Quantity(0.05, 0, "std_force"),
-    "observer_torque_z": Quantity(0.03, 2, "observer_torque"),
+    "observer_torque_z": Quantity(0.03, 2, "observer_torque", odd=True),
     "observer_force_x": Quantity(0.5, 0, "observer_force"),
-    "observer_force_y": Quantity(0.5, 1, "observer_force"),
+    "observer_force_y": Quantity(0.5, 1, "observer_force", odd=True),
 }
 
 
@@ -113,6 +114,12 @@ class Features:
         scaled[:, self.summed] *= DECISION_PERIOD  # what one decision adds
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
+
+    @property
+    def mirrored(self) -> Array:
+        """Signs (size,) of what a policy sees where left and right change places."""
+        signs = [-1.0 if QUANTITIES[name].odd else 1.0 for name in self.frame]
+        return np.array(signs * self.history, dtype=np.float32)
 
     @property
     def summed(self) -> list[int]:

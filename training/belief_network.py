@@ -15,6 +15,7 @@ Array = NDArray[np.float32]
 
 CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
 _SURE, _UNSURE = -4.0, 1.5  # bounds of what it may say of a logarithmic standard deviation
+_MIRRORED = 0.5  # share of the episodes
 _STEEPEST = 1.0  # norm to which a gradient is cut
 
 
@@ -92,6 +93,7 @@ def fit(
     batch_size: int,
     rates: tuple[float, float],
     generator: torch.Generator,
+    mirrored: Array | None = None,
     advance: Callable[[float], None] = lambda share: None,
 ) -> float:
     """Fit means and deviations to what is taught, over whole episodes; return the last epoch's
@@ -108,13 +110,17 @@ def fit(
         epochs: over all of them.
         batch_size: episodes.
         rates: learning rate at first and in the end; it falls as a cosine.
-        generator: of the order.
+        generator: of the order, and of which episodes are mirrored.
+        mirrored: signs (quantities,) of a frame where left and right change places, and all that is
+            taught changes its sign: each time that an episode is learned from, it is mirrored or
+            not. Default: none is.
         advance: called after each epoch with the share of them that is done.
     """
     seen, truth, counts = (
         torch.from_numpy(x) for x in (episodes.seen, episodes.truth, episodes.counts)
     )
     count = seen.shape[1]
+    flips = None if mirrored is None else torch.from_numpy(mirrored)
     updates = epochs * -(-count // batch_size)
     optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
@@ -122,8 +128,13 @@ def fit(
     for epoch in range(epochs):
         losses.clear()
         for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
-            mean, deviation, _ = network(seen[:, batch])
-            wrong = (mean - truth[:, batch]) * torch.exp(-deviation)
+            frames, taught = seen[:, batch], truth[:, batch]
+            if flips is not None:
+                some = torch.rand((len(batch), 1), generator=generator) < _MIRRORED
+                frames = torch.where(some, frames * flips, frames)
+                taught = torch.where(some, -taught, taught)
+            mean, deviation, _ = network(frames)
+            wrong = (mean - taught) * torch.exp(-deviation)
             each = (0.5 * wrong**2 + deviation) * torch.exp(deviation.detach())
             counted = counts[:, batch]
             loss = (each.sum(dim=-1) * counted).sum() / counted.sum()

@@ -57,9 +57,14 @@ def recurrent_imitation(
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     order, rng = torch.Generator().manual_seed(seed), np.random.default_rng(seed)
-    size, taught = features_of(config).size, 1 if config["says"] == "command" else 3
+    features, taught = features_of(config), 1 if config["says"] == "command" else 3
     network = BeliefNetwork(
-        size, taught, config["cell"], config["state"], config["net"], config["activation"]
+        features.size,
+        taught,
+        config["cell"],
+        config["state"],
+        config["net"],
+        config["activation"],
     )
     judge = make_training_env(scenario)
     seeds = validation_seeds(config["validation"]["episodes"])
@@ -78,6 +83,7 @@ def recurrent_imitation(
             config["batch_size"],
             (rate, 0.0 if last else _LEAST_RATE * rate),
             order,
+            features.mirrored,
             fitting,
         )
         if not last and flights.decisions // config["validation"]["every"] == validated:

@@ -307,7 +307,7 @@ def run_study(
             finished, open_ones = wait(open_ones, timeout=0.5, return_when=FIRST_EXCEPTION)
             for future in finished:
                 future.result()
-            report(dict(shares), len(futures) - len(open_ones))
+            report(shares.copy(), len(futures) - len(open_ones))
     return len(waiting)
 
 

@@ -26,6 +26,11 @@ def test_truth_comes_from_info():
     np.testing.assert_allclose(features.frames(np.zeros((1, 8)), info), [[0.3, 1.0]], rtol=1e-6)
 
 
+def test_what_is_mirrored_is_known():
+    features = Features(("torque_z", "force_x", "path_y"), 2)
+    np.testing.assert_array_equal(features.mirrored, [-1, 1, -1, -1, 1, -1])
+
+
 def test_a_history_is_oldest_first_and_starts_with_its_first_frame():
     history = History(Features(("torque_z",), 3), 2)
     history.restart(np.array([[1.0], [2.0]], dtype=np.float32), [0, 1])

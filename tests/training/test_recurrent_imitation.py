@@ -100,6 +100,21 @@ def test_the_mean_of_what_is_hidden_is_learned():
     assert np.exp(deviation[20:].numpy()).mean() == pytest.approx(error, rel=0.2)
 
 
+def test_the_left_is_learned_from_the_right():
+    """Episodes in which what is hidden is positive alone teach what it is where it is negative."""
+    rng = np.random.default_rng(0)
+    hidden = np.repeat(rng.uniform(0.5, 1.5, (1, 128, 1)), 20, axis=0).astype(np.float32)
+    seen = np.concatenate([hidden, np.ones_like(hidden)], axis=2)
+    torch.manual_seed(0)
+    network = BeliefNetwork(2, 1, "gru", 8, [8], "relu")
+    mirrored = np.array([-1.0, 1.0], dtype=np.float32)
+    episodes = Sequences(seen, hidden, np.ones((20, 128), dtype=np.float32))
+    fit(network, episodes, 40, 16, (0.02, 0.0), torch.Generator().manual_seed(0), mirrored)
+    with torch.no_grad():
+        mean, _, _ = network(torch.from_numpy(seen * mirrored))
+    assert np.abs(mean.numpy() + hidden)[5:].mean() < 0.05
+
+
 def test_a_run_leaves_the_best_policy_and_is_the_same_again(tmp_path):
     config = config_of("steps=2000")
     told = []
