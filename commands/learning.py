@@ -16,7 +16,7 @@ from .terminal import Out, console, offering, progress_bar, results_folder, say
 
 def algorithm_names() -> list[str]:
     """Return the algorithms that ``train`` knows."""
-    return ["sac", "ppo", "recurrent-ppo", "td3"]
+    return ["sac", "ppo", "recurrent-ppo", "td3", "recurrent-imitation"]
 
 
 def world_names() -> list[str]:
@@ -61,7 +61,7 @@ def train(
     algorithm: Annotated[
         str,
         typer.Argument(
-            help="Learning algorithm: sac, ppo, recurrent-ppo or td3.",
+            help="Learning algorithm: sac, ppo, recurrent-ppo, td3 or recurrent-imitation.",
             autocompletion=offering(algorithm_names),
         ),
     ],
@@ -85,7 +85,8 @@ def train(
     ] = None,
     out: Out = Path("results/train"),
 ) -> dict[str, Any]:
-    """Train a policy. An interrupted run resumes from its last checkpoint.
+    """Train a policy. An interrupted run resumes from its last checkpoint, or, of
+    recurrent-imitation, starts anew.
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
@@ -109,7 +110,7 @@ def train(
             cluster,
             out,
         )
-    from ..training.train import train as work
+    from ..training.algorithms import run_training as work
 
     return _learn(work, algorithm, scenario, seed, steps, setting, config, out)
 
@@ -168,7 +169,7 @@ def imitate(
     from ..runtime.extras import need
 
     need("torch", "rl")
-    from ..training.imitate import imitate as work
+    from ..training.algorithms import run_training as work
 
     return _learn(work, "imitation", scenario, seed, steps, setting, config, out)
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..runtime.errors import InputError, unknown_name
 from .observation import (
+    DECISION_PERIOD,
     FORCE_X,
     FORCE_Y,
     FORCE_Z,
@@ -26,30 +27,34 @@ Array = NDArray[np.float32]
 class Quantity:
     """Where a quantity stands, and the size that becomes 1."""
 
-    scale: float  # N, Nm or m/s
+    scale: float  # N, Nm, m/s or m
     column: int
     source: str = "observation"  # or the entry of the environment's ``info``
+    summed: bool = False  # over the decisions since the episode's start, times their period
+    odd: bool = False  # changes its sign where left and right change places
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "torque_x": Quantity(0.03, TORQUE_X),
+    "torque_x": Quantity(0.03, TORQUE_X, odd=True),
     "torque_y": Quantity(0.03, TORQUE_Y),
-    "torque_z": Quantity(0.03, TORQUE_Z),
+    "torque_z": Quantity(0.03, TORQUE_Z, odd=True),
     "force_x": Quantity(0.5, FORCE_X),
-    "force_y": Quantity(0.5, FORCE_Y),
+    "force_y": Quantity(0.5, FORCE_Y, odd=True),
     "force_z": Quantity(0.5, FORCE_Z),
-    "velocity_y": Quantity(0.5, VELOCITY_Y),
-    "command": Quantity(1.0, LAST_COMMAND),
+    "velocity_y": Quantity(0.5, VELOCITY_Y, odd=True),
+    "command": Quantity(1.0, LAST_COMMAND, odd=True),
+    # how far it has flown along y since the episode's start, by its own estimated velocity
+    "path_y": Quantity(1.0, VELOCITY_Y, summed=True, odd=True),
     # what only a simulator knows, or an estimator beside the filter: for ablations (see
     # ``sensing``)
-    "true_torque_z": Quantity(0.03, 2, "torque"),
+    "true_torque_z": Quantity(0.03, 2, "torque", odd=True),
     "true_force_x": Quantity(0.5, 0, "force"),
-    "true_force_y": Quantity(0.5, 1, "force"),
+    "true_force_y": Quantity(0.5, 1, "force", odd=True),
     "std_torque_z": Quantity(0.005, 2, "std_torque"),
     "std_force_x": Quantity(0.05, 0, "std_force"),
-    "observer_torque_z": Quantity(0.03, 2, "observer_torque"),
+    "observer_torque_z": Quantity(0.03, 2, "observer_torque", odd=True),
     "observer_force_x": Quantity(0.5, 0, "observer_force"),
-    "observer_force_y": Quantity(0.5, 1, "observer_force"),
+    "observer_force_y": Quantity(0.5, 1, "observer_force", odd=True),
 }
 
 
@@ -106,16 +111,29 @@ class Features:
             for name in self.frame
         ]
         scaled = np.stack(columns, axis=1) / np.array(self.scale)
+        scaled[:, self.summed] *= DECISION_PERIOD  # what one decision adds
         clipped: Array = np.clip(scaled, -10.0, 10.0).astype(np.float32)
         return clipped
+
+    @property
+    def mirrored(self) -> Array:
+        """Signs (size,) of what a policy sees where left and right change places."""
+        signs = [-1.0 if QUANTITIES[name].odd else 1.0 for name in self.frame]
+        return np.array(signs * self.history, dtype=np.float32)
+
+    @property
+    def summed(self) -> list[int]:
+        """Columns of a frame that a ``History`` adds up."""
+        return [i for i, name in enumerate(self.frame) if QUANTITIES[name].summed]
 
 
 class History:
     """The last frames of n environments, oldest first; an episode begins with its first frame
-    repeated.
+    repeated, and sums begin at 0.
     """
 
     def __init__(self, features: Features, count: int) -> None:
+        self._summed = features.summed
         self._frames = np.zeros((count, features.history, len(features.frame)), dtype=np.float32)
 
     def restart(self, frames: Array, which: Sequence[int] | NDArray[np.bool_]) -> None:
@@ -123,11 +141,15 @@ class History:
         quantities).
         """
         self._frames[which] = frames[which][:, None, :]
+        for column in self._summed:
+            self._frames[which, :, column] = 0.0
 
     def push(self, frames: Array) -> None:
         """Add one frame (n, quantities) each."""
+        sums = self._frames[:, -1, self._summed]
         self._frames[:, :-1] = self._frames[:, 1:]
         self._frames[:, -1] = frames
+        self._frames[:, -1, self._summed] += sums
 
     def flat(self) -> Array:
         """Return a copy (n, history * quantities)."""

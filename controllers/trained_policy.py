@@ -67,6 +67,27 @@ def lstm(weights: Weights, x: Array, hidden: Array, cell: Array) -> tuple[Array,
     return after, cell
 
 
+def gru(weights: Weights, x: Array, hidden: Array) -> Array:
+    """Return the next hidden state (h,) of a GRU with gates in the order reset, update, new."""
+    entered = weights["gru_input"] @ x + weights["gru_input_bias"]
+    kept = weights["gru_hidden"] @ hidden + weights["gru_hidden_bias"]
+    size = len(hidden)
+    gates = _sigmoid(entered[: 2 * size] + kept[: 2 * size])
+    reset, update = gates[:size], gates[size:]
+    new = np.tanh(entered[2 * size :] + reset * kept[2 * size :])
+    after: Array = new + update * (hidden - new)
+    return after
+
+
+# gates of each recurrent cell
+_CELLS = {"lstm": 4, "gru": 3}
+
+
+def cell_of(weights: Weights) -> str | None:
+    """Return which recurrent cell stands before the dense layers: lstm, gru, or none."""
+    return next((name for name in _CELLS if f"{name}_input" in weights), None)
+
+
 def _sigmoid(x: Array) -> Array:
     between: Array = (0.5 * (1.0 + np.tanh(0.5 * x))).astype(np.float32)
     return between
@@ -80,7 +101,7 @@ class TrainedPolicy:
             ``activation``, ``squash`` (the output goes through a tanh), and where it comes from.
         weights: dense layers ``weight0`` (out, in), ``bias0`` (out,), ...; before them, where there
             is one, the LSTM ``lstm_input`` (4h, in), ``lstm_hidden`` (4h, h), ``lstm_input_bias``,
-            ``lstm_hidden_bias`` (4h,).
+            ``lstm_hidden_bias`` (4h,), or the GRU ``gru_input`` (3h, in) and so on.
 
     Raises:
         InputError: card and weights do not go together.
@@ -104,13 +125,15 @@ class TrainedPolicy:
             raise InputError(
                 f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at least 1"
             )
-        self._recurrent = "lstm_input" in weights
-        entry = weights.get("lstm_input" if self._recurrent else "weight0")
+        self._cell = cell_of(weights)
+        entry = weights.get("weight0" if self._cell is None else f"{self._cell}_input")
         if entry is None or entry.shape[1] != self.features.size:
             raise InputError(f"{name}: the first layer must take {self.features.size} numbers")
+        if self._cell is not None:
+            self._check_cell(self._cell, name)
         for i in range(layers_of(weights)):
             bias = weights.get(f"bias{i}")
-            below = weights["lstm_hidden"].shape[1] if self._recurrent else self.features.size
+            below = self._memory_size or self.features.size
             below = below if i == 0 else weights[f"weight{i - 1}"].shape[0]
             if bias is None or weights[f"weight{i}"].shape != (len(bias), below):
                 raise InputError(f"{name}: layer {i} does not fit the one before it")
@@ -122,12 +145,28 @@ class TrainedPolicy:
         """Forget the last episode."""
         self._history = History(self.features, 1)
         self._count, self._held = 0, np.zeros(1, dtype=np.float32)
-        if self._recurrent:
-            size = self.weights["lstm_hidden"].shape[1]
-            self._hidden, self._cell = (
-                np.zeros(size, dtype=np.float32),
-                np.zeros(size, dtype=np.float32),
-            )
+        size = self._memory_size
+        self._hidden, self._kept = (
+            np.zeros(size, dtype=np.float32),
+            np.zeros(size, dtype=np.float32),
+        )
+
+    @property
+    def _memory_size(self) -> int:
+        """Size of the recurrent cell's state, 0 where there is none."""
+        return 0 if self._cell is None else int(self.weights[f"{self._cell}_hidden"].shape[1])
+
+    def _check_cell(self, cell: str, name: str) -> None:
+        size = self._memory_size
+        shapes = {
+            "input": (_CELLS[cell] * size, self.features.size),
+            "hidden": (_CELLS[cell] * size, size),
+            "input_bias": (_CELLS[cell] * size,),
+            "hidden_bias": (_CELLS[cell] * size,),
+        }
+        for part, shape in shapes.items():
+            if self.weights[f"{cell}_{part}"].shape != shape:
+                raise InputError(f"{name}: {cell}_{part} must have the shape {shape}")
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
@@ -148,9 +187,11 @@ class TrainedPolicy:
 
     def act(self, x: Array) -> Array:
         """Return the command (1,) for features (size,); a recurrent policy remembers them."""
-        if self._recurrent:
-            self._hidden, self._cell = lstm(self.weights, x, self._hidden, self._cell)
+        if self._cell == "lstm":
+            self._hidden, self._kept = lstm(self.weights, x, self._hidden, self._kept)
             x = self._hidden
+        elif self._cell == "gru":
+            x = self._hidden = gru(self.weights, x, self._hidden)
         out = dense(self.weights, self._activation, x)
         return (
             np.tanh(out) * np.float32(MAX_COMMAND)

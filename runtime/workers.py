@@ -4,10 +4,10 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing.managers import SyncManager
+from multiprocessing.managers import DictProxy, SyncManager
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -91,8 +91,8 @@ def one_process(prepare: Callable[[], None] = end_with_parent) -> ProcessPoolExe
 
 
 @contextmanager
-def shared_dict(values: Mapping[str, Any]) -> Iterator[MutableMapping[str, Any]]:
-    """Give a dictionary that workers can change too."""
+def shared_dict(values: Mapping[str, Any]) -> Iterator["DictProxy[str, Any]"]:
+    """Give a dictionary that workers can change too; its ``copy`` is of one instant."""
     manager = SyncManager(ctx=_CONTEXT)
     with _interrupts_blocked():
         manager.start(end_with_parent)

@@ -10,12 +10,12 @@ from typing import Any
 
 import yaml
 
-from ..controllers.features import Features
+from ..controllers.features import QUANTITIES, Features
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
-ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation")
+ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation", "recurrent-imitation")
 
 
 def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:
@@ -91,7 +91,7 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    for key in ("steps", "environments", "repeat"):
+    for key in ("steps", "environments", "repeat", "rounds", "state", "ahead"):
         if config.get(key, 1) < 1:
             raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
     for key in ("every", "episodes"):
@@ -112,10 +112,30 @@ def _check(config: Config) -> None:
         raise InputError(
             f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"
         )
-    known = ("ukf", "constant-gain", "ukf-lanes")[: 2 if config["algorithm"] == "imitation" else 3]
+    in_lanes = config["algorithm"] not in ("imitation", "recurrent-imitation")
+    known = ("ukf", "constant-gain", "ukf-lanes")[: 3 if in_lanes else 2]
     if config["estimator"] not in known:
         raise unknown_name("estimator", config["estimator"], known, config["algorithm"])
-    features_of(config)
+    features = features_of(config)
+    if config["algorithm"] == "recurrent-imitation":
+        _check_memory(config, features)
+
+
+def _check_memory(config: Config, features: Features) -> None:
+    name = config["algorithm"]
+    if config["says"] not in ("motion", "command"):
+        raise unknown_name("word", config["says"], ("motion", "command"), f"{name}: says")
+    if config["cell"] not in ("lstm", "gru"):
+        raise unknown_name("cell", config["cell"], ("lstm", "gru"), name)
+    if config["repeat"] != 1:
+        raise InputError(f"{name}: repeat must be 1, got {config['repeat']}")
+    for key in ("gains", "dampings"):
+        numbers = all(isinstance(x, int | float) for x in config[key])
+        if not config[key] or not numbers:
+            raise InputError(f"{name}: {key} must list numbers, got {config[key]}")
+    for quantity in features.frame:
+        if QUANTITIES[quantity].source not in ("observation", "force", "torque"):
+            raise InputError(f"{name}: sees {quantity}, which the vector environment does not tell")
 
 
 def features_of(config: Config) -> Features:

@@ -20,7 +20,7 @@ from ..controllers.references import Oracle
 from ..controllers.trained_policy import TrainedPolicy, Weights
 from ..evaluation.episodes import DECISIONS
 from .configuration import Config, features_of
-from .learners import dense_weights
+from .learners import ACTIVATIONS, dense_weights
 from .seeds import training_seed, validation_seeds
 from .train import Progress, card_of, claim, read_progress, take_stock, write_json
 from .training_envs import check_training_env, make_training_env
@@ -91,7 +91,7 @@ def imitate(
 
 
 def _network(size: int, config: Config) -> torch.nn.Sequential:
-    act = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}[config["activation"]]
+    act = ACTIVATIONS[config["activation"]]
     layers: list[torch.nn.Module] = []
     for width in config["net"]:
         layers += [torch.nn.Linear(size, width), act()]

@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from ..controllers.trained_policy import Weights
 from .configuration import Config
 
-_ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
+ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
 
 def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
@@ -20,7 +20,7 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
     algorithm = config["algorithm"]
     policy: dict[str, Any] = {
         "net_arch": list(config["net"]),
-        "activation_fn": _ACTIVATIONS[config["activation"]],
+        "activation_fn": ACTIVATIONS[config["activation"]],
         "optimizer_kwargs": {"fused": True},
     }
     start, end = config["learner"]["learning_rate"], config["learning_rate_end"]
@@ -110,7 +110,7 @@ def weights_of(learner: Any, algorithm: str) -> Weights:
                 ("lstm_input_bias", cell.bias_ih_l0),
                 ("lstm_hidden_bias", cell.bias_hh_l0),
             ):
-                arrays[name] = _array(tensor)
+                arrays[name] = array_of(tensor)
     return arrays | dense_weights(layers)
 
 
@@ -119,11 +119,12 @@ def dense_weights(layers: Any) -> Weights:
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
     arrays: Weights = {}
     for i, layer in enumerate(linear):
-        arrays[f"weight{i}"], arrays[f"bias{i}"] = _array(layer.weight), _array(layer.bias)
+        arrays[f"weight{i}"], arrays[f"bias{i}"] = array_of(layer.weight), array_of(layer.bias)
     return arrays
 
 
-def _array(tensor: torch.Tensor) -> Any:
+def array_of(tensor: torch.Tensor) -> Any:
+    """Return a copy of a tensor's numbers."""
     return tensor.detach().cpu().numpy().astype(np.float32).copy()
 
 

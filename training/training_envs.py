@@ -19,8 +19,11 @@ from ..runtime.errors import InputError, unknown_name
 Frame = NDArray[np.float32]
 
 LANES = "ukf-lanes"
+_SCENARIO = 1  # second word of the seed from which the scenario of an episode is drawn
+
 # a scenario that comes twice is drawn twice as often
 TIERS: dict[str, tuple[str, ...]] = {
+    "base-fast": ("base", "fast"),
     "wide": (
         "static",
         "base",
@@ -46,6 +49,11 @@ def check_training_env(name: str) -> None:
         raise unknown_name("scenario", name, [*SCENARIOS, *TIERS])
 
 
+def scenarios_of(name: str) -> tuple[str, ...]:
+    """Return the scenarios of a tier, as often as they are drawn, or the one scenario."""
+    return TIERS.get(name, (name,))
+
+
 class MixedFanTracking(gym.Env[Frame, Frame]):
     """Each episode in one of several scenarios, drawn from the episode's seed."""
 
@@ -61,10 +69,15 @@ class MixedFanTracking(gym.Env[Frame, Frame]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Frame, dict[str, Any]]:
-        """Draw a scenario and start an episode in it."""
+        """Draw a scenario and start an episode in it.
+
+        The episode is that of the scenario with the same seed; which scenario it is, is drawn by
+        itself, or it would settle the fan's motion, too.
+        """
         super().reset(seed=seed)
-        self._env = self.envs[self._scenarios[self.np_random.integers(len(self._scenarios))]]
         inner = int(self.np_random.integers(2**31)) if seed is None else seed
+        drawn = np.random.default_rng((inner, _SCENARIO)).integers(len(self._scenarios))
+        self._env = self.envs[self._scenarios[drawn]]
         return self._env.reset(seed=inner, options=options)
 
     @property

@@ -15,7 +15,7 @@ from ...controllers.observation import (
     TORQUE_Z,
     VELOCITY_Y,
 )
-from ...controllers.trained_policy import layers_of, load_policy
+from ...controllers.trained_policy import cell_of, layers_of, load_policy
 from ...runtime.errors import InputError
 from .c_numbers import literal, table
 
@@ -55,17 +55,17 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
             f"--policy {name}: expected {', '.join(LAWS)} or the name or path of a trained policy"
         )
     policy = load_policy(path)
-    if "lstm_input" in policy.weights:
+    if cell_of(policy.weights) is not None:
         raise InputError(
             f"--policy {name}: is recurrent; only policies of dense layers can be exported"
         )
     frame = []
     for quantity, scale in zip(policy.features.frame, policy.features.scale, strict=True):
         known = QUANTITIES[quantity]
-        if known.source != "observation":
+        if known.source != "observation" or known.summed:
             raise InputError(
-                f"--policy {name}: sees {quantity}, which is not in the estimate; such a policy "
-                "cannot be exported"
+                f"--policy {name}: sees {quantity}, which is not in an estimate by itself; "
+                "such a policy cannot be exported"
             )
         frame.append({"c": _COLUMNS[known.column], "scale": literal(scale, name)})
     layers = []

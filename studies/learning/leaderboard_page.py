@@ -14,6 +14,8 @@ from windwrench.evaluation.leaderboard import (
     Result,
     Row,
     aggregate,
+    best_of,
+    compare,
     lines_of,
     rows_of,
 )
@@ -81,7 +83,7 @@ def _text(
 ) -> str:
     parts = [
         _head(plan),
-        _verdict(rows),
+        _verdict(rows, lines),
         _tables(rows),
         _pictures(folder),
         _limit(results, rows, plan),
@@ -136,8 +138,8 @@ files in `docs/results/learning`; `windwrench leaderboard` writes this page from
 neither training nor tuning sees; a lost vehicle's remaining time counts at 2.5 m; everybody flies with the full filter.
 Every interval on this page is a 95 % interval over policies and episodes: both are drawn anew, a policy with all its episodes and an
 episode for all policies (hierarchical bootstrap); a designed controller is one policy, and episodes alone vary.
-The line sac-fast, and all trackers and laws with lead, were added once results on these episodes were known; the gains of these laws
-come from validation episodes alone."""
+The lines sac-fast and recurrent-imitation, and all trackers and laws with lead, were added once results on these episodes were known;
+the gains of these laws come from validation episodes alone."""
 
 
 def _get(rows: Sequence[Row], name: str, world: str) -> Row | None:
@@ -156,7 +158,16 @@ def _said(one: Comparison) -> str:
     return f"{_percent(one.change)} ({_between(one.interval)})"
 
 
-def _verdict(rows: Sequence[Row]) -> str:
+def _against_informed(name: str, lines: Sequence[Line], world: str) -> Comparison | None:
+    """Compare a policy with the best tracker that knows the family of motions, as whoever learned
+    from these motions does, too.
+    """
+    line = next(x for x in lines if x.name == name)
+    rival = best_of(lines, "tracker-informed", world)
+    return None if rival is None else compare(line.rmse[world], rival, world)
+
+
+def _verdict(rows: Sequence[Row], lines: Sequence[Line]) -> str:
     """Say first what learning loses to."""
     sentences = []
     for world in _MAIN:
@@ -180,10 +191,12 @@ def _verdict(rows: Sequence[Row]) -> str:
             f"numbers: {even} it."
         )
         informed = [row for row in some if row.name.startswith("tracker-informed")]
-        if informed:
+        one = _against_informed(best.name, lines, world)
+        if informed and one is not None:
             text += (
                 f" A tracker that knows the family of motions reaches {informed[0].rmse_m:.3f} m, "
-                f"{_said(informed[0].against['tracker'])} against the one that does not."
+                f"{_said(informed[0].against['tracker'])} against the one that does not; {best.name}, "
+                f"which was trained on motions of that family, is {_said(one)} against it."
             )
         sentences.append(text)
     if not sentences:
@@ -196,7 +209,8 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
     asked: list[tuple[str, bool, str, float | None]] = []
     for line in lines:
         learner = line.name in ("sac", "sac-wide", "sac-fast")
-        if line.group != "learned" or (not learner and line.trained_on != "wide"):
+        memory = line.name.startswith("recurrent-imitation")
+        if line.group != "learned" or not (learner or memory or line.trained_on == "wide"):
             continue
         for world, target in (("base", 0.10), ("fast", 0.15)):
             row = _get(rows, line.name, world)
@@ -208,6 +222,11 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
                     one = row.against[law]
                     what = f"{who}: better than the best {law} ({one.rival})"
                     asked.append((what, one.change < 0, _said(one), one.p))
+            informed = _against_informed(line.name, lines, world) if memory else None
+            if informed is not None:
+                what = f"{who}: better than the best tracker that knows the motions"
+                told = f"{what} ({informed.rival})"
+                asked.append((told, informed.change < 0, _said(informed), informed.p))
             if learner:
                 one = row.against["admittance"]
                 what = f"{who}: {target:.0%} or more below the best admittance"

@@ -27,6 +27,8 @@ _LEARNED = {
     "recurrent-ppo": "#5b3a1e",
     "imitation": "#3a6ea5",
     "imitation-wide": "#8fb8de",
+    "recurrent-imitation": "#c1121f",
+    "recurrent-imitation-wide": "#f28482",
 }
 _TRACKED = (
     "hover",

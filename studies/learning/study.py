@@ -160,11 +160,9 @@ def train_entry(
     config = load_config(entry.algorithm, entry.overrides)
     done = read_progress(folder)
     if done is None or not done.steps or done.steps[-1] < config["steps"]:
-        from windwrench.training.imitate import imitate
-        from windwrench.training.train import train
+        from windwrench.training.algorithms import run_training
 
-        work = imitate if entry.algorithm == "imitation" else train
-        work(
+        run_training(
             config,
             entry.scenario,
             entry.seed,
@@ -309,7 +307,7 @@ def run_study(
             finished, open_ones = wait(open_ones, timeout=0.5, return_when=FIRST_EXCEPTION)
             for future in finished:
                 future.result()
-            report(dict(shares), len(futures) - len(open_ones))
+            report(shares.copy(), len(futures) - len(open_ones))
     return len(waiting)
 
 

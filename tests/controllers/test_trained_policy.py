@@ -6,7 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, lstm, save_policy
+from windwrench.controllers.trained_policy import (
+    TrainedPolicy,
+    gru,
+    load_policy,
+    lstm,
+    save_policy,
+)
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.evaluation.benchmark import fly_all, leaderboard
@@ -56,20 +62,25 @@ def test_a_held_command_changes_every_other_decision():
     assert len(np.unique(commands[:, 0])) > 15
 
 
-def test_a_recurrent_policy_forgets_at_the_start_of_an_episode():
+def recurrent(cell, gates):
+    """Random weights of a cell with a state of four numbers, and a linear layer."""
     rng = np.random.default_rng(0)
-    weights = {
+    return {
         name: 0.3 * rng.normal(size=shape).astype(np.float32)
         for name, shape in (
-            ("lstm_input", (16, 1)),
-            ("lstm_hidden", (16, 4)),
-            ("lstm_input_bias", (16,)),
-            ("lstm_hidden_bias", (16,)),
+            (f"{cell}_input", (4 * gates, 1)),
+            (f"{cell}_hidden", (4 * gates, 4)),
+            (f"{cell}_input_bias", (4 * gates,)),
+            (f"{cell}_hidden_bias", (4 * gates,)),
             ("weight0", (1, 4)),
             ("bias0", (1,)),
         )
     }
-    policy = TrainedPolicy(CARD, weights)
+
+
+@pytest.mark.parametrize(("cell", "gates"), [("lstm", 4), ("gru", 3)])
+def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(cell, gates):
+    policy = TrainedPolicy(CARD, recurrent(cell, gates))
     observation = np.full(8, 0.02)
     first = [policy(observation)[0] for _ in range(3)]
     assert len(set(first)) == 3  # it remembers
@@ -97,6 +108,35 @@ def test_the_lstm_is_torch_s():
     for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
         hidden, state = lstm(weights, x, hidden, state)
         np.testing.assert_allclose(hidden, h, atol=1e-6)
+
+
+def test_the_gru_is_torch_s():
+    torch = pytest.importorskip(
+        "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
+    )
+    torch.manual_seed(0)
+    cell = torch.nn.GRU(5, 7)
+    weights = {
+        "gru_input": cell.weight_ih_l0,
+        "gru_hidden": cell.weight_hh_l0,
+        "gru_input_bias": cell.bias_ih_l0,
+        "gru_hidden_bias": cell.bias_hh_l0,
+    }
+    weights = {name: tensor.detach().numpy() for name, tensor in weights.items()}
+    inputs = torch.randn(6, 1, 5)
+    with torch.no_grad():
+        expected = cell(inputs)[0][:, 0].numpy()
+    hidden = np.zeros(7, dtype=np.float32)
+    for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
+        hidden = gru(weights, x, hidden)
+        np.testing.assert_allclose(hidden, h, atol=1e-6)
+
+
+def test_a_cell_whose_parts_do_not_fit_is_refused():
+    weights = recurrent("gru", 3)
+    weights["gru_hidden_bias"] = weights["gru_hidden_bias"][:-1]
+    with pytest.raises(InputError, match="gru_hidden_bias must have the shape"):
+        TrainedPolicy(CARD, weights)
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,14 @@ TINY = {
         "lstm=4",
     ],
     "imitation": ["steps=600", "rounds=2", "epochs=2"],
+    "recurrent-imitation": [
+        "steps=1000",
+        "rounds=2",
+        "epochs=1",
+        "last_epochs=1",
+        "state=4",
+        "gains=[2.0]",
+    ],
 }
 SHORT = ["net=[8]", "validation.every=120", "validation.episodes=1"]
 
@@ -60,7 +68,7 @@ def tiny(algorithm, *more):
         pytest.importorskip(
             "sb3_contrib", reason="sb3_contrib is not installed: pip install 'windwrench[rl]'"
         )
-    checkpoint = [] if algorithm == "imitation" else ["checkpoint=60"]
+    checkpoint = ["checkpoint=60"] if algorithm in LEARNERS else []
     return load_config(algorithm, [*SHORT, *TINY[algorithm], *checkpoint, *more])
 
 

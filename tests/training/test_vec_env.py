@@ -8,7 +8,7 @@ import pytest
 from windwrench.controllers.features import Features, History
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.vector import FanTrackingVectorEnv
-from windwrench.training.training_envs import make_training_envs
+from windwrench.training.training_envs import MixedFanTracking, make_training_envs
 
 pytest.importorskip(
     "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
@@ -131,6 +131,18 @@ def test_recall_flies_back_to_where_memory_was_taken(repeat):
             if isinstance(a, np.ndarray):
                 np.testing.assert_array_equal(a, b)
     assert env.memory()["episode"] == other.memory()["episode"]
+
+
+def test_the_scenario_of_a_mixed_episode_says_nothing_of_its_motion():
+    env = MixedFanTracking(("base", "fast"), estimator="constant-gain")
+    moved = {"base": set(), "fast": set()}
+    for seed in range(60):
+        _, info = env.reset(seed=seed)
+        moved["base" if env.current is env.envs["base"] else "fast"].add(info["fan_motion"])
+    assert moved == {
+        "base": {"sine", "triangle", "ramp", "still"},
+        "fast": {"sine", "triangle", "ramp"},
+    }
 
 
 def test_mixed_worlds_repeat_with_their_seeds():

@@ -1,0 +1,148 @@
+"""A recurrent network that says what a tracker would believe, and how it is fitted to episodes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from ..controllers.trained_policy import Weights, layers_of
+from .learners import ACTIVATIONS, array_of, dense_weights
+
+Array = NDArray[np.float32]
+
+CELLS: dict[str, Any] = {"lstm": torch.nn.LSTM, "gru": torch.nn.GRU}
+_SURE, _UNSURE = -4.0, 1.5  # bounds of what it may say of a logarithmic standard deviation
+_MIRRORED = 0.5  # share of the episodes
+_STEEPEST = 1.0  # norm to which a gradient is cut
+
+
+@dataclass(frozen=True)
+class Sequences:
+    """Whole episodes to learn from, time first."""
+
+    seen: Array  # (decisions, episodes, quantities), frames
+    truth: Array  # (decisions, episodes, quantities that are taught)
+    counts: Array  # (decisions, episodes), 0 where the vehicle is lost or the truth unknown
+
+
+class BeliefNetwork(torch.nn.Module):
+    """A recurrent cell, dense layers, and for each quantity that it is taught a mean and the
+    logarithm of a standard deviation.
+
+    Args:
+        quantities: of a frame.
+        taught: quantities that it says.
+        cell: ``gru`` or ``lstm``; torch fits an LSTM in less than half the time, but it needs more
+                epochs.
+        state: size of the cell.
+        net: sizes of the dense layers between.
+        activation: of these layers.
+    """
+
+    def __init__(
+        self, quantities: int, taught: int, cell: str, state: int, net: list[int], activation: str
+    ) -> None:
+        super().__init__()
+        self.taught, self._name = taught, cell
+        self.cell = CELLS[cell](quantities, state)
+        if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
+            with torch.no_grad():
+                self.cell.bias_ih_l0[state : 2 * state] = 1.0
+        layers: list[torch.nn.Module] = []
+        for width in net:
+            layers += [torch.nn.Linear(state, width), ACTIVATIONS[activation]()]
+            state = width
+        self.dense = torch.nn.Sequential(*layers, torch.nn.Linear(state, 2 * taught))
+
+    def forward(
+        self, frames: torch.Tensor, state: Any = None
+    ) -> tuple[torch.Tensor, torch.Tensor, Any]:
+        """Return means and logarithmic deviations (decisions, episodes, taught) and the cell's
+        state for frames (decisions, episodes, quantities).
+        """
+        remembered, state = self.cell(frames, state)
+        said = self.dense(remembered)
+        deviations = said[..., self.taught :].clamp(_SURE, _UNSURE)
+        return said[..., : self.taught], deviations, state
+
+    def policy_weights(self, shares: Array) -> Weights:
+        """Return the weights of the policy that commands ``shares`` (taught,) of the means."""
+        weights: Weights = {
+            f"{self._name}_{name}": array_of(tensor)
+            for name, tensor in (
+                ("input", self.cell.weight_ih_l0),
+                ("hidden", self.cell.weight_hh_l0),
+                ("input_bias", self.cell.bias_ih_l0),
+                ("hidden_bias", self.cell.bias_hh_l0),
+            )
+        }
+        weights |= dense_weights(self.dense)
+        last = layers_of(weights) - 1
+        for name in (f"weight{last}", f"bias{last}"):
+            weights[name] = shares[None] @ weights[name][: self.taught]
+        return weights
+
+
+def fit(
+    network: BeliefNetwork,
+    episodes: Sequences,
+    epochs: int,
+    batch_size: int,
+    rates: tuple[float, float],
+    generator: torch.Generator,
+    mirrored: Array | None = None,
+    advance: Callable[[float], None] = lambda share: None,
+) -> float:
+    """Fit means and deviations to what is taught, over whole episodes; return the last epoch's
+    mean loss.
+
+    The loss is the likelihood of normal errors, each times the deviation that was said: where the
+    fan is hard to tell a sample counts less, but not as little as by the likelihood alone, which
+    would let hard episodes go (beta-NLL with beta 0.5: Seitzer and others, *On the pitfalls of
+    heteroscedastic uncertainty estimation with probabilistic neural networks*, 2022).
+
+    Args:
+        network: to fit.
+        episodes: to fit it to.
+        epochs: over all of them.
+        batch_size: episodes.
+        rates: learning rate at first and in the end; it falls as a cosine.
+        generator: of the order, and of which episodes are mirrored.
+        mirrored: signs (quantities,) of a frame where left and right change places, and all that is
+            taught changes its sign: each time that an episode is learned from, it is mirrored or
+            not. Default: none is.
+        advance: called after each epoch with the share of them that is done.
+    """
+    seen, truth, counts = (
+        torch.from_numpy(x) for x in (episodes.seen, episodes.truth, episodes.counts)
+    )
+    count = seen.shape[1]
+    flips = None if mirrored is None else torch.from_numpy(mirrored)
+    updates = epochs * -(-count // batch_size)
+    optimiser = torch.optim.Adam(network.parameters(), lr=rates[0], fused=True)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, updates, eta_min=rates[1])
+    losses: list[float] = []
+    for epoch in range(epochs):
+        losses.clear()
+        for batch in torch.randperm(count, generator=generator).split(batch_size):  # type: ignore[no-untyped-call]
+            frames, taught = seen[:, batch], truth[:, batch]
+            if flips is not None:
+                some = torch.rand((len(batch), 1), generator=generator) < _MIRRORED
+                frames = torch.where(some, frames * flips, frames)
+                taught = torch.where(some, -taught, taught)
+            mean, deviation, _ = network(frames)
+            wrong = (mean - taught) * torch.exp(-deviation)
+            each = (0.5 * wrong**2 + deviation) * torch.exp(deviation.detach())
+            counted = counts[:, batch]
+            loss = (each.sum(dim=-1) * counted).sum() / counted.sum()
+            optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            torch.nn.utils.clip_grad_norm_(network.parameters(), _STEEPEST)
+            optimiser.step()
+            schedule.step()
+            losses.append(loss.item())
+        advance((epoch + 1) / epochs)
+    return float(np.mean(losses))
