@@ -44,7 +44,6 @@ Array = NDArray[np.float64]
 
 WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
 BETWEEN = "rotors between samples"
-OWN_GAIN = "own gain"
 MODEL_ERROR, GAIN, UNKNOWN = "model error", "rotor gain", "unknown "
 
 
@@ -59,8 +58,6 @@ class LikelihoodSettings:
     # standard deviations of the gains on the rotors' innovations, by which pose, rate and
     # disturbance answer them, in what one period of such an acceleration makes
     gains: tuple[float, float, float] = (10.0, 10.0, 10.0)
-    # share of itself by which each of the steady filters' gains is unknown
-    own_gain: float = 0.5
     # second differences of the rotor speeds, the standard deviation of what they may do between
     # samples beside a straight line
     between_samples: float = 0.5
@@ -382,9 +379,6 @@ class Likelihood:
         for kind in (*(f"rotor {axis}" for axis in DRIVEN), "attitude x", "attitude y", "x", "y"):
             names += [("", f"{GAIN} of {kind} {state}") for state in range(3)]
             states += [0, 1, 2]
-        for axis in range(6):
-            names += [("", f"{OWN_GAIN} of axis {axis} {state}") for state in range(3)]
-            states += [0, 1, 2]
         out = []
         units = np.array([self.period**2, self.period, 1.0])
         g = self.flights.vehicle.gravity
@@ -409,9 +403,6 @@ class Likelihood:
                 # about the other axis, by what pushes as much within a tenth of a second
                 jumps[:, 3, 18 + state] = -(10.0**state) * body[:, 1]
                 jumps[:, 4, 21 + state] = (10.0**state) * body[:, 0]
-                for axis in range(6):
-                    own = self.noise[axis].gain[state]
-                    jumps[:, axis, 24 + 3 * axis + state] = own * last[:, axis]
             out.append(jumps)
         return names, out, np.array(states)
 

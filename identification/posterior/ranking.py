@@ -31,7 +31,7 @@ from ..inference.regression import (
 from ..inference.starting_points import starting_points
 from ...dynamics.effects.declaration import Role
 from .evidence import Marginal, SetEvidence, log_sum, marginal, set_evidence, tempering
-from .likelihood import BETWEEN, GAIN, LIKELIHOOD, OWN_GAIN, UNKNOWN, WHOLE_PREFIX, Likelihood, Sums
+from .likelihood import BETWEEN, GAIN, LIKELIHOOD, UNKNOWN, WHOLE_PREFIX, Likelihood, Sums
 from .discrepancy import DISCREPANCY, GROUPS
 
 Array = NDArray[np.float64]
@@ -50,11 +50,13 @@ class RankingSettings:
     prior_size: float = 1.0  # typical sizes, the standard deviation of a coefficient
     any_size: float = 3.0  # the same of effects that may be of any size
     # typical sizes at which a lag or a delay is tried as a whole: their columns change with them
-    time_starts: tuple[float, ...] = (0.3, 1.0)
+    time_starts: tuple[float, ...] = (0.3, 0.6, 1.2)
+    # times such a start, between which its column stands for it
+    near_start: tuple[float, float] = (0.5, 1.5)
     most_effects: int = 4
-    kept_sets: int = 12  # of each size, to which a further effect is added
+    kept_sets: int = 8  # of each size, to which a further effect is added
     kept_unknown: int = 24  # sets, the best, that are tried beside an unknown effect
-    rounds: int = 3  # of fitting the noise beside the best set
+    rounds: int = 4  # of fitting the noise beside the best set
     least_probability: float = 0.001  # of what is reported
 
 
@@ -114,28 +116,40 @@ def rank(
     report: Callable[[str], None] = lambda text: None,
 ) -> Ranking:
     """Return the posterior over sets of effects of a library."""
-    bases: list[_Base] = []
-    setting: Setting = {}
-    tried: list[frozenset[str]] = []
-    found: _Posterior | None = None
+    near = likelihood(flights, {})
+    starts = _starts(flights, library, {})
+    sums = near.sums(_wanted(library, {}, starts), starts)
+    loud = _in_prior_units(flights, sums, {}, starts)
+    quiet = near.quieter(_whole_library(loud))
+    now = _in_prior_units(flights, quiet, {}, starts)
+    found = _Posterior(flights, library, (loud, now))
+    tried = {frozenset[str]()}
+    # the best effect first, alone: another set's columns are those of the model that has it
+    setting = found.best_setting(1)
+    last: Setting = {}
     for _ in range(RANKING.rounds):
+        # the columns of the same set change with its coefficients, where these have moved far
+        if frozenset(setting) in tried and not found.has_moved(last, setting):
+            setting = found.best_setting()
+            if frozenset(setting) in tried:
+                break
+        last = setting
+        tried.add(frozenset(setting))
+        report(f"trying {', '.join(setting)}")
         near = likelihood(flights, setting)
         starts = _starts(flights, library, setting)
-        wanted = [c for e in library for v in _variants(e, setting, starts) for c in v[1]]
-        # pylint: the columns of the setting's own effects are among them
-        sums = near.sums(dict.fromkeys(wanted), starts)
-        bases.append(_in_prior_units(flights, sums, setting, starts))
-        if not setting:
-            quiet = near.quieter(_whole_library(bases[0]))
-            bases.append(_in_prior_units(flights, quiet, setting, starts))
-        tried.append(frozenset(setting))
-        found = _Posterior(flights, library, bases)
-        best = found.best_setting()
-        if frozenset(best) in tried:
-            break
-        setting = best
-    assert found is not None
-    return found.ranking()
+        sums = near.sums(_wanted(library, setting, starts), starts)
+        now = _in_prior_units(flights, sums, setting, starts)
+        found = _Posterior(flights, library, (loud, now))
+        setting = found.best_setting()
+    return _Posterior(flights, library, (loud, now), found.tempering()).ranking()
+
+
+def _wanted(
+    library: Sequence[str], setting: Setting, starts: Mapping[Column, Mapping[str, float]]
+) -> dict[Column, None]:
+    """Return the columns of all effects, in order."""
+    return dict.fromkeys(c for e in library for v in _variants(e, setting, starts) for c in v[1])
 
 
 def _whole_library(base: _Base) -> dict[Column, float]:
@@ -200,8 +214,6 @@ def _prior_size(column: Column, flights: Flights) -> float:
     if not effect:
         if name == BETWEEN:
             return LIKELIHOOD.between_samples
-        if name.startswith(OWN_GAIN):
-            return LIKELIHOOD.own_gain
         if name.startswith(GAIN):
             return LIKELIHOOD.gains[int(name[-1])]
         return LIKELIHOOD.model_error if not name.startswith(UNKNOWN) else 1.0
@@ -225,7 +237,7 @@ def _bounds(column: Column, flights: Flights) -> tuple[float, float]:
     if not effect:
         return -math.inf, math.inf
     if name.startswith(START_PREFIX):
-        return 0.0, math.inf
+        return RANKING.near_start if moves_time(effect) else (0.0, math.inf)
     c = coefficient((effect, name.removeprefix(WHOLE_PREFIX)))
     low, high = c.minimum, min(c.maximum, c.plausible)
     if get(effect).role == Role.MASS:
@@ -287,25 +299,31 @@ class _Candidate:
 class _Posterior:
     """The evidence of sets, of all bases together."""
 
-    def __init__(self, flights: Flights, library: Sequence[str], bases: Sequence[_Base]) -> None:
-        self.flights, self.library, self.bases = flights, library, bases
-        self.power = 1.0
+    def __init__(
+        self,
+        flights: Flights,
+        library: Sequence[str],
+        bases: Sequence[_Base],
+        power: float = 1.0,
+    ) -> None:
+        self.flights, self.library, self.bases, self.power = flights, library, bases, power
         self.inclusion = min(RANKING.expected / max(len(library), 1), 0.5)
-        self.power = self._tempering()
         self.known: dict[frozenset[str], _Candidate] = {}
         self.scores: dict[frozenset[str], float] = {}
         self.beside: dict[tuple[frozenset[str], str], float] = {}
-        for i in range(len(bases)):
+        # beside the noise of nothing explained no effect shows: what others found is asked there
+        for i in range(1, len(bases)):
             self._search(i)
+        found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
+        self._search(0, [self.known[k].variants for k in found[: RANKING.kept_unknown]])
         self._unknown()
 
-    def _tempering(self) -> float:
-        base = self.bases[-1]
-        chosen = [
-            *base.plain,
-            *(i for (effect, _), i in base.columns.items() if effect in base.effects),
-        ]
-        return tempering(base.blocks, np.array(sorted(chosen), dtype=np.intp))
+    def tempering(self) -> float:
+        """Return the power of the likelihood that the scatter beside the likeliest set allows."""
+        best = self.known[max(self.scores, key=self.scores.__getitem__)]
+        base = self.bases[best.base]
+        own = [base.columns[c] for v in best.variants for c in v[1]]
+        return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
 
     def _marginal(self, base: _Base, unknown: str | None = None, size: float = 1.0) -> tuple[Marginal, Array, dict[Column, int]]:
         total = self.power * base.blocks.sum(axis=0)
@@ -342,7 +360,9 @@ class _Posterior:
                     out.append(variant)
         return out
 
-    def _search(self, number: int) -> None:
+    def _search(
+        self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None
+    ) -> None:
         base = self.bases[number]
         m, asked, at = self._marginal(base)
         low, high = base.low[asked], base.high[asked]
@@ -359,6 +379,8 @@ class _Posterior:
             if not self._possible(base, some, evidence):
                 return -math.inf
             key = frozenset(e for e, _ in some)
+            if number == 0 and self.bases[-1].effects and key >= self.bases[-1].effects:
+                return -math.inf  # its columns are those of the other base
             total = value + self._log_prior(len(some))
             if total > self.scores.get(key, -math.inf):
                 self.scores[key] = total
@@ -366,12 +388,16 @@ class _Posterior:
             return total
 
         score(())
+        if asked_sets is not None:
+            for some in asked_sets:
+                if all(c in at for v in some for c in v[1]):
+                    score(some)
         level: list[tuple[float, tuple[Variant, ...]]] = [(score((v,)), (v,)) for v in variants]
-        for size in range(2, RANKING.most_effects + 1):
+        for size in range(2, 1 if asked_sets is not None else RANKING.most_effects + 1):
             level.sort(key=lambda x: x[0], reverse=True)
             seen: set[frozenset[Variant]] = set()
             more = []
-            kept = level if size == 2 else level[: RANKING.kept_sets]
+            kept = level[: RANKING.kept_sets * (2 if size == 2 else 1)]
             for _, some in kept:
                 for v in variants:
                     key = frozenset((*some, v))
@@ -423,10 +449,23 @@ class _Posterior:
                     key = (effects, f"{group} {size:g}")
                     self.beside[key] = max(self.beside.get(key, -math.inf), value)
 
-    def best_setting(self) -> Setting:
-        """Return the coefficients of the likeliest set."""
-        key = max(self.scores, key=self.scores.__getitem__)
+    def best_setting(self, most: int = RANKING.most_effects) -> Setting:
+        """Return the coefficients of the likeliest set of at most so many effects."""
+        key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._setting(key)[0]
+
+    def has_moved(self, old: Setting, new: Setting) -> bool:
+        """Return whether a set's coefficients are more than a standard deviation from those of the
+        model that its columns are of.
+        """
+        if not new or set(old) != set(new):
+            return False
+        std = self._setting(frozenset(new))[1]
+        return any(
+            abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
+            for effect, values in new.items()
+            for name, value in values.items()
+        )
 
     def _setting(self, key: frozenset[str]) -> tuple[Setting, Setting]:
         found = self.known[key]
