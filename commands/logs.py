@@ -238,6 +238,14 @@ def diagnose(
             autocompletion=offering(effect_names),
         ),
     ] = None,
+    probabilities: Annotated[
+        bool,
+        typer.Option(
+            "--probabilities",
+            help="Also say how probable each effect is, and that something unknown acts; it takes "
+            "some seconds a minute of flight. Not calibrated yet.",
+        ),
+    ] = False,
     vehicle: LogVehicleOption = None,
     fleet: Annotated[
         bool,
@@ -308,7 +316,12 @@ def diagnose(
     folder = results_folder(out)
     with working("looking at the logs") as progress:
         found = run(
-            flights, model, unseen, without or (), lambda text: progress(_STAGES.get(text), text)
+            flights,
+            model,
+            unseen,
+            without or (),
+            lambda text: progress(_STAGES.get(text), text),
+            probabilities,
         )
     found = _with_rotor_faults(found, logs, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results

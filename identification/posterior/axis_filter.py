@@ -164,9 +164,7 @@ def likeliest_noise(
     strength, time, shaken = np.exp(np.clip(best.x, low, high)).tolist()
     innovation = math.sqrt(sums(strength, time, shaken) / count)
     noise = innovation / math.sqrt(steady(strength, time, shaken, period, gain))
-    return steady_noise(
-        noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period
-    )
+    return steady_noise(noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period)
 
 
 def steady_noise(

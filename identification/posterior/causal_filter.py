@@ -37,8 +37,8 @@ class Poses:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A piece of a flight as the filter saw it. Row k is of the step from sample k to k + 1, but for
-    the predictions, which are of sample k.
+    """A piece of a flight as the filter saw it. Row k is of the step from sample k to k + 1, but
+    for the predictions, which are of sample k.
     """
 
     position: Array  # (n, 3) m, half a step on from what is known at sample k
@@ -159,7 +159,10 @@ def _run(
         for i in range(3):
             x, y = (i + 1) % 3, (i + 2) % 3
             needed[i] = (
-                acting[k, 3 + x] * com[y] - acting[k, 3 + y] * com[x] + along * w[i] - square * com[i]
+                acting[k, 3 + x] * com[y]
+                - acting[k, 3 + y] * com[x]
+                + along * w[i]
+                - square * com[i]
             )
         for i in range(3):
             model[k, i] = (

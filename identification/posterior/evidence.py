@@ -102,7 +102,7 @@ def _share(low: Array, high: Array) -> Array:
 def _bounded(
     normal: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the mode within bounds, all of them at once, and which coefficients are held at one."""
+    """Return the mode within all bounds at once, and which coefficients are held at one."""
     held = np.zeros(len(right), dtype=bool)
     mode = np.linalg.solve(normal, right)
     if np.all((mode >= low) & (mode <= high)):

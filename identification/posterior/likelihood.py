@@ -1,4 +1,4 @@
-"""The likelihood of a flight's poses as a regression of whitened innovations: one Gram matrix a log.
+"""The likelihood of a flight's poses as a regression of whitened innovations: one Gram matrix.
 
 Everything that a model may lack is a column: a unit of a coefficient, through the same causal
 filter as the poses. The noise of each axis is fitted first, at maximum likelihood. With it the
@@ -19,7 +19,6 @@ from ...runtime.errors import InputError
 from ..inference.regression import (
     ATTITUDE_TIME_OFFSET,
     CENTRAL,
-    REGRESSION,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
@@ -96,7 +95,10 @@ class Likelihood:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
         self.pieces = [
-            piece for log in flights.logs for piece in read_poses(log, self.vehicle, flights)
+            piece
+            for i, log in enumerate(flights.logs)
+            if flights.fit_rows[flights.log == i].any()  # no test log
+            for piece in read_poses(log, self.vehicle)
         ]
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
@@ -278,8 +280,8 @@ class Likelihood:
         starts: Mapping[Column, Mapping[str, float]],
         unknown: bool = True,
     ) -> Sums:
-        """Return the sums of products of these columns, of what any flight may have beside them, and
-        of the innovations.
+        """Return the sums of products of these columns, of what any flight may have beside them,
+        and of the innovations.
 
         Args:
             wanted: coefficients of effects.
@@ -366,11 +368,11 @@ class Likelihood:
         return parts
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
-        """Return the columns of the joint filter's gains that the steady filters of single axes lack,
+        """Return the columns of the joint filter's gains that steady filters of single axes lack,
         their jumps (n, 6, e) of each piece, and which state jumps.
 
-        The rotors' innovations say something of the axes that rotors drive. The attitude's say where
-        thrust has pushed sideways, and the position's sideways part which attitude has done so.
+        The rotors' innovations say something of the axes that rotors drive. The attitude's say
+        where thrust has pushed sideways, and the position's sideways part which attitude has done so.
         """
         pairs = list(zip(self.pieces, self.tracks, strict=True))
         rotors = rotor_innovations(pairs, self.inertias[2:])
@@ -472,7 +474,7 @@ class Likelihood:
         return Sums(names, np.array(blocks), value, penalty)
 
 
-def read_poses(log: FlightLog, vehicle: Vehicle, flights: Flights) -> list[Poses]:
+def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:
     """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
     effects did to them.
     """
@@ -511,6 +513,3 @@ def _signals(piece: Poses, track: Track) -> Signals:
         between,
         piece.voltage if piece.voltage.any() else None,
     )
-
-
-__all__ = ["LIKELIHOOD", "REGRESSION", "Likelihood", "Sums", "read_poses"]

@@ -1,11 +1,10 @@
 """Which effects act: the posterior over sets of up to four, and an unknown one beside them.
 
 Every effect of the library is as likely as every other before the flight, and one is expected to be
-missing. A set's evidence is that of the likeliest noise among those that were fitted: once beside no
-effect, once beside each best set, because what is not explained counts as a disturbance.
+missing. A set's evidence is that of the likelier noise of two: that beside no effect, and that
+beside the best set, because what is not explained counts as a disturbance.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.effects import get
+from ...dynamics.effects.declaration import Role
 from ..inference.gram_matrix import GRAM
 from ..inference.regression import (
     ATTITUDE_TIME_OFFSET,
@@ -29,10 +29,9 @@ from ..inference.regression import (
     unit_of_change,
 )
 from ..inference.starting_points import starting_points
-from ...dynamics.effects.declaration import Role
+from .discrepancy import DISCREPANCY, GROUPS
 from .evidence import Marginal, SetEvidence, log_sum, marginal, set_evidence, tempering
 from .likelihood import BETWEEN, GAIN, LIKELIHOOD, UNKNOWN, WHOLE_PREFIX, Likelihood, Sums
-from .discrepancy import DISCREPANCY, GROUPS
 
 Array = NDArray[np.float64]
 Setting = dict[str, dict[str, float]]
@@ -44,8 +43,8 @@ class RankingSettings:
 
     expected: float = 1.0  # effects that a vehicle lacks, before its flight is seen
     unknown: float = 0.1  # probability of an effect outside the library, likewise
-    # typical sizes: every effect acts a little, and one that is no larger is not worth a name. It is
-    # the standard deviation of what any coefficient may have without the effect being named
+    # typical sizes: every effect acts a little, and one that is no larger is not worth a name. It
+    # is the standard deviation of what any coefficient may have without the effect being named
     negligible: float = 0.03
     prior_size: float = 1.0  # typical sizes, the standard deviation of a coefficient
     any_size: float = 3.0  # the same of effects that may be of any size
@@ -156,9 +155,7 @@ def _whole_library(base: _Base) -> dict[Column, float]:
     """Return the coefficients of all columns of effects together, at the mode."""
     chosen = np.concatenate([base.plain, [i for c, i in base.columns.items() if c[0]]]).astype(int)
     total = base.blocks.sum(axis=0)
-    mode = np.linalg.solve(
-        total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1]
-    )
+    mode = np.linalg.solve(total[np.ix_(chosen, chosen)] + np.eye(len(chosen)), total[chosen, -1])
     names = list(base.columns)
     return {names[i]: float(x * base.size[i]) for i, x in zip(chosen, mode, strict=True)}
 
@@ -220,9 +217,7 @@ def _prior_size(column: Column, flights: Flights) -> float:
     if name.startswith(START_PREFIX) or name == CENTRAL:
         return 1.0
     factor = RANKING.any_size if get(effect).any_size else RANKING.prior_size
-    return factor * typical_size(
-        (effect, name.removeprefix(WHOLE_PREFIX)), flights.vehicle
-    )
+    return factor * typical_size((effect, name.removeprefix(WHOLE_PREFIX)), flights.vehicle)
 
 
 def _typical(column: Column, flights: Flights) -> float:
@@ -262,11 +257,7 @@ def _in_prior_units(
     blocks[:, -1, :] = whole
     blocks[:, -1, -1] = np.einsum("c,bc->b", back, whole)
     columns = {c: i for i, c in enumerate(sums.columns)}
-    plain = [
-        i
-        for c, i in columns.items()
-        if not c[0] and not c[1].startswith(UNKNOWN)
-    ]
+    plain = [i for c, i in columns.items() if not c[0] and not c[1].startswith(UNKNOWN)]
     groups = {
         group: np.array(
             [i for c, i in columns.items() if not c[0] and c[1].startswith(UNKNOWN + group)],
@@ -325,7 +316,9 @@ class _Posterior:
         own = [base.columns[c] for v in best.variants for c in v[1]]
         return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
 
-    def _marginal(self, base: _Base, unknown: str | None = None, size: float = 1.0) -> tuple[Marginal, Array, dict[Column, int]]:
+    def _marginal(
+        self, base: _Base, unknown: str | None = None, size: float = 1.0
+    ) -> tuple[Marginal, Array, dict[Column, int]]:
         total = self.power * base.blocks.sum(axis=0)
         deviance = float(total[-1, -1]) + self.power * base.penalty
         asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
@@ -360,9 +353,7 @@ class _Posterior:
                     out.append(variant)
         return out
 
-    def _search(
-        self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None
-    ) -> None:
+    def _search(self, number: int, asked_sets: Sequence[tuple[Variant, ...]] | None = None) -> None:
         base = self.bases[number]
         m, asked, at = self._marginal(base)
         low, high = base.low[asked], base.high[asked]
@@ -424,7 +415,9 @@ class _Posterior:
         return True
 
     def _unknown(self) -> None:
-        best = sorted(self.scores, key=self.scores.__getitem__, reverse=True)[: RANKING.kept_unknown]
+        best = sorted(self.scores, key=self.scores.__getitem__, reverse=True)[
+            : RANKING.kept_unknown
+        ]
         for effects in [*best, frozenset[str]()]:
             self.beside[effects, ""] = self.scores[effects] + math.log1p(-RANKING.unknown)
         choices = [(g, s) for g in (*GROUPS, "all") for s in DISCREPANCY.sizes]
@@ -439,12 +432,7 @@ class _Posterior:
                     if self.known[effects].base != number and not all(c in at for c in columns):
                         continue
                     evidence = set_evidence(m, [at[c] for c in columns], low, high)
-                    ways = {e: 1 for e, _ in some}
-                    del ways
-                    offset = (
-                        self.scores[effects]
-                        - self.known[effects].evidence.log_evidence
-                    )
+                    offset = self.scores[effects] - self.known[effects].evidence.log_evidence
                     value = evidence.log_evidence + offset + each
                     key = (effects, f"{group} {size:g}")
                     self.beside[key] = max(self.beside.get(key, -math.inf), value)
@@ -501,16 +489,14 @@ class _Posterior:
         shift: dict[frozenset[str], float] = {}
         for (effects, _), value in self.beside.items():
             shift[effects] = log_sum([shift.get(effects, -math.inf), value])
-        rest = {k: v + math.log1p(-RANKING.unknown) for k, v in self.scores.items() if k not in shift}
+        rest = {
+            k: v + math.log1p(-RANKING.unknown) for k, v in self.scores.items() if k not in shift
+        }
         every = {**rest, **shift}
         total = log_sum(list(every.values()))
         p = {k: math.exp(v - total) for k, v in every.items()}
-        probability = {
-            e: sum(x for k, x in p.items() if e in k) for e in self.library
-        }
-        unknown = sum(
-            math.exp(v - total) for (_, group), v in self.beside.items() if group
-        )
+        probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
+        unknown = sum(math.exp(v - total) for (_, group), v in self.beside.items() if group)
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = []
         for key in best:

@@ -34,8 +34,8 @@ DRIVEN = (2, 3, 4, 5)
 
 
 def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> list[Array]:
-    """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2) and
-    about the body's axes (rad/s2).
+    """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
+    and about the body's axes (rad/s2).
 
     Args:
         pieces: as they were measured, and as the filter sees them.
