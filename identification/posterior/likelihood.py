@@ -372,7 +372,7 @@ class Likelihood:
         their jumps (n, 6, e) of each piece, and which state jumps.
 
         The rotors' innovations say something of the axes that rotors drive. The attitude's say
-        where thrust has pushed sideways, and the position's sideways part which attitude has done so.
+        where thrust has pushed sideways, and the position's sideways part which attitude did so.
         """
         pairs = list(zip(self.pieces, self.tracks, strict=True))
         rotors = rotor_innovations(pairs, self.inertias[2:])

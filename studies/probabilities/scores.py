@@ -2,6 +2,7 @@
 coverage of coefficients' intervals.
 """
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +13,6 @@ from scipy.stats import mannwhitneyu
 from windwrench.studies.page_tables import share, table
 from windwrench.studies.resumed_tasks import Task
 from windwrench.studies.trials.trials import EQUIVALENTS
-import itertools
 
 _EDGES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0001)  # of the reliability diagram; below, nothing is named
 _NAMED = 0.5  # probability from which an effect counts as named
