@@ -248,6 +248,14 @@ def diagnose(
             autocompletion=offering(effect_names),
         ),
     ] = None,
+    probabilities: Annotated[
+        bool,
+        typer.Option(
+            "--probabilities",
+            help="Also say how probable each effect is, and that something unknown acts; it takes "
+            "some seconds a minute of flight. Not calibrated yet.",
+        ),
+    ] = False,
     vehicle: LogVehicleOption = None,
     fleet: Annotated[
         bool,
@@ -353,7 +361,14 @@ def _diagnose(
     flights, unseen = every[: len(logs)], every[len(logs) :]
     folder = results_folder(out)
     with working("looking at the logs") as progress:
-        found = run(flights, model, unseen, without, lambda text: progress(STAGES.get(text), text))
+        found = run(
+            flights,
+            model,
+            unseen,
+            without,
+            lambda text: progress(STAGES.get(text), text),
+            probabilities,
+        )
     found = _with_rotor_faults(found, logs, flights)
     # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
     written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))

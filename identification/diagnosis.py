@@ -18,11 +18,13 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .findings import (
     CHANNELS,
+    Alternative,
     Candidate,
     Diagnosis,
     Disturbance,
     Errors,
     NamedEffect,
+    Probabilities,
     Signature,
     Structure,
     Trace,
@@ -71,6 +73,7 @@ from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
+from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
 
 Array = NDArray[np.float64]
@@ -95,6 +98,7 @@ class DiagnosisSettings:
 
 
 DIAGNOSIS = DiagnosisSettings()
+_MOST_PERIOD_RATIO = 1.01  # between logs that one filter reads
 FILTERED_NAMES = (
     "the pose was filtered before the log was written. Whether the named effects act on the "
     "vehicle, or follow from feedback-induced correlation, shows only in the sensors' "
@@ -108,6 +112,7 @@ def diagnose(
     test: Sequence[FlightLog] = (),
     without: Sequence[str] = (),
     report: Callable[[str], None] = lambda text: None,
+    probabilities: bool = False,
 ) -> Diagnosis:
     """Return what the logs of one vehicle say about its model.
 
@@ -119,6 +124,8 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
+        probabilities: whether how probable each effect is, is worked out as well, beside all else
+            and without changing it. They are not calibrated yet.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -278,6 +285,27 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
+        probabilities=_probabilities(flights, search, report) if probabilities else None,
+    )
+
+
+def _probabilities(
+    flights: Flights, search: Search, report: Callable[[str], None]
+) -> Probabilities | None:
+    """Return how probable each effect is; None where the logs hold no poses and rotor speeds as
+    they were measured, or where the vehicle declares effects, of which none is then tried.
+    """
+    if flights.commanded or flights.inertial or flights.filtered or flights.vehicle.effects:
+        return None
+    periods = [log.period for log in flights.logs]
+    if max(periods) > _MOST_PERIOD_RATIO * min(periods):
+        return None
+    report("asking how probable each effect is")
+    found = rank(flights, search.library, report=report)
+    return Probabilities(
+        found.probability,
+        tuple(Alternative(x.effects, x.probability) for x in found.sets),
+        found.unknown,
     )
 
 

@@ -188,6 +188,34 @@ class TransientDisturbance:
     peak: float
 
 
+@dataclass(frozen=True)
+class Alternative:
+    """A set of effects that may be what the model lacks.
+
+    Attributes:
+        effects: names; empty: nothing of the library.
+        probability: that these act and no others of the library.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
+class Probabilities:
+    """How probable what was found is, by one likelihood of the logs' poses.
+
+    Attributes:
+        names: of each effect of the library, that it acts by more than nobody would name.
+        alternatives: the likeliest sets of effects first.
+        unknown: that something acts which no effect of the library is.
+    """
+
+    names: Mapping[str, float]
+    alternatives: tuple[Alternative, ...]
+    unknown: float
+
+
 Gusts, Push = Disturbance, TransientDisturbance  # their older names
 
 
@@ -228,6 +256,8 @@ class Diagnosis:
             plain data (``rotor_faults/words.py``); empty where that was not looked for.
         needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
             beside the IMU.
+        probabilities: of what was found; none where they were not asked for, or where rotors or
+            pose were not measured as they were.
     """
 
     verdict: str
@@ -255,6 +285,7 @@ class Diagnosis:
     floor_is_bound: bool = False
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
     needs_pose: tuple[str, ...] = ()
+    probabilities: Probabilities | None = None
 
     def __repr__(self) -> str:
         names = ", ".join(e.name + (" (tentative)" if e.tentative else "") for e in self.effects)

@@ -22,7 +22,7 @@ from .words import headline
 
 # MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
 # is a new minor version, a key that goes or changes its meaning a new major one
-SCHEMA_VERSION = "1.0"
+SCHEMA_VERSION = "1.1"
 
 
 def write_report(
@@ -74,10 +74,16 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         for log, start, end in diagnosis.held_out_segments:
             by_log.setdefault(log, []).append([start, end])
         error["held_out_by_log"] = by_log
+    stated = diagnosis.probabilities
+    names = stated.names if stated else {}
     data: dict[str, Any] = {
         "verdict": diagnosis.verdict,
         "remainder": diagnosis.remainder,
-        "effects": [asdict(effect) for effect in diagnosis.effects],
+        "effects": [
+            asdict(effect) | {"probability": names.get(effect.name)} for effect in diagnosis.effects
+        ],
+        "alternatives": [asdict(x) for x in stated.alternatives] if stated else [],
+        "unknown": stated.unknown if stated else None,
         "error": error,
         "advice": diagnosis.advice,
         "notes": diagnosis.notes,

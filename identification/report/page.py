@@ -44,6 +44,7 @@ from .words import (
     headline,
     in_words,
     percent,
+    probability_sentences,
     ranking_sentences,
     remainder_sentence,
     rounded,
@@ -109,6 +110,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
             {"where": s.where, "test": s.test, "gain": percent(s.gain)} for s in diagnosis.structure
         ],
         alike=[confusion(effect) for effect in diagnosis.effects if effect.indistinguishable_from],
+        probabilities=probability_sentences(diagnosis),
         advice=diagnosis.advice,
         notes=diagnosis.notes,
         command=command,

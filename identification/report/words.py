@@ -307,3 +307,20 @@ def confusion(effect: NamedEffect) -> str:
         f"{in_words(effect.indistinguishable_from, 'or')}, which explain "
         "them equally well."
     )
+
+
+def probability_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return how probable what was found is, in plain words; nothing where that was not asked."""
+    found = diagnosis.probabilities
+    if found is None:
+        return []
+    out = [
+        f"{' and '.join(x.effects) or 'Nothing of the library'}: {percent(x.probability)}."
+        for x in found.alternatives[:5]
+    ]
+    return [
+        *out,
+        f"Something acts that no effect of the library is: {percent(found.unknown)}.",
+        "These probabilities are not calibrated yet: read them as an order, and the names above by "
+        "what is said of them there.",
+    ]

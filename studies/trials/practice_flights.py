@@ -142,6 +142,7 @@ def fly_practice(
     sensor: float = 1.0,
     outsider_size: float = 1.0,
     imu: bool = False,
+    gust_time: float | None = None,
 ) -> FlightLog:
     """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
     with the true wrench.
@@ -157,6 +158,7 @@ def fly_practice(
         sensor: factor on the declared noise of the pose.
         outsider_size: factor on the disturbance.
         imu: whether the log has gyro and accelerometer, true to the last digit.
+        gust_time: s, correlation time of the turbulence; default: the plant's.
 
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
@@ -179,6 +181,8 @@ def fly_practice(
         # the filter that flies cannot believe in a perfect pose
         flown = vehicle
     settings = replace(background(vehicle, turbulence), sensor_noise=sensor > 0.0)
+    if gust_time is not None:
+        settings = replace(settings, disturbance_time=gust_time)
     disturbance = None
     if outsider is not None:
         t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
@@ -251,6 +255,7 @@ def practise(
     seconds: float = 60.0,
     turbulence: float | None = None,
     imu: bool = False,
+    gust_time: float | None = None,
 ) -> Practice:
     """Fly one practice flight.
 
@@ -265,6 +270,7 @@ def practise(
         seconds: length of the log.
         turbulence: factor on the background; default: 0 or 1 at random.
         imu: as of ``fly_practice``.
+        gust_time: as of ``fly_practice``.
 
     Raises:
         InputError: an unknown name, or a crash.
@@ -305,6 +311,7 @@ def practise(
         sensor,
         SIZES[size],
         imu,
+        gust_time,
     )
     name = "_".join((kind, *added, size, trajectory, str(seed)))
     return Practice(

@@ -1,0 +1,1 @@
+"""Which effects act, with probabilities: one likelihood of a flight's poses, one posterior."""

@@ -1,0 +1,178 @@
+"""The steady Kalman filter of one axis of the pose, and the disturbance that makes its innovations
+likeliest.
+
+The states of an axis are its pose, the pose's rate, and a disturbance: an Ornstein-Uhlenbeck
+acceleration with a standard deviation and a correlation time. The rotors' rounding, and whatever
+else changes from sample to sample, is a white acceleration beside it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from ...runtime.compiled import compiled, compiled_for_vectors
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AxisSettings:
+    """Where the likeliest disturbance of an axis is searched for."""
+
+    settling_time: float = 1.0  # s, from the start of a piece to the first innovation that counts
+    first_time: float = 0.4  # s, correlation time at which a search begins
+    # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
+    times: tuple[float, float] = (0.03, 3.0)
+
+
+AXIS = AxisSettings()
+
+
+@dataclass(frozen=True)
+class AxisNoise:
+    """The noise of one axis. Units: m or rad, and s."""
+
+    pose: float  # standard deviation of one sample
+    disturbance: float  # standard deviation, an acceleration
+    time: float  # s, correlation time
+    white: float  # standard deviation of an acceleration that lasts one period
+    innovation: float  # standard deviation of an innovation
+    gain: tuple[float, float, float]  # of pose, rate and disturbance, per unit of innovation
+
+
+@compiled
+def steady(strength: float, time: float, white: float, period: float, gain: Array) -> float:
+    """Write the gain (3,) of the steady filter; return the innovations' variance over the pose's.
+
+    ``strength`` and ``white`` are variances of accelerations over that of the pose's noise.
+    """
+    keep = math.exp(-period / time)
+    half = 0.5 * period * period
+    p00, p01, p02, p11, p12, p22 = 1.0, 0.0, 0.0, 1.0, 0.0, strength
+    last = 0.0
+    variance = 2.0
+    for _ in range(4000):
+        # F P F' with F = [[1, T, T2/2], [0, 1, T], [0, 0, keep]], and the noise of a period
+        a0 = p00 + period * p01 + half * p02
+        a1 = p01 + period * p11 + half * p12
+        a2 = p02 + period * p12 + half * p22
+        b1 = p11 + period * p12
+        b2 = p12 + period * p22
+        n00 = a0 + period * a1 + half * a2 + white * half * half
+        n01 = a1 + period * a2 + white * half * period
+        n02 = keep * a2
+        n11 = b1 + period * b2 + white * period * period
+        n12 = keep * b2
+        n22 = keep * keep * p22 + strength * (1.0 - keep * keep)
+        variance = n00 + 1.0
+        gain[0], gain[1], gain[2] = n00 / variance, n01 / variance, n02 / variance
+        p00 = n00 - gain[0] * n00
+        p01 = n01 - gain[0] * n01
+        p02 = n02 - gain[0] * n02
+        p11 = n11 - gain[1] * n01
+        p12 = n12 - gain[1] * n02
+        p22 = n22 - gain[2] * n02
+        if abs(variance - last) < 1e-9 * variance:
+            break
+        last = variance
+    return variance
+
+
+@compiled_for_vectors
+def _sum_of_squares(
+    measured: Array, drive: Array, rate: float, keep: float, period: float, gain: Array, skip: int
+) -> float:
+    """Return the sum of squared innovations of one axis from sample ``skip`` on."""
+    x, v, d = measured[0], rate, 0.0
+    half = 0.5 * period * period
+    total = 0.0
+    for k in range(1, len(measured)):
+        a = drive[k - 1] + d
+        x += period * v + half * a
+        v += period * a
+        d *= keep
+        e = measured[k] - x
+        x += gain[0] * e
+        v += gain[1] * e
+        d += gain[2] * e
+        if k >= skip:
+            total += e * e
+    return total
+
+
+def likeliest_noise(
+    measured: Sequence[Array],
+    drive: Sequence[Array],
+    rate: Sequence[float],
+    period: float,
+    white: float,
+    pose: float,
+    disturbance: float,
+) -> AxisNoise:
+    """Return the noise of one axis at maximum likelihood.
+
+    Args:
+        measured: pose of each piece (n,), m or rad.
+        drive: acceleration (n,) that the model says acts from each sample to the next.
+        rate: the pose's rate at the start of each piece.
+        period: s.
+        white: standard deviation of the white acceleration that is known: the rotors' rounding.
+        pose: standard deviation of the pose at which the search begins.
+        disturbance: that of the disturbance.
+    """
+    skip = round(AXIS.settling_time / period)
+    count = max(sum(len(x) - skip for x in measured), 1)
+    gain = np.empty(3)
+
+    def sums(strength: float, time: float, shaken: float) -> float:
+        steady(strength, time, shaken, period, gain)
+        keep = math.exp(-period / time)
+        return sum(
+            _sum_of_squares(y, a, v, keep, period, gain, skip)
+            for y, a, v in zip(measured, drive, rate, strict=True)
+        )
+
+    def loss(x: Array) -> float:
+        inside = np.clip(x, low, high)
+        beyond = float(np.abs(x - inside).sum())
+        return count * (math.log(max(sums(*np.exp(inside).tolist()), 1e-300)) + beyond)
+
+    begun = np.array(
+        [
+            2.0 * math.log(disturbance / pose),
+            math.log(AXIS.first_time),
+            2.0 * math.log(max(white, 1e-3 * disturbance) / pose),
+        ]
+    )
+    low, high = begun - 16.0, begun + 16.0
+    low[1], high[1] = np.log(AXIS.times)
+    best = minimize(
+        loss,
+        begun,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": begun + np.vstack([np.zeros(3), 2.0 * np.eye(3)]),
+            "xatol": 0.05,
+            "fatol": 0.5,
+            "maxfev": 160,
+        },
+    )
+    strength, time, shaken = np.exp(np.clip(best.x, low, high)).tolist()
+    innovation = math.sqrt(sums(strength, time, shaken) / count)
+    noise = innovation / math.sqrt(steady(strength, time, shaken, period, gain))
+    return steady_noise(noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period)
+
+
+def steady_noise(
+    pose: float, disturbance: float, time: float, white: float, period: float
+) -> AxisNoise:
+    """Return the noise of an axis with these standard deviations and correlation time."""
+    gain = np.empty(3)
+    ratio = steady((disturbance / pose) ** 2, time, (white / pose) ** 2, period, gain)
+    innovation = pose * math.sqrt(ratio)
+    gains = (float(gain[0]), float(gain[1]), float(gain[2]))
+    return AxisNoise(pose, disturbance, time, white, innovation, gains)

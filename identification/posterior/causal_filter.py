@@ -1,0 +1,312 @@
+"""The causal filter of a flight: from the poses of the past to the state at each sample, and what a
+coefficient changes in its innovations.
+
+The state is position, velocity, attitude, angular velocity and the disturbance's force and torque
+as accelerations: 18 numbers. Each axis has its own steady gain, so the filter is an observer of
+fixed gains: what an innovation changes with a coefficient follows from linear recursions, exactly
+but for second order. Rotor speeds move linearly between samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ...dynamics.vehicle import Vehicle
+from ...runtime.compiled import Record, compiled, compiled_for_vectors
+from .axis_filter import AxisNoise
+
+Array = NDArray[np.float64]
+_MODEL = np.dtype(MODEL_FIELDS)
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """An unbroken piece of a flight as it was measured, evenly spaced (n samples)."""
+
+    t: Array  # (n,) s
+    period: float  # s
+    position: Array  # (n, 3) m
+    quaternion: Array  # (n, 4), of continuous sign
+    rotor_speeds: Array  # (n, 4) rad/s, at the samples
+    voltage: Array  # (n,) V; 0 where it is not known
+    velocity: Array  # (3,) m/s, at the start
+    angular_velocity: Array  # (3,) rad/s, body, at the start
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A piece of a flight as the filter saw it. Row k is of the step from sample k to k + 1, but
+    for the predictions, which are of sample k.
+    """
+
+    position: Array  # (n, 3) m, half a step on from what is known at sample k
+    rotation: Array  # (n, 3, 3) body to world
+    velocity: Array  # (n, 3) m/s
+    angular_velocity: Array  # (n, 3) rad/s, body
+    acceleration: Array  # (n, 6) of the model and its disturbance: m/s2 world, rad/s2 body
+    model: Array  # (n, 6) of the model alone
+    rotors: Array  # (n, 4) thrust (N) and torques (Nm) of the rotors
+    predicted: Array  # (n, 7) position and quaternion at sample k, from samples before it
+    innovations: Array  # (n, 6) m, and rad in the body frame
+
+
+@compiled
+def _turn(q: Array, w: Array, out: Array) -> None:
+    """Write the quaternion after a rotation vector in the body frame."""
+    angle = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    s = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    c, x, y, z = np.cos(0.5 * angle), s * w[0], s * w[1], s * w[2]
+    a, b, d, e = q[0], q[1], q[2], q[3]
+    out[0] = a * c - b * x - d * y - e * z
+    out[1] = a * x + b * c + d * z - e * y
+    out[2] = a * y - b * z + d * c + e * x
+    out[3] = a * z + b * y - d * x + e * c
+    size = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    for i in range(4):
+        out[i] /= size
+
+
+@compiled
+def _matrix(q: Array, r: Array) -> None:
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    r[0, 0], r[0, 1], r[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    r[1, 0], r[1, 1], r[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    r[2, 0], r[2, 1], r[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
+@compiled
+def _run(
+    models: Record,
+    period: float,
+    speeds: Array,
+    voltage: Array,
+    position: Array,
+    quaternion: Array,
+    begun: Array,
+    gain: Array,
+    keep: Array,
+    mass: float,
+    gravity: float,
+    com: Array,
+    inertia: Array,
+    inverse: Array,
+    at_position: Array,
+    at_rotation: Array,
+    at_velocity: Array,
+    at_rate: Array,
+    acting: Array,
+    model: Array,
+    rotors: Array,
+    predicted: Array,
+    innovations: Array,
+) -> None:
+    f = models[0]
+    p, v, w, d = position[0].copy(), begun[:3].copy(), begun[3:].copy(), np.zeros(6)
+    q, q2, r = quaternion[0].copy(), np.empty(4), np.empty((3, 3))
+    step, spin, moment, needed = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    mid, both = np.empty(3), np.empty(4)
+    half = 0.5 * period
+    for k in range(len(speeds)):
+        for i in range(3):
+            predicted[k, i] = p[i]
+        for i in range(4):
+            predicted[k, 3 + i] = q[i]
+        # what the pose of this sample says
+        o, m = q, quaternion[k]
+        sign = 1.0 if o[0] * m[0] + o[1] * m[1] + o[2] * m[2] + o[3] * m[3] > 0.0 else -1.0
+        e0 = sign * (o[0] * m[1] - o[1] * m[0] - o[2] * m[3] + o[3] * m[2])
+        e1 = sign * (o[0] * m[2] + o[1] * m[3] - o[2] * m[0] - o[3] * m[1])
+        e2 = sign * (o[0] * m[3] - o[1] * m[2] + o[2] * m[1] - o[3] * m[0])
+        innovations[k, 3], innovations[k, 4], innovations[k, 5] = 2 * e0, 2 * e1, 2 * e2
+        for i in range(3):
+            e = position[k, i] - p[i]
+            innovations[k, i] = e
+            p[i] += gain[i, 0] * e
+            v[i] += gain[i, 1] * e
+            d[i] += gain[i, 2] * e
+            e = innovations[k, 3 + i]
+            step[i] = gain[3 + i, 0] * e
+            w[i] += gain[3 + i, 1] * e
+            d[3 + i] += gain[3 + i, 2] * e
+        _turn(q, step, q2)
+        # half a step on, where the model is asked
+        for i in range(3):
+            mid[i] = p[i] + half * v[i]
+            step[i] = half * w[i]
+        _turn(q2, step, q)
+        _matrix(q, r)
+        for i in range(4):
+            both[i] = 0.5 * (speeds[k, i] + speeds[min(k + 1, len(speeds) - 1), i])
+        drive(f, both, period, voltage[k])
+        apply_effects(f, mid, r, v, w)
+        f.time += period
+        for i in range(3):
+            spin[i] = inertia[i, 0] * w[0] + inertia[i, 1] * w[1] + inertia[i, 2] * w[2]
+        for i in range(3):
+            x, y = (i + 1) % 3, (i + 2) % 3
+            moment[i] = (
+                f.rotor_wrench[1 + i] + f.effect_wrench[3 + i] - (w[x] * spin[y] - w[y] * spin[x])
+            )
+        for i in range(3):
+            model[k, 3 + i] = (
+                inverse[i, 0] * moment[0] + inverse[i, 1] * moment[1] + inverse[i, 2] * moment[2]
+            )
+            acting[k, 3 + i] = model[k, 3 + i] + d[3 + i]
+        along = w[0] * com[0] + w[1] * com[1] + w[2] * com[2]
+        square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        for i in range(3):
+            x, y = (i + 1) % 3, (i + 2) % 3
+            needed[i] = (
+                acting[k, 3 + x] * com[y]
+                - acting[k, 3 + y] * com[x]
+                + along * w[i]
+                - square * com[i]
+            )
+        for i in range(3):
+            model[k, i] = (
+                (r[i, 2] * f.rotor_wrench[0] + f.effect_wrench[i]) / mass
+                - r[i, 0] * needed[0]
+                - r[i, 1] * needed[1]
+                - r[i, 2] * needed[2]
+            )
+        model[k, 2] -= gravity
+        for i in range(3):
+            acting[k, i] = model[k, i] + d[i]
+            at_position[k, i], at_velocity[k, i], at_rate[k, i] = mid[i], v[i], w[i]
+            for j in range(3):
+                at_rotation[k, i, j] = r[i, j]
+        for i in range(4):
+            rotors[k, i] = f.rotor_wrench[i]
+        # on to the next sample
+        for i in range(3):
+            p[i] += period * (v[i] + half * acting[k, i])
+            v[i] += period * acting[k, i]
+            step[i] = period * (w[i] + half * acting[k, 3 + i])
+            w[i] += period * acting[k, 3 + i]
+            d[i] *= keep[i]
+            d[3 + i] *= keep[3 + i]
+        _turn(q2, step, q)
+
+
+def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...]) -> Track:
+    """Return a piece as the filter with a vehicle's model and six axes' noise sees it."""
+    models = np.zeros(1, dtype=_MODEL)
+    body = load_model(models[0], vehicle)
+    n = len(poses.t)
+    out = Track(
+        np.empty((n, 3)),
+        np.empty((n, 3, 3)),
+        np.empty((n, 3)),
+        np.empty((n, 3)),
+        np.empty((n, 6)),
+        np.empty((n, 6)),
+        np.empty((n, 4)),
+        np.empty((n, 7)),
+        np.empty((n, 6)),
+    )
+    _run(
+        models,
+        poses.period,
+        np.ascontiguousarray(poses.rotor_speeds),
+        np.ascontiguousarray(poses.voltage),
+        np.ascontiguousarray(poses.position),
+        np.ascontiguousarray(poses.quaternion),
+        np.concatenate([poses.velocity, poses.angular_velocity]),
+        np.array([x.gain for x in noise]),
+        np.exp(-poses.period / np.array([x.time for x in noise])),
+        body.mass,
+        body.gravity,
+        np.ascontiguousarray(body.com),
+        np.ascontiguousarray(body.inertia),
+        np.linalg.inv(body.inertia),
+        out.position,
+        out.rotation,
+        out.velocity,
+        out.angular_velocity,
+        out.acceleration,
+        out.model,
+        out.rotors,
+        out.predicted,
+        out.innovations,
+    )
+    return out
+
+
+@compiled_for_vectors
+def sensitivities(
+    period: float,
+    gain: Array,
+    keep: Array,
+    pull: Array,
+    rate: Array,
+    acting: Array,
+    moved: Array,
+    jumps: Array,
+    jump_state: np.ndarray,
+    state: Array,
+    out: Array,
+) -> None:
+    """Write by how much the innovations' predictions (n, 6, c) change with a unit of each column.
+
+    Args:
+        period: s.
+        gain: (6, 3) of the axes.
+        keep: (6,) what is left of a disturbance after a period.
+        pull: (n, 3, 2) by how much the acceleration (world) grows with an error of the attitude
+            about body x and y.
+        rate: (n, 3) angular velocity.
+        acting: (n, 6, a) what a unit of the first ``a`` columns adds to the model's acceleration.
+        moved: (n, 6, b) by how much a unit of the last ``b`` of those moves the measured pose.
+        jumps: (n, 6, e) what a unit of the columns behind them adds to one state of each axis,
+            before the pose of sample k is read.
+        jump_state: (e,) the state: 0 the pose, 1 its rate, 2 the disturbance.
+        state: (6, 3, c) carried from one call to the next.
+        out: (n, 6, c).
+    """
+    n, a, b, e = len(acting), acting.shape[2], moved.shape[2], jumps.shape[2]
+    c = a + e
+    half = 0.5 * period * period
+    before = np.empty((3, c))
+    for k in range(n):
+        for m in range(e):
+            for i in range(6):
+                state[i, jump_state[m], a + m] += jumps[k, i, m]
+        for i in range(6):
+            for j in range(c):
+                out[k, i, j] = state[i, 0, j]
+            for j in range(b):
+                out[k, i, a - b + j] -= moved[k, i, j]
+            for j in range(c):
+                x = out[k, i, j]
+                state[i, 0, j] -= gain[i, 0] * x
+                state[i, 1, j] -= gain[i, 1] * x
+                state[i, 2, j] -= gain[i, 2] * x
+        for i in range(3):
+            for j in range(c):
+                before[i, j] = state[3 + i, 0, j]
+        for i in range(3):
+            px, py = pull[k, i, 0], pull[k, i, 1]
+            for j in range(c):
+                g = state[i, 2, j] + px * before[0, j] + py * before[1, j]
+                if j < a:
+                    g += acting[k, i, j]
+                state[i, 0, j] += period * state[i, 1, j] + half * g
+                state[i, 1, j] += period * g
+                state[i, 2, j] *= keep[i]
+        for i in range(3):
+            x, y = (i + 1) % 3, (i + 2) % 3
+            wx, wy = rate[k, x], rate[k, y]
+            for j in range(c):
+                g = state[3 + i, 2, j]
+                if j < a:
+                    g += acting[k, 3 + i, j]
+                # an error in body axes turns back as these turn on
+                state[3 + i, 0, j] += (
+                    period * state[3 + i, 1, j]
+                    + half * g
+                    - period * (wx * before[y, j] - wy * before[x, j])
+                )
+                state[3 + i, 1, j] += period * g
+                state[3 + i, 2, j] *= keep[3 + i]

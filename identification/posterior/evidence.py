@@ -1,0 +1,166 @@
+"""The evidence of a set of effects, from sums of products: a coefficient's prior, its bounds, and
+Laplace's integral.
+
+Everything is in prior standard deviations. What any flight may have beside effects is integrated
+out first, so a set costs a small Cholesky factor.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import log_ndtr
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal:
+    """A quadratic log-likelihood of the coefficients that are asked about, with all others
+    integrated out: ``constant + right @ z - z @ normal @ z / 2``.
+    """
+
+    normal: Array  # (c, c)
+    right: Array  # (c,)
+    constant: float
+
+
+def marginal(
+    normal: Array, right: Array, deviance: float, asked: Index, others: Index, size: Array
+) -> Marginal:
+    """Return the log-likelihood with ``others`` integrated out over their standard normal prior.
+
+    Args:
+        normal: (c, c) products of all columns, in prior standard deviations.
+        right: (c,) their products with the residual.
+        deviance: -2 log-likelihood where all coefficients are zero.
+        asked: columns that stay.
+        others: columns that go; they may be among those that stay as well.
+        size: (len(others),) standard deviations of their prior.
+    """
+    inner = normal[np.ix_(others, others)] * size[:, None] * size + np.eye(len(others))
+    factor = np.linalg.cholesky(inner)
+    cross = np.column_stack([normal[np.ix_(others, asked)], right[others]]) * size[:, None]
+    both = solve_triangular(factor, cross, lower=True)
+    cross, own = both[:, :-1], both[:, -1]
+    return Marginal(
+        normal[np.ix_(asked, asked)] - cross.T @ cross,
+        right[asked] - cross.T @ own,
+        -0.5 * deviance + 0.5 * float(own @ own) - float(np.log(np.diagonal(factor)).sum()),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SetEvidence:
+    """The evidence of one set of effects, and where its posterior has its mode."""
+
+    log_evidence: float
+    mode: Array  # (len(index),) in prior standard deviations
+    std: Array  # (len(index),)
+
+
+def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> SetEvidence:
+    """Return the evidence of a set.
+
+    The prior of a coefficient is normal with mean zero and standard deviation one, cut off at its
+    bounds. Where the mode is at a bound, the integral is that of a normal density cut off there.
+
+    Args:
+        m: the likelihood.
+        index: the set's columns.
+        low: (c,) bounds of all columns, at most zero.
+        high: (c,) at least zero.
+    """
+    at = np.asarray(index, dtype=np.intp)
+    if not len(at):
+        return SetEvidence(m.constant, np.zeros(0), np.zeros(0))
+    normal = m.normal[np.ix_(at, at)] + np.eye(len(at))
+    right, lo, hi = m.right[at], low[at], high[at]
+    mode, held = _bounded(normal, right, lo, hi)
+    factor = np.linalg.cholesky(normal)
+    value = float(right @ mode - 0.5 * mode @ normal @ mode)
+    value -= float(np.log(np.diagonal(factor)).sum())
+    if held.any():
+        slope = np.abs(right - normal @ mode)
+        # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
+        z = slope[held] / np.sqrt(np.diagonal(normal)[held])
+        value += float(np.sum(0.5 * z * z + log_ndtr(-z)))
+    value -= float(np.sum(np.log(_share(lo, hi))))
+    inverse = np.linalg.inv(normal)
+    return SetEvidence(m.constant + value, mode, np.sqrt(np.diagonal(inverse)))
+
+
+def _share(low: Array, high: Array) -> Array:
+    """Return how much of a standard normal density lies between bounds."""
+    return np.maximum(np.exp(log_ndtr(high)) - np.exp(log_ndtr(low)), 1e-12)
+
+
+def _bounded(
+    normal: Array, right: Array, low: Array, high: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the mode within all bounds at once, and which coefficients are held at one."""
+    held = np.zeros(len(right), dtype=bool)
+    mode = np.linalg.solve(normal, right)
+    if np.all((mode >= low) & (mode <= high)):
+        return mode, held
+    for _ in range(3 * len(right)):
+        beyond = np.where(held, 0.0, np.maximum(low - mode, mode - high))
+        worst = int(np.argmax(beyond * np.sqrt(np.diagonal(normal))))
+        if beyond[worst] > 1e-12:
+            held[worst] = True
+            mode[worst] = low[worst] if mode[worst] < low[worst] else high[worst]
+        else:
+            pull = right - normal @ mode
+            inwards = np.where(mode >= high, -pull, pull)
+            inwards[~held] = 0.0
+            back = int(np.argmax(inwards))
+            if inwards[back] <= 1e-9:
+                break
+            held[back] = False
+        free = ~held
+        if free.any():
+            rest = right[free] - normal[np.ix_(free, held)] @ mode[held]
+            mode[free] = np.linalg.solve(normal[np.ix_(free, free)], rest)
+    return np.clip(mode, low, high), held
+
+
+def tempering(blocks: Array, chosen: Index) -> float:
+    """Return the power of the likelihood that its own scatter over blocks allows, at most one.
+
+    Blocks are summed as if they were independent. Where what the model lacks lasts longer than a
+    sample, as the rounding of rotor speeds does that hardly leave their steps, the scores of the
+    blocks scatter by more than the sums of squares say, and by as much the likelihood is too sure.
+    (The magnitude adjustment of composite likelihoods: F. Pauli, W. Racugno and L. Ventura,
+    Statistica Sinica 21 (2011), 149-164.)
+
+    Args:
+        blocks: (blocks, c + 1, c + 1) products of columns and residual, in prior standard
+            deviations.
+        chosen: columns that are fitted.
+    """
+    total = blocks.sum(axis=0)
+    normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
+    mode = np.linalg.solve(normal, total[chosen, -1])
+    scores = blocks[:, chosen, -1] - blocks[np.ix_(range(len(blocks)), chosen, chosen)] @ mode
+    known = np.diagonal(total)[chosen] > 1.0  # columns of which the flight says more than the prior
+    if not known.any():
+        return 1.0
+    # the scores as independent ones: in the eigenvectors of what they should be
+    size, axes = np.linalg.eigh(total[np.ix_(chosen, chosen)][np.ix_(known, known)])
+    keep = size > 1e-6 * size[-1]
+    ratio = np.square(scores[:, known] @ axes[:, keep]).sum(axis=0) / size[keep]
+    # their sum over all blocks is zero where they are fitted: that costs one block of all
+    spread = float(np.mean(ratio)) * len(blocks) / max(len(blocks) - 1, 1)
+    return 1.0 / max(1.0, spread)
+
+
+def log_sum(values: Sequence[float]) -> float:
+    """Return the logarithm of a sum of exponentials."""
+    most = max(values, default=-math.inf)
+    if most == -math.inf:
+        return most
+    return most + math.log(sum(math.exp(x - most) for x in values))

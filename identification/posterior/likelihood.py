@@ -1,0 +1,515 @@
+"""The likelihood of a flight's poses as a regression of whitened innovations: one Gram matrix.
+
+Everything that a model may lack is a column: a unit of a coefficient, through the same causal
+filter as the poses. The noise of each axis is fitted first, at maximum likelihood. With it the
+innovations are white, and the log-likelihood of any set of coefficients near the setting follows
+from sums of products alone.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ...dynamics.effects import get
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from ..inference.regression import (
+    ATTITUDE_TIME_OFFSET,
+    CENTRAL,
+    ROTOR_TIME_OFFSET,
+    START_PREFIX,
+    Column,
+    Flights,
+    Setting,
+    coefficient,
+    is_delay,
+    typical_size,
+)
+from ..logs.flight_log import FlightLog
+from ..motion.residual import acting_wrench
+from ..motion.sensing_effects import undo_log_sensing
+from ..motion.sensor_noise import sensor_noise
+from ..motion.signals import Signals, log_signals
+from ..motion.smoothing import continuous
+from .axis_filter import AXIS, AxisNoise, likeliest_noise, steady_noise
+from .causal_filter import Poses, Track, run, sensitivities
+from .discrepancy import discrepancy_columns
+from .rotor_innovations import DRIVEN, rotor_innovations
+
+Array = NDArray[np.float64]
+
+WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
+BETWEEN = "rotors between samples"
+MODEL_ERROR, GAIN, UNKNOWN = "model error", "rotor gain", "unknown "
+
+
+@dataclass(frozen=True)
+class LikelihoodSettings:
+    """What the likelihood allows for beside effects."""
+
+    step: float = 0.1  # typical sizes, over which derivatives are taken
+    # share of an axis' force or torque by which any model is wrong: of thrust along its axis and
+    # across it, and of the torques. Propellers and bearings are not stable to less
+    model_error: float = 0.003
+    # standard deviations of the gains on the rotors' innovations, by which pose, rate and
+    # disturbance answer them, in what one period of such an acceleration makes
+    gains: tuple[float, float, float] = (10.0, 10.0, 10.0)
+    # second differences of the rotor speeds, the standard deviation of what they may do between
+    # samples beside a straight line
+    between_samples: float = 0.5
+    block: float = 3.0  # s, of the sums by which the likelihood's scatter is judged
+    first_disturbance: float = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
+
+
+LIKELIHOOD = LikelihoodSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of products over blocks, of columns and of the innovations (last), whitened."""
+
+    columns: tuple[Column, ...]
+    blocks: Array  # (blocks, c + 1, c + 1)
+    value: Array  # (c,) the coefficients' values at the setting
+    penalty: float  # twice the sum over samples of the logarithm of innovation deviations
+
+    def deviance(self) -> float:
+        """Return -2 log-likelihood at the setting."""
+        return float(self.blocks[:, -1, -1].sum()) + self.penalty
+
+
+class Likelihood:
+    """The likelihood of flights with measured rotors near a setting of coefficients.
+
+    Args:
+        flights: of the vehicle.
+        setting: the coefficients about which all is linear.
+    """
+
+    axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # whose innovations count
+
+    def __init__(self, flights: Flights, setting: Setting) -> None:
+        self.flights, self.setting = flights, setting
+        self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
+        self.pieces = [
+            piece
+            for i, log in enumerate(flights.logs)
+            if flights.fit_rows[flights.log == i].any()  # no test log
+            for piece in read_poses(log, self.vehicle)
+        ]
+        self.period = self.pieces[0].period
+        inertia = flights.vehicle.inertia
+        self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
+        self.noise = self._first_noise()
+        for _ in range(2):
+            self.tracks = [run(piece, self.vehicle, self.noise) for piece in self.pieces]
+            self.noise = self._likeliest()
+        self.tracks = [run(piece, self.vehicle, self.noise) for piece in self.pieces]
+        self.signals = [
+            _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
+        ]
+        self._base = [self._acceleration(s, self.vehicle) for s in self.signals]
+
+    # Noise
+
+    def _first_noise(self) -> tuple[AxisNoise, ...]:
+        floor = sensor_noise(self.flights.logs[0], self.vehicle)
+        out = []
+        for axis in range(6):
+            pose = max(floor.position if axis < 3 else floor.attitude, 1e-6)
+            size = LIKELIHOOD.first_disturbance * (1.0 if axis < 3 else 10.0)
+            white = float(self._rounding()[axis])
+            out.append(steady_noise(pose, size, AXIS.first_time, white, self.period))
+        return tuple(out)
+
+    def _rounding(self) -> Array:
+        """Return the standard deviation of the accelerations (6,) that the rotor speeds' rounding
+        makes: m/s2 and rad/s2.
+        """
+        vehicle = self.vehicle
+        std = vehicle.omega_lsb / np.sqrt(12.0) if vehicle.omega_source == "measured" else 0.0
+        speeds = np.concatenate([p.rotor_speeds for p in self.pieces]).mean(axis=0)
+        base = vehicle.rotor_wrench(speeds[None])[0]
+        steps = [
+            vehicle.rotor_wrench((speeds + std * np.eye(4)[i])[None])[0] - base for i in range(4)
+        ]
+        # between two samples the mean of both counts
+        wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
+        out = np.array([0.0, 0.0, wrench[0], *wrench[1:]]) / self.inertias
+        return np.maximum(out, 1e-9)
+
+    def _likeliest(self, explained: Sequence[Array] | None = None) -> tuple[AxisNoise, ...]:
+        """Return the likeliest noise of each axis; ``explained`` (n, 2, 6) is what is known to move
+        the pose, and to accelerate, beside the model.
+        """
+        angles = []
+        for piece in self.pieces:
+            q = Rotation.from_quat(piece.quaternion, scalar_first=True)
+            angles.append(
+                np.vstack([np.zeros(3), np.cumsum((q[:-1].inv() * q[1:]).as_rotvec(), axis=0)])
+            )
+        out = []
+        white = self._rounding()
+        for axis in range(6):
+            measured = [
+                np.ascontiguousarray(p.position[:, axis] if axis < 3 else angle[:, axis - 3])
+                for p, angle in zip(self.pieces, angles, strict=True)
+            ]
+            drives = [np.ascontiguousarray(track.model[:, axis]) for track in self.tracks]
+            if explained is not None:
+                measured = [y + x[:, 0, axis] for y, x in zip(measured, explained, strict=True)]
+                drives = [y + x[:, 1, axis] for y, x in zip(drives, explained, strict=True)]
+            rates = [
+                float(p.velocity[axis] if axis < 3 else p.angular_velocity[axis - 3])
+                for p in self.pieces
+            ]
+            now = self.noise[axis]
+            out.append(
+                likeliest_noise(
+                    measured,
+                    drives,
+                    rates,
+                    self.period,
+                    max(float(white[axis]), now.white),
+                    now.pose,
+                    now.disturbance,
+                )
+            )
+        return tuple(out)
+
+    # Columns
+
+    def _acceleration(self, signals: Signals, vehicle: Vehicle) -> Array:
+        wrench, _ = acting_wrench(signals, vehicle, self.flights.vehicle)
+        return np.column_stack(
+            [
+                wrench[:, :3] / self.flights.vehicle.mass,
+                np.linalg.solve(self.flights.vehicle.inertia, wrench[:, 3:].T).T,
+            ]
+        )
+
+    def _slope(self, column: Column) -> list[Array] | None:
+        """Return what a unit of a coefficient adds to the acceleration (n, 6) of each piece; None
+        where no vehicle can be like that.
+        """
+        effect, name = column
+        whole = name.startswith(WHOLE_PREFIX)
+        name = name.removeprefix(WHOLE_PREFIX)
+        own = dict(self.flights.coefficients(self.setting, effect))
+        if whole:
+            own[CENTRAL] = 1.0
+        value = own.get(name, 0.0)
+        c = coefficient((effect, name))
+        delta = LIKELIHOOD.step * typical_size((effect, name), self.flights.vehicle)
+        if not c.minimum <= value + delta <= c.maximum:
+            delta = -delta
+        after = {k: v for k, v in self.setting.items() if k}
+        after[effect] = {**own, name: value + delta}
+        try:
+            vehicle = self.flights.amended(after)
+            return [
+                (self._acceleration(s, vehicle) - base) / delta
+                for s, base in zip(self.signals, self._base, strict=True)
+            ]
+        except (InputError, np.linalg.LinAlgError):
+            return None
+
+    def _start(self, effect: str, coefficients: Mapping[str, float]) -> list[Array]:
+        after = {k: v for k, v in self.setting.items() if k}
+        after[effect] = dict(coefficients)
+        vehicle = self.flights.amended(after)
+        return [
+            self._acceleration(s, vehicle) - base
+            for s, base in zip(self.signals, self._base, strict=True)
+        ]
+
+    def _later_rotors(self) -> list[Array]:
+        """Return what rotor speeds that act a second later add, by the derivative."""
+        delta, out = 0.001, []
+        for s, base in zip(self.signals, self._base, strict=True):
+            at = np.arange(len(s.t)) - delta / s.period
+            ends = np.arange(len(s.t))
+            moved = np.column_stack([np.interp(at, ends, x) for x in s.rotor_speeds.T])
+            shifted = replace(s, rotor_speeds=moved)
+            out.append((self._acceleration(shifted, self.vehicle) - base) / delta)
+        return out
+
+    def _bent_rotors(self) -> list[Array]:
+        """Return what rotor speeds add that move between samples by their second difference beside
+        the straight line.
+        """
+        out = []
+        for s, base in zip(self.signals, self._base, strict=True):
+            u = s.rotor_speeds  # of k + 1/2: nothing later than sample k + 1
+            bent = np.zeros_like(u)
+            bent[2:] = u[2:] - 2.0 * u[1:-1] + u[:-2]
+            moved = replace(s, rotor_speeds=u + bent)
+            out.append(self._acceleration(moved, self.vehicle) - base)
+        return out
+
+    def _moved(self, column: Column) -> list[Array]:
+        """Return by how much a unit of a sensing effect moves the pose (n, 6), at the pose that the
+        filter predicts: so the pose's own noise is no part of it.
+        """
+        effect, name = column
+        delta = LIKELIHOOD.step * typical_size(column, self.flights.vehicle)
+        bare = replace(self.flights.vehicle, effects=())
+        vehicle = replace(bare, effects=self.flights.amended({effect: {name: delta}}).effects[-1:])
+        out = []
+        for piece, track in zip(self.pieces, self.tracks, strict=True):
+            log = FlightLog(
+                piece.t, track.predicted[:, :3], track.predicted[:, 3:], piece.rotor_speeds
+            )
+            undone = undo_log_sensing(log, vehicle)
+            old = Rotation.from_quat(track.predicted[:, 3:], scalar_first=True)
+            new = Rotation.from_quat(undone.quaternion, scalar_first=True)
+            out.append(
+                np.column_stack(
+                    [undone.position - track.predicted[:, :3], (old.inv() * new).as_rotvec()]
+                )
+                / delta
+            )
+        return out
+
+    def sums(
+        self,
+        wanted: Iterable[Column],
+        starts: Mapping[Column, Mapping[str, float]],
+        unknown: bool = True,
+    ) -> Sums:
+        """Return the sums of products of these columns, of what any flight may have beside them,
+        and of the innovations.
+
+        Args:
+            wanted: coefficients of effects.
+            starts: columns of whole effects, with the coefficients of each.
+            unknown: whether the discrepancy's columns are wanted.
+        """
+        acting: dict[Column, list[Array]] = {}
+        moved: dict[Column, list[Array]] = {}
+        later = self._later_rotors()
+        acting[ROTOR_TIME_OFFSET] = later
+        acting["", BETWEEN] = self._bent_rotors()
+        for name, column in self._model_errors().items():
+            acting["", f"{MODEL_ERROR} {name}"] = column
+        if unknown:
+            found = discrepancy_columns(
+                self.tracks,
+                [p.t for p in self.pieces],
+                self.flights.vehicle.weight,
+                self.flights.vehicle.arm_l,
+                self.inertias,
+            )
+            for (group, name), column in found.items():
+                acting["", f"{UNKNOWN}{group}: {name}"] = column
+        for c, start in starts.items():
+            acting[c] = self._start(c[0], start)
+        for c in wanted:
+            if c[1].startswith(START_PREFIX):
+                continue
+            if is_delay(c[0]):
+                acting[c] = later
+            elif get(c[0]).kind == "sensing" and not is_delay(c[0]):
+                moved[c] = self._moved(c)
+            elif (slope := self._slope(c)) is not None:
+                acting[c] = slope
+        moved[ATTITUDE_TIME_OFFSET] = []
+        for track in self.tracks:
+            # the rate before the sample is read: after it, it knows that sample's noise
+            rate = track.angular_velocity + self.period * track.acceleration[:, 3:]
+            rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
+            moved[ATTITUDE_TIME_OFFSET].append(np.column_stack([np.zeros_like(rate), -rate]))
+        self._columns = acting, moved
+        return self._products(acting, moved)
+
+    def quieter(self, coefficients: Mapping[Column, float]) -> Sums:
+        """Return the sums of the same columns with the noise that is likeliest beside them all, at
+        these coefficients.
+
+        What an effect explains counts as a disturbance where the effect is not known. Beside the
+        whole library the noise is that of a flight of which everything is known.
+        """
+        acting, moved = self._columns
+        explained = []
+        for i, track in enumerate(self.tracks):
+            x = np.zeros((len(track.position), 2, 6))
+            for c, column in acting.items():
+                x[:, 1] += coefficients.get(c, 0.0) * column[i]
+            for c, column in moved.items():
+                x[:, 0] += coefficients.get(c, 0.0) * column[i]
+            specific = track.rotors[:, :1] / self.vehicle.mass
+            x[:, 1, :3] += specific * (
+                x[:, 0, 4:5] * track.rotation[:, :, 0] - x[:, 0, 3:4] * track.rotation[:, :, 1]
+            )
+            explained.append(x)
+        noise, tracks = self.noise, self.tracks
+        self.noise = self._likeliest(explained)
+        heard = [run(piece, self.vehicle, self.noise).innovations for piece in self.pieces]
+        self.tracks = [
+            replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)
+        ]
+        out = self._products(acting, moved)
+        self.noise, self.tracks = noise, tracks
+        return out
+
+    def _model_errors(self) -> dict[str, list[Array]]:
+        parts: dict[str, list[Array]] = {}
+        for track in self.tracks:
+            specific = track.rotors[:, 0] / self.vehicle.mass
+            for i, axis in enumerate("xyz"):
+                force, torque = np.zeros((len(specific), 6)), np.zeros((len(specific), 6))
+                force[:, :3] = specific[:, None] * track.rotation[:, :, i]
+                torque[:, 3 + i] = track.rotors[:, 1 + i] / self.inertias[3 + i]
+                parts.setdefault(f"of force {axis}", []).append(force)
+                parts.setdefault(f"of torque {axis}", []).append(torque)
+        return parts
+
+    def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
+        """Return the columns of the joint filter's gains that steady filters of single axes lack,
+        their jumps (n, 6, e) of each piece, and which state jumps.
+
+        The rotors' innovations say something of the axes that rotors drive. The attitude's say
+        where thrust has pushed sideways, and the position's sideways part which attitude did so.
+        """
+        pairs = list(zip(self.pieces, self.tracks, strict=True))
+        rotors = rotor_innovations(pairs, self.inertias[2:])
+        names: list[Column] = []
+        states: list[int] = []
+        for kind in (*(f"rotor {axis}" for axis in DRIVEN), "attitude x", "attitude y", "x", "y"):
+            names += [("", f"{GAIN} of {kind} {state}") for state in range(3)]
+            states += [0, 1, 2]
+        out = []
+        units = np.array([self.period**2, self.period, 1.0])
+        g = self.flights.vehicle.gravity
+        for found, track in zip(rotors, self.tracks, strict=True):
+            n = len(found)
+            jumps = np.zeros((n, 6, len(names)))
+            rotation = track.rotation
+            # an innovation of sample k changes the state after it: the jump is before sample k + 1
+            found = np.vstack([np.zeros(4), found[:-1]])
+            for i, axis in enumerate(DRIVEN):
+                for state in range(3):
+                    at = 3 * i + state
+                    if axis == 2:
+                        jumps[:, :3, at] = units[state] * found[:, i, None] * rotation[:, :, 2]
+                    else:
+                        jumps[:, axis, at] = units[state] * found[:, i]
+            last = np.vstack([np.zeros(6), track.innovations[:-1]])
+            body = np.einsum("nij,ni->nj", rotation, last[:, :3])
+            for state in range(3):
+                jumps[:, :3, 12 + state] = -g * units[state] * last[:, 3, None] * rotation[:, :, 1]
+                jumps[:, :3, 15 + state] = g * units[state] * last[:, 4, None] * rotation[:, :, 0]
+                # about the other axis, by what pushes as much within a tenth of a second
+                jumps[:, 3, 18 + state] = -(10.0**state) * body[:, 1]
+                jumps[:, 4, 21 + state] = (10.0**state) * body[:, 0]
+            out.append(jumps)
+        return names, out, np.array(states)
+
+    def _products(
+        self, acting: Mapping[Column, list[Array]], moved: Mapping[Column, list[Array]]
+    ) -> Sums:
+        gains, jumps, jump_state = self._jumps()
+        names = (*acting, *moved, *gains)
+        count = len(names)
+        gain = np.array([x.gain for x in self.noise])
+        keep = np.exp(-self.period / np.array([x.time for x in self.noise]))
+        std = np.array([x.innovation for x in self.noise])
+        use = list(self.axes)
+        length = round(LIKELIHOOD.block / self.period)
+        skip = round(AXIS.settling_time / self.period)
+        blocks, samples = [], 0
+        for i, track in enumerate(self.tracks):
+            state = np.zeros((6, 3, count))
+            specific = track.rotors[:, 0] / self.vehicle.mass
+            pull = np.stack(
+                [
+                    -specific[:, None] * track.rotation[:, :, 1],
+                    specific[:, None] * track.rotation[:, :, 0],
+                ],
+                axis=2,
+            )
+            for begin in range(0, len(track.position), length):
+                at = slice(begin, min(begin + length, len(track.position)))
+                rows = at.stop - at.start
+                a, b = len(acting), len(moved)
+                x, y = np.zeros((rows, 6, a + b)), np.zeros((rows, 6, b))
+                for j, column in enumerate(acting.values()):
+                    x[:, :, j] = column[i][at]
+                for j, column in enumerate(moved.values()):
+                    y[:, :, j] = column[i][at]
+                out = np.empty((rows, 6, count + 1))
+                inner = np.empty((rows, 6, count))
+                sensitivities(
+                    self.period,
+                    gain,
+                    keep,
+                    pull[at],
+                    track.angular_velocity[at],
+                    x,
+                    y,
+                    np.ascontiguousarray(jumps[i][at]),
+                    jump_state,
+                    state,
+                    inner,
+                )
+                out[:, :, :count] = inner
+                out[:, :, count] = track.innovations[at]
+                out /= std[None, :, None]
+                out = out[max(skip - begin, 0) :, use].reshape(-1, count + 1)
+                if len(out):
+                    samples += len(out) // len(use)
+                    blocks.append(out.T @ out)
+        value = np.array(
+            [
+                0.0
+                if not effect or name.startswith((START_PREFIX, WHOLE_PREFIX))
+                else self.flights.coefficients(self.setting, effect).get(name, 0.0)
+                for effect, name in names
+            ]
+        )
+        penalty = 2.0 * samples * float(np.log(std[use]).sum())
+        return Sums(names, np.array(blocks), value, penalty)
+
+
+def read_poses(log: FlightLog, vehicle: Vehicle) -> list[Poses]:
+    """Return the unbroken pieces of a log as they were measured, without what the vehicle's sensing
+    effects did to them.
+    """
+    undone = undo_log_sensing(log, vehicle)
+    out = []
+    for raw, smooth in zip(log_signals(undone, np.inf), log_signals(undone), strict=True):
+        q = Rotation.from_matrix(raw.rotation).as_quat(scalar_first=True)
+        out.append(
+            Poses(
+                raw.t,
+                raw.period,
+                np.ascontiguousarray(raw.position),
+                continuous(q),
+                raw.rotor_speeds,
+                np.zeros(len(raw.t)) if raw.voltage is None else raw.voltage,
+                smooth.velocity[0],
+                smooth.angular_velocity[0],
+            )
+        )
+    return out
+
+
+def _signals(piece: Poses, track: Track) -> Signals:
+    """Return the flight as the filter sees it between samples, as the effect models are asked."""
+    speeds = piece.rotor_speeds
+    between = 0.5 * (speeds + np.vstack([speeds[1:], speeds[-1:]]))
+    return Signals(
+        piece.t,
+        piece.period,
+        track.position,
+        track.rotation,
+        track.velocity,
+        track.acceleration[:, :3],
+        track.angular_velocity,
+        track.acceleration[:, 3:],
+        between,
+        piece.voltage if piece.voltage.any() else None,
+    )

@@ -1,0 +1,86 @@
+"""What the rotors do that the flight's past does not predict.
+
+A flight loop that reads a gyro answers a gust before the pose shows it, and a rotor speed is
+measured with noise and rounding. Both reach the likelihood through the rotors' own innovations: the
+part of thrust and torques that neither past rotor speeds nor the filter's state predict. What of it
+the pose confirms later, as a gust or as an error of measurement, is the gain of the joint filter of
+rotors and pose. That gain is unknown, as the loop is, so it is fitted beside the effects: an effect
+is known by what of the rotors was predictable alone. (Joint input-output identification: L. Ljung,
+System Identification, 2nd edition, 1999, section 13.5.)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .causal_filter import Poses, Track
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FeedbackSettings:
+    """The model by which the rotors answer the past."""
+
+    lags: int = 4  # samples of the rotors' past
+    # relative, of each regressor's own variance: against columns that are alike
+    ridge: float = 1e-6
+
+
+FEEDBACK = FeedbackSettings()
+# the axis of the pose that each of thrust and torques drives
+DRIVEN = (2, 3, 4, 5)
+
+
+def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> list[Array]:
+    """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
+    and about the body's axes (rad/s2).
+
+    Args:
+        pieces: as they were measured, and as the filter sees them.
+        inertias: (4,) mass (kg) and moments of inertia (kg m2).
+    """
+    sides = [_sides(poses, track, inertias) for poses, track in pieces]
+    x, y = (np.concatenate(part) for part in zip(*sides, strict=True))
+    mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
+    z = np.column_stack([(x - mean) / size, np.ones(len(x))])
+    normal = z.T @ z
+    normal += FEEDBACK.ridge * np.diag(np.diagonal(normal))
+    gain = np.linalg.solve(normal, z.T @ y)
+    out, row = [], 0
+    for poses, _ in pieces:
+        count = len(poses.t) - FEEDBACK.lags
+        found = np.zeros((len(poses.t), 4))
+        found[FEEDBACK.lags :] = (y - z @ gain)[row : row + count]
+        row += count
+        out.append(found)
+    return out
+
+
+def _sides(poses: Poses, track: Track, inertias: Array) -> tuple[Array, Array]:
+    """Return what is known before a sample's rotors, and their wrench at it, sample by sample."""
+    lags = FEEDBACK.lags
+    # the track has the rotors between samples: the wrench at sample k is twice that less the last
+    now = np.empty_like(track.rotors)
+    squares = np.square(poses.rotor_speeds)
+    wrench = np.linalg.lstsq(
+        np.square(0.5 * (poses.rotor_speeds[:-1] + poses.rotor_speeds[1:])),
+        track.rotors[:-1],
+        rcond=None,
+    )[0]
+    now = squares @ wrench / inertias
+    known = [now[lags - i - 1 : len(now) - i - 1] for i in range(lags)]
+    before = slice(lags - 1, len(now) - 1)
+    body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
+    known += [
+        track.rotation[before][:, 2, :2],
+        body,
+        track.position[before],
+        track.angular_velocity[before],
+        track.acceleration[before] - track.model[before],
+        track.innovations[before],
+        # the loop may have read this sample's pose before the rotors were logged
+        track.innovations[lags:],
+    ]
+    return np.column_stack(known), now[lags:]

@@ -1,0 +1,165 @@
+"""Flights of which the truth is known, ranked: of this project's plant, and of a simulator that was
+written apart from it and is read from its own file.
+"""
+
+import importlib.util
+import sys
+import tempfile
+import time
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import names
+from windwrench.dynamics.vehicle import Vehicle
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.posterior.ranking import rank
+from windwrench.runtime.errors import InputError
+from windwrench.studies.trials.outsiders import OUTSIDERS
+from windwrench.studies.trials.practice_flights import practise, shown_in
+from windwrench.studies.trials.trials import EQUIVALENTS
+
+KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
+_ATTEMPTS = 4  # at a flight that crashes
+_GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
+_STRONGEST_GUSTS = 3.0  # times the background's
+_NOISES = ((1e-3, 0.3), (1e-3, 0.3), (0.5e-3, 0.15), (2e-3, 0.5))  # m and degrees, as its own
+_TURBULENCE = (0.015, 3e-4, 0.25)  # N, Nm and s, as its own
+# what the other simulator calls no effect of a library, and this library has
+_KNOWN = {
+    "pendulum payload 30 g on 0.5 m tether": ("slung_payload",),
+    "localised fan jet through body drag": ("fan_jet", "body_drag"),
+}
+# effects that its flights show or not in the way that this library's laws write them
+_INSEPARABLE = ("hover", "noyaw")
+
+
+def ranked(simulator: str, kind: str, number: int) -> dict[str, Any]:
+    """Return what the ranking says of one flight, and its truth, as JSON.
+
+    Args:
+        simulator: "own", or the file of the other one.
+        kind: one of ``KINDS``; of the other simulator "catalogue" or "left out".
+        number: the seed of a flight, or its place in the other simulator's catalogues, one seed
+            after the other.
+    """
+    log, vehicle, truth, outsider, flown = (
+        _own(kind, number) if simulator == "own" else _other(Path(simulator), number)
+    )
+    library = list(names())
+    left_out: list[str] = []
+    if kind == "left out":
+        left_out = [e for t in truth for e in (t, *EQUIVALENTS.get(t, ()))]
+        library = [e for e in library if e not in left_out]
+    flights = Flights([log], vehicle)
+    begun = time.process_time()
+    found = rank(flights, library)
+    return {
+        "kind": kind,
+        "flown": flown,
+        "truth": truth,
+        "outsider": outsider,
+        "left_out": left_out,
+        "probability": {k: round(v, 5) for k, v in found.probability.items() if v > 0.001},
+        "unknown": round(found.unknown, 5),
+        "tempering": round(found.tempering, 4),
+        "sets": [
+            {
+                "effects": list(s.effects),
+                "probability": round(s.probability, 5),
+                "coefficients": s.coefficients,
+                "std": s.std,
+            }
+            for s in found.sets[:3]
+        ],
+        "cpu_s": round(time.process_time() - begun, 2),
+    }
+
+
+def _own(kind: str, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
+    rng = np.random.default_rng((number, len(kind)))
+    vehicle = load_vehicle("ardrone2")
+    gust_time = float(np.exp(rng.uniform(*np.log(_GUST_TIMES))))
+    turbulence = float(rng.uniform(0.0, _STRONGEST_GUSTS))
+    what = {"third": "effect", "single": "effect", "left out": "effect"}.get(kind, kind)
+    pool = tuple(OUTSIDERS) if kind == "outsider" else names()
+    for attempt in range(_ATTEMPTS):
+        added = () if what in ("pair", "nothing") else (str(rng.choice(pool)),)
+        path = shown_in(added[0])[0] if added else None
+        try:
+            p = practise(
+                vehicle,
+                what,
+                added,
+                "small" if kind == "third" else "typical",
+                path,
+                10 * number + attempt,
+                60.0,
+                turbulence,
+                gust_time=gust_time,
+            )
+        except InputError:
+            continue
+        truth = {e.name: dict(e.coefficients) for e in p.effects}
+        flown = f"{p.trajectory}, gusts of {turbulence:.1f} and {gust_time:.2f} s"
+        return p.log, p.vehicle, truth, p.outsider or "", flown
+    raise InputError(f"no flight loop flies {kind} {number}")
+
+
+@cache
+def _simulator(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("other_simulator", path)
+    if spec is None or spec.loader is None or not path.exists():
+        raise InputError(f"{path}: expected the other simulator's Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["other_simulator"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
+    simulator = _simulator(path)
+    catalogue = simulator.catalogue()
+    kind, settings, said = catalogue[number % len(catalogue)]
+    rng = np.random.default_rng((number, 1))
+    noise = _NOISES[int(rng.integers(len(_NOISES)))]
+    flown = simulator.make_log(
+        kind,
+        seed=int(rng.integers(1 << 30)),
+        sig_p=noise[0],
+        sig_q=np.deg2rad(noise[1]),
+        turb=_TURBULENCE if rng.random() < 0.5 else None,
+        **settings,
+    )
+    log = FlightLog(
+        flown["t"],
+        np.round(flown["p"], 5),
+        np.round(flown["q"], 6),
+        np.round(flown["om"], 3),
+        flown["vbat"],
+        name=f"{kind} {number}",
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "vehicle.yaml"
+        # its vehicle's file describes the pose's noise in words
+        text = simulator.VEHICLE.replace("nominal ", "")
+        file.write_text(text, encoding="utf-8")
+        vehicle = load_vehicle(str(file))
+    truth: dict[str, Any] = {}
+    outsider = ""
+    for effect in said:
+        if effect["name"] in names():
+            truth[effect["name"]] = {}
+        else:
+            known = _KNOWN.get(effect["what"], ())
+            truth |= {name: {} for name in known}
+            outsider = "" if known else effect["what"]
+    return log, vehicle, truth, outsider, kind
+
+
+__all__ = ["KINDS", "ranked"]

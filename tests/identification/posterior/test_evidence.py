@@ -1,0 +1,80 @@
+"""The evidence of sets, against integrals that are done by numbers."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from windwrench.identification.posterior.evidence import (
+    Marginal,
+    log_sum,
+    marginal,
+    set_evidence,
+    tempering,
+)
+
+
+def by_numbers(normal, right, low, high):
+    """The integral of the likelihood over a normal prior that is cut off at its bounds."""
+
+    def density(z):
+        return math.exp(right * z - 0.5 * normal * z * z - 0.5 * z * z)
+
+    low, high = max(low, -12.0), min(high, 12.0)
+    share = quad(lambda z: math.exp(-0.5 * z * z), low, high)[0]
+    return math.log(quad(density, low, high)[0] / share)
+
+
+@pytest.mark.parametrize(("right", "low"), [(3.0, -np.inf), (-4.0, 0.0), (-0.5, -np.inf)])
+def test_the_evidence_of_one_coefficient_is_the_integral(right, low):
+    found = set_evidence(
+        Marginal(np.array([[2.0]]), np.array([right]), 0.0),
+        [0],
+        np.array([low]),
+        np.array([np.inf]),
+    )
+    assert found.log_evidence == pytest.approx(by_numbers(2.0, right, low, np.inf), abs=1e-6)
+    assert found.mode[0] == pytest.approx(max(right / 3.0, low))
+
+
+def test_bounds_hold_jointly():
+    # alone both would be positive; together the second pays for the first
+    m = Marginal(np.array([[50.0, 49.0], [49.0, 50.0]]), np.array([20.0, 5.0]), 0.0)
+    free = set_evidence(m, [0, 1], np.full(2, -np.inf), np.full(2, np.inf))
+    held = set_evidence(m, [0, 1], np.zeros(2), np.full(2, np.inf))
+    assert free.mode[1] < 0.0
+    assert held.mode[1] == 0.0
+    assert held.mode[0] == pytest.approx(20.0 / 51.0)
+
+
+def test_what_is_integrated_out_costs_what_it_explains():
+    rng = np.random.default_rng(1)
+    x, y = rng.standard_normal((300, 3)), rng.standard_normal(300)
+    normal, right = x.T @ x, x.T @ y
+    part = marginal(normal, right, float(y @ y), np.array([0, 1]), np.array([2]), np.ones(1))
+    whole = Marginal(normal, right, -0.5 * float(y @ y))
+    none = np.full(3, -np.inf), np.full(3, np.inf)
+    both = set_evidence(whole, [0, 1, 2], *none)
+    found = set_evidence(part, [0, 1], none[0][:2], none[1][:2])
+    assert found.log_evidence == pytest.approx(both.log_evidence)
+    assert found.mode == pytest.approx(both.mode[:2])
+
+
+def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
+    rng = np.random.default_rng(2)
+    x, noise = rng.standard_normal((40, 100, 3)), rng.standard_normal((40, 100))
+    alike = np.repeat(rng.standard_normal((40, 5)), 20, axis=1)  # one error for 20 samples
+    slow = np.repeat(rng.standard_normal((40, 5, 3)), 20, axis=1)
+
+    def power(x, y):
+        both = np.concatenate([x, y[..., None]], axis=2)
+        return tempering(np.einsum("bni,bnj->bij", both, both), np.arange(3))
+
+    assert power(x, noise) > 0.75
+    assert power(slow, alike) < 0.1
+
+
+def test_log_sums():
+    assert log_sum([0.0, 0.0]) == pytest.approx(math.log(2.0))
+    assert log_sum([]) == -math.inf

@@ -1,0 +1,45 @@
+"""A short flight's missing effect is the likeliest, and its coefficient within its deviation."""
+
+import pytest
+
+from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.posterior.likelihood import Likelihood
+from windwrench.identification.posterior.ranking import rank
+from windwrench.studies.trials.practice_flights import fly_practice
+
+LIBRARY = ("rotor_drag", "mass", "inertia", "constant_force", "motor_lag")
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return load_vehicle("ardrone2")
+
+
+def flown(vehicle, *effects):
+    return Flights([fly_practice(vehicle, effects, "excite", 20.0, seed=5)], vehicle)
+
+
+def test_a_missing_mass_is_found(vehicle):
+    flights = flown(vehicle, EffectSetting("mass", {"dm": 0.03}))
+    found = rank(flights, LIBRARY)
+    best = found.sets[0]
+    assert best.effects == ("mass",)
+    assert found.probability["mass"] > 0.9
+    off = best.coefficients["mass"]["dm"] - 0.03
+    assert abs(off) < 3.0 * best.std["mass"]["dm"]
+    assert 0.0 <= found.unknown < 0.5
+
+
+def test_nothing_is_found_in_turbulence_alone(vehicle):
+    found = rank(flown(vehicle), LIBRARY)
+    assert found.sets[0].effects == ()
+    assert max(found.probability.values()) < 0.5
+
+
+def test_the_noise_is_that_of_the_flight(vehicle):
+    noise = Likelihood(flown(vehicle), {}).noise
+    for axis in noise[:3]:
+        assert axis.pose == pytest.approx(vehicle.mocap.sigma_pos_m, rel=0.1)
+    for axis in noise[3:]:
+        assert axis.pose == pytest.approx(vehicle.mocap.sigma_att_rad, rel=0.1)
