@@ -135,12 +135,8 @@ def compare(
         """Logarithms (scales, n) of how likely the difference is, for changes whose ``means`` (n,
         4) and standard deviations beside the scatter, ``spread`` (n, 4), are given.
         """
-        return np.array(
-            [
-                log + _log_t(difference, means, one + spread[:, :, None] ** 2 * np.eye(4), freedom)
-                for log, one in zip(scale_logs, unchanged, strict=True)
-            ]
-        )
+        scales = unchanged[:, None] + spread[:, :, None] ** 2 * np.eye(4)
+        return scale_logs[:, None] + _log_t(difference, means, scales, freedom)
 
     nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
     amounts, prior = _amounts(use)
@@ -228,21 +224,28 @@ def _scatters(
 
 
 def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
-    """Return the logarithms (n,) of multivariate Student's t densities with ``means`` (n, 4) and
-    ``scales`` (n, 4, 4) at ``x`` (4,).
+    """Return the logarithms (..., n) of multivariate Student's t densities with ``means`` (n, 4)
+    and ``scales`` (..., n, 4, 4) at ``x`` (4,).
+
+    Many small matrices: Cholesky's rows are worked out for all of them together.
     """
     dof = len(x)
-    root = np.linalg.cholesky(scales)
-    y = np.linalg.solve(root, (x - means)[:, :, None])[:, :, 0]
     constant = (
         gammaln(0.5 * (freedom + dof))
         - gammaln(0.5 * freedom)
         - 0.5 * dof * math.log(freedom * math.pi)
     )
-    diagonal = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-    bent: Array = np.log1p(np.square(y).sum(axis=1) / freedom)
-    found: Array = constant - diagonal - 0.5 * (freedom + dof) * bent
-    return found
+    root: dict[tuple[int, int], Array] = {}
+    y: list[Array] = []  # what is left, whitened
+    for i in range(dof):
+        for j in range(i + 1):
+            rest = scales[..., i, j] - sum(root[i, k] * root[j, k] for k in range(j))
+            root[i, j] = np.sqrt(rest) if i == j else rest / root[j, j]
+        left = x[i] - means[:, i] - sum(root[i, k] * y[k] for k in range(i))
+        y.append(left / root[i, i])
+    diagonal = sum(np.log(root[i, i]) for i in range(dof))
+    bent = np.log1p(sum(np.square(one) for one in y) / freedom)
+    return np.asarray(constant - diagonal - 0.5 * (freedom + dof) * bent)
 
 
 def _weigh(
