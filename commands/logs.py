@@ -300,9 +300,13 @@ def diagnose(
         for option, is_given in {**given, "--rotor-faults": rotor_faults}.items():
             if is_given:
                 raise InputError(f"--example: has a log of its own; expected it without {option}")
-        return _example(without or (), out, no_open)
+        return _example(without or (), out, no_open, probabilities)
     if not logs:
         raise InputError("diagnose: expected at least one flight log, or --example")
+    if probabilities and (rotor_faults or fleet or against):
+        raise InputError(
+            "--probabilities: expected no --rotor-faults, --fleet or --against with it"
+        )
     if rotor_faults:
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
@@ -321,10 +325,12 @@ def diagnose(
             raise InputError(f"{option}: expected --fleet with it")
     if against:
         return _compare(logs, against, reader, vehicle, out, map)
-    return _diagnose(logs, test or [], reader, vehicle, map, without or (), out)
+    return _diagnose(logs, test or [], reader, vehicle, map, without or (), out, probabilities)
 
 
-def _example(without: Sequence[str], out: Path, no_open: bool) -> dict[str, Any]:
+def _example(
+    without: Sequence[str], out: Path, no_open: bool, probabilities: bool
+) -> dict[str, Any]:
     """Diagnose the flight that comes with the kit."""
     from ..identification.logs.example import example_flight
     from .example import conclude, introduce
@@ -332,7 +338,9 @@ def _example(without: Sequence[str], out: Path, no_open: bool) -> dict[str, Any]
 
     with example_flight() as flight:
         introduce(flight)
-        result = _diagnose([flight.log], [], None, flight.vehicle, None, without, out)
+        result = _diagnose(
+            [flight.log], [], None, flight.vehicle, None, without, out, probabilities
+        )
     result["known"] = conclude(flight, result["effects"])
     show_page(out / "report.html", not no_open)
     return result
@@ -346,6 +354,7 @@ def _diagnose(
     log_map: str | None,
     without: Sequence[str],
     out: Path,
+    probabilities: bool,
 ) -> dict[str, Any]:
     """Find the effects that a vehicle's model lacks; write the report."""
     from ..identification.diagnosis import diagnose as run
