@@ -139,7 +139,7 @@ def fit(
             counted = counts[:, batch]
             loss = (each.sum(dim=-1) * counted).sum() / counted.sum()
             optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            loss.backward()
             torch.nn.utils.clip_grad_norm_(network.parameters(), _STEEPEST)
             optimiser.step()
             schedule.step()

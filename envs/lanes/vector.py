@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils.seeding import np_random
 
 from ...estimator.ukf_lanes import estimates_of, new_work
-from ...runtime.compiled import announced, specialised
+from ...runtime.compiled import specialised
 from ...runtime.errors import InputError
 from ...runtime.pcg_normals import pcg_state
 from ...runtime.vector_lanes import WIDTH
@@ -53,8 +53,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         like = first.flight()
         _refuse(first, like)
         self._parts = -(-num_envs // WIDTH)
-        with announced():
-            self._flying = Blocks(self._parts, like)
+        self._flying = Blocks(self._parts, like)
         self._settling = Blocks(0, like)
         self._like = like
         self._compiled: Callable[..., None] | None = None
@@ -78,8 +77,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         try:
             arguments = *given, work.ctypes.data, patience
             if self._compiled is None:
-                with announced():
-                    self._compiled = specialised(fly_blocks, *arguments)
+                self._compiled = specialised(fly_blocks, *arguments)
             self._compiled(*arguments)
         finally:
             self._works.append(work)

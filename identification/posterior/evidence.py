@@ -96,15 +96,15 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
 
 def _share(low: Array, high: Array) -> Array:
     """Return how much of a standard normal density lies between bounds."""
-    return np.maximum(np.exp(log_ndtr(high)) - np.exp(log_ndtr(low)), 1e-12)
+    return np.asarray(np.maximum(np.exp(log_ndtr(high)) - np.exp(log_ndtr(low)), 1e-12))
 
 
 def _bounded(
     normal: Array, right: Array, low: Array, high: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the mode within all bounds at once, and which coefficients are held at one."""
-    held = np.zeros(len(right), dtype=bool)
-    mode = np.linalg.solve(normal, right)
+    held = np.zeros(len(right), dtype=np.bool_)
+    mode: Array = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
     if np.all((mode >= low) & (mode <= high)):
         return mode, held
     for _ in range(3 * len(right)):
@@ -145,7 +145,7 @@ def tempering(blocks: Array, chosen: Index) -> float:
     total = blocks.sum(axis=0)
     normal = total[np.ix_(chosen, chosen)] + np.eye(len(chosen))
     mode = np.linalg.solve(normal, total[chosen, -1])
-    scores = blocks[:, chosen, -1] - blocks[np.ix_(range(len(blocks)), chosen, chosen)] @ mode
+    scores = blocks[:, chosen, -1] - blocks[:, chosen[:, None], chosen] @ mode
     known = np.diagonal(total)[chosen] > 1.0  # columns of which the flight says more than the prior
     if not known.any():
         return 1.0

@@ -139,7 +139,7 @@ class Likelihood:
         # between two samples the mean of both counts
         wrench = np.sqrt(np.sum(np.square(steps), axis=0) / 2.0)
         out = np.array([0.0, 0.0, wrench[0], *wrench[1:]]) / self.inertias
-        return np.maximum(out, 1e-9)
+        return np.asarray(np.maximum(out, 1e-9))
 
     def _likeliest(self, explained: Sequence[Array] | None = None) -> tuple[AxisNoise, ...]:
         """Return the likeliest noise of each axis; ``explained`` (n, 2, 6) is what is known to move
@@ -458,10 +458,10 @@ class Likelihood:
                 out[:, :, :count] = inner
                 out[:, :, count] = track.innovations[at]
                 out /= std[None, :, None]
-                out = out[max(skip - begin, 0) :, use].reshape(-1, count + 1)
-                if len(out):
-                    samples += len(out) // len(use)
-                    blocks.append(out.T @ out)
+                kept = out[max(skip - begin, 0) :, use].reshape(-1, count + 1)
+                if len(kept):
+                    samples += len(kept) // len(use)
+                    blocks.append(kept.T @ kept)
         value = np.array(
             [
                 0.0

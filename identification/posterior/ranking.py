@@ -30,7 +30,7 @@ from ..inference.regression import (
 )
 from ..inference.starting_points import starting_points
 from .discrepancy import DISCREPANCY, GROUPS
-from .evidence import Marginal, SetEvidence, log_sum, marginal, set_evidence, tempering
+from .evidence import Index, Marginal, SetEvidence, log_sum, marginal, set_evidence, tempering
 from .likelihood import BETWEEN, GAIN, LIKELIHOOD, UNKNOWN, WHOLE_PREFIX, Likelihood, Sums
 
 Array = NDArray[np.float64]
@@ -102,9 +102,9 @@ class _Base:
     blocks: Array
     penalty: float
     effects: frozenset[str]  # of the setting
-    plain: Array  # columns that any flight may have
+    plain: Index  # columns that any flight may have
     typical: Array  # (c,) typical sizes in prior standard deviations
-    groups: dict[str, Array]  # columns of the discrepancy
+    groups: dict[str, Index]  # columns of the discrepancy
     starts: Mapping[Column, Mapping[str, float]]
 
 
@@ -318,7 +318,7 @@ class _Posterior:
 
     def _marginal(
         self, base: _Base, unknown: str | None = None, size: float = 1.0
-    ) -> tuple[Marginal, Array, dict[Column, int]]:
+    ) -> tuple[Marginal, Index, dict[Column, int]]:
         total = self.power * base.blocks.sum(axis=0)
         deviance = float(total[-1, -1]) + self.power * base.penalty
         asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
@@ -345,8 +345,8 @@ class _Posterior:
 
     def _variants(self, base: _Base) -> list[Variant]:
         out = []
-        setting = {e: {} for e in base.effects}
-        starts = {c: {} for c in base.columns if c[1].startswith(START_PREFIX)}
+        setting: dict[str, dict[str, float]] = {e: {} for e in base.effects}
+        starts: dict[Column, dict[str, float]] = {c: {} for c in base.columns if c[1].startswith(START_PREFIX)}
         for effect in self.library:
             for variant in _variants(effect, setting, starts):
                 if all(c in base.columns for c in variant[1]):

@@ -44,7 +44,7 @@ def fly(plant: str, law: str, scenario: str, seeds: list[int]) -> tuple[Array, A
         offsets[k, flying] = np.minimum(np.abs(infos["offset"][flying]), LOST_OFFSET)
         flying &= ~lost
     envs.close()
-    return np.sqrt(np.mean(offsets**2, axis=0)), ~flying
+    return np.asarray(np.sqrt(np.mean(offsets**2, axis=0))), (~flying).astype(np.float64)
 
 
 def flown(plant: str, law: str, given: argparse.Namespace) -> tuple[Array, Array]:

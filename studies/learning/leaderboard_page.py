@@ -245,12 +245,12 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
     tested = {n: one[3] for n, one in enumerate(asked) if one[3] is not None}
     corrected = dict(zip(tested, holm(list(tested.values())), strict=True))
     table = ["| asked | holds | measured | p, corrected |", "| ----- | ----- | -------- | - |"]
-    told = []
+    answers = []
     for n, (what, holds, measured, _) in enumerate(asked):
         holds = holds and corrected.get(n, 0.0) < _LEVEL
         p = f"{corrected[n]:.3f}" if n in corrected else "-"
-        told.append((holds, f"| {what} | {'yes' if holds else '**no**'} | {measured} | {p} |"))
-    table += [line for holds, line in sorted(told, key=lambda one: one[0])]
+        answers.append((holds, f"| {what} | {'yes' if holds else '**no**'} | {measured} | {p} |"))
+    table += [line for holds, line in sorted(answers, key=lambda one: one[0])]
     return (
         "## What was asked\n\nWhat does not hold stands first. In parentheses: what it was trained "
         f"on. A comparison holds if its p-value, corrected for all {len(tested)} comparisons of "
