@@ -200,9 +200,10 @@ _define(
     ),
 )
 # as numba orders single numbers
-for _function, _sign in ((max, ">"), (min, "<")):
+_extremes: tuple[tuple[Any, str], ...] = ((max, ">"), (min, "<"))
+for _extreme, _sign in _extremes:
     _define(
-        _function,
+        _extreme,
         LANES,
         (LANES, LANES),
         lambda builder, a, b, sign=_sign: builder.select(builder.fcmp_ordered(sign, b, a), b, a),
@@ -327,6 +328,8 @@ class LaneRecord:
         shared: Sequence[str] = (),
         nested: Mapping[str, "LaneRecord"] | None = None,
     ) -> None:
+        self.dtype: np.dtype
+        self.record: Any
         self._lanes, self._shared, self._nested = tuple(lanes), tuple(shared), dict(nested or {})
         nested = self._nested
         forms: dict[str, Any] = {}

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from windwrench.controllers import make_controller
 from windwrench.dynamics.motion import Array
@@ -23,7 +24,7 @@ LAWS = ("hover", "admittance", "lead")
 _TOGETHER = 100
 
 
-def fly(plant: str, law: str, scenario: str, seeds: list[int]) -> tuple[Array, Array]:
+def fly(plant: str, law: str, scenario: str, seeds: list[int]) -> tuple[Array, NDArray[np.bool_]]:
     """Return RMSE (n,), m, and whether the vehicle was lost (n,) of one episode a seed.
 
     A lost vehicle's remaining time counts at 2.5 m, as in the benchmark.
@@ -47,7 +48,7 @@ def fly(plant: str, law: str, scenario: str, seeds: list[int]) -> tuple[Array, A
     return np.asarray(np.sqrt(np.mean(offsets**2, axis=0))), (~flying).astype(np.float64)
 
 
-def flown(plant: str, law: str, given: argparse.Namespace) -> tuple[Array, Array]:
+def flown(plant: str, law: str, given: argparse.Namespace) -> tuple[Array, NDArray[np.bool_]]:
     """Return what ``fly`` does for all episodes, from the file where there is one."""
     path = given.out / f"{given.scenario}-{law}-{plant}.json"
     if path.exists():
