@@ -346,7 +346,8 @@ class _Posterior:
     def _variants(self, base: _Base) -> list[Variant]:
         out = []
         setting: dict[str, dict[str, float]] = {e: {} for e in base.effects}
-        starts: dict[Column, dict[str, float]] = {c: {} for c in base.columns if c[1].startswith(START_PREFIX)}
+        from_start = [c for c in base.columns if c[1].startswith(START_PREFIX)]
+        starts: dict[Column, dict[str, float]] = {c: {} for c in from_start}
         for effect in self.library:
             for variant in _variants(effect, setting, starts):
                 if all(c in base.columns for c in variant[1]):

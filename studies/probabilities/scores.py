@@ -82,7 +82,8 @@ def _same(name: str) -> set[str]:
 
 def _is_right(x: dict[str, Any]) -> bool:
     """Return whether the likeliest set is the truth, or its exact equivalent."""
-    best: dict[str, Any] = max(x["sets"], key=lambda s: float(s["probability"]), default={"effects": []})
+    none: dict[str, Any] = {"effects": []}
+    best = max(x["sets"], key=lambda s: float(s["probability"]), default=none)
     found = set(best["effects"])
     truth = set(x["truth"])
     return len(found) == len(truth) and all(_same(name) & found for name in truth)
