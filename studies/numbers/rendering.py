@@ -4,6 +4,7 @@ import difflib
 import gzip
 import json
 import re
+import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -101,15 +102,14 @@ def _trials() -> str:
 
 
 def _close_loop() -> str:
+    from windwrench.studies.closed_loop.closed_loop import DEFAULT_EFFECTS
     from windwrench.studies.closed_loop.page import write_page
 
-    text = (DOCS / "close-loop.md").read_text(encoding="utf-8")
-    names = [path.name for path in (DOCS / "close-loop").glob("*.json")]
-    names.sort(key=lambda name: text.index(f"/{name})"))  # in the order of the flights
-    results = [kept(f"close-loop/{name}") for name in names]
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / "close-loop.md"
-        write_page(results, page.with_suffix(""), page)
+    with tempfile.TemporaryDirectory() as above:
+        folder = Path(above) / "close-loop"
+        shutil.copytree(DOCS / "close-loop", folder)
+        page = folder.with_suffix(".md")
+        write_page([kept(f"close-loop/{name}.json") for name in DEFAULT_EFFECTS], folder, page)
         return page.read_text(encoding="utf-8")
 
 
