@@ -21,6 +21,7 @@ from ..runtime.compiled import is_on_disk
 from ..runtime.errors import InputError, unknown_name
 from .episodes import DECISIONS, FIRST_TEST_SEED, Episode, benchmark_seeds, fly_episode
 from .side_by_side import each_flown
+from .side_by_side import write_leaderboard as write_leaderboard  # from here, too, as at first
 
 _CHUNK = 5  # episodes that a worker flies at a time
 _SAMPLE = 25  # decisions by which a duration is told

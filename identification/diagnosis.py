@@ -95,10 +95,10 @@ class DiagnosisSettings:
     least_share_of_residual: float = 0.1
     most_signature_points: int = 600
     least_rotor_time_offset: float = 0.001  # s, worth a note
+    most_period_ratio: float = 1.01  # between logs that one filter of the posterior reads
 
 
 DIAGNOSIS = DiagnosisSettings()
-_MOST_PERIOD_RATIO = 1.01  # between logs that one filter reads
 FILTERED_NAMES = (
     "the pose was filtered before the log was written. Whether the named effects act on the "
     "vehicle, or follow from feedback-induced correlation, shows only in the sensors' "
@@ -298,7 +298,7 @@ def _probabilities(
     if flights.commanded or flights.inertial or flights.filtered or flights.vehicle.effects:
         return None
     periods = [log.period for log in flights.logs]
-    if max(periods) > _MOST_PERIOD_RATIO * min(periods):
+    if max(periods) > DIAGNOSIS.most_period_ratio * min(periods):
         return None
     report("asking how probable each effect is")
     found = rank(flights, search.library, report=report)

@@ -77,7 +77,7 @@ _PLANT = LaneRecord(
 _FLIGHT = LaneRecord(
     FLIGHT,
     ("setpoint", "sum", "yaw_sum", "rotation", "command"),
-    ("body", "unmixing", "omega_max", *FlightGains.__dataclass_fields__),
+    ("body", "unmixing", "omega_max", "foreseen", *FlightGains.__dataclass_fields__),
 )
 _FAN = LaneRecord(
     FAN,

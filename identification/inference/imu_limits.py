@@ -8,6 +8,8 @@ second turns and stretches what the model says acts: errors drawn anew from the 
 deviations move the coefficients, and by how much is part of their own.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +29,15 @@ from .sensor_bias import is_bias
 
 Array = NDArray[np.float64]
 
-_DRAWS = 8  # of the fusion's errors: a standard deviation of them is then known to a quarter
+
+@dataclass(frozen=True)
+class ImuLimitsSettings:
+    """How the errors of a fused motion are drawn."""
+
+    draws: int = 8  # a standard deviation of them is then known to a quarter
+
+
+IMU_LIMITS = ImuLimitsSettings()
 
 
 def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
@@ -80,7 +90,7 @@ def with_errors_of_fusion(search: Search, fit: FittedEffects) -> FittedEffects:
     here = change(flights)
     moved = [
         change(flights.with_drift(np.random.default_rng((2, draw)))) - here
-        for draw in range(_DRAWS)
+        for draw in range(IMU_LIMITS.draws)
     ]
     spread = np.sqrt(np.mean(np.square(moved), axis=0))
     std = {

@@ -83,6 +83,13 @@ def wind_section(folder: Path, where: str) -> list[str]:
         "",
         f"![Tracking before and after, each effect]({where}/{_PICTURE}.png)",
         "",
+        "Data: "
+        + ", ".join(
+            f"[{setting.title}]({where}/{result_path(folder, setting).name})"
+            for setting, _ in found
+        )
+        + ".",
+        "",
     ]
     for setting, result in found:
         lines += [f"### {setting.title}", "", _table(result), ""]

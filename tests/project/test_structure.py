@@ -32,6 +32,7 @@ STOREYS = (
     {"inertial_wrench"},
     {"wrench_series"},
     {"prediction", "inference", "comparison", "rotor_faults", "vehicle_fit"},
+    {"posterior"},
     {"diagnosis"},
     {"report"},
     {"fleet"},

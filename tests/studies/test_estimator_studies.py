@@ -188,10 +188,10 @@ def test_a_fitted_tuning_is_near_the_best_and_bad_poses_are_refused(monkeypatch)
     assert jumped[0]["after_s"] == pytest.approx(0.6, abs=0.05)
 
 
-def test_faults_are_counted(monkeypatch):
+def test_faults_are_counted(monkeypatch, tmp_path):
     monkeypatch.setattr(faults_study, "FILTERS", {"ekf": faults_study.FILTERS["ekf"]})
     monkeypatch.setattr(faults_study, "LONGEST", 2.0)
-    result = faults_study.run(4, 2000, 0, silent)
+    result = faults_study.run(4, 2000, 0, tmp_path)
     (row,) = result["sequences"]
     assert row["not_finite"] == 0
     assert row["count"] == 4

@@ -263,7 +263,15 @@ def test_the_numbers(reports):
         "vehicle.yaml",
     ]
     data = strict(paths[0])
-    assert list(data)[:5] == ["verdict", "remainder", "effects", "error", "advice"]
+    assert list(data)[:7] == [
+        "verdict",
+        "remainder",
+        "effects",
+        "alternatives",
+        "unknown",
+        "error",
+        "advice",
+    ]
     assert (data["verdict"], data["remainder"]) == ("explained", "random")
     (effect,) = data["effects"]
     assert list(effect) == [
