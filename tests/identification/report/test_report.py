@@ -283,6 +283,7 @@ def test_the_numbers(reports):
         "indistinguishable_from",
         "evidence",
         "channels",
+        "probability",
     ]
     assert effect["name"] == "rotor_drag"
     assert effect["coefficients"] == pytest.approx(DRAG, rel=0.2)
