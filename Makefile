@@ -8,14 +8,16 @@ BIN := $(VENV)/bin
 demo: $(VENV)/.installed
 	$(BIN)/windwrench demo --out results/demo
 
+# processes that share the tests; 0: none beside the first
+WORKERS ?= auto
 # one thread of linear algebra for each worker, or they wait for one another
-PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
+PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 COVERAGE = --cov --cov-report=term-missing:skip-covered --cov-fail-under=88
 # folders that neither diagnose, train, draw, nor start programs
 FAST = tests/controllers tests/dynamics tests/estimator tests/identification/logs tests/identification/motion \
 	tests/runtime tests/evaluation/test_statistics.py tests/project/test_structure.py
 
-# all but the marked slow: some 25 minutes of processor time, half of it compiling, and nearly all lines
+# all but the marked slow: some 18 minutes of processor time, 4 of them compiling, and nearly all lines
 test: $(VENV)/.tested
 	$(PYTEST) -m "not slow"
 

@@ -1,5 +1,6 @@
 """What holds for the whole suite."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -13,6 +14,8 @@ COMPILED = (
 def pytest_configure(config):
     """Compile what most files need before workers start, or each of them compiles it; a part of
     the suite compiles what it needs.
+
+    Lines of the compiler's own would be followed for nothing where lines are counted.
     """
     hear_interrupts()
     whole = config.args == ["tests"]
@@ -21,10 +24,13 @@ def pytest_configure(config):
         and getattr(config.option, "numprocesses", None)
         and not hasattr(config, "workerinput")
     ):
+        counted = ("COVERAGE_PROCESS_", "COV_CORE_")
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(counted)}
         running = [
             subprocess.Popen(
                 [sys.executable, "-c", source],
                 cwd=config.rootpath,
+                env=environment,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
