@@ -75,6 +75,7 @@ from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
+from .wrench_series import pose_notes
 
 Array = NDArray[np.float64]
 
@@ -146,6 +147,7 @@ def diagnose(
     flights = Flights(logs, vehicle, test)
     notes = [*(f"{log.name}: {note}" for log in flights.logs for note in log.notes), *doubts]
     notes += [f"{log.name}: {note}" for log in every for note in filtering_notes(log)]
+    notes += [f"{log.name}: {note}" for log in every for note in pose_notes(log, vehicle)]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = find_effects(search)
     rotor_delay = delay_kind(search, fit)

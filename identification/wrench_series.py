@@ -181,6 +181,21 @@ def _by_imu(
     )
 
 
+def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
+    """Return what ``estimate_log`` notes of a log's poses: how many jump from those before, and
+    where its filter restarted. For answers of other kinds from the same log; none of one whose
+    motion is that of its IMU.
+
+    Raises:
+        InputError: as ``estimate_log``.
+    """
+    if reads_imu(log):
+        return ()
+    series = estimate_log(log, vehicle)
+    restarts = log.t[series.status == STATUSES.index("restarted")]
+    return tuple(_notes(log, series.status, restarts.tolist(), False))
+
+
 def counts(series: WrenchSeries) -> dict[str, int]:
     """Return how many rows have each status: tracking, coasting, rejected, restarted."""
     return {name: int(np.sum(series.status == i)) for i, name in enumerate(STATUSES)}

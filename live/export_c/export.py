@@ -25,6 +25,7 @@ from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
+from ...estimator.recovery import AGREEING as AGREEING_POSES
 from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
@@ -116,6 +117,7 @@ def export_c(
         "mass": literal(float(made.record[0]["body"]["mass"])),
         "hover_speed": literal(float(made.record[0]["last_speeds"][0])),
         "agreeing": AGREEING,
+        "agreeing_poses": AGREEING_POSES,
         "offset": bool(np.any(made.record[0]["body"]["com"] != 0.0)),
         "pairs": 12 if wrench else 6,
         "wrench": wrench,

@@ -19,6 +19,10 @@ def study(
     out: Annotated[Path, typer.Option(help="Folder of data and picture.")] = Path(
         "docs/log-estimates"
     ),
+    poses_only: Annotated[
+        bool,
+        typer.Option("--poses-only", help="Keep the accuracy by tuning from data that lie there."),
+    ] = False,
     page_only: Annotated[
         bool, typer.Option("--page-only", help="Write the page from data that lie there.")
     ] = False,
@@ -27,7 +31,8 @@ def study(
     data = out / "results.json"
     if not page_only:
         with share_bars_by_part() as report:
-            write_json(run(seconds, flights, seed, report), data)
+            measured = read_json(data, "results of this study") if poses_only else None
+            write_json(run(seconds, flights, seed, report, measured), data)
     result = read_json(data, "results of this study")
     picture = write_figure(draw(result), out, "errors")
     write_page(result, data, picture, out.with_suffix(".md"))

@@ -163,7 +163,7 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
     lines = [
         "# How good the wrench from a log is",
         "",
-        made_by(command, [result["commit"]], result["version"]),
+        made_by(command, [result["commit"], result.get("poses_commit")], result["version"]),
         "",
         "`windwrench estimate` reads a log, and `--tune` fits the filter's noise to it "
         "([the filter](estimator.md)). Here the true wrench is known.",

@@ -1,7 +1,7 @@
 """Accuracy on RotorPy's flights with given, fitted and best tuning, and the cost of bad poses."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -121,24 +121,22 @@ def accuracy(seconds: float, seed: int, progress: Callable[[float], None]) -> li
     return rows
 
 
-def outliers(
-    seconds: float, seed: int, flights: int, progress: Callable[[float], None]
-) -> list[Result]:
-    """Return what bad poses cost: the error of the force over that of the clean log, on the rows
-    that count, gate and no gate, with an interval over the flights.
-    """
-    kinds: list[tuple[str, list[Flight]]] = [
-        (name, [plant_flight(name, seconds, seed + i) for i in range(flights)])
-        for name in PLANT_VEHICLES
-    ]
+def groups(seconds: float, seed: int, flights: int) -> Iterator[tuple[str, list[Flight]]]:
+    """Yield the flights whose poses are spoiled, by the name that a group of them has."""
+    for name in PLANT_VEHICLES:
+        yield name, [plant_flight(name, seconds, seed + i) for i in range(flights)]
     fast = list(rotorpy_flights(seconds, seed))
-    kinds.append(("RotorPy, default tuning", fast))
-    kinds.append(
-        (
-            "RotorPy, tuning fitted to the clean log",
-            [replace(f, tuning=tune_to_log(f.log, f.vehicle).tuning) for f in fast],
-        )
+    yield "RotorPy, default tuning", fast
+    yield (
+        "RotorPy, tuning fitted to the clean log",
+        [replace(f, tuning=tune_to_log(f.log, f.vehicle).tuning) for f in fast],
     )
+
+
+def outliers(name: str, group: Sequence[Flight], seed: int) -> list[Result]:
+    """Return what bad poses cost a group of flights: the error of the force over that of the clean
+    log, on the rows that count, gate and no gate, with an interval over the flights.
+    """
     cases: list[tuple[str, Spoil]] = [
         (f"{100 * SHARE:g} % of the poses {100 * FAR:g} cm off", _isolated)
     ]
@@ -160,21 +158,19 @@ def outliers(
         return errors(series, flight.log, "force")
 
     rows = []
-    for name, group in kinds:
-        clean = [{k: error(f, f.log, options) for k, options in filters} for f in group]
-        for case, spoil in cases:
-            pairs: dict[str, list[tuple[float, float]]] = {label: [] for label, _ in filters}
-            for i, flight in enumerate(group):
-                spoiled, where = spoil(flight.log, np.random.default_rng([seed, i]))
-                for label, options in filters:
-                    pairs[label].append(
-                        (rms(error(flight, spoiled, options), where), rms(clean[i][label], where))
-                    )
-            rows.append(
-                {"flights": name, "count": len(group), "case": case}
-                | {label: _ratio(found, seed) for label, found in pairs.items()}
-            )
-            progress(len(rows) / (len(kinds) * len(cases)))
+    clean = [{k: error(f, f.log, options) for k, options in filters} for f in group]
+    for case, spoil in cases:
+        pairs: dict[str, list[tuple[float, float]]] = {label: [] for label, _ in filters}
+        for i, flight in enumerate(group):
+            spoiled, where = spoil(flight.log, np.random.default_rng([seed, i]))
+            for label, options in filters:
+                pairs[label].append(
+                    (rms(error(flight, spoiled, options), where), rms(clean[i][label], where))
+                )
+        rows.append(
+            {"flights": name, "count": len(group), "case": case}
+            | {label: _ratio(found, seed) for label, found in pairs.items()}
+        )
     return rows
 
 
@@ -244,18 +240,31 @@ def jumps(seconds: float, seed: int, flights: int) -> list[Result]:
     return rows
 
 
-def run(seconds: float, flights: int, seed: int, progress: Callable[[str, float], None]) -> Result:
-    """Return everything that the page says."""
+def run(
+    seconds: float,
+    flights: int,
+    seed: int,
+    progress: Callable[[str, float], None],
+    measured: Result | None = None,
+) -> Result:
+    """Return everything that the page says; ``measured`` is an earlier result whose accuracy by
+    tuning is kept.
+    """
     made = commit()
+    poses: list[Result] = []
+    for i, (name, group) in enumerate(groups(seconds / 2, seed, flights)):
+        poses += outliers(name, group, seed)
+        progress("bad poses", (i + 1) / (len(PLANT_VEHICLES) + 2))
     return {
-        "commit": made,
+        "commit": measured["commit"] if measured else made,
+        "poses_commit": made,
         "version": __version__,
         "seconds": seconds,
         "flights": flights,
         "seed": seed,
-        "accuracy": accuracy(seconds, seed, lambda share: progress("accuracy", share)),
-        "outliers": outliers(
-            seconds / 2, seed, flights, lambda share: progress("bad poses", share)
-        ),
+        "accuracy": measured["accuracy"]
+        if measured
+        else accuracy(seconds, seed, lambda share: progress("accuracy", share)),
+        "outliers": poses,
         "jumps": jumps(seconds / 2, seed, flights),
     }

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from tests.fuzz.answers import FAULTS, Fault, diagnosis_of, estimate_of, replay_of
+from tests.fuzz.answers import FAULTS, Fault, diagnosis_of, estimate_of, flight, replay_of, vehicle
+from windwrench.identification.wrench_series import estimate_log, pose_notes
 
 NAMED = {fault.name: fault for fault in FAULTS}
 
@@ -28,6 +30,20 @@ def test_another_wrench_is_told_from_the_unspoiled_one():
         "stronger", lambda log, rng: replace(log, rotor_speeds=1.05 * log.rotor_speeds), ("no",)
     )
     assert estimate_of(1, stronger, 0)[0] == "wrong"
+
+
+def test_a_diagnosis_is_told_of_poses_that_jump_as_an_estimate_is():
+    """Rows that are lost while times are counted as if none were; slow turns."""
+    lossy = NAMED["rows lost, times counted"].spoil(flight(3), np.random.default_rng([19, 3, 2]))
+    (said,) = [note for note in estimate_log(lossy, vehicle()).notes if "poses jump" in note]
+    assert said in pose_notes(lossy, vehicle())
+    assert not pose_notes(flight(3), vehicle())
+
+
+@pytest.mark.slow
+def test_a_clock_that_counts_lost_rows_is_not_diagnosed_unsaid():
+    outcome, words = diagnosis_of(3, NAMED["rows lost, times counted"], 19)
+    assert outcome == "noted", words
 
 
 @pytest.mark.slow
