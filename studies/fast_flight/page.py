@@ -59,6 +59,7 @@ def _full(force: Sequence[Mapping[str, Any]]) -> str:
                 _figure(row),
                 f"{row['rmse_below_5_hz']:.3f}",
                 f"{row['rmse_own_scale']:.3f}" if "rmse_own_scale" in row else "–",
+                f"{row['doubt']:.3f}" if "doubt" in row else "–",
                 "–" if network is None else f"{network:.3f}",
             ]
         )
@@ -68,6 +69,7 @@ def _full(force: Sequence[Mapping[str, Any]]) -> str:
         "N, full rate (95 %)",
         "below 5 Hz",
         "with the thrust scale of its first second",
+        "of it, coefficients' own uncertainty",
         "network",
     ]
     return _table(head, rows)
@@ -111,6 +113,7 @@ def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
         rows.append(
             [
                 row["flight"],
+                row["measured"],
                 row["vehicle"],
                 "smoothed" if row["smooth"] else "the past alone",
                 _figure(row),
@@ -121,6 +124,7 @@ def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
         )
     head = [
         "flight",
+        "measured",
         "vehicle",
         "estimate",
         "N, total force (95 %)",
