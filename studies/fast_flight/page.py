@@ -5,6 +5,7 @@ from typing import Any
 
 from .study import FULL, MODELS, PUBLISHED, SETTINGS
 
+_ALLOWED = 1.5  # times the published estimator's error, of the past alone
 _WAYS = {
     "others": "all other flights",
     "one": "{}",
@@ -20,7 +21,7 @@ def tables(found: Mapping[str, Any]) -> str:
     parts = [_losses(force, flights), _full(force), _nested(force, flights)]
     parts.append(_coefficients(force))
     if found["filter"]:
-        parts.append(_filter(found["filter"]))
+        parts += [_filter_losses(found["filter"]), _filter(found["filter"])]
     parts.append(_pose(found["pose"]))
     return "\n\n".join(parts)
 
@@ -104,6 +105,20 @@ def _coefficients(force: Sequence[Mapping[str, Any]]) -> str:
     rows = [[name, f"{value:.3g}"] for name, value in row["coefficients"].items()]
     rows.append(["low-pass of the logged force", f"{row['cutoff_hz']:g} Hz"])
     return _table(["coefficient, fitted on all flights", "value"], rows)
+
+
+def _filter_losses(filtered: Sequence[Mapping[str, Any]]) -> str:
+    """Say where the filter on the past alone stays above what the published estimator allows it."""
+    lines = []
+    for row in filtered:
+        published = _published(row["flight"], 1)
+        if published and not row["smooth"] and row["rmse"] > _ALLOWED * published:
+            lines.append(
+                f"* {row['flight']}, {row['measured']} measured, {row['vehicle']}: "
+                f"{row['rmse'] / published:.2f} times {published:.3f} N"
+            )
+    head = f"Above {_ALLOWED:g} times the published estimator, of the past alone: {len(lines)}."
+    return head + "".join(f"\n{line}" for line in lines)
 
 
 def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
