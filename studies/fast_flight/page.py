@@ -152,10 +152,22 @@ def _filter(filtered: Sequence[Mapping[str, Any]]) -> str:
 
 def _pose(flights: Sequence[Mapping[str, Any]]) -> str:
     rows = [
-        [row["flight"], f"{row['seconds']:.0f}", f"{row['fastest']:.1f}", f"{row['rmse']:.3f}"]
+        [
+            row["flight"],
+            f"{row['seconds']:.0f}",
+            f"{row['fastest']:.1f}",
+            f"{row['rmse']:.3f}",
+            f"{1e3 * row['position_noise']:.3f}",
+        ]
         for row in flights
     ]
-    head = ["flight", "s", "fastest, m/s", "force against that of its own velocity, N"]
+    head = [
+        "flight",
+        "s",
+        "fastest, m/s",
+        "force against that of its own velocity, N",
+        "position against its own velocity, above 5 Hz, mm an axis",
+    ]
     return _table(head, rows)
 
 

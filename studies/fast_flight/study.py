@@ -269,7 +269,8 @@ def filtered(flight: Flight, log: FlightLog, flown: Vehicle) -> list[dict[str, A
 
 def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, Any]]:
     """Return by how much each flight's force differs from that of its own velocity, differentiated:
-    what no estimate from the motion can lower. With it how long and fast it flew.
+    what no estimate from the motion can lower. With it how long and fast it flew, and what position
+    has above a frequency that the integral of velocity has not.
     """
     gravity = np.array([0.0, 0.0, vehicle.gravity])
     rows = []
@@ -278,12 +279,15 @@ def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, An
         acceleration = derivative(s.velocity, s.period)
         needed = vehicle.mass * np.einsum("nji,nj->ni", s.rotation, acceleration + gravity)
         inside = slice(round(0.25 / s.period), -round(0.25 / s.period))
+        apart = s.position - velocity_log(flight).position
+        apart -= low_pass(apart, CUTOFFS.residual_hz, s.period)
         rows.append(
             {
                 "flight": flight.name,
                 "seconds": float(s.t[-1] - s.t[0]),
                 "fastest": float(np.linalg.norm(s.velocity, axis=1).max()),
                 "rmse": rmse((flight.force - needed)[inside]),
+                "position_noise": rmse(apart[inside]) / np.sqrt(3.0),
             }
         )
     return rows
