@@ -7,12 +7,13 @@ specific force. The files may be measured with, and are not part of the project.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import Vehicle
@@ -105,6 +106,22 @@ def read_flight(path: Path, vehicle: Vehicle) -> Flight:
     )
     network = axes("network_force") if "network_force_x" in known else None
     return Flight(name, log, signals, vehicle.mass * specific, network)
+
+
+def pose_log(flight: Flight) -> FlightLog:
+    """Return a flight's log with pose and rotor speeds alone, as motion capture has them."""
+    return replace(flight.log, accelerometer=None, gyro=None)
+
+
+def velocity_log(flight: Flight) -> FlightLog:
+    """Return that log with the integral of the logged velocity in place of the position.
+
+    A filter that knows its motion from positions alone so measures the velocity: force depends on
+    no position, and what the integral drifts is slow.
+    """
+    s = flight.signals
+    moved = cumulative_trapezoid(s.velocity, s.t, axis=0, initial=0.0)
+    return replace(pose_log(flight), position=s.position[0] + moved)
 
 
 def gyro_delay(t: Array, rotation: Rotation, gyro: Array) -> float:

@@ -5,10 +5,11 @@ the force of these logs was filtered before it was written, by how much is fitte
 coefficients. A nuisance is fitted with them: a share of thrust of each flight's own, of mean zero
 over the flights. A flight that the fit did not see is predicted without one.
 
-Each coefficient has a normal prior about zero, of the library's typical size. What a flight hardly
-shows so stays small, where free least squares would take it as far as noise goes. How much data
-weighs against the prior follows from the residual itself: its variance over blocks longer than it
-remembers, which is far more than that of independent samples.
+Each coefficient has a normal prior: of a given mean and deviation (``blade_element``), else about
+zero and of the library's typical size. What a flight hardly shows so stays near it, where free
+least squares would take it as far as noise goes. How much data weighs against the prior follows
+from the residual itself: its variance over blocks longer than it remembers, which is far more than
+that of independent samples.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,10 +24,10 @@ from windwrench.dynamics.effects import get
 from windwrench.identification.motion.residual import acting_wrench, model_wrench
 from windwrench.identification.motion.smoothing import low_pass
 
+from .blade_element import Coefficient, Priors
 from .flights import Flight
 
 Array = NDArray[np.float64]
-Coefficient = tuple[str, str]  # effect and coefficient
 Rows = tuple[Flight, slice]
 
 CUTOFFS_HZ = (5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 15.0)
@@ -44,6 +45,8 @@ class ForceModel:
     coefficients: Mapping[Coefficient, float]
     cutoff_hz: float | None  # None: none
     own_scales: Mapping[str, float]  # by flight: share of thrust that it alone has
+    # (p, p) of the coefficients over their typical sizes, were the model true and without bounds
+    covariance: Array
 
     def vehicle(self, declared: Vehicle) -> Vehicle:
         """Return the vehicle with these effects."""
@@ -100,7 +103,11 @@ class Regression:
     """
 
     def __init__(
-        self, flights: Sequence[Flight], declared: Vehicle, coefficients: Sequence[Coefficient]
+        self,
+        flights: Sequence[Flight],
+        declared: Vehicle,
+        coefficients: Sequence[Coefficient],
+        priors: Priors | None = None,
     ) -> None:
         self.declared, self.coefficients = declared, tuple(coefficients)
         known = [
@@ -108,6 +115,14 @@ class Regression:
             for effect, name in coefficients
         ]
         self._scale = np.array([c.typical[0] or 1.0 for c in known])
+        stated = [(priors or {}).get(key) for key in self.coefficients]
+        means = [0.0 if prior is None else prior[0] for prior in stated]
+        self._mean = np.array(means) / self._scale
+        deviations = [
+            size if prior is None else prior[1]
+            for prior, size in zip(stated, self._scale, strict=True)
+        ]
+        self._precision = np.square(self._scale / np.array(deviations))
         self._low = np.array([c.minimum for c in known]) / self._scale
         self._high = np.array([c.maximum for c in known]) / self._scale
         self._low, self._high = (
@@ -150,9 +165,9 @@ class Regression:
 
     def _solve(
         self, rows: Sequence[Rows], cutoff_hz: float | None
-    ) -> tuple[Array, dict[str, float], float]:
-        """Return coefficients over their typical sizes, each flight's own share of thrust, and the
-        mean square of what is left.
+    ) -> tuple[Array, dict[str, float], Array, float]:
+        """Return coefficients over their typical sizes, each flight's own share of thrust, the
+        coefficients' covariance, and the mean square of what is left.
         """
         names = list(dict.fromkeys(flight.name for flight, _ in rows))
         p, own = len(self._at), len(names) - 1
@@ -176,14 +191,17 @@ class Regression:
             noise = float(np.mean(np.square(parts[:, -1] - parts[:, :-1] @ x)))
         shares = [*x[p:], -float(np.sum(x[p:]))]
         loss = (whole - 2.0 * float(x @ h) + float(x @ G @ x)) / count
-        return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, loss
+        known = G / noise + np.diag(np.concatenate([self._precision, np.zeros(own)]))
+        covariance = np.linalg.inv(known)[:p, :p]
+        return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, covariance, loss
 
     def _bounded(self, G: Array, h: Array, noise: float, p: int) -> Array:
         """Return the likeliest coefficients over their typical sizes and shares of thrust within
         their ranges, at a variance (N2) of the noise.
         """
         own = len(h) - p
-        G = G + np.diag(np.repeat([noise, 0.0], [p, own]))
+        G = G + np.diag(np.concatenate([noise * self._precision, np.zeros(own)]))
+        h = h + np.concatenate([noise * self._precision * self._mean, np.zeros(own)])
         size = np.sqrt(np.diag(G)) + 1e-12
         root = np.linalg.cholesky(G / np.outer(size, size) + 1e-10 * np.eye(p + own))
         free = np.full(own, np.inf)
@@ -203,6 +221,15 @@ class Regression:
     ) -> ForceModel:
         """Return the model that leaves least of the force at some rows of some flights."""
         solved = [(*self._solve(rows, cutoff), cutoff) for cutoff in cutoffs_hz]
-        at, shares, _, cutoff_hz = min(solved, key=lambda found: found[2])
+        at, shares, covariance, _, cutoff_hz = min(solved, key=lambda found: found[3])
         values = (float(x) for x in at * self._scale)
-        return ForceModel(dict(zip(self.coefficients, values, strict=True)), cutoff_hz, shares)
+        coefficients = dict(zip(self.coefficients, values, strict=True))
+        return ForceModel(coefficients, cutoff_hz, shares, covariance)
+
+    def doubt(self, model: ForceModel, flight: Flight) -> float:
+        """Return the RMS (N, vector) by which the force on a flight is uncertain since a model's
+        coefficients are, were the model true.
+        """
+        slopes = self._filtered(flight, model.cutoff_hz)[1][..., :-1]
+        variance = np.einsum("nai,ij,naj->", slopes, model.covariance, slopes) / len(slopes)
+        return float(np.sqrt(variance))

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from windwrench.dynamics import EffectSetting, Vehicle, load_vehicle
 from windwrench.dynamics.effects import Role, playing
+from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import acting_wrench
 from windwrench.identification.motion.smoothing import CUTOFFS, derivative, low_pass
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
 from windwrench.runtime.errors import InputError
 
-from .flights import Flight, read_flight
+from .blade_element import priors
+from .flights import Flight, pose_log, read_flight, velocity_log
 from .force_fit import Coefficient, ForceModel, Regression, Rows
 
 Array = NDArray[np.float64]
@@ -132,7 +134,7 @@ def force_study(
     rows: list[dict[str, Any]] = []
     for label, (coefficients, filtered) in MODELS.items():
         report(f"fitting: {label}")
-        regression = Regression(flights, vehicle, coefficients)
+        regression = Regression(flights, vehicle, coefficients, priors(vehicle))
 
         def fit(
             parts: Sequence[Rows], of: Regression = regression, smoothed: bool = filtered
@@ -154,6 +156,7 @@ def force_study(
                 scale = own_scale(test, predicted, thrust)
                 rows.append(_row(label, test, way, on, test.force - predicted, model, scale))
                 rows[-1]["rmse_own_scale"] = rmse(test.force - predicted - scale * thrust)
+                rows[-1]["doubt"] = regression.doubt(model, test)
             rows.append(_row(label, test, "blocks", "", _blocks(test, others, fit, vehicle), None))
     for flight in flights:
         if flight.network is not None:
@@ -213,51 +216,61 @@ def filter_study(
     fits: Mapping[str, Mapping[str, float]],
     report: Callable[[str], None],
 ) -> list[dict[str, Any]]:
-    """Return the error of the filter's total force on each flight: with the declared vehicle, with
-    the effects fitted on the other flights, and with those but the centre of mass; of the past
-    alone and smoothed. Beside the whole error stand its parts below and above a frequency.
+    """Return the error of the filter's total force on each flight, of the past alone and smoothed:
+    by what it measures, pose or attitude and velocity, and with the declared vehicle or with what
+    was fitted on the other flights, but for the centre of mass. Beside the whole error stand its
+    parts below and above a frequency.
 
     Total force is what rotors and declared effects give plus the estimated external force. The
-    filter sees pose and rotor speeds alone: the accelerometer is what it is compared with.
+    accelerometer is left out: it is what the filter is compared with.
     """
     rows = []
     for flight in flights:
-        log = replace(flight.log, accelerometer=None, gyro=None)
-        named = fits[flight.name]
-        centred = {key: x for key, x in named.items() if key.partition(".")[0] not in _OFF_CENTRE}
-        for label, flown in (
-            ("declared vehicle", vehicle),
-            ("with named effects", _with_fit(vehicle, named)),
-            ("but the centre of mass", _with_fit(vehicle, centred)),
-        ):
-            report(f"filtering: {flight.name}, {label}")
-            tuning = tune_to_log(log, flown).tuning
-            for smooth in (False, True):
-                series = estimate_log(log, flown, tuning, smooth=smooth)
-                total = _total(flight, flown, series.force)
-                kept = flight.signals.t >= flight.signals.t[0] + SETTINGS.settled
-                error = total - flight.force
-                slow = low_pass(error, SETTINGS.split_hz, flight.signals.period)
-                residual = error[kept]
-                rows.append(
-                    {
-                        "flight": flight.name,
-                        "vehicle": label,
-                        "smooth": smooth,
-                        "rmse": rmse(residual),
-                        "rmse_slow": rmse(slow[kept]),
-                        "rmse_fast": rmse((error - slow)[kept]),
-                        "interval": interval(
-                            residual, flight.signals.period, np.random.default_rng(0)
-                        ),
-                    }
-                )
+        named = {
+            key: x
+            for key, x in fits[flight.name].items()
+            if key.partition(".")[0] not in _OFF_CENTRE
+        }
+        for measured, log in (("pose", pose_log(flight)), ("velocity", velocity_log(flight))):
+            for label, flown in (
+                ("declared vehicle", vehicle),
+                ("with named effects", _with_fit(vehicle, named)),
+            ):
+                report(f"filtering: {flight.name}, {measured}, {label}")
+                for row in filtered(flight, log, flown):
+                    rows.append({"measured": measured, "vehicle": label, **row})
+    return rows
+
+
+def filtered(flight: Flight, log: FlightLog, flown: Vehicle) -> list[dict[str, Any]]:
+    """Return the error of the total force, of the past alone and smoothed, of a filter that is
+    tuned to a flight's log and knows a vehicle.
+    """
+    s = flight.signals
+    kept = s.t >= s.t[0] + SETTINGS.settled
+    tuning = tune_to_log(log, flown).tuning
+    rows = []
+    for smooth in (False, True):
+        series = estimate_log(log, flown, tuning, smooth=smooth)
+        error = _total(flight, flown, series.force) - flight.force
+        slow = low_pass(error, SETTINGS.split_hz, s.period)
+        rows.append(
+            {
+                "flight": flight.name,
+                "smooth": smooth,
+                "rmse": rmse(error[kept]),
+                "rmse_slow": rmse(slow[kept]),
+                "rmse_fast": rmse((error - slow)[kept]),
+                "interval": interval(error[kept], s.period, np.random.default_rng(0)),
+            }
+        )
     return rows
 
 
 def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, Any]]:
     """Return by how much each flight's force differs from that of its own velocity, differentiated:
-    what no estimate from the motion can lower. With it how long and fast it flew.
+    what no estimate from the motion can lower. With it how long and fast it flew, and what position
+    has above a frequency that the integral of velocity has not.
     """
     gravity = np.array([0.0, 0.0, vehicle.gravity])
     rows = []
@@ -266,12 +279,15 @@ def pose_study(flights: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, An
         acceleration = derivative(s.velocity, s.period)
         needed = vehicle.mass * np.einsum("nji,nj->ni", s.rotation, acceleration + gravity)
         inside = slice(round(0.25 / s.period), -round(0.25 / s.period))
+        apart = s.position - velocity_log(flight).position
+        apart -= low_pass(apart, CUTOFFS.residual_hz, s.period)
         rows.append(
             {
                 "flight": flight.name,
                 "seconds": float(s.t[-1] - s.t[0]),
                 "fastest": float(np.linalg.norm(s.velocity, axis=1).max()),
                 "rmse": rmse((flight.force - needed)[inside]),
+                "position_noise": rmse(apart[inside]) / np.sqrt(3.0),
             }
         )
     return rows

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numba import cfunc
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
@@ -268,9 +269,15 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
     )
     leads = direction @ u[:2]
     assert leads.min() < 0.0 < leads.max()
-    lift = -W @ (kp * leads + kw * np.clip(-leads, 0.0, None))
+    # the induced velocity of momentum theory, and by how far it leans towards the followers
+    along = np.hypot(u[0], u[1])
+    needed = np.sum(VEHICLE.k * W**2) / (8.0 * 1.2 * np.pi * VEHICLE.rotor_radius**2)
+    induced = brentq(lambda v: v * np.hypot(along, u[2] + v) - needed, 0.0, 50.0)
+    back = np.arctan2(along, u[2] + induced)
+    lean = 2.0 * induced * np.tan(0.5 * back) / along
+    lift = -W @ (kp * lean * leads + kw * np.clip(-leads, 0.0, None))
     force, torque = wrench(setting("rotor_interaction", kp=kp, kw=kw), wind=wind)
-    np.testing.assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-12)
+    np.testing.assert_allclose(force, R @ [0.0, 0.0, lift], rtol=1e-9)
     np.testing.assert_allclose(torque, 0.0, atol=1e-15)
 
 

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.identification.motion.residual import acting_wrench
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.studies.fast_flight.flights import gyro_delay, read_flight
+from windwrench.studies.fast_flight import blade_element
+from windwrench.studies.fast_flight.flights import gyro_delay, read_flight, velocity_log
 from windwrench.studies.fast_flight.force_fit import Regression
 from windwrench.studies.fast_flight.page import tables
 from windwrench.studies.fast_flight.study import (
@@ -121,6 +123,71 @@ def test_coefficients_stay_within_their_ranges(tmp_path):
     assert model.coefficients["thrust_scale", "s"] >= -0.9
 
 
+def test_a_coefficient_that_no_flight_shows_keeps_its_prior(tmp_path):
+    noise = np.random.default_rng(0).standard_normal
+    flights = [read_flight(write_racer(tmp_path / f"flight_{k}.csv", k), VEHICLE) for k in (1, 2)]
+    flights = [replace(f, force=f.force + 0.1 * noise(f.force.shape)) for f in flights]
+    rho = ("ground_effect", "rho")  # they fly 20 m up
+    regression = Regression(flights, VEHICLE, (*TRUTH, rho), {rho: (2.5, 0.5)})
+    whole = [(flight, slice(None)) for flight in flights]
+    both, one = regression.fit(whole), regression.fit(whole[:1])
+    assert both.coefficients[rho] == pytest.approx(2.5, rel=1e-2)
+    assert both.coefficients["rotor_drag", "kdx"] == pytest.approx(1.2e-4, rel=0.03)
+    assert 0.0 < regression.doubt(both, flights[0]) < regression.doubt(one, flights[0])
+
+
+def test_the_thrust_of_blade_elements_is_that_of_momentum():
+    set_ = blade_element.SETTINGS
+    k, radius = 1.5e-6, 0.065
+    speed, edgewise, climb = np.array(
+        [[1100.0, 0.0, 0.0], [1100.0, 5.0, 2.0], [1600.0, 14.0, -5.0], [1600.0, 14.0, 5.0]]
+    ).T
+    thrust = blade_element.rotor_thrust(speed, edgewise, climb, k, radius, set_)
+    assert thrust[0] == pytest.approx(k * 1100.0**2, rel=1e-9)  # hover is as declared
+    area, slope = np.pi * radius**2, set_.solidity * set_.lift_slope
+    hover = np.sqrt(k / (2.0 * set_.density * area)) / radius  # induced over tip speed
+
+    def of_blades(w, along, through):
+        """Thrust by the integral of the blade over its radius, and not by its closed form."""
+        r = (np.arange(2000) + 0.5) / 2000
+        tip = w * radius
+        pitch = (2.0 * (2.0 * hover**2) / slope + hover / 2.0) * 3.0
+        lift = pitch * (r**2 + 0.5 * (along / tip) ** 2) - through / tip * r
+        return 0.5 * set_.density * area * tip**2 * slope * float(np.mean(lift))
+
+    for w, along, up, found in zip(speed, edgewise, climb, thrust, strict=True):
+        induced = brentq(
+            lambda v, w=w, along=along, up=up: (
+                of_blades(w, along, up + v) - 2 * set_.density * area * v * np.hypot(along, up + v)
+            ),
+            0.0,
+            30.0,
+        )
+        assert found == pytest.approx(of_blades(w, along, up + induced), rel=1e-5)
+
+
+def test_the_librarys_terms_come_near_to_blade_elements():
+    found = blade_element.project(VEHICLE)
+    assert found.left < 0.2 * found.change
+    known = blade_element.priors(VEHICLE)
+    assert known["inflow_thrust", "kz"][0] > 0.0
+    assert known["translational_lift", "kh"][0] > 0.0
+    assert known["body_drag", "cz"][0] > known["body_drag", "cx"][0]
+
+
+def test_the_velocity_log_measures_the_velocity_and_no_position(tmp_path):
+    flight = read_flight(write_racer(tmp_path / "flight_1.csv", 1), VEHICLE)
+    noise = 0.01 * np.random.default_rng(0).standard_normal(flight.log.position.shape)
+    jumping = replace(flight, log=replace(flight.log, position=flight.log.position + noise))
+    log = velocity_log(jumping)
+    assert log.accelerometer is None
+    assert log.gyro is None
+    np.testing.assert_array_equal(log.position, velocity_log(flight).position)
+    moved = np.diff(log.position, axis=0) / 0.005
+    v = flight.signals.velocity
+    np.testing.assert_allclose(moved, 0.5 * (v[1:] + v[:-1]), atol=1e-9)
+
+
 def test_a_gyro_that_lags_is_put_earlier():
     t, _, quaternion, _, _ = columns(3)
     rotation = Rotation.from_quat(quaternion, scalar_first=True)
@@ -175,6 +242,16 @@ def test_the_page_holds_a_figure_for_each_flight_and_model(tmp_path, monkeypatch
     for row in found["force"]:
         if row["model"] == FULL:
             assert f"{row['rmse']:.3f}" in text
+    row = {"flight": "flight_c", "measured": "pose", "vehicle": "declared vehicle"}
+    figures = {"interval": (0.1, 0.3), "rmse_slow": 0.1, "rmse_fast": 0.1}
+    found["filter"] = [
+        {**row, **figures, "smooth": False, "rmse": 0.2},
+        {**row, **figures, "smooth": True, "rmse": 0.2},
+        {**row, **figures, "smooth": False, "rmse": 0.11, "measured": "velocity"},
+    ]
+    text = tables(found)
+    assert "of the past alone: 1." in text
+    assert "* flight_c, pose measured, declared vehicle: 2.53 times 0.079 N" in text
     page.write_text("no marks")
     with pytest.raises(InputError, match="expected a page with one line"):
         put_between(text, page)
