@@ -20,7 +20,7 @@ from ..dynamics.mean_jet import (
     jet_table,
 )
 from ..runtime.compiled import Record, compiled
-from ..runtime.vector_lanes import any_of, choose, in_each_lane
+from ..runtime.vector_lanes import any_of, choose, corners
 
 Array = NDArray[np.float64]
 
@@ -90,19 +90,11 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 
 @compiled
-def _entry(table: Array, row: float, column: float) -> float:
-    value: float = table[int(row), int(column)]
-    return value
-
-
-_entry_of = in_each_lane(_entry)
-
-
-@compiled
 def _between(table: Array, i: float, j: float, a: float, b: float) -> float:
     """Return what a table says shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
-    value: float = (1 - a) * ((1 - b) * _entry_of(table, i, j) + b * _entry_of(table, i, j + 1)) + (
-        a * ((1 - b) * _entry_of(table, i + 1, j) + b * _entry_of(table, i + 1, j + 1))
+    near, far, near_after, far_after = corners(table, i, j)
+    value: float = (1 - a) * ((1 - b) * near + b * far) + (
+        a * ((1 - b) * near_after + b * far_after)
     )
     return value
 

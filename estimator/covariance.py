@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_for_vectors, compiled_inline
+from ..runtime.vector_lanes import first_below, first_column, lanes_by
 from .estimate import Array
 from .filter_record import N
 
@@ -48,9 +49,12 @@ def root_of_six(f: Record) -> None:
     P, S, M = f.P, f.S, f.M
     _six_columns(f, P[0:6], 0)
     for i in range(12):
-        for j in range(12):
+        for j in range(first_column(M, i), 12):
             M[i, j] = P[6 + i, 6 + j]
     _take_off(S, 0, M)
+    for i in range(12):
+        for j in range(first_column(M, i)):
+            M[i, j] = M[j, i]
 
 
 @compiled_for_vectors
@@ -88,7 +92,7 @@ def _take_off(S: Array, first: int, M: Array) -> None:
         a3, a4, a5 = S[first + 3, 6 + i], S[first + 4, 6 + i], S[first + 5, 6 + i]
         b0, b1, b2 = S[first, 7 + i], S[first + 1, 7 + i], S[first + 2, 7 + i]
         b3, b4, b5 = S[first + 3, 7 + i], S[first + 4, 7 + i], S[first + 5, 7 + i]
-        for j in range(12):
+        for j in range(first_column(M, i), 12):
             s0, s1, s2 = S[first, 6 + j], S[first + 1, 6 + j], S[first + 2, 6 + j]
             s3, s4, s5 = S[first + 3, 6 + j], S[first + 4, 6 + j], S[first + 5, 6 + j]
             M[i, j] -= (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
@@ -195,8 +199,7 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
 
 
 @compiled_for_vectors
-def carry_linear_part(f: Record, dt: float) -> None:
-    """Write ``A M A'`` into P, where A is the linear part of the model at ``f.centre_rotation``."""
+def _carry_linear_singly(f: Record, dt: float) -> None:
     Y, Z = f.Y, f.Z
     _linear_rows(f, dt, f.M, f.Y, 12)
     for i in range(
@@ -206,6 +209,23 @@ def carry_linear_part(f: Record, dt: float) -> None:
             Z[j, i] = Y[i, j]
             Z[j, i + 1] = Y[i + 1, j]
     _linear_rows(f, dt, f.Z, f.P, N)
+
+
+@compiled_for_vectors
+def _carry_linear_in_lanes(f: Record, dt: float) -> None:
+    """Do the same; without a copy of rows as columns, and without the attitude's columns, which
+    are zero.
+    """
+    P, Z = f.P, f.Z
+    _linear_rows(f, dt, f.M, Z.T, 12)
+    for i in range(N):
+        for j in range(3):
+            P[i, j] = 0.0
+    _linear_rows(f, dt, Z[:, 3:], P[:, 3:], N - 3)
+
+
+# write ``A M A'`` into P, where A is the linear part of the model at ``f.centre_rotation``
+carry_linear_part = lanes_by(_carry_linear_singly, _carry_linear_in_lanes)
 
 
 @compiled_for_vectors
@@ -227,7 +247,7 @@ def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
         a3, a4, a5 = sign * rows[r3, i], sign * rows[r4, i], sign * rows[r5, i]
         b0, b1, b2 = sign * rows[r0, i + 1], sign * rows[r1, i + 1], sign * rows[r2, i + 1]
         b3, b4, b5 = sign * rows[r3, i + 1], sign * rows[r4, i + 1], sign * rows[r5, i + 1]
-        for j in range(N):
+        for j in range(first_column(P, i), N):
             s0, s1, s2, s3, s4, s5 = (
                 rows[r0, j],
                 rows[r1, j],
@@ -236,8 +256,13 @@ def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
                 rows[r4, j],
                 rows[r5, j],
             )
-            P[i, j] += (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
-            P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
+            a = (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
+            b = (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
+            P[i, j] += a
+            P[i + 1, j] += b
+            if j >= first_below(P, i + 1):
+                P[j, i] += a
+                P[j, i + 1] += b
 
 
 @compiled_for_vectors
@@ -267,7 +292,7 @@ def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
         )
         b0, b1, b2 = E[k, i + 1], E[k + 1, i + 1], E[k + 2, i + 1]
         b3, b4, b5 = E[k + 3, i + 1], E[k + 4, i + 1], E[k + 5, i + 1]
-        for j in range(12):
+        for j in range(first_column(P, i), 12):
             s0, s1, s2, s3, s4, s5 = (
                 E[k, j],
                 E[k + 1, j],
@@ -276,8 +301,13 @@ def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
                 E[k + 4, j],
                 E[k + 5, j],
             )
-            P[i, j] += (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
-            P[i + 1, j] += (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
+            a = (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
+            b = (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
+            P[i, j] += a
+            P[i + 1, j] += b
+            if j >= first_below(P, i + 1):
+                P[j, i] += a
+                P[j, i + 1] += b
 
 
 @compiled_for_vectors

@@ -30,7 +30,7 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError
-from ..runtime.vector_lanes import all_of, any_of, choose
+from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
 from .bias_states import (
     begin_imu,
     carry_companions,
@@ -58,7 +58,7 @@ from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, mo
 from .imu import take_in_imu
 from .recovery import NOISE, Recovery, after_prediction, judge, remember
 from .sample import Sample, check_sample, undo_first_pose, undo_sensing
-from .sigma_points import errors_of_points, halve_pairs, propagate_points, spread_points
+from .sigma_points import PAIRS, errors_of_points, halve_pairs, propagate_points, spread_points
 from .tuning import UKFTuning
 
 
@@ -113,16 +113,48 @@ def carry(f: Record, dt: float) -> None:
     """Carry a filter without wrench effects ahead, its rotors' wrench and the matrix of its
     attitude being known.
     """
-    spread, weight, scale = _spread_of(f)
     root_of_six(f)
     move(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
+    _pairs(f, dt)
+    add_pairs(f)
+    _gather(f, dt)
+
+
+@compiled
+def _pairs_together(f: Record, dt: float) -> None:
+    """Write what six pairs of sigma points come to, all of them side by side."""
+    spread, weight, scale = _spread_of(f)
     spread_points(f, spread)
     propagate_points(f, dt)
     errors_of_points(f)
     halve_pairs(f, scale, weight)
-    add_pairs(f)
-    _gather(f, dt)
+
+
+@compiled
+def _pairs_one_by_one(f: Record, dt: float) -> None:
+    """Do the same where each number is a vector already: one point after the other, so that all of
+    them need no more memory than one.
+    """
+    spread, weight, scale = _spread_of(f)
+    x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
+    for i in range(N):
+        mean[i] = 0.0
+    for j in range(PAIRS):
+        for sign in range(2):
+            displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
+            quaternion_to_matrix(f.point[3:7], f.rotation)
+            move(f, f.point, dt, f.next)
+            error_from(f.next, f.centre, error[sign])
+        for i in range(N):
+            H[j, i] = scale * (error[0, i] - error[1, i])
+        for i in range(12):
+            total = error[0, i] + error[1, i]
+            E[j, i] = scale * total
+            mean[i] += weight * total  # (26)
+
+
+_pairs = lanes_by(_pairs_together, _pairs_one_by_one)
 
 
 @compiled
@@ -151,8 +183,11 @@ def _gather(f: Record, dt: float) -> None:
     P, mean = f.P, f.mean
     for i in range(12):
         a = mean[i]
-        for j in range(12):
-            P[i, j] -= a * mean[j]
+        for j in range(first_column(P, i), 12):
+            square = a * mean[j]
+            P[i, j] -= square
+            if j >= first_below(P, i):
+                P[j, i] -= square
     fold(f, f.centre, mean)
     symmetrise(P)
     f.x[NIS] = math.nan

@@ -266,36 +266,117 @@ def _any_of(condition: Any) -> Any:
     return lambda condition: bool(condition)
 
 
-def in_each_lane(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return what compiled code calls a compiled ``function(table, a, b)`` by, with single numbers
-    or lanes: a question that lanes cannot answer together, such as where to look in a table.
+def first_column(numbers: Any, i: int) -> int:
+    """Return the column from which on row ``i`` of a symmetric sum, of the size of ``numbers``
+    (n, n), is worked out.
+
+    With single numbers whole rows are: that is what a vector unit does well. Lanes fill it as they
+    are, and what lies below the diagonal has the numbers from above it, bit for bit.
+    """
+    return 0
+
+
+@overload(first_column, strict=False)
+def _first_column(numbers: Any, i: Any) -> Any:
+    if numbers.dtype == LANES:
+        return lambda numbers, i: i
+    return lambda numbers, i: 0
+
+
+_BEYOND = 1 << 62  # a constant: compilers then see that single numbers never come there
+
+
+def first_below(numbers: Any, i: int) -> int:
+    """Return the row from which on what was worked out in row ``i`` is to be put into column ``i``
+    as well; with single numbers beyond the last.
+    """
+    return _BEYOND
+
+
+@overload(first_below, strict=False)
+def _first_below(numbers: Any, i: Any) -> Any:
+    if numbers.dtype == LANES:
+        return lambda numbers, i: i + 1
+    return lambda numbers, i: _BEYOND
+
+
+def lanes_by(singly: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what compiled code calls one of two compiled functions of a record and a step in s by:
+    ``singly`` for a record of single numbers, ``lanes`` for one with lanes.
+
+    They do the same in another order of memory.
     """
 
-    @intrinsic
-    def lanes(_context: Any, table: Any, a: Any, b: Any) -> Any:
-        def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-            kind = signature(types.float64, given.args[0], types.float64, types.float64)
-
-            def one(*numbers: Any) -> Any:
-                return context.compile_internal(builder, singly, kind, [arguments[0], *numbers])
-
-            return _lane_by_lane(builder, one, *arguments[1:])
-
-        return LANES(table, a, b), generate
-
-    def singly(table: Any, a: Any, b: Any) -> Any:
-        return function(table, a, b)
-
-    def call(table: Any, a: Any, b: Any) -> Any:
-        return function(table, a, b)
+    def call(f: Any, dt: Any) -> Any:
+        return singly(f, dt)
 
     @overload(call, strict=False)
-    def _call(table: Any, a: Any, b: Any) -> Any:
-        if LANES in (a, b):
-            return lambda table, a, b: lanes(table, a, b)
-        return lambda table, a, b: function(table, a, b)
+    def _call(f: Any, dt: Any) -> Any:
+        if isinstance(f, _LaneRecord):
+            return lambda f, dt: lanes(f, dt)
+        return lambda f, dt: singly(f, dt)
 
     return call
+
+
+def corners(table: Any, i: Any, j: Any) -> Any:
+    """Return what stands in ``table`` (n, m), contiguous, at (i, j), (i, j + 1), (i + 1, j) and
+    (i + 1, j + 1); i and j are whole numbers as floats, each lane's own, and inside of it.
+    """
+    k, m = int(i), int(j)
+    return table[k, m], table[k, m + 1], table[k + 1, m], table[k + 1, m + 1]
+
+
+@intrinsic
+def _corners_in_lanes(_context: Any, table: Any, i: Any, j: Any) -> Any:
+    def generate(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        array = context.make_array(given.args[0])(context, builder, arguments[0])
+        columns = cgutils.unpack_tuple(builder, array.shape, 2)[1]
+        whole, place = ir.IntType(64), ir.IntType(32)
+        width = _splat(builder, builder.sitofp(columns, ir.DoubleType()), _VECTOR)
+        first = builder.fptosi(
+            builder.fadd(builder.fmul(arguments[1], width), arguments[2]),
+            ir.VectorType(whole, WIDTH),
+        )
+        pair = ir.VectorType(ir.DoubleType(), 2)
+        out = []
+        for row in range(2):
+            parts = []
+            for lane in range(WIDTH):
+                k = builder.extract_element(first, ir.Constant(place, lane))
+                k = builder.add(k, columns) if row else k
+                where = builder.bitcast(builder.gep(array.data, [k]), pair.as_pointer())
+                parts.append(builder.load(where, align=8))
+            while len(parts) > 1:  # neighbours beside each other
+                parts = [
+                    _shuffled(builder, a, b, list(range(2 * a.type.count)))
+                    for a, b in zip(parts[::2], parts[1::2], strict=True)
+                ]
+            all_of_row = parts[0]
+            out += [
+                _shuffled(builder, all_of_row, all_of_row, [2 * n + side for n in range(WIDTH)])
+                for side in range(2)
+            ]
+        return cgutils.pack_array(builder, out)
+
+    return types.UniTuple(LANES, 4)(table, i, j), generate
+
+
+def _shuffled(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places)
+    return builder.shuffle_vector(a, b, mask)
+
+
+@overload(corners, strict=False)
+def _corners(table: Any, i: Any, j: Any) -> Any:
+    if LANES in (i, j):
+        return lambda table, i, j: _corners_in_lanes(table, i, j)
+
+    def singly(table: Any, i: Any, j: Any) -> Any:
+        k, m = int(i), int(j)
+        return table[k, m], table[k, m + 1], table[k + 1, m], table[k + 1, m + 1]
+
+    return singly
 
 
 class _LaneRecord(types.Record):

@@ -14,7 +14,10 @@ from windwrench.runtime.vector_lanes import (
     all_of,
     any_of,
     choose,
-    in_each_lane,
+    corners,
+    first_below,
+    first_column,
+    lanes_by,
 )
 
 SINGLE = np.dtype(
@@ -29,15 +32,7 @@ SINGLE = np.dtype(
 )
 INNER = LaneRecord(SINGLE["inner"], ("more",), ("shift",))
 RECORD = LaneRecord(SINGLE, ("a", "b", "out"), ("gain", "count"), {"inner": INNER})
-TABLE = np.arange(12.0).reshape(3, 4)
-
-
-@njit
-def entry(table, a, b):
-    return table[int(a), int(b)]
-
-
-entry_of = in_each_lane(entry)
+TABLE = np.arange(12.0).reshape(3, 4) ** 2
 _at = RECORD.at
 
 
@@ -63,7 +58,10 @@ def work(f):
     more[3] = math.atan2(a, b) + shift
     more[4] = choose(a == b, 1.0, 0.0)
     inside = (abs(a) < 2.0) & (abs(b) < 3.0)
-    more[5] = entry_of(TABLE, choose(inside, abs(a), 0.0), choose(inside, abs(b), 0.0))
+    row = choose(inside, math.floor(abs(a)), 0.0)
+    column = choose(inside, math.floor(abs(b)), 0.0)
+    first, after, below, across = corners(TABLE, row, column)
+    more[5] = first + 1e3 * after + 1e6 * below + 1e9 * across
     more[6] = min(a, 0.5)
     if any_of(a > 5.0):
         out[11] = 1.0
@@ -136,7 +134,53 @@ def test_single_records_are_written_into_lanes_and_read_as_columns():
     assert records[1:].view(np.float64)[where + 2] == 4.0
 
 
+@njit
+def once(f, factor):
+    f.gain = factor
+
+
+@njit
+def twice(f, factor):
+    f.gain = 2.0 * factor
+
+
+by_kind = lanes_by(once, twice)
+
+
+@njit
+def fill(f, rows):
+    """A symmetric matrix of products, each of them worked out once in lanes."""
+    by_kind(f, 1.5)
+    for i in range(3):
+        for j in range(first_column(rows, i), 3):
+            f.inner.more[3 + i] += 1.0  # products that were worked out in this row
+            if j >= first_below(rows, i):
+                f.inner.more[j] += 1.0  # and put below the diagonal
+
+
+@njit
+def fill_lanes(address):
+    fill(_at(address), _at(address).out)
+
+
+@njit
+def fill_singly(records):
+    fill(records[0], records[0].out)
+
+
+def test_lanes_work_out_the_upper_half_and_single_numbers_all():
+    lanes, single = RECORD.zeros(1), np.zeros(1, SINGLE)
+    fill_lanes(lanes.ctypes.data)
+    fill_singly(single)
+    assert (lanes["gain"][0], single["gain"][0]) == (3.0, 1.5)
+    assert single["inner"]["more"][0].tolist() == [0, 0, 0, 3, 3, 3, 0]
+    assert lanes["inner"]["more"][0, :, 0].tolist() == [0, 1, 2, 3, 2, 1, 0]
+    assert first_column(single["out"], 2) == 0
+    assert first_below(single["out"], 2) > len(single["out"][0])
+
+
 def test_in_python_a_condition_is_one_truth():
     assert choose(True, 1, 2) == 1
     assert any_of(True)
     assert not all_of(False)
+    assert corners(TABLE, 1.0, 2.0) == (36.0, 49.0, 100.0, 121.0)
