@@ -251,11 +251,11 @@ def diagnose(
     probabilities: Annotated[
         bool,
         typer.Option(
-            "--probabilities",
-            help="Also say how probable each effect is, and that something unknown acts; it takes "
-            "some seconds a minute of flight. Not calibrated yet.",
+            "--probabilities/--no-probabilities",
+            help="Say how probable each name is, its alternatives, and that something unknown "
+            "acts; it takes some seconds a minute of flight.",
         ),
-    ] = False,
+    ] = True,
     vehicle: LogVehicleOption = None,
     fleet: Annotated[
         bool,
@@ -303,10 +303,6 @@ def diagnose(
         return _example(without or (), out, no_open, probabilities)
     if not logs:
         raise InputError("diagnose: expected at least one flight log, or --example")
-    if probabilities and (rotor_faults or fleet or against):
-        raise InputError(
-            "--probabilities: expected no --rotor-faults, --fleet or --against with it"
-        )
     if rotor_faults:
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
