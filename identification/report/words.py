@@ -328,5 +328,5 @@ def probability_sentences(diagnosis: Diagnosis) -> list[str]:
         *sets,
         f"Something acts that no effect of the library is: {percent(found.unknown)}.",
         "A probability is how often such a finding was right on simulated flights of which the "
-        "truth is known, a third of them with a cause outside the library.",
+        "truth is known, some of them with a cause outside the library.",
     ]
