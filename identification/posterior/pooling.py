@@ -33,18 +33,18 @@ class PoolingSettings:
 
     # below the likeliest set: no likelihood is so right that its tails further out count
     most_worse: float = 10.0
-    evidence: float = 0.55  # a nat of the posterior, between sets
-    sure: float = 2.7  # an effect that the search names
-    tentative: float = 0.59  # one that it names with a doubt
-    other: float = -2.97  # one that it does not name
+    evidence: float = 0.47  # a nat of the posterior, between sets
+    sure: float = 2.69  # an effect that the search names
+    tentative: float = -0.14  # one that it names with a doubt
+    other: float = -3.34  # one that it does not name
     # log odds that something unknown acts: where the residual is at its noise and all names are
     # sure, and what each sign adds
-    unknown: float = -2.91
-    structured: float = 3.09  # the residual depends on motion, load, place or time
-    random: float = -1.09  # it is larger than its noise beside what is named
-    random_alone: float = 2.42  # it is, and nothing is named
-    doubted: float = 0.81  # a name is tentative
-    structure: float = 0.14  # a nat of ``Ranking.structure``
+    unknown: float = -2.8
+    structured: float = 2.03  # the residual depends on motion, load, place or time
+    random: float = -1.28  # it is larger than its noise beside what is named
+    random_alone: float = 2.45  # it is, and nothing is named
+    doubted: float = 1.58  # a name is tentative
+    structure: float = 0.08  # a nat of ``Ranking.structure``
     structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
     least: float = 0.001  # probability of an alternative that is reported
 
