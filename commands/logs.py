@@ -251,11 +251,11 @@ def diagnose(
     probabilities: Annotated[
         bool,
         typer.Option(
-            "--probabilities",
-            help="Also say how probable each effect is, and that something unknown acts; it takes "
-            "some seconds a minute of flight. Not calibrated yet.",
+            "--probabilities/--no-probabilities",
+            help="Say how probable each name is, its alternatives, and that something unknown "
+            "acts; it takes some seconds a minute of flight.",
         ),
-    ] = False,
+    ] = True,
     vehicle: LogVehicleOption = None,
     fleet: Annotated[
         bool,
@@ -303,10 +303,6 @@ def diagnose(
         return _example(without or (), out, no_open, probabilities)
     if not logs:
         raise InputError("diagnose: expected at least one flight log, or --example")
-    if probabilities and (rotor_faults or fleet or against):
-        raise InputError(
-            "--probabilities: expected no --rotor-faults, --fleet or --against with it"
-        )
     if rotor_faults:
         if against or test:
             raise InputError("--rotor-faults: expected neither --against nor --test with it")
@@ -363,6 +359,7 @@ def _diagnose(
         error_sentences,
         headline,
         name_in_words,
+        percent,
         remainder_sentence,
     )
 
@@ -388,12 +385,19 @@ def _diagnose(
     for sentence in sentences:
         console.print(sentence, highlight=False, markup=False)
     if found.effects:
-        table = Table("effect", "coefficient", "value", "+-", "unit", box=box.SIMPLE_HEAD)
+        stated = found.probabilities.names if found.probabilities else {}
+        last = ["probability"] if stated else []
+        table = Table("effect", "coefficient", "value", "+-", "unit", *last, box=box.SIMPLE_HEAD)
         for effect in found.effects:
             for i, (name, value) in enumerate(effect.coefficients.items()):
-                title = name_in_words(effect) if i == 0 else ""
+                first = i == 0
                 table.add_row(
-                    title, name, f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
+                    name_in_words(effect) if first else "",
+                    name,
+                    f"{value:.4g}",
+                    f"{effect.std[name]:.2g}",
+                    effect.units[name],
+                    *([percent(stated[effect.name]) if first else ""] if stated else []),
                 )
         console.print(table)
     table = Table("error on held-out data", "before", "after", "noise floor", box=box.SIMPLE_HEAD)

@@ -18,7 +18,6 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError, unknown_name
 from .findings import (
     CHANNELS,
-    Alternative,
     Candidate,
     Diagnosis,
     Disturbance,
@@ -73,6 +72,7 @@ from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
+from .posterior.pooling import pooled
 from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
 from .wrench_series import pose_notes
@@ -125,8 +125,8 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each effect is, is worked out as well, beside all else
-            and without changing it. They are not calibrated yet.
+        probabilities: whether how probable each name is, is worked out as well, beside all else
+            and without changing it. It takes about as long again.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -287,15 +287,21 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
-        probabilities=_probabilities(flights, search, report) if probabilities else None,
+        probabilities=_probabilities(flights, search, effects, remainder, report)
+        if probabilities
+        else None,
     )
 
 
 def _probabilities(
-    flights: Flights, search: Search, report: Callable[[str], None]
+    flights: Flights,
+    search: Search,
+    effects: Sequence[NamedEffect],
+    remainder: str,
+    report: Callable[[str], None],
 ) -> Probabilities | None:
-    """Return how probable each effect is; None where the logs hold no poses and rotor speeds as
-    they were measured, or where the vehicle declares effects, of which none is then tried.
+    """Return how probable each name is; None where the logs hold no poses and rotor speeds as they
+    were measured, or where the vehicle declares effects, of which none is then tried.
     """
     if flights.commanded or flights.inertial or flights.filtered or flights.vehicle.effects:
         return None
@@ -304,11 +310,8 @@ def _probabilities(
         return None
     report("asking how probable each effect is")
     found = rank(flights, search.library, report=report)
-    return Probabilities(
-        found.probability,
-        tuple(Alternative(x.effects, x.probability) for x in found.sets),
-        found.unknown,
-    )
+    sets = [(x.effects, x.probability) for x in found.sets]
+    return pooled(effects, remainder, sets, found.structure)
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

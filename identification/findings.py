@@ -203,10 +203,10 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Probabilities:
-    """How probable what was found is, by one likelihood of the logs' poses.
+    """How probable what was found is, by the search and the likelihood of the logs' poses together.
 
     Attributes:
-        names: of each effect of the library, that it acts by more than nobody would name.
+        names: that it acts, of each effect that is named, or that an alternative has.
         alternatives: the likeliest sets of effects first.
         unknown: that something acts which no effect of the library is.
     """

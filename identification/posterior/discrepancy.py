@@ -1,5 +1,5 @@
-"""What an effect that is in no library may depend on: columns in groups, each group with a variance
-of its own.
+"""What an effect that is in no library may depend on: a dictionary of columns, of which it follows
+one.
 
 They are of the state as the filter predicts it, so none knows the noise of the pose to come.
 """
@@ -20,7 +20,7 @@ class DiscrepancySettings:
 
     # shares of the weight, and of the weight at a quarter of the arm: standard deviations of what a
     # column adds
-    sizes: tuple[float, ...] = (0.005, 0.05)
+    sizes: tuple[float, ...] = (0.001, 0.003, 0.01, 0.03)
     torque_arm: float = 0.25
     heights: tuple[float, ...] = (0.2, 0.6)  # m above the lowest place: where a bump falls off
 

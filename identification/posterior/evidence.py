@@ -158,6 +158,36 @@ def tempering(blocks: Array, chosen: Index) -> float:
     return 1.0 / max(1.0, spread)
 
 
+def evidence_of_one_more(
+    normal: Array, right: Array, chosen: Index, size: Array, tried: Index, sizes: Sequence[float]
+) -> float:
+    """Return the logarithm of the Bayes factor of one further column, no one knows which, against
+    none.
+
+    Each of the columns is as likely as each other, of each size. An effect that is in no library
+    follows few of the many things that a dictionary holds: a variance for all of them at once would
+    pay for each.
+
+    Args:
+        normal: (c, c) products of all columns.
+        right: (c,) their products with the residual.
+        chosen: columns of the model.
+        size: (len(chosen),) standard deviations of their prior.
+        tried: the further columns.
+        sizes: standard deviations that theirs may have.
+    """
+    inner = normal[np.ix_(chosen, chosen)] * size[:, None] * size + np.eye(len(chosen))
+    cross = normal[np.ix_(chosen, tried)] * size[:, None]
+    both = np.linalg.solve(inner, np.column_stack([cross, right[chosen] * size]))
+    left = np.maximum(
+        normal[tried, tried] - np.einsum("ij,ij->j", cross, both[:, :-1]), 1e-9
+    )  # of each column, what the model does not have already
+    score = right[tried] - cross.T @ both[:, -1]
+    square = np.square(np.asarray(sizes))[:, None]
+    factors = 0.5 * square * score**2 / (1.0 + square * left) - 0.5 * np.log1p(square * left)
+    return log_sum(factors.ravel().tolist()) - math.log(factors.size)
+
+
 def log_sum(values: Sequence[float]) -> float:
     """Return the logarithm of a sum of exponentials."""
     most = max(values, default=-math.inf)

@@ -1,4 +1,4 @@
-"""Which effects act: the posterior over sets of up to four, and an unknown one beside them.
+"""Which effects act: the posterior over sets of up to four, and what they leave unexplained.
 
 Every effect of the library is as likely as every other before the flight, and one is expected to be
 missing. A set's evidence is that of the likelier noise of two: that beside no effect, and that
@@ -29,8 +29,17 @@ from ..inference.regression import (
     unit_of_change,
 )
 from ..inference.starting_points import starting_points
-from .discrepancy import DISCREPANCY, GROUPS
-from .evidence import Index, Marginal, SetEvidence, log_sum, marginal, set_evidence, tempering
+from .discrepancy import DISCREPANCY
+from .evidence import (
+    Index,
+    Marginal,
+    SetEvidence,
+    evidence_of_one_more,
+    log_sum,
+    marginal,
+    set_evidence,
+    tempering,
+)
 from .likelihood import BETWEEN, GAIN, LIKELIHOOD, UNKNOWN, WHOLE_PREFIX, Likelihood, Sums
 
 Array = NDArray[np.float64]
@@ -42,7 +51,6 @@ class RankingSettings:
     """Priors, and how much of the sets is looked at."""
 
     expected: float = 1.0  # effects that a vehicle lacks, before its flight is seen
-    unknown: float = 0.1  # probability of an effect outside the library, likewise
     # typical sizes: every effect acts a little, and one that is no larger is not worth a name. It
     # is the standard deviation of what any coefficient may have without the effect being named
     negligible: float = 0.03
@@ -54,9 +62,9 @@ class RankingSettings:
     near_start: tuple[float, float] = (0.5, 1.5)
     most_effects: int = 4
     kept_sets: int = 8  # of each size, to which a further effect is added
-    kept_unknown: int = 24  # sets, the best, that are tried beside an unknown effect
+    kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
     rounds: int = 4  # of fitting the noise beside the best set
-    least_probability: float = 0.001  # of what is reported
+    least_probability: float = 1e-6  # of a set that is kept
 
 
 RANKING = RankingSettings()
@@ -76,18 +84,19 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Ranking:
-    """The posterior of a flight.
+    """The posterior of a flight, given that nothing acts but effects of the library.
 
     Attributes:
         probability: of each effect of the library, that it acts.
         sets: the likeliest first.
-        unknown: probability that something acts which no effect of the library is.
+        structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
+            effect outside the library may follow, beside the likeliest set.
         tempering: power of the likelihood, 1 where its scatter is what it should be.
     """
 
     probability: Mapping[str, float]
     sets: tuple[Ranked, ...]
-    unknown: float
+    structure: float
     tempering: float
 
 
@@ -104,7 +113,7 @@ class _Base:
     effects: frozenset[str]  # of the setting
     plain: Index  # columns that any flight may have
     typical: Array  # (c,) typical sizes in prior standard deviations
-    groups: dict[str, Index]  # columns of the discrepancy
+    dictionary: Index  # columns of the discrepancy
     starts: Mapping[Column, Mapping[str, float]]
 
 
@@ -114,13 +123,14 @@ def rank(
     likelihood: Callable[[Flights, Setting], Likelihood] = Likelihood,
     report: Callable[[str], None] = lambda text: None,
 ) -> Ranking:
-    """Return the posterior over sets of effects of a library."""
+    """Return the posterior over sets of effects of a library, of those that flights can show."""
+    library = [e for e in library if e not in flights.not_identifiable]
     near = likelihood(flights, {})
     starts = _starts(flights, library, {})
-    sums = near.sums(_wanted(library, {}, starts), starts)
+    sums = near.sums(_wanted(library, {}, starts), starts, unknown=False)
     loud = _in_prior_units(flights, sums, {}, starts)
-    quiet = near.quieter(_whole_library(loud))
-    now = _in_prior_units(flights, quiet, {}, starts)
+    explained = _whole_library(loud)
+    now = _in_prior_units(flights, near.quieter(explained), {}, starts)
     found = _Posterior(flights, library, (loud, now))
     tried = {frozenset[str]()}
     # the best effect first, alone: another set's columns are those of the model that has it
@@ -137,10 +147,15 @@ def rank(
         report(f"trying {', '.join(setting)}")
         near = likelihood(flights, setting)
         starts = _starts(flights, library, setting)
-        sums = near.sums(_wanted(library, setting, starts), starts)
+        sums = near.sums(_wanted(library, setting, starts), starts, unknown=False)
         now = _in_prior_units(flights, sums, setting, starts)
         found = _Posterior(flights, library, (loud, now))
         setting = found.best_setting()
+    # once more, with the dictionary's columns, that are dear
+    sums = near.sums(_wanted(library, last, starts), starts)
+    if not last:
+        sums = near.quieter(explained)
+    now = _in_prior_units(flights, sums, last, starts)
     return _Posterior(flights, library, (loud, now), found.tempering()).ranking()
 
 
@@ -258,13 +273,7 @@ def _in_prior_units(
     blocks[:, -1, -1] = np.einsum("c,bc->b", back, whole)
     columns = {c: i for i, c in enumerate(sums.columns)}
     plain = [i for c, i in columns.items() if not c[0] and not c[1].startswith(UNKNOWN)]
-    groups = {
-        group: np.array(
-            [i for c, i in columns.items() if not c[0] and c[1].startswith(UNKNOWN + group)],
-            dtype=np.intp,
-        )
-        for group in GROUPS
-    }
+    dictionary = [i for c, i in columns.items() if not c[0] and c[1].startswith(UNKNOWN)]
     return _Base(
         columns,
         size,
@@ -275,7 +284,7 @@ def _in_prior_units(
         frozenset(k for k in setting if k),
         np.array(plain, dtype=np.intp),
         np.array([_typical(c, flights) for c in sums.columns]) / size,
-        groups,
+        np.array(dictionary, dtype=np.intp),
         starts,
     )
 
@@ -301,13 +310,11 @@ class _Posterior:
         self.inclusion = min(RANKING.expected / max(len(library), 1), 0.5)
         self.known: dict[frozenset[str], _Candidate] = {}
         self.scores: dict[frozenset[str], float] = {}
-        self.beside: dict[tuple[frozenset[str], str], float] = {}
         # beside the noise of nothing explained no effect shows: what others found is asked there
         for i in range(1, len(bases)):
             self._search(i)
         found = sorted(self.scores, key=self.scores.__getitem__, reverse=True)
-        self._search(0, [self.known[k].variants for k in found[: RANKING.kept_unknown]])
-        self._unknown()
+        self._search(0, [self.known[k].variants for k in found[: RANKING.kept_asked]])
 
     def tempering(self) -> float:
         """Return the power of the likelihood that the scatter beside the likeliest set allows."""
@@ -316,9 +323,7 @@ class _Posterior:
         own = [base.columns[c] for v in best.variants for c in v[1]]
         return tempering(base.blocks, np.array(sorted([*base.plain, *own]), dtype=np.intp))
 
-    def _marginal(
-        self, base: _Base, unknown: str | None = None, size: float = 1.0
-    ) -> tuple[Marginal, Index, dict[Column, int]]:
+    def _marginal(self, base: _Base) -> tuple[Marginal, Index, dict[Column, int]]:
         total = self.power * base.blocks.sum(axis=0)
         deviance = float(total[-1, -1]) + self.power * base.penalty
         asked = np.array([i for (e, _), i in base.columns.items() if e], dtype=np.intp)
@@ -327,15 +332,6 @@ class _Posterior:
         normal, right = total[:-1, :-1], total[:-1, -1]
         little = np.ones(len(right))
         little[asked] = RANKING.negligible * base.typical[asked]
-        if unknown is not None:
-            group = (
-                np.concatenate(list(base.groups.values()))
-                if unknown == "all"
-                else base.groups[unknown]
-            )
-            others = np.concatenate([others, group])
-            # as many columns as there are make up one standard deviation together
-            little[group] = size / math.sqrt(max(len(group), 1))
         at = {c: i for i, c in enumerate(c for c in base.columns if c[0])}
         return marginal(normal, right, deviance, asked, others, little[others]), asked, at
 
@@ -415,28 +411,25 @@ class _Posterior:
                 return False
         return True
 
-    def _unknown(self) -> None:
-        best = sorted(self.scores, key=self.scores.__getitem__, reverse=True)[
-            : RANKING.kept_unknown
+    def structure(self) -> float:
+        """Return the logarithm of the Bayes factor of one more column beside the likeliest set."""
+        base = self.bases[-1]
+        best = max(self.scores, key=self.scores.__getitem__)
+        own = [
+            base.columns[c] for v in self.known[best].variants for c in v[1] if c in base.columns
         ]
-        for effects in [*best, frozenset[str]()]:
-            self.beside[effects, ""] = self.scores[effects] + math.log1p(-RANKING.unknown)
-        choices = [(g, s) for g in (*GROUPS, "all") for s in DISCREPANCY.sizes]
-        each = math.log(RANKING.unknown / len(choices))
-        for number, base in enumerate(self.bases):
-            for group, size in choices:
-                m, asked, at = self._marginal(base, group, size)
-                low, high = base.low[asked], base.high[asked]
-                for effects in dict.fromkeys([*best, frozenset[str]()]):
-                    some = self.known[effects].variants
-                    columns = [c for v in some for c in v[1]]
-                    if self.known[effects].base != number and not all(c in at for c in columns):
-                        continue
-                    evidence = set_evidence(m, [at[c] for c in columns], low, high)
-                    offset = self.scores[effects] - self.known[effects].evidence.log_evidence
-                    value = evidence.log_evidence + offset + each
-                    key = (effects, f"{group} {size:g}")
-                    self.beside[key] = max(self.beside.get(key, -math.inf), value)
+        asked = [i for (e, _), i in base.columns.items() if e]
+        little = RANKING.negligible * base.typical[asked]
+        chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
+        total = self.power * base.blocks.sum(axis=0)
+        return evidence_of_one_more(
+            total[:-1, :-1],
+            total[:-1, -1],
+            chosen,
+            np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own))]),
+            base.dictionary,
+            DISCREPANCY.sizes,
+        )
 
     def best_setting(self, most: int = RANKING.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
@@ -486,18 +479,9 @@ class _Posterior:
 
     def ranking(self) -> Ranking:
         """Return probabilities."""
-        # sets that were not tried beside an unknown effect are as likely with it as the best ones
-        shift: dict[frozenset[str], float] = {}
-        for (effects, _), value in self.beside.items():
-            shift[effects] = log_sum([shift.get(effects, -math.inf), value])
-        rest = {
-            k: v + math.log1p(-RANKING.unknown) for k, v in self.scores.items() if k not in shift
-        }
-        every = {**rest, **shift}
-        total = log_sum(list(every.values()))
-        p = {k: math.exp(v - total) for k, v in every.items()}
+        total = log_sum(list(self.scores.values()))
+        p = {k: math.exp(v - total) for k, v in self.scores.items()}
         probability = {e: sum(x for k, x in p.items() if e in k) for e in self.library}
-        unknown = sum(math.exp(v - total) for (_, group), v in self.beside.items() if group)
         best = sorted(p, key=p.__getitem__, reverse=True)
         sets = []
         for key in best:
@@ -505,4 +489,4 @@ class _Posterior:
                 break
             setting, std = self._setting(key)
             sets.append(Ranked(tuple(sorted(key)), p[key], setting, std))
-        return Ranking(probability, tuple(sets), unknown, self.power)
+        return Ranking(probability, tuple(sets), self.structure(), self.power)

@@ -314,13 +314,19 @@ def probability_sentences(diagnosis: Diagnosis) -> list[str]:
     found = diagnosis.probabilities
     if found is None:
         return []
-    out = [
-        f"{' and '.join(x.effects) or 'Nothing of the library'}: {percent(x.probability)}."
+    names = [
+        f"{e.name}: {percent(found.names.get(e.name, 0.0))} that it acts."
+        for e in diagnosis.effects
+    ]
+    sets = [
+        f"{' and '.join(x.effects) or 'Nothing of the library'}, and nothing else: "
+        f"{percent(x.probability)}."
         for x in found.alternatives[:5]
     ]
     return [
-        *out,
+        *names,
+        *sets,
         f"Something acts that no effect of the library is: {percent(found.unknown)}.",
-        "These probabilities are not calibrated yet: read them as an order, and the names above by "
-        "what is said of them there.",
+        "A probability is how often such a finding was right on simulated flights of which the "
+        "truth is known, some of them with a cause outside the library.",
     ]

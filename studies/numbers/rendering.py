@@ -71,6 +71,12 @@ def _imu() -> str:
     )
 
 
+def _probabilities() -> str:
+    from windwrench.studies.probabilities.scores import tables
+
+    return _between_marks("probabilities", tables(kept("probabilities/results.json.gz")))
+
+
 def _log_estimates() -> str:
     from windwrench.studies.log_estimates.page import write_page
 
@@ -159,6 +165,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "close-loop": _close_loop,
     "fleets": _fleets,
     "real-flights": _real_flights,
+    "probabilities": _probabilities,
     "real-faults": _real_faults,
     "imu-logs": _imu_logs,
     "filtered-logs": _filtered_logs,

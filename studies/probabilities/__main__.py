@@ -1,43 +1,69 @@
 """``python -m studies.probabilities``; ``--help`` lists what it takes."""
 
 import argparse
+import gzip
 import json
 from pathlib import Path
 
+from windwrench.runtime.page_files import write_text
 from windwrench.studies.page_tables import put_between
-from windwrench.studies.probabilities.flights import KINDS, ranked
+from windwrench.studies.probabilities.flights import recorded
 from windwrench.studies.probabilities.scores import tables
 from windwrench.studies.resumed_tasks import Task, run_tasks
 
 # of ten flights of the project's own simulator
-_OF_TEN = ("single", "third", "pair", "nothing", "nothing", "outsider", "left out", "single")
+_OF_TEN = (
+    "single",
+    "third",
+    "pair",
+    "nothing",
+    "left out",
+    "outsider",
+    "single",
+    "nothing",
+    "single",
+    "left out",
+)
+RESULTS = Path("docs/probabilities/results.json.gz")
+# the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
+_STRIDE, _CATALOGUE = 7, 33
+
+
+def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> list[Task]:
+    """Return the flights of a run: simulator, kind and number each."""
+    out: list[Task] = [("own", _OF_TEN[i % len(_OF_TEN)], first + i) for i in range(own)]
+    for i in range(other):
+        place = i * _STRIDE % _CATALOGUE + _CATALOGUE * (catalogue + i // _CATALOGUE)
+        out.append((simulator, "catalogue", place))
+        if i % 4 == 0:
+            out.append((simulator, "left out", place))
+    return out
+
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.probabilities")
-    parser.add_argument("--own", type=int, default=40, help="flights of this project's plant")
-    parser.add_argument("--other", type=int, default=33, help="flights of the other simulator")
+    parser.add_argument("--own", type=int, default=66, help="flights of this project's plant")
+    parser.add_argument("--other", type=int, default=66, help="flights of the other simulator")
     parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
-    parser.add_argument("--first", type=int, default=0, help="first number of a flight")
+    parser.add_argument("--first", type=int, default=500_000, help="number of the first own flight")
+    parser.add_argument(
+        "--catalogue", type=int, default=700, help="first of the other's catalogues"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("results/probabilities"))
+    parser.add_argument("--results", type=Path, default=RESULTS, help="what is kept for the page")
     parser.add_argument("--page", type=Path, default=None, help="page whose tables are made anew")
-    parser.add_argument("--done", action="store_true", help="score only what has been flown")
+    parser.add_argument("--done", action="store_true", help="score only what has been kept")
     given = parser.parse_args()
-    wanted: list[Task] = [
-        ("own", _OF_TEN[i % len(_OF_TEN)], given.first + i) for i in range(given.own)
-    ]
-    wanted += [
-        (given.simulator, kind, given.first + i)
-        for i in range(given.other)
-        for kind in ("catalogue", *(("left out",) if i % 3 == 0 else ()))
-    ]
-    file = given.out / "flights.jsonl"
-    if given.done:
-        lines = [json.loads(x) for x in file.read_text(encoding="utf-8").splitlines()]
-        outcomes = {tuple(x["task"]): x["result"] for x in lines}
-    else:
-        outcomes = run_tasks(ranked, wanted, file, given.jobs)
-    text = tables(outcomes)
+    if not given.done:
+        wanted = plan(given.own, given.other, given.first, given.catalogue, given.simulator)
+        outcomes = run_tasks(recorded, wanted, given.out / "flights.jsonl", given.jobs)
+        kept = [
+            {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
+            for task, result in outcomes.items()
+        ]
+        lines = ",\n".join(json.dumps(x) for x in kept)
+        write_text(f"[\n{lines}\n]\n", given.results)
+    text = tables(json.loads(gzip.decompress(given.results.read_bytes())))
     put_between(text, given.page)
     print(text)
-    assert set(KINDS) >= set(_OF_TEN)

@@ -1,5 +1,5 @@
-"""Flights of which the truth is known, ranked: of this project's plant, and of a simulator that was
-written apart from it and is read from its own file.
+"""Flights of which the truth is known, diagnosed and ranked: of this project's plant, and of a
+simulator that was written apart from it and is read from its own file.
 """
 
 import importlib.util
@@ -16,6 +16,7 @@ import numpy as np
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
+from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.posterior.ranking import rank
@@ -26,6 +27,7 @@ from windwrench.studies.trials.trials import EQUIVALENTS
 
 KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
 _ATTEMPTS = 4  # at a flight that crashes
+_MOST_SETS = 40  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
 _STRONGEST_GUSTS = 3.0  # times the background's
 _NOISES = ((1e-3, 0.3), (1e-3, 0.3), (0.5e-3, 0.15), (2e-3, 0.5))  # m and degrees, as its own
@@ -35,12 +37,10 @@ _KNOWN = {
     "pendulum payload 30 g on 0.5 m tether": ("slung_payload",),
     "localised fan jet through body drag": ("fan_jet", "body_drag"),
 }
-# effects that its flights show or not in the way that this library's laws write them
-_INSEPARABLE = ("hover", "noyaw")
 
 
-def ranked(simulator: str, kind: str, number: int) -> dict[str, Any]:
-    """Return what the ranking says of one flight, and its truth, as JSON.
+def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
+    """Return what the search and the posterior say of one flight, and its truth, as JSON.
 
     Args:
         simulator: "own", or the file of the other one.
@@ -51,33 +51,34 @@ def ranked(simulator: str, kind: str, number: int) -> dict[str, Any]:
     log, vehicle, truth, outsider, flown = (
         _own(kind, number) if simulator == "own" else _other(Path(simulator), number)
     )
-    library = list(names())
     left_out: list[str] = []
     if kind == "left out":
         left_out = [e for t in truth for e in (t, *EQUIVALENTS.get(t, ()))]
-        library = [e for e in library if e not in left_out]
-    flights = Flights([log], vehicle)
     begun = time.process_time()
-    found = rank(flights, library)
+    search = diagnose([log], vehicle, without=left_out)
+    middle = time.process_time()
+    found = rank(Flights([log], vehicle), [e for e in names() if e not in left_out])
+    ended = time.process_time()
     return {
-        "kind": kind,
         "flown": flown,
         "truth": truth,
         "outsider": outsider,
         "left_out": left_out,
-        "probability": {k: round(v, 5) for k, v in found.probability.items() if v > 0.001},
-        "unknown": round(found.unknown, 5),
-        "tempering": round(found.tempering, 4),
-        "sets": [
+        "named": [
             {
-                "effects": list(s.effects),
-                "probability": round(s.probability, 5),
-                "coefficients": s.coefficients,
-                "std": s.std,
+                "name": e.name,
+                "tentative": e.tentative,
+                "indistinguishable_from": list(e.indistinguishable_from),
+                "coefficients": {k: float(f"{v:.6g}") for k, v in e.coefficients.items()},
+                "std": {k: float(f"{v:.6g}") for k, v in e.std.items()},
             }
-            for s in found.sets[:3]
+            for e in search.effects
         ],
-        "cpu_s": round(time.process_time() - begun, 2),
+        "remainder": search.remainder,
+        "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
+        "structure": round(found.structure, 3),
+        "tempering": round(found.tempering, 4),
+        "cpu_s": [round(middle - begun, 2), round(ended - middle, 2)],
     }
 
 
@@ -162,4 +163,4 @@ def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any],
     return log, vehicle, truth, outsider, kind
 
 
-__all__ = ["KINDS", "ranked"]
+__all__ = ["KINDS", "recorded"]

@@ -1,176 +1,296 @@
-"""What the probabilities of ranked flights are worth: calibration, log score, false alarms, and the
-coverage of coefficients' intervals.
+"""What the probabilities of recorded flights are worth: calibration, log score, and the coverage of
+coefficients' intervals.
+
+Flights of even numbers are scored with weights that were fitted to those of odd numbers, and the
+other way round: no flight is scored with weights that know it.
 """
 
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.stats import mannwhitneyu
 
+from windwrench.identification.findings import Alternative, Probabilities
+from windwrench.identification.posterior.pooling import POOLING
 from windwrench.studies.page_tables import share, table
-from windwrench.studies.resumed_tasks import Task
-from windwrench.studies.trials.trials import EQUIVALENTS
+from windwrench.studies.probabilities.fitting import (
+    acts_unknown,
+    fit,
+    frequencies,
+    is_right,
+    pool,
+    stands_for,
+)
 
-_EDGES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0001)  # of the reliability diagram; below, nothing is named
-_NAMED = 0.5  # probability from which an effect counts as named
-_CERTAIN = 1e-4  # no probability counts as less than this in the log score
-
-
-def tables(outcomes: Mapping[Task, dict[str, Any]]) -> str:
-    """Return the scores of ranked flights as Markdown tables, each simulator apart."""
-    parts = []
-    sides = {task[0] == "own" for task in outcomes}
-    for own in sorted(sides, reverse=True):
-        some = [x for task, x in outcomes.items() if (task[0] == "own") == own]
-        parts += [f"**{'Own flights' if own else 'The other simulator'}**", _summary(some)]
-        parts += ["Names by their probability:", _reliability(some)]
-    return "\n\n".join(parts)
+EDGES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0001)  # of the reliability diagram; below, nothing is said
+_CERTAIN = 1e-3  # no probability counts as less than this in the log score
+_RESAMPLED = 2000
+_MUCH = 3.0  # nats, a dictionary's
+Claim = tuple[float, bool]
+WAYS = ("pooled", "search alone", "posterior alone")
 
 
-def _known(flights: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the flights whose whole truth is in the library."""
-    return [x for x in flights if not x["outsider"] and not x["left_out"]]
+@dataclass(frozen=True)
+class Scored:
+    """A recorded flight and its probabilities by one way."""
+
+    own: bool
+    flight: dict[str, Any]
+    found: Probabilities
+
+    def claims(self) -> list[Claim]:
+        """Return the probability of each name, and whether it is right: of what the search names,
+        and of each other effect from the least probability that is shown.
+        """
+        named = {e["name"] for e in self.flight["named"]}
+        return [
+            (p, is_right(self.flight, e))
+            for e, p in self.found.names.items()
+            if e in named or p >= EDGES[0]
+        ]
+
+    def log_score(self) -> float:
+        """Return the sum of logarithms of the probabilities of what is true, over claims and
+        effects that act and that nobody claims.
+        """
+        claims = self.claims()
+        shown = [e for e, p in self.found.names.items() if p >= EDGES[0]]
+        shown += [e["name"] for e in self.flight["named"]]
+        claimed = {x for e in shown for x in stands_for(self.flight, e)}
+        missed = set(self.flight["truth"]) - set(self.flight["left_out"]) - claimed
+        claims += [
+            (sum(self.found.names.get(x, 0.0) for x in stands_for(self.flight, e)), True)
+            for e in missed
+        ]
+        total = 0.0
+        for p, right in claims:
+            q = min(max(p, _CERTAIN), 1.0 - _CERTAIN)
+            total += math.log(q if right else 1.0 - q)
+        return total
 
 
-def _claims(flights: Sequence[dict[str, Any]]) -> list[tuple[float, bool]]:
-    """Return each name's probability and whether it is right, from the least that counts on."""
-    return [
-        (p, name in x["truth"] and name not in x["left_out"])
-        for x in flights
-        for name, p in x["probability"].items()
-        if p >= _EDGES[0]
-    ]
+def scored(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Scored]]:
+    """Return the flights with the probabilities of each way, none by weights that know it.
+
+    Args:
+        records: ``{"task": [simulator, kind, number], "result": ...}`` each.
+    """
+    halves = [[r["result"] for r in records if r["task"][2] % 2 == odd] for odd in (0, 1)]
+    weights = [fit(halves[1]), fit(halves[0])]
+    shares = [frequencies(halves[1]), frequencies(halves[0])]
+    out: dict[str, list[Scored]] = {way: [] for way in WAYS}
+    for record in records:
+        own, flight, odd = record["task"][0] == "own", record["result"], record["task"][2] % 2
+        out[WAYS[0]].append(Scored(own, flight, pool(flight, weights[odd])))
+        out[WAYS[1]].append(Scored(own, flight, _by_frequency(flight, shares[odd])))
+        out[WAYS[2]].append(Scored(own, flight, _by_posterior(flight)))
+    return out
 
 
-def expected_calibration_error(claims: Sequence[tuple[float, bool]]) -> float:
+def _by_frequency(flight: Mapping[str, Any], right: Mapping[bool, float]) -> Probabilities:
+    names = {e["name"]: right[e["tentative"]] for e in flight["named"]}
+    return Probabilities(names, (), float(flight["remainder"] == "structured"))
+
+
+def _by_posterior(flight: Mapping[str, Any]) -> Probabilities:
+    names: dict[str, float] = {}
+    for effects, p in flight["sets"]:
+        for e in effects:
+            names[e] = names.get(e, 0.0) + p
+    sets = tuple(Alternative(tuple(e), p) for e, p in flight["sets"])
+    odds = 1.0 / (1.0 + math.exp(-max(min(flight["structure"], 30.0), -30.0)))
+    return Probabilities(names, sets, odds)
+
+
+def expected_calibration_error(claims: Sequence[Claim]) -> float:
     """Return the mean distance of stated probability and share that is right, over bins."""
     total = 0.0
-    for low, high in itertools.pairwise(_EDGES):
+    for low, high in itertools.pairwise(EDGES):
         inside = [x for x in claims if low <= x[0] < high]
         if inside:
             total += abs(sum(p - right for p, right in inside))
     return total / max(len(claims), 1)
 
 
-def _reliability(flights: Sequence[dict[str, Any]]) -> str:
+def _of(flights: Sequence[Scored]) -> list[Claim]:
+    return [claim for flight in flights for claim in flight.claims()]
+
+
+def calibration_interval(flights: Sequence[Scored]) -> tuple[float, float]:
+    """Return the 95 % interval of the expected calibration error, over flights drawn anew."""
+    rng = np.random.default_rng(0)
+    claims = [flight.claims() for flight in flights]
+    drawn = [
+        expected_calibration_error(
+            [c for i in rng.integers(len(claims), size=len(claims)) for c in claims[i]]
+        )
+        for _ in range(_RESAMPLED)
+    ]
+    low, high = np.quantile(drawn, [0.025, 0.975]).tolist()
+    return float(low), float(high)
+
+
+def error_of_perfect_calibration(claims: Sequence[Claim]) -> float:
+    """Return the expected calibration error that these probabilities would have in the mean if each
+    were right as often as it says.
+    """
+    rng = np.random.default_rng(1)
+    p = np.array([x for x, _ in claims])
+    return float(
+        np.mean(
+            [
+                expected_calibration_error(
+                    list(zip(p.tolist(), (rng.random(len(p)) < p).tolist(), strict=True))
+                )
+                for _ in range(_RESAMPLED)
+            ]
+        )
+    )
+
+
+def _mean_and_interval(values: Sequence[float]) -> str:
+    x = np.array(values)
+    rng = np.random.default_rng(2)
+    drawn = x[rng.integers(len(x), size=(_RESAMPLED, len(x)))].mean(axis=1)
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return f"{x.mean():.2f} ({low:.2f} to {high:.2f})"
+
+
+def reliability(flights: Sequence[Scored]) -> list[list[str]]:
+    """Return rows of the reliability diagram: probability, its mean, and how often it is right."""
     rows = []
-    claims = _claims(flights)
-    for low, high in itertools.pairwise(_EDGES):
+    claims = _of(flights)
+    for low, high in itertools.pairwise((0.0, *EDGES)):
         inside = [x for x in claims if low <= x[0] < high]
         if inside:
             mean = float(np.mean([p for p, _ in inside]))
-            rows.append(
-                [
-                    f"{low:g} to {min(high, 1.0):g}",
-                    f"{mean:.3f}",
-                    share(sum(right for _, right in inside), len(inside)),
-                ]
-            )
-    return table(["probability", "mean", "right"], rows)
+            right = share(sum(right for _, right in inside), len(inside))
+            rows.append([f"{low:g} to {min(high, 1.0):g}", f"{mean:.3f}", right])
+    return rows
 
 
-def _named(x: dict[str, Any], least: float = _NAMED) -> set[str]:
-    return {name for name, p in x["probability"].items() if p > least}
-
-
-def _same(name: str) -> set[str]:
-    return {name, *EQUIVALENTS.get(name, ())}
-
-
-def _is_right(x: dict[str, Any]) -> bool:
-    """Return whether the likeliest set is the truth, or its exact equivalent."""
-    none: dict[str, Any] = {"effects": []}
-    best = max(x["sets"], key=lambda s: float(s["probability"]), default=none)
-    found = set(best["effects"])
-    truth = set(x["truth"])
-    return len(found) == len(truth) and all(_same(name) & found for name in truth)
-
-
-def _log_score(flights: Sequence[dict[str, Any]]) -> float:
-    """Return the mean over flights of the logarithm of the probability of what is true, of all
-    effects one by one.
-    """
-    scores = []
-    for x in flights:
-        value = 0.0
-        for name, p in {**dict.fromkeys(x["truth"], 0.0), **x["probability"]}.items():
-            q = float(np.clip(p, _CERTAIN, 1.0 - _CERTAIN))
-            value += math.log(q if name in x["truth"] else 1.0 - q)
-        scores.append(value)
-    return float(np.mean(scores)) if scores else float("nan")
-
-
-def _coverage(flights: Sequence[dict[str, Any]]) -> list[float]:
-    """Return errors of coefficients in stated standard deviations, where the likeliest set is the
-    truth.
-    """
-    out = []
-    for x in flights:
-        if not x["sets"] or set(x["sets"][0]["effects"]) != set(x["truth"]):
-            continue
-        best = x["sets"][0]
-        for effect, values in x["truth"].items():
-            for name, value in values.items():
-                std = best["std"][effect].get(name, 0.0)
-                if std > 0.0:
-                    out.append(abs(best["coefficients"][effect][name] - value) / std)
-    return out
-
-
-def _area(strange: Sequence[float], known: Sequence[float]) -> str:
+def _area(flights: Sequence[Scored]) -> str:
+    strange = [x.found.unknown for x in flights if acts_unknown(x.flight)]
+    known = [x.found.unknown for x in flights if not acts_unknown(x.flight)]
     if not strange or not known:
         return "–"
     area = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
     return f"{area:.3f} ({len(strange)} against {len(known)})"
 
 
-def _summary(flights: Sequence[dict[str, Any]]) -> str:
-    known = _known(flights)
-    nothing = [x for x in known if not x["truth"]]
-    strange = [x for x in flights if x["outsider"] or x["left_out"]]
-    claims = _claims(flights)
+def _coverage(flights: Sequence[Scored]) -> list[float]:
+    """Return errors of coefficients in stated standard deviations, of right names whose truth is
+    known.
+    """
+    out = []
+    for x in flights:
+        for e in x.flight["named"]:
+            for name, value in x.flight["truth"].get(e["name"], {}).items():
+                std = e["std"].get(name) or 0.0
+                if std > 0.0 and not acts_unknown(x.flight):
+                    out.append(abs(e["coefficients"][name] - value) / std)
+    return out
+
+
+def _comparison(every: Mapping[str, Sequence[Scored]]) -> str:
+    rows = []
+    for way, flights in every.items():
+        claims = _of(flights)
+        low, high = calibration_interval(flights)
+        rows.append(
+            [
+                way,
+                f"{expected_calibration_error(claims):.3f} ({low:.3f} to {high:.3f})",
+                f"{error_of_perfect_calibration(claims):.3f}",
+                _mean_and_interval([x.log_score() for x in flights]),
+                _area(flights),
+                str(len(claims)),
+            ]
+        )
+    return table(
+        [
+            "probabilities",
+            "expected calibration error of names (95 %)",
+            "of a perfect forecaster of as many",
+            "log score a flight (95 %)",
+            "area under the curve of `unknown`",
+            "names",
+        ],
+        rows,
+    )
+
+
+def _counts(flights: Sequence[Scored]) -> str:
+    known = [x for x in flights if not acts_unknown(x.flight)]
+    nothing = [x for x in known if not x.flight["truth"]]
+    strange = [x for x in flights if acts_unknown(x.flight)]
+    sure = [(e, x) for x in flights for e in x.flight["named"] if not e["tentative"]]
+
+    def above(some: Sequence[Scored], least: float) -> str:
+        return share(sum(any(p >= least for p in x.found.names.values()) for x in some), len(some))
+
     rows = [
         ["flights", str(len(flights))],
         [
-            "expected calibration error of names",
-            f"{expected_calibration_error(claims):.3f} ({len(claims)} names of 0.05 and more)",
+            "names of the search that are sure, and right",
+            share(sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)),
         ],
-        ["log score a flight, all effects", f"{_log_score(known):.2f} ({len(known)} flights)"],
+        [
+            f"dictionary worth more than {_MUCH:g} nats, nothing unknown",
+            share(sum(x.flight["structure"] > _MUCH for x in known), len(known)),
+        ],
+        [
+            "... outsiders and left-out effects",
+            share(sum(x.flight["structure"] > _MUCH for x in strange), len(strange)),
+        ],
+        ["nothing missing, yet a name of 0.5 and more", above(nothing, 0.5)],
+        ["outsiders and left-out effects, yet a name of 0.5 and more", above(strange, 0.5)],
+        ["... of 0.95 and more", above(strange, 0.95)],
     ]
-    for kind in ("single", "third", "pair", "catalogue"):
-        some = [x for x in known if x["kind"] == kind and x["truth"]]
-        if some:
-            rows.append(
-                [f"likeliest set is the truth: {kind}", share(sum(map(_is_right, some)), len(some))]
-            )
-    rows += [
-        ["nothing missing, yet a name", share(sum(bool(_named(x)) for x in nothing), len(nothing))],
-        [
-            "outsiders and left-out effects, yet a name of 0.95 and more",
-            share(sum(bool(_named(x, 0.95)) for x in strange), len(strange)),
-        ],
-        [
-            "... of these with `unknown` below 0.5",
-            share(sum(bool(_named(x, 0.95)) and x["unknown"] < 0.5 for x in strange), len(strange)),
-        ],
-        [
-            "area under the curve of `unknown`",
-            _area([x["unknown"] for x in strange], [x["unknown"] for x in known]),
-        ],
-    ]
-    errors = _coverage(known)
+    errors = _coverage(flights)
     if errors:
         for level, most in ((68, 0.9945), (95, 1.96)):
-            rows.append(
-                [
-                    f"coverage of {level} % intervals",
-                    share(sum(e < most for e in errors), len(errors)),
-                ]
-            )
-    times = [x["cpu_s"] for x in flights]
-    if times:
-        rows.append(["CPU time of a ranking", f"{np.median(times):.1f} s in the median"])
+            count = share(sum(e < most for e in errors), len(errors))
+            rows.append([f"coverage of {level} % intervals of coefficients", count])
+    search, ranking = np.median([x.flight["cpu_s"] for x in flights], axis=0)
+    rows.append(
+        ["CPU time of search and of posterior, median", f"{search:.1f} and {ranking:.1f} s"]
+    )
     return table(["", "value (95 % interval)"], rows)
+
+
+def _weights(records: Sequence[Mapping[str, Any]]) -> str:
+    w = fit([r["result"] for r in records])
+    names = (
+        "evidence",
+        "sure",
+        "tentative",
+        "other",
+        "unknown",
+        "structured",
+        "random",
+        "random_alone",
+        "doubted",
+        "structure",
+    )
+    rows = [[f"`{x}`", f"{getattr(w, x):.2f}", f"{getattr(POOLING, x):.2f}"] for x in names]
+    return table(["weight, nats", "fitted to all these flights", "in use"], rows)
+
+
+def tables(records: Sequence[Mapping[str, Any]]) -> str:
+    """Return the scores of recorded flights as Markdown tables."""
+    every = scored(records)
+    parts = ["**Three ways to a probability, all flights**", _comparison(every)]
+    best = every[WAYS[0]]
+    parts += ["**Pooled: names by their probability, all flights**"]
+    parts += [table(["probability", "mean", "right"], reliability(best))]
+    for own, title in ((True, "Own flights"), (False, "The other simulator")):
+        some = [x for x in best if x.own == own]
+        if some:
+            parts += [f"**{title}**", _counts(some)]
+            parts += [table(["probability", "mean", "right"], reliability(some))]
+    return "\n\n".join([*parts, "**Weights of the pool**", _weights(records)])

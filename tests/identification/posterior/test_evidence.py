@@ -8,6 +8,7 @@ from scipy.integrate import quad
 
 from windwrench.identification.posterior.evidence import (
     Marginal,
+    evidence_of_one_more,
     log_sum,
     marginal,
     set_evidence,
@@ -73,6 +74,28 @@ def test_a_likelihood_is_tempered_where_its_scores_scatter_too_much():
 
     assert power(x, noise) > 0.75
     assert power(slow, alike) < 0.1
+
+
+def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
+    rng = np.random.default_rng(4)
+    x, y = rng.standard_normal((200, 4)), rng.standard_normal(200)
+    y += 0.4 * x[:, 3]
+    normal, right, chosen = x.T @ x, x.T @ y, np.array([0, 1])
+
+    def evidence(columns, size):
+        at = np.array(columns)
+        own = np.array([1.0, 1.0, size])[: len(at)]
+        inner = normal[np.ix_(at, at)] * own[:, None] * own + np.eye(len(at))
+        b = right[at] * own
+        return 0.5 * b @ np.linalg.solve(inner, b) - 0.5 * np.linalg.slogdet(inner)[1]
+
+    sizes = (0.1, 1.0)
+    found = evidence_of_one_more(normal, right, chosen, np.ones(2), np.array([2, 3]), sizes)
+    each = [evidence([0, 1, c], s) - evidence([0, 1], s) for c in (2, 3) for s in sizes]
+    assert found == pytest.approx(log_sum(each) - math.log(4.0))
+    assert found > 5.0
+    without = evidence_of_one_more(normal, right, chosen, np.ones(2), np.array([2]), sizes)
+    assert without < 0.0
 
 
 def test_log_sums():

@@ -28,13 +28,18 @@ def test_a_missing_mass_is_found(vehicle):
     assert found.probability["mass"] > 0.9
     off = best.coefficients["mass"]["dm"] - 0.03
     assert abs(off) < 3.0 * best.std["mass"]["dm"]
-    assert 0.0 <= found.unknown < 0.5
+    assert found.structure < 3.0
 
 
 def test_nothing_is_found_in_turbulence_alone(vehicle):
     found = rank(flown(vehicle), LIBRARY)
     assert found.sets[0].effects == ()
     assert max(found.probability.values()) < 0.5
+
+
+def test_a_law_that_the_library_lacks_shows_as_structure(vehicle):
+    drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
+    assert rank(flown(vehicle, drag), ("mass", "inertia")).structure > 10.0
 
 
 def test_the_noise_is_that_of_the_flight(vehicle):

@@ -1,0 +1,163 @@
+"""How probable each name is: the posterior of the flight's poses and the verdict of the search,
+pooled.
+
+The posterior knows what the likelihood says of each set of effects, and takes for granted that
+nothing acts but effects of the library. The search knows whether a name withstood its checks, and
+whether the residual has structure left. Each is an expert, and a weighted sum of logarithms (a
+logarithmic opinion pool: C. Genest and J. V. Zidek, Statistical Science 1 (1986), 114-135) makes
+one probability of both. The weights are fitted to flights of which the truth is known: so the
+probability of a name is the frequency with which such names are right on such flights.
+
+An explanation is a set of effects. Its score is the logarithm of its evidence, tempered, and a
+weight for each of its effects: one that the search is sure of, one that it calls tentative, one
+that it does not name. Beside them stands the explanation that something acts which no effect of the
+library is; then no name counts as right, because what is named imitates it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..findings import Alternative, Probabilities
+
+Array = NDArray[np.float64]
+Explanations = dict[frozenset[str], float]
+
+
+@dataclass(frozen=True)
+class PoolingSettings:
+    """The weights, in nats. ``python -m studies.probabilities`` fits them."""
+
+    # below the likeliest set: no likelihood is so right that its tails further out count
+    most_worse: float = 10.0
+    evidence: float = 0.47  # a nat of the posterior, between sets
+    sure: float = 2.69  # an effect that the search names
+    tentative: float = -0.14  # one that it names with a doubt
+    other: float = -3.34  # one that it does not name
+    # log odds that something unknown acts: where the residual is at its noise and all names are
+    # sure, and what each sign adds
+    unknown: float = -2.8
+    structured: float = 2.03  # the residual depends on motion, load, place or time
+    random: float = -1.28  # it is larger than its noise beside what is named
+    random_alone: float = 2.45  # it is, and nothing is named
+    doubted: float = 1.58  # a name is tentative
+    structure: float = 0.08  # a nat of ``Ranking.structure``
+    structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
+    least: float = 0.001  # probability of an alternative that is reported
+
+
+POOLING = PoolingSettings()
+
+
+class Named(Protocol):
+    """A name of the search."""
+
+    @property
+    def name(self) -> str:
+        """Of the effect."""
+
+    @property
+    def tentative(self) -> bool:
+        """Whether it may stand for something else."""
+
+    @property
+    def indistinguishable_from(self) -> Sequence[str]:
+        """Effects that it may stand for."""
+
+
+def explanations(
+    named: Sequence[Named], sets: Sequence[tuple[Sequence[str], float]]
+) -> Explanations:
+    """Return how likely each explanation is by the posterior, in nats below the likeliest.
+
+    An effect that the flights cannot tell from a named one counts as that one. Whatever the search
+    names is an explanation, and so are its parts, though the posterior may never have tried them.
+
+    Args:
+        named: by the search.
+        sets: effects and probability of the posterior's sets.
+    """
+    own = {e.name for e in named}
+    same = {x: e.name for e in reversed(named) for x in e.indistinguishable_from if x not in own}
+    shares: dict[frozenset[str], float] = {}
+    for effects, probability in sets:
+        key = frozenset(same.get(e, e) for e in effects)
+        shares[key] = shares.get(key, 0.0) + probability
+    most = max(shares.values(), default=1.0)
+    every = [frozenset(own), frozenset[str](), *(frozenset([e]) for e in own)]
+    every += [frozenset(own - {e}) for e in own]
+    for key in every:
+        shares.setdefault(key, 0.0)
+    least = np.exp(-POOLING.most_worse)
+    return {key: float(np.log(max(x / most, least))) for key, x in shares.items()}
+
+
+def features(named: Sequence[Named], found: Explanations) -> Array:
+    """Return of each explanation (s, 4) its evidence and how many of its effects are sure,
+    tentative, and not named.
+    """
+    sure = {e.name for e in named if not e.tentative}
+    doubted = {e.name for e in named if e.tentative}
+    return np.array(
+        [
+            [x, len(key & sure), len(key & doubted), len(key - sure - doubted)]
+            for key, x in found.items()
+        ],
+        dtype=np.float64,
+    )
+
+
+def signs(named: Sequence[Named], remainder: str, structure: float) -> Array:
+    """Return the signs (6,) that something unknown acts; the first is one."""
+    return np.array(
+        [
+            1.0,
+            remainder == "structured",
+            remainder == "random" and len(named) > 0,
+            remainder == "random" and not named,
+            any(e.tentative for e in named),
+            np.clip(structure, *POOLING.structure_range),
+        ],
+        dtype=np.float64,
+    )
+
+
+def pooled(
+    named: Sequence[Named],
+    remainder: str,
+    sets: Sequence[tuple[Sequence[str], float]],
+    structure: float,
+    weights: PoolingSettings = POOLING,
+) -> Probabilities:
+    """Return how probable names, explanations and something unknown are.
+
+    Args:
+        named: by the search.
+        remainder: none, random or structured, by the search.
+        sets: effects and probability of the posterior's sets.
+        structure: of the posterior, ``Ranking.structure``.
+        weights: of the pool.
+    """
+    w = weights
+    found = explanations(named, sets)
+    score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
+    share = np.exp(score - score.max())
+    share /= share.sum()
+    odds = signs(named, remainder, structure) @ np.array(
+        [w.unknown, w.structured, w.random, w.random_alone, w.doubted, w.structure]
+    )
+    unknown = float(1.0 / (1.0 + np.exp(-odds)))
+    share *= 1.0 - unknown
+    names = {e.name: 0.0 for e in named}
+    for key, p in zip(found, share.tolist(), strict=True):
+        for effect in key:
+            names[effect] = names.get(effect, 0.0) + p
+    order = np.argsort(-share, kind="stable")
+    keys = list(found)
+    alternatives = tuple(
+        Alternative(tuple(sorted(keys[i])), float(share[i])) for i in order if share[i] >= w.least
+    )
+    return Probabilities(names, alternatives, unknown)

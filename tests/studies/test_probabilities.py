@@ -1,0 +1,101 @@
+"""What is said of probabilities follows from flights that are kept, and no flight knows its own
+weights.
+"""
+
+import gzip
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from windwrench.identification.findings import Probabilities
+from windwrench.identification.posterior.pooling import POOLING
+from windwrench.studies.probabilities.__main__ import RESULTS, plan
+from windwrench.studies.probabilities.fitting import fit, frequencies, is_right
+from windwrench.studies.probabilities.scores import (
+    Scored,
+    error_of_perfect_calibration,
+    expected_calibration_error,
+    scored,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", structure=-1.0):
+    return {
+        "truth": {e: {} for e in truth},
+        "outsider": outsider,
+        "left_out": list(left_out),
+        "named": [
+            {"name": e.strip("?"), "tentative": "?" in e, "indistinguishable_from": []}
+            for e in named
+        ],
+        "remainder": remainder,
+        "sets": sets or [[[e.strip("?") for e in named], 1.0]],
+        "structure": structure,
+    }
+
+
+@pytest.fixture(scope="module")
+def records():
+    return json.loads(gzip.decompress((ROOT / RESULTS).read_bytes()))
+
+
+def test_the_weights_in_use_are_those_of_the_kept_flights(records):
+    found = fit([r["result"] for r in records])
+    for name, value in asdict(POOLING).items():
+        assert getattr(found, name) == pytest.approx(value, abs=0.02), name
+
+
+def test_each_half_is_scored_by_the_other(records):
+    changed = [json.loads(json.dumps(r)) for r in records]
+    for r in changed:
+        if r["task"][2] % 2:
+            r["result"]["truth"] = {}
+    old, new = scored(records)["pooled"], scored(changed)["pooled"]
+    for r, a, b in zip(records, old, new, strict=True):
+        same = a.found.unknown == b.found.unknown
+        assert same == bool(r["task"][2] % 2)  # odd flights know even ones, that did not change
+
+
+def test_what_is_right():
+    assert is_right(flight(["mass"], ["mass"]), "mass")
+    assert is_right(flight(["clock_offset"], ["latency"]), "clock_offset")  # exact equivalents
+    assert not is_right(flight(["mass"], ["inertia"]), "mass")
+    assert not is_right(flight(["mass"], ["inertia"], left_out=["inertia"]), "mass")
+    assert not is_right(flight(["mass"], [], outsider="tether"), "mass")
+
+
+def test_weights_follow_who_was_right():
+    agree = [flight(["mass"], ["mass"], sets=[[["mass"], 0.9], [[], 0.1]]) for _ in range(20)]
+    strange = [
+        flight(["wind?"], [], "tether", remainder="structured", structure=12.0) for _ in range(20)
+    ]
+    found = fit([*agree, *strange])
+    assert found.sure > 2.0
+    assert found.unknown < -1.0 < 1.0 < found.structured
+    assert frequencies([*agree, *strange]) == {False: 21 / 22, True: 1 / 22}
+
+
+def test_calibration_of_made_up_claims():
+    right = [(0.9, True)] * 9 + [(0.9, False)]
+    assert expected_calibration_error(right) == pytest.approx(0.0)
+    assert expected_calibration_error([(0.9, False)] * 10) == pytest.approx(0.9)
+    assert 0.01 < error_of_perfect_calibration(right) < 0.15
+
+
+def test_a_log_score_counts_what_nobody_named():
+    missed = Scored(True, flight([], ["mass"]), Probabilities({}, (), 0.1))
+    named = Scored(True, flight(["mass"], ["mass"]), Probabilities({"mass": 0.9}, (), 0.1))
+    assert missed.log_score() == pytest.approx(np.log(1e-3))
+    assert named.log_score() == pytest.approx(np.log(0.9))
+
+
+def test_a_run_has_flights_of_both_and_none_twice():
+    tasks = plan(20, 20, 0, 3, "other.py")
+    assert len(set(tasks)) == len(tasks)
+    assert {t[1] for t in tasks if t[0] == "own"} >= {"single", "pair", "nothing", "left out"}
+    assert {t[1] for t in tasks if t[0] == "other.py"} == {"catalogue", "left out"}
