@@ -127,12 +127,13 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
     """With everything in it: effects, an offset centre of mass, a policy."""
     needs(compiler)
     model = load_vehicle("ardrone2")
-    effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset")
+    effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = model.with_effects(*(parse_setting(e, model) for e in effects))
-    policy = exportable_policy("sac-0", POLICY) if estimator == "ekf" else None
+    names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
+    policy = exportable_policy(names[estimator], POLICY if estimator == "ekf" else None)
     for number, exported in enumerate(
         (
-            export_c(model, estimator, policy=policy or exportable_policy("lead", None)),
+            export_c(model, estimator, policy=policy),
             export_c(load_vehicle("crazyflie"), estimator, gate=None),
             *(export_c(model.with_effects(one), estimator) for one in model.effects[:2]),
         )
