@@ -21,9 +21,11 @@ def _estimators() -> list[str]:
 
 
 def _policies() -> list[str]:
+    from ..live.export_c.policies import LAWS
+
     folder = resources.files("windwrench.training").joinpath("policies")
     shipped = [file.name[:-4] for file in folder.iterdir() if file.name.endswith(".npz")]
-    return ["lead", *sorted(shipped)]
+    return [*LAWS, *sorted(shipped)]
 
 
 def _policy_path(name: str) -> Path | None:
@@ -32,10 +34,10 @@ def _policy_path(name: str) -> Path | None:
     Raises:
         InputError: there is none of this name.
     """
-    if name == "lead":
+    from ..live.export_c.policies import LAWS
+
+    if name in LAWS:
         return None
-    if name == "tracker":
-        raise InputError("--policy tracker: cannot be exported yet; expected lead or sac-0")
     if name.endswith((".npz", ".json")):
         return Path(name)
     path = Path(str(resources.files("windwrench.training"))) / "policies" / f"{name}.npz"
@@ -67,8 +69,8 @@ def export_c(
     policy: Annotated[
         str | None,
         typer.Option(
-            help="Also a policy that tracks a fan: lead, the name of a trained one (sac-0), or its "
-            "path.",
+            help="Also a policy that tracks a fan: lead, tracker, the name of a trained one "
+            "(sac-0), or its path.",
             autocompletion=offering(_policies),
         ),
     ] = None,

@@ -249,6 +249,7 @@ def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str
         "period_s": session.filter.period,
         "clock_drift_ppm": now.drift_ppm,
         "latency_ms": {"median": median, "p99": most},
+        "processor_ms": dict(zip(("median", "p99"), now.processor_ms, strict=True)),
         "recorded_rows": now.recorded,
         "force_mean_N": means.mean[:3],
         "force_std_N": means.deviation[:3],

@@ -41,8 +41,9 @@ class _Terminal(Console):
             yield Segment(text if control else printable(text), style, control)
 
 
-console = _Terminal()
-errors = _Terminal(stderr=True)
+# without emoji: an address such as crazyflie:radio://0/80 is no picture of a radio
+console = _Terminal(emoji=False)
+errors = _Terminal(stderr=True, emoji=False)
 
 
 @dataclass

@@ -19,7 +19,7 @@ from .wrench_lag import ORDER, autoregressions, lags
 Array = NDArray[np.float64]
 
 _TYPICAL = 0.15  # m off the axis, where the noise is taken whose colour stands for all
-_SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation
+SETTLED = 19  # decisions of 80 ms that the filter has settled before the first observation
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class Sensing:
         """Carry the own motion on to this observation (8,)."""
         torque, velocity = float(observation[TORQUE_Z]), float(observation[VELOCITY_Y])
         if self.count == 0:
-            for _ in range(_SETTLED):
+            for _ in range(SETTLED):
                 self._yaw = self.model.yaw @ np.array([*self._yaw, torque, 0.0])
         else:
             self.own += 0.5 * DECISION_PERIOD * (velocity + self.velocity)

@@ -26,10 +26,10 @@ from .tracker_filter import MEMORY, resample
 Array = NDArray[np.float64]
 
 _SEED = 2016  # of the own generator, the same in every episode
-_FEW = 0.5  # share of effective particles below which they are drawn anew
+FEW = 0.5  # share of effective particles below which they are drawn anew
 # what a fan that changes its velocity at once does: a third of them stop, half turn round, the rest
 # take any other velocity
-_STOP, _TURN = 1 / 3, 1 / 2
+STOP, TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
 _SMALLEST = 1e-12 * np.eye(3)  # of a covariance
 
@@ -103,7 +103,7 @@ class _Belief(ABC):
         place, velocity = float(shares @ self._place), float(shares @ self._velocity)
         self.mean = place - sensing.own, velocity
         self.deviation = float(np.sqrt(shares @ (self._place - place) ** 2))
-        if shares @ shares > 1.0 / (_FEW * len(shares)):
+        if shares @ shares > 1.0 / (FEW * len(shares)):
             resample(shares, self._rng.random(), self._chosen)
             self._level, self._memory = self._level[self._chosen], self._memory[self._chosen]
             self._weight[:] = 0.0
@@ -158,7 +158,7 @@ class Tracker(_Belief):
     def _begin(self) -> None:
         rng, n = self._rng, self.particles
         self._place = rng.uniform(-self.reach, self.reach, n)
-        self._velocity = np.where(rng.random(n) < _STOP, 0.0, self.speed * rng.standard_normal(n))
+        self._velocity = np.where(rng.random(n) < STOP, 0.0, self.speed * rng.standard_normal(n))
 
     def _move(self) -> None:
         rng, n = self._rng, self.particles
@@ -168,7 +168,7 @@ class Tracker(_Belief):
         jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
         kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
         self._velocity[jumped] = np.where(
-            kind < _STOP, 0.0, np.where(kind < _STOP + _TURN, -before[jumped], fresh)
+            kind < STOP, 0.0, np.where(kind < STOP + TURN, -before[jumped], fresh)
         )
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
 

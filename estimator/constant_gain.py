@@ -23,10 +23,17 @@ from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import COASTING, NIS, TRACKING, Array, WrenchEstimate
 from .filter_record import FILTER, N, drive, propagate
-from .recovery import Recovery, remember, start_over_if_broken
+from .hover_covariance import (
+    carry_at_hover,
+    catch_up,
+    heading,
+    jacobian_at_hover,
+    turn_world,
+)
+from .recovery import Recovery, after_prediction, remember
 from .sample import check_sample, undo_sensing
 from .tuning import UKFTuning
-from .ukf import WrenchUKF, carry_on, correct_parts
+from .ukf import WrenchUKF, correct_parts
 from .ukf import step as ukf_step
 
 _MEASURED = [0, 1, 2, 6, 7, 8]  # rows of (rho, x) in the error state
@@ -34,7 +41,10 @@ _LONGEST = 60  # s of hover in which the gain must have converged
 _CONVERGED = 1e-9  # relative change of the covariance in a second
 _HEIGHT = 1.2  # m, of that hover
 _LONGEST_GAP = 0.1  # s without a position or an attitude that is coasted over with a constant gain
-_NEAR = 1.1  # of the converged variances: converged again
+_NEAR = 1.1  # of the converged variances: nearly converged again
+# time constants of the wrench for which it must have been near: what then still differs is e^-4 of
+# it, so that it makes no difference whether the constant gain takes over a step earlier or later
+_SETTLE = 2.0
 
 
 @compiled
@@ -50,10 +60,6 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     """Do what the step of ``ukf`` does, with the gain in ``f.gain`` in place of the covariance's
     while the filter is in its steady state.
     """
-    if f.steady == 0:
-        usable: int = ukf_step(f, z, parts, dt, voltage)
-        _look_for_steady_state(f)
-        return usable
     usable = check_sample(f, z, parts)
     if usable < 0:
         return usable
@@ -65,6 +71,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         drive(f, sample[0:4], dt, voltage)
         propagate(f, x, dt, centre)
         f.time += dt
+    if f.steady == 0:
+        _step_with_covariance(f, sample, usable, dt)
+        return usable
     for i in range(3):
         f.gap[i] += dt
     f.status = COASTING
@@ -95,7 +104,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
             nis += y[i] * f.information[i, j] * y[j]
     if f.gap[0] > _LONGEST_GAP or f.gap[1] > _LONGEST_GAP or not nis <= f.alarm[usable // 3]:
         _leave_steady_state(f)
-        correct_parts(f, sample, usable)
+        _correct_with_covariance(f, sample, usable)
         return usable
     x[NIS] = nis if usable == 3 else math.nan
     _turn(mean[0:3], cosine, sine)  # the rate, next, is in body axes
@@ -109,30 +118,55 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
 
 @compiled
 def _leave_steady_state(f: Record) -> None:
-    """Let the filter's own covariance take over at the predicted state, ``f.centre``: after a gap,
-    whose widening is made up for here, or at a measurement that is not to be believed as it is.
+    """Let a covariance take over at the predicted state, ``f.centre``: after a gap, whose widening
+    is made up for here, or at a measurement that is not to be believed as it is.
     """
-    x, position_gap, attitude_gap, refused = f.x, f.gap[0], f.gap[1], f.gap[2]
-    f.steady = 0
-    # the covariance after a correction, carried over the time that has not been measured since
-    held = f.centre[:NIS].copy()
-    x[:NIS] = held
-    for _ in range(max(1, round(max(position_gap, attitude_gap) / f.period))):
-        carry_on(f, f.period)
-        x[:NIS] = held
-        f.gap[0], f.gap[1], f.gap[2] = position_gap, attitude_gap, refused
-    start_over_if_broken(f)
+    x = f.x
+    f.steady, f.near = 0, 0.0
+    for i in range(NIS):
+        x[i] = f.centre[i]
     x[NIS] = math.nan
+    catch_up(f)
+    after_prediction(f, 0.0)
+
+
+@compiled
+def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> None:
+    """Go on from the predicted state, ``f.centre``, with the covariance."""
+    x = f.x
+    for i in range(NIS):
+        x[i] = f.centre[i]
+    x[NIS] = math.nan
+    if dt > 0.0:
+        f.near += dt
+        carry_at_hover(f, dt)
+        after_prediction(f, dt)
+    if usable > 0:
+        _correct_with_covariance(f, sample, usable)
+        _look_for_steady_state(f)
+
+
+@compiled
+def _correct_with_covariance(f: Record, sample: Array, usable: int) -> None:
+    if usable > 0:
+        w, z = heading(f.x[3:7])
+        turn_world(f, sample, w, -z)
+        correct_parts(f, sample, usable)
+        turn_world(f, sample, w, z)
 
 
 @compiled
 def _look_for_steady_state(f: Record) -> None:
-    """Return to the constant gain once the covariance is that of a converged filter."""
-    if f.status != TRACKING:
-        return
+    """Return to the constant gain once the covariance has been that of a converged filter for a
+    while.
+    """
+    near = f.status == TRACKING
     for i in range(N):
-        if f.P[i, i] > _NEAR * f.converged[i, i]:
-            return
+        near &= f.P[i, i] <= _NEAR * f.converged[i, i]
+    if not near:
+        f.near = 0.0
+    if f.near <= f.settle:
+        return
     f.steady = 1
     for i in range(N):
         for j in range(N):
@@ -157,10 +191,9 @@ class ConstantGainFilter(WrenchUKF):
     that is far off takes the rise time to correct. A measurement, or a part of it, that was not
     made is coasted over for up to 0.1 s: the state moves on by the model, and what is measured
     again is believed no more than before. After a longer gap, at a restart and at a measurement
-    that the gate refuses it is ``WrenchUKF`` itself, covariance and all, until that has converged
-    again. While the gain is constant, the covariance is that of the converged ``WrenchUKF`` at
-    hover, facing along x. Where noise differs between x and y, the gain is exact at that heading
-    only.
+    that the gate refuses it has a covariance like ``WrenchUKF``, until that has converged again:
+    that of the model linearised at hover. ``covariance`` is always that of a vehicle that faces
+    along x. Where noise differs between x and y, the gain is exact at that heading only.
 
     Args:
         vehicle: the declared vehicle, with its declared effects.
@@ -186,8 +219,9 @@ class ConstantGainFilter(WrenchUKF):
     ) -> None:
         super().__init__(vehicle, tuning, period, gate, recovery)
         super().reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
-        self._converged = _converged_covariance(self.record.tobytes(), vehicle.voltage_ref)
+        self._converged, hover = _converged(self.record.tobytes(), vehicle.voltage_ref)
         f = self.record[0]
+        f["hover"] = hover
         inverse = 1.0 / f["noise"]
         # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R -
         # H P H') within / R
@@ -195,6 +229,8 @@ class ConstantGainFilter(WrenchUKF):
         left = np.diag(f["noise"]) - self._converged[np.ix_(_MEASURED, _MEASURED)]
         f["information"] = inverse[:, None] * left * inverse
         f["P"] = f["converged"] = self._converged
+        walks = f["thrust"] / f["force_walk"], f["motor_torque"] / f["torque_walk"]
+        f["settle"] = _SETTLE * period * math.sqrt(float(np.max(walks)))
         f["steady"] = 1
 
     def reset(
@@ -231,9 +267,9 @@ def _hover(record: np.ndarray, z: Array, steps: int, voltage: float) -> None:
 
 
 @lru_cache(maxsize=32)
-def _converged_covariance(start: bytes, voltage: float) -> Array:
+def _converged(start: bytes, voltage: float) -> tuple[Array, Array]:
     """Return the covariance (18, 18) after a correction that ``WrenchUKF``, its record given at
-    hover, comes to.
+    hover, comes to, and the derivatives (6, 18) of its accelerations there.
 
     Raises:
         InputError: it comes to none.
@@ -247,7 +283,7 @@ def _converged_covariance(start: bytes, voltage: float) -> Array:
         _hover(record, z, second, voltage)
         scale = np.sqrt(np.diag(f["P"]))
         if np.all(np.abs(f["P"] - before) <= _CONVERGED * np.outer(scale, scale)):
-            return np.array(f["P"])
+            return np.array(f["P"]), jacobian_at_hover(record, voltage, scale)
     raise InputError(
         f"ConstantGainFilter: the gain does not converge within {_LONGEST} s of hover; use "
         f"WrenchUKF"

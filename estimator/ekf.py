@@ -104,7 +104,7 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
 
 
 @compiled
-def _acceleration_jacobian(f: Record, A: Array) -> None:
+def acceleration_jacobian(f: Record, A: Array) -> None:
     """Write the derivatives of the accelerations at ``f.x`` by the error state into ``A`` (12, 18),
     rows 3-5 and 9-11.
 
@@ -200,7 +200,7 @@ def model_jacobian(f: Record, dt: float, A: Array) -> None:
     for i in range(12):
         for j in range(N):
             A[i, j] = 0.0
-    _acceleration_jacobian(f, A)
+    acceleration_jacobian(f, A)
     R = f.centre_rotation
     # the turn of this step is at the old rate: 4 d(rho) = R Jl(omega dt) dt d(omega), Jl the left
     # Jacobian of SO(3)

@@ -120,6 +120,9 @@ FILTER = np.dtype(
         ("information", "f8", (6, 6)),
         ("steady", "i8"),  # whether that gain holds now
         ("converged", "f8", (N, N)),  # the covariance that goes with it
+        ("near", "f8"),  # s for which the covariance has been near that
+        ("settle", "f8"),  # s for which it must have been
+        ("hover", "f8", (6, N)),  # derivatives of the accelerations at hover by the error state
         ("imu", IMU),
     ]
 )

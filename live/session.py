@@ -52,6 +52,7 @@ class Snapshot:
     counts: dict[str, int]
     silence: float  # s since the last message
     latency_ms: tuple[float, float]  # median and 99 % quantile
+    processor_ms: tuple[float, float]  # likewise, of a row's own processor time, but its recording
     drift_ppm: float | None
     clocks: int
     estimates: int
@@ -96,6 +97,7 @@ class Session:
         self._stopped = False
         self._begin_t: float | None = None
         self._kinds: set[str] = set()
+        self._unrecorded: list[Row] = []
         self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
         self.output: Output | None = None
         self._recent: deque[Output] | None = None  # what a view shows
@@ -142,12 +144,14 @@ class Session:
                 self._out(output)
             self._flush()
             if self.recorder is not None and self.estimates:
+                self._record()
                 self.recorder.close()
             if not self.estimates and not self._stop.is_set():
                 raise self._nothing("before it ended")
         finally:
             self.source.close()
             if self.recorder is not None and self.estimates:
+                self._record()
                 self.recorder.close()
 
     def _once(self) -> bool:
@@ -162,15 +166,18 @@ class Session:
             if silence and self._kinds and self.source.paced:
                 self.tallies.counts["stops"] += 1
             self._last = now
+            spent = time.thread_time_ns()
             for sample in samples:
                 self.take(sample)
                 if self._stop.is_set():
                     break
             self._flush()
-            out = time.monotonic_ns()
+            out, spent = time.monotonic_ns(), time.thread_time_ns() - spent
             for arrival in self._fresh:
                 self.tallies.latency.add(out - arrival)
+                self.tallies.processor.add(spent // len(self._fresh))
             self._fresh.clear()
+            self._record()
         elif self.recorder is not None:
             self.recorder.idle(1e-9 * (now - self._last))
         wait = self._settings.wait
@@ -193,7 +200,14 @@ class Session:
             if output.row is row and self.source.paced:  # not one that was held back
                 self._fresh.append(row.arrival)
         if self.recorder is not None:
-            self.recorder.add(row)
+            self._unrecorded.append(row)
+
+    def _record(self) -> None:
+        """Record the rows that came, once their estimates are out."""
+        if self.recorder is not None:
+            for row in self._unrecorded:
+                self.recorder.add(row)
+            self._unrecorded.clear()
 
     def _out(self, output: Output) -> None:
         self.estimates += 1
@@ -232,13 +246,14 @@ class Session:
     def snapshot(self) -> Snapshot:
         """Return what there is to show, from any thread."""
         now = time.monotonic_ns()
-        latency = self.tallies.latency
+        latency, processor = self.tallies.latency, self.tallies.processor
         return Snapshot(
             output=self.output,
             rates={kind: rate.hertz(now) for kind, rate in list(self.tallies.rates.items())},
             counts={name: n for name, n in list(self.tallies.counts.items()) if n},
             silence=1e-9 * (now - self._last),
             latency_ms=(latency.quantile(0.5), latency.quantile(0.99)),
+            processor_ms=(processor.quantile(0.5), processor.quantile(0.99)),
             drift_ppm=self._clocks.drift,
             clocks=self._clocks.count,
             estimates=self.estimates,

@@ -83,6 +83,7 @@ class Tallies:
         self.counts: Counter[str] = Counter()
         self.rates: dict[str, Rate] = {}
         self.latency = Durations()
+        self.processor = Durations()
 
     def message(self, kind: str, now: int) -> None:
         """Count a message of a kind that came ``now``, ns."""

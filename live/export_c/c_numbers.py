@@ -25,7 +25,7 @@ def literal(value: float, what: str = "a number") -> str:
 
 
 def table(values: ArrayLike, what: str = "a number") -> str:
-    """Return an array of one or two dimensions as the initialiser of a C array."""
+    """Return an array as the initialiser of a C array."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim == 1:
         return _wrapped([literal(x, what) for x in array])

@@ -31,7 +31,14 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.And: "&&",
     ast.Or: "||",
 }
-_MATHS = {"sqrt": "sqrtf", "sin": "sinf", "cos": "cosf", "exp": "ww_exp", "fabs": "fabsf"}
+_MATHS = {
+    "sqrt": "sqrtf",
+    "sin": "sinf",
+    "cos": "cosf",
+    "exp": "ww_exp",
+    "fabs": "fabsf",
+    "atan2": "ww_atan2",
+}
 # words of C that may be names in Python
 _KEYWORDS = {
     *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "goto"),
@@ -53,6 +60,7 @@ class _Function:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
         self.tree = cast(ast.FunctionDef, tree.body[0])
         self.integers: set[str] = set()
+        self.places: dict[str, str] = {}  # short names of places in an array
         self.counter = 0
         annotated = [a for a in self.tree.args.args if a.annotation is not None]
         self.floats = [
@@ -151,6 +159,16 @@ class _Function:
 
     def assignment(self, target: ast.expr, value: ast.expr) -> list[str]:
         """Return the lines of an assignment to one target, or to several at once."""
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            pairs = [
+                (a, b)
+                for a, b in zip(target.elts, value.elts, strict=True)
+                if not self.names_a_place(a, b)
+            ]
+            target = ast.Tuple([a for a, _ in pairs], ast.Store())
+            value = ast.Tuple([b for _, b in pairs], ast.Load())
+        elif self.names_a_place(target, value):
+            return []
         if isinstance(target, ast.Tuple):
             self.counter += 1
             t = f"t{self.counter}"
@@ -165,6 +183,17 @@ class _Function:
             return lines
         before, text = self.value(value)
         return [*before, f"{self.expression(target)} = {text};"]
+
+    def names_a_place(self, target: ast.expr, value: ast.expr) -> bool:
+        """Return whether an assignment gives a place in an array a short name; keep it."""
+        if not (isinstance(target, ast.Name) and isinstance(value, ast.Name)):
+            return False
+        place = self.globals.get(value.id)
+        if not isinstance(place, int) or getattr(base, value.id, None) != place:
+            return False
+        self.integers.add(target.id)
+        self.places[target.id] = f"WW_{value.id}"
+        return True
 
     def value(self, node: ast.expr) -> tuple[list[str], str]:
         """Return the lines that come before an expression, and the expression."""
@@ -249,7 +278,7 @@ class _Function:
     def name_of(self, name: str, integer: bool) -> str:
         """Return what a name is in C: an index, a constant of the effect's file, or a variable."""
         if name in self.integers:
-            return name if integer else f"(float){name}"
+            return self.places.get(name, name) if integer else f"(float){name}"
         if name in self.globals and name not in self.arrays:
             value = self.globals[name]
             if isinstance(value, int) and getattr(base, name, None) == value:
@@ -270,7 +299,7 @@ class _Function:
         ):
             if function.attr not in _MATHS:
                 raise UntranslatableError(f"calls math.{function.attr}")
-            return f"{_MATHS[function.attr]}({arguments[0]})"
+            return f"{_MATHS[function.attr]}({', '.join(arguments)})"
         name = function.id if isinstance(function, ast.Name) else "a method"
         if name in ("min", "max") and len(arguments) == 2:
             return f"{'smaller' if name == 'min' else 'larger'}({', '.join(arguments)})"
@@ -298,8 +327,8 @@ def translate(effect: Effect, needed: dict[str, str]) -> str:
     Raises:
         UntranslatableError: it does something else than what is translated.
     """
-    if effect.kind == "sensing":
-        raise UntranslatableError("changes what is measured")
+    if effect.kind == "sensing" and effect.memory:
+        raise UntranslatableError("remembers what was measured")
     if effect.advance is not None:
         raise UntranslatableError("has a state of its own")
     if effect.model is None:

@@ -24,11 +24,13 @@ from ...estimator import ConstantGainFilter, Recovery, UKFTuning, WrenchEKF, Wre
 from ...estimator.constant_gain import _LONGEST_GAP, _NEAR
 from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
+from ...estimator.hover_covariance import CATCH_UP
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
 from ...estimator.recovery import AGREEING as AGREEING_POSES
 from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
+from . import hover
 from .c_numbers import literal, table
 from .effect_code import (
     UntranslatableError,
@@ -36,6 +38,7 @@ from .effect_code import (
     exportable_effects,
     translate,
 )
+from .tracker import tracker_policy
 
 FILTERS: dict[str, type[WrenchUKF]] = {
     "constant-gain": ConstantGainFilter,
@@ -99,10 +102,13 @@ def export_c(
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(f"{name}: expected a positive number, got {value!r}")
     period = 1.0 / rate
-    wrench, rotor_effects, effect_code = _effects(vehicle)
+    wrench, rotor_effects, sensing, effect_code = _effects(vehicle)
     tuning = UKFTuning.for_vehicle(vehicle, period, rise_time)
     made = FILTERS[estimator](vehicle, tuning, period, gate, Recovery())
+    if policy is not None and policy["kind"] == "tracker":
+        policy = tracker_policy(vehicle, tuning, period)
     imu = estimator != "constant-gain"
+    offset = bool(np.any(made.record[0]["body"]["com"] != 0.0))
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
@@ -115,13 +121,16 @@ def export_c(
         "rate": rate,
         "period": literal(period),
         "mass": literal(float(made.record[0]["body"]["mass"])),
+        "kept": len(hover.kept(made.record[0])),
         "hover_speed": literal(float(made.record[0]["last_speeds"][0])),
         "agreeing": AGREEING,
         "agreeing_poses": AGREEING_POSES,
-        "offset": bool(np.any(made.record[0]["body"]["com"] != 0.0)),
+        "offset": offset,
         "pairs": 12 if wrench else 6,
+        "bent": 12 if wrench else 6 if offset else 3,
         "wrench": wrench,
         "rotor_effects": rotor_effects,
+        "sensing": sensing,
         "rotor_memory": max((e.memory for e in rotor_effects), default=1) or 1,
         "rotors_size": ROTORS_SIZE,
         "parameters": PARAMETERS,
@@ -130,9 +139,7 @@ def export_c(
         "policy": policy,
         "uses_exp": "ww_exp(" in effect_code,
     }
-    context["uses_smaller"] = "smaller(" in effect_code or (
-        policy is not None and (policy["kind"] == "dense" or policy["kind"] == "lead")
-    )
+    context["uses_smaller"] = "smaller(" in effect_code or policy is not None
     context["constants"] = _constants(made, estimator, context)
     environment = Environment(
         loader=PackageLoader("windwrench.live.export_c", "templates"),
@@ -154,16 +161,16 @@ def _one_line(text: str) -> str:
     return kept.replace("*/", "* /").replace("\\", "/")
 
 
-def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], str]:
-    """Return the effects that have a model, wrench and rotor input, in the filter's order, and
-    their code.
+def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect], str]:
+    """Return the effects that have a model, wrench, rotor input and sensing, in the filter's order,
+    and their code.
 
     Raises:
         InputError: one cannot be exported.
     """
     needed: dict[str, str] = {}
     models: dict[str, str] = {}
-    found: dict[str, list[Effect]] = {"wrench": [], "rotor input": []}
+    found: dict[str, list[Effect]] = {"wrench": [], "rotor input": [], "sensing": []}
     for setting in vehicle.effects:
         effect = get(setting.name)
         if effect.kind == "body":  # its numbers are the vehicle's
@@ -180,12 +187,12 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], str]:
     found["wrench"].sort(key=lambda effect: not effect.sets_wind)
     code = "\n".join([*needed.values(), *models.values()])
     if not code:
-        return [], [], ""
-    parts = []
-    if "ww_exp(" in code:
-        parts.append(
-            (Path(__file__).parent / "templates" / "exponential.c.j2").read_text(encoding="utf-8")
-        )
+        return [], [], [], ""
+    parts = [
+        (Path(__file__).parent / "templates" / f"{name}.c.j2").read_text(encoding="utf-8")
+        for name, called in (("exponential", "ww_exp("), ("arctangent", "ww_atan2("))
+        if called in code
+    ]
     # what the template of the effects names
     always = "WW_STEP WW_ROTOR_TIME "
     if found["wrench"]:
@@ -193,9 +200,15 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], str]:
             "WW_POSITION WW_VELOCITY WW_RATE WW_WIND WW_ROTATION WW_ROTOR_SPEED WW_ROTOR_THRUST "
             "WW_TIME WW_ROTOR_ACCELERATION"
         )
+    if found["sensing"]:
+        always += (
+            " WW_SAMPLE_SIZE WW_SAMPLE_POSITION WW_SAMPLE_QUATERNION WW_DIRECTION WW_HAS_POSITION "
+            "WW_HAS_QUATERNION"
+        )
     return (
         found["wrench"],
         found["rotor input"],
+        found["sensing"],
         "\n".join([definitions(always + code) + "\n", *parts, code]),
     )
 
@@ -215,6 +228,11 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
             f"static const float ww_{name}{shape} = {table(values, name)}; /* {meaning} */"
         )
 
+    def entries(name: str, values: list[hover.Entry], meaning: str) -> None:
+        lines.append(f"#define WW_{name.upper()} {len(values)}")
+        rows = ", ".join(f"{{{e[0]}, {e[1]}, {e[2]}, {literal(e[3], name)}}}" for e in values)
+        lines.append(f"static const ww_entry ww_{name}[] = {{{rows}}}; /* {meaning} */")
+
     define("PERIOD", made.period, "s, that the noise is stated for")
     define("MASS", body["mass"], "kg")
     define("GRAVITY", body["gravity"], "m/s2")
@@ -224,7 +242,7 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
     array("mixing", body["mixing"], "squared rotor speeds to thrust (N) and torques (Nm)")
     if context["offset"]:
         array("com", body["com"], "m, centre of mass from the geometric centre")
-    if context["wrench"] or context["rotor_effects"]:
+    if context["wrench"] or context["rotor_effects"] or context["sensing"]:
         array("effect_vehicle", f["constants"], "what effects may know of the vehicle")
     if context["wrench"]:
         array("thrust_k", body["k"], "N/(rad/s)^2")
@@ -233,18 +251,22 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
     if context["rotor_effects"]:
         rows = f["rotor_coefficients"][: len(context["rotor_effects"])]
         array("rotor_coefficients", rows, "of the effects on the rotors, one a row")
+    if context["sensing"]:
+        rows = f["sensing_coefficients"][: len(context["sensing"])]
+        array("sensing_coefficients", rows, "of the effects on what is measured, one a row")
     define("LONG_TURN", LONG_TURN, "rad a step, beyond which the body turns exactly")
     define("PI", math.pi, "")
     lines[-1] = lines[-1].replace(" /*  */", "")
-    array("motor_torque_std", np.sqrt(f["motor_torque"]), "Nm, body, new each period")
-    array("thrust_std", np.sqrt(f["thrust"]), "N, body, new each period")
-    array("torque_walk", f["torque_walk"], "variance a period, world")
-    array("force_walk", f["force_walk"], "variance a period, world")
+    if estimator != "constant-gain":
+        array("motor_torque_std", np.sqrt(f["motor_torque"]), "Nm, body, new each period")
+        array("thrust_std", np.sqrt(f["thrust"]), "N, body, new each period")
+        array("torque_walk", f["torque_walk"], "variance a period, world")
+        array("force_walk", f["force_walk"], "variance a period, world")
     array("noise", f["noise"], "variance of a measured pose: MRP, position")
     define("LARGEST_MRP_VARIANCE", LARGEST_MRP_VARIANCE, "an attitude cannot be less known")
-    array("prior", f["prior"], "variances of what nothing is known of")
-    array("lost", f["lost"], "variances beyond which what is not measured is given up")
-    array("reason", f["reason"], "squares of torque and force beyond which none is believed")
+    array("prior", f["prior"][::3], "variances of what nothing is known of, three rows each")
+    array("lost", f["lost"][::3], "variances beyond which what is not measured is given up")
+    array("reason", f["reason"][::3], "squares of torque and force beyond which none is believed")
     array("push", f["push"], "rad/s2 and m/s2 of the hardest push")
     define("RESPONSE", f["response"], "s in which the filter follows a push")
     define("PATIENCE", f["patience"], "s")
@@ -252,16 +274,26 @@ def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> l
     define("ALARM_SIX", f["alarm"][1], "and of six")
     define("RESTART_AT", f["restart_at"], "NIS beyond which no linear correction is made")
     kappa = float(f["kappa"])
-    if estimator != "ekf":
+    if estimator == "ukf":
         define("SPREAD", math.sqrt(N + NOISE + kappa), "how far out sigma points lie")
         define("WEIGHT", 0.5 / (N + NOISE + kappa), "of a sigma point")
     if estimator == "constant-gain":
         define("LONGEST_GAP", _LONGEST_GAP, "s that the constant gain coasts over")
-        define("NEAR", _NEAR, "of the converged variances: converged again")
+        define("NEAR", _NEAR, "of the converged variances: nearly converged again")
+        define("SETTLE", f["settle"], "s for which they must have been")
+        define("CATCH_UP", CATCH_UP, "predictions, at most, that make up for a gap")
+        entries("couplings", hover.couplings(f), "derivatives of the accelerations at hover")
+        entries("noises", hover.noises(f), "variances that time adds; lower half")
+        kept = hover.kept(f)
+        rows = ", ".join(f"{{{i}, {j}}}" for i, j in kept)
+        lines.append(
+            f"static const unsigned char ww_kept[WW_KEPT][2] = {{{rows}}};"
+            " /* rows and columns of covariances that are not always zero, the diagonal first */"
+        )
         array(
             "converged",
-            f["converged"][np.tril_indices(N)],
-            "covariance after a correction, facing along x; lower half, by rows",
+            [f["converged"][i, j] for i, j in kept],
+            "those after a correction, facing along x",
         )
     else:
         first = np.diag(default_covariance(made.vehicle, made.tuning))

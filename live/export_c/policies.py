@@ -22,7 +22,7 @@ from .c_numbers import literal, table
 # Fan tracking by the ratio of torque and force, with the lead that makes up for the filter's delay:
 # gains (1/s, 1) and the least force (N) fitted to what the trained policies command
 LEAD_GAIN, LEAD_RATE_GAIN, LEAD_LEAST_FORCE = 11.35, 2.79, 0.183
-LAWS = ("lead",)
+LAWS = ("lead", "tracker")
 _COLUMNS = {
     FORCE_X: "e->force[0]",
     FORCE_Y: "e->force[1]",
@@ -36,7 +36,7 @@ _COLUMNS = {
 
 
 def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
-    """Return what the templates need of a policy: ``lead``, or the trained one at ``path``.
+    """Return what the templates need of a policy: a law, or the trained one at ``path``.
 
     Raises:
         InputError: there is no such policy, or it is of a kind that is not exported.
@@ -50,6 +50,8 @@ def exportable_policy(name: str, path: Path | None) -> Mapping[str, Any]:
             "rate_gain": literal(LEAD_RATE_GAIN),
             "least_force": literal(LEAD_LEAST_FORCE),
         }
+    if name == "tracker":
+        return {"kind": "tracker"}  # the rest is the vehicle's: ``tracker.tracker_policy``
     if path is None:
         raise InputError(
             f"--policy {name}: expected {', '.join(LAWS)} or the name or path of a trained policy"

@@ -72,10 +72,15 @@ class CompiledFilter:
 
     def __init__(self, exported: Exported, folder: Path, compiler: str = "gcc") -> None:
         write(exported, folder)
-        (folder / "size.c").write_text(
-            '#include "windwrench_filter.h"\nunsigned size_of_filter(void);\n'
-            "unsigned size_of_filter(void) { return (unsigned)sizeof(ww_filter); }\n"
-        )
+        header = exported.files["windwrench_filter.h"]
+        lines = ['#include "windwrench_filter.h"']
+        with_policy = "ww_policy" in header
+        for name, type_ in (("filter", "ww_filter"), ("policy", "ww_policy_memory"))[
+            : 1 + with_policy
+        ]:
+            head = f"unsigned size_of_{name}(void)"
+            lines += [f"{head};", f"{head} {{ return (unsigned)sizeof({type_}); }}"]
+        (folder / "size.c").write_text("\n".join([*lines, ""]))
         library = folder / "filter.so"
         sources = ("windwrench_filter.c", "size.c")
         run(
@@ -87,11 +92,11 @@ class CompiledFilter:
         self.c.ww_predict.argtypes = [ctypes.c_void_p, _FLOATS, ctypes.c_float]
         self.bytes = int(self.c.size_of_filter())
         self._memory = ctypes.create_string_buffer(self.bytes)
-        header = exported.files["windwrench_filter.h"]
         self._now = _estimate_type("gyro_bias" in header)()
-        if "ww_policy" in header:
+        if with_policy:
             self.c.ww_policy.restype = ctypes.c_float
-            self._policy = ctypes.create_string_buffer(4096)
+            self.policy_bytes = int(self.c.size_of_policy())
+            self._policy = ctypes.create_string_buffer(self.policy_bytes)
             self.c.ww_policy_init(self._policy)
 
     def reset(self, position: Any, quaternion: Any) -> int:

@@ -39,6 +39,8 @@ class Measured:
     status: Array  # (n,)
     estimates: Array  # (n, 19)
     loop: int  # instructions that the timer saw in the loop of 2,000
+    policy: int = 0  # instructions of the longest ww_policy, where there is one
+    policy_ram: int = 0  # bytes, of one ww_policy_memory
 
 
 def tools_missing() -> list[str]:
@@ -119,4 +121,6 @@ def _read(said: str, code: int, tables: int) -> Measured:
         numbers[:, 3].astype(float),
         numbers[:, 4:].copy().view(np.float32).astype(float),
         round(words["loop"] * 5 / 8),
+        words.get("policy", 0),
+        words.get("policysize", 0),
     )

@@ -15,6 +15,7 @@ from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
 
 BOARD_STEPS = 1_000
 BOARD_FLIGHT = "ardrone2, turning"
+POLICIES = ("lead", "sac-0", "tracker")
 _POLICY = Path(__file__).parents[2] / "training" / "policies" / "sac-0.npz"
 
 
@@ -91,14 +92,20 @@ def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> lis
                     "imu": float(np.median(felt_row.imu)),
                 }
             if optimise == "-Os":
-                row["policy"] = _policy(estimator, here) - calm.code
+                row["policies"] = [_policy(name, estimator, here, calm.code) for name in POLICIES]
             rows.append(row)
             report("board", len(rows) / (2 * len(ESTIMATORS)))
     return rows
 
 
-def _policy(estimator: str, folder: Path) -> int:
-    """Return the bytes of the filter with the policy sac-0 beside it."""
-    policy = exportable_policy("sac-0", _POLICY)
+def _policy(name: str, estimator: str, folder: Path, alone: int) -> dict[str, Any]:
+    """Return what a policy takes beside the filter of ``alone`` bytes."""
+    policy = exportable_policy(name, _POLICY if name == "sac-0" else None)
     both = export_c(vehicle_of(BOARD_FLIGHT), estimator, policy=policy)
-    return firmware.object_size(both, folder, "-Os")[0]
+    flown = firmware.fly(both, flight(BOARD_FLIGHT, BOARD_STEPS, 0, faults=False), folder, "-Os")
+    return {
+        "name": name,
+        "code": flown.code - alone,
+        "ram": flown.policy_ram,
+        "decision": flown.policy,
+    }

@@ -1,7 +1,7 @@
 """``python -m studies.live_stream``: a day of a stream, one with faults, and the latency.
 
 Writes ``docs/live/live-stream.json``. ``--hours H --rate HZ`` for other lengths; ``--only long``,
-``faults`` or ``latency`` does one part again and keeps the others.
+``rates``, ``faults`` or ``latency`` does one part again and keeps the others.
 """
 
 import argparse
@@ -15,6 +15,7 @@ from windwrench.studies.live_stream.latency import measure
 from windwrench.studies.live_stream.long_stream import Faults, run_long
 
 RESULT = Path("docs/live/live-stream.json")
+RATES = ((4.0, 100.0), (2.0, 200.0))  # hours and Hz, as vehicles fly
 FAULTS = Faults(lost=0.01, doubled=0.01, late=0.02, silences=4.0)
 
 
@@ -23,7 +24,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
     parser.add_argument("--rate", type=float, default=5.0)
-    parser.add_argument("--only", choices=("long", "faults", "latency"))
+    parser.add_argument("--only", choices=("long", "rates", "faults", "latency"))
     parser.add_argument("--out", type=Path, default=RESULT)
     given = parser.parse_args()
     found: dict[str, Any] = {}
@@ -45,6 +46,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             log = Path(folder) / "flight.csv"
             found["faults"] = run_long(given.hours / 24.0, 200.0, FAULTS, log, report)
+    if wanted("rates"):
+        found["flight_rates"] = [run_long(*rate, Faults(), report=report) for rate in RATES]
     if wanted("long"):
         found["long"] = run_long(given.hours, given.rate, Faults(), report=report)
     given.out.parent.mkdir(parents=True, exist_ok=True)

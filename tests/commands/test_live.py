@@ -94,6 +94,14 @@ def test_what_cannot_be_is_refused(arguments, said, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_address_is_printed_as_it_is(capsys):
+    """Not as a picture: ``:radio:`` is the name of one."""
+    from windwrench.commands.terminal import errors
+
+    errors.print("crazyflie:radio://0/80/2M", markup=False)
+    assert "crazyflie:radio://0/80" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def watched():
     """A flight of 2 s that was watched."""

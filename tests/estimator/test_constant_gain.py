@@ -168,16 +168,66 @@ def test_bad_input_is_named_and_changes_nothing():
         f.correct_imu(gyro=[0, 0, 0])
 
 
+def after_a_gap(f, vehicle):
+    """Standard deviations of the horizontal velocity after a gap longer than it coasts over."""
+    f.reset([0, 0, 1], [1, 0, 0, 0])
+    speeds = np.full(4, vehicle.hover_rate)
+    for _ in range(1200):
+        f.step(speeds, [0, 0, 1], [1, 0, 0, 0])
+    for _ in range(25):
+        e = f.step(speeds)
+    return np.sqrt(np.diag(e.covariance))[9:11]
+
+
 def test_a_gap_widens_its_covariance_with_the_declared_effects():
     """Drag holds a velocity that nobody measures: without it the deviation would be larger."""
-    vehicle = VEHICLE.with_effects(EffectSetting("body_drag", {"dx": 10.0, "dy": 10.0}))
-    deviations = []
-    for f in (WrenchUKF(vehicle), ConstantGainFilter(vehicle)):
-        f.reset([0, 0, 1], [1, 0, 0, 0])
-        speeds = np.full(4, vehicle.hover_rate)
-        for _ in range(1200):
-            f.step(speeds, [0, 0, 1], [1, 0, 0, 0])
-        for _ in range(25):  # longer than it coasts with a constant gain
-            e = f.step(speeds)
-        deviations.append(np.sqrt(np.diag(e.covariance))[9:11])
-    np.testing.assert_allclose(deviations[1], deviations[0], rtol=1e-3)
+    vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 2e-3, "kdy": 2e-3}))
+    full, constant, free = (
+        after_a_gap(make(model), model)
+        for make, model in (
+            (WrenchUKF, vehicle),
+            (ConstantGainFilter, vehicle),
+            (ConstantGainFilter, VEHICLE),
+        )
+    )
+    np.testing.assert_allclose(constant, full, rtol=1e-3)
+    assert np.all(free > 1.1 * constant)
+
+
+def test_after_a_gap_it_is_honest_at_any_heading(turning):
+    """Through half a second unseen, in a turn of several rad/s: deviations widen as those of the
+    full filter do, and what is estimated lies within them from the first pose on.
+    """
+    gap, rise = range(1200, 1300), 200
+    full, constant = both(VEHICLE, turning, 0, set(gap), **twist(turning))
+    deviations = [np.sqrt(np.diag(e[gap[-1] - 1].covariance)) for e in (full, constant)]
+    ratio = deviations[1] / deviations[0]
+    assert np.all((ratio[6:] > 0.4) & (ratio[6:] < 1.6))  # it does not know of the tilt
+    assert np.all(
+        deviations[1][6:12] > 3.0 * np.sqrt(np.diag(constant[gap[0] - 2].covariance))[6:12]
+    )
+    truth = {"velocity": turning["velocity"], "position": turning["true_x"]}
+    truth["torque"] = np.tile((0.01, -0.015, 0.02), (len(turning["rotors"]), 1))
+    truth["force"] = np.tile((0.3, -0.2, -0.1), (len(turning["rotors"]), 1))
+    rows = {"position": 6, "velocity": 9, "torque": 12, "force": 15}
+    for name, row in rows.items():
+        scores = []
+        for k in range(gap[-1], gap[-1] + 2 * rise):
+            std = np.sqrt(np.diag(constant[k].covariance))[row : row + 3]
+            scores.append(np.abs(getattr(constant[k], name) - truth[name][k + 1]) / std)
+        assert np.sqrt(np.mean(np.square(scores))) < 1.5, name
+        assert np.max(scores[-1]) < 3.0, name
+
+
+def test_it_returns_to_the_constant_gain_wherever_the_vehicle_flies(turning):
+    f = ConstantGainFilter(VEHICLE)
+    f.reset(turning["position"][0], turning["quaternion"][0], **twist(turning))
+    steady = []
+    for k in range(1, 1800):
+        seen = not 1000 <= k < 1040
+        pose = (turning["position"][k], turning["quaternion"][k]) if seen else (None, None)
+        f.step(turning["rotors"][k], *pose)
+        steady.append(int(f.record[0]["steady"]))
+    assert all(steady[:1000])
+    assert not any(steady[1025:1100])
+    assert all(steady[-100:])

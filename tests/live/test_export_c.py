@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 from windwrench.controllers.trained_policy import load_policy
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import compile_effects, get, parse_setting
-from windwrench.dynamics.effects.base import ROTORS_SIZE, STATE_SIZE
+from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.runtime.errors import InputError
@@ -73,6 +73,25 @@ def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
     assert worst["over"] < 0.03
 
 
+@pytest.mark.parametrize("estimator", ["constant-gain", "ekf"])
+def test_c_undoes_what_a_pose_is_declared_to_suffer(estimator, tmp_path):
+    needs("gcc")
+    name = "ardrone2, turning"
+    model = vehicle_of(name)
+    effects = (
+        "world_tilt:ax=0.03,ay=-0.05",
+        "marker_offset:mx=0.03,mz=0.05",
+        "attitude_gain:g=0.1",
+    )
+    exported = export_c(model.with_effects(*(parse_setting(e, model) for e in effects)), estimator)
+    c = CompiledFilter(exported, tmp_path)
+    flown = flight(name, QUICK)
+    assert_same(compare(c, exported.filter, flown, 10))
+    plain = export_c(model, estimator).filter
+    compare(c, plain, flown, 1000)
+    assert np.linalg.norm(plain.estimate.position - exported.filter.estimate.position) > 0.02
+
+
 @pytest.mark.parametrize("estimator", ["ekf", "ukf"])
 def test_c_and_python_agree_with_an_imu(estimator, tmp_path):
     needs("gcc")
@@ -108,12 +127,13 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
     """With everything in it: effects, an offset centre of mass, a policy."""
     needs(compiler)
     model = load_vehicle("ardrone2")
-    effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset")
+    effects = ("rotor_drag", "motor_lag", "ground_effect", "com_offset", "attitude_gain")
     model = model.with_effects(*(parse_setting(e, model) for e in effects))
-    policy = exportable_policy("sac-0", POLICY) if estimator == "ekf" else None
+    names = {"ekf": "sac-0", "ukf": "tracker", "constant-gain": "lead"}
+    policy = exportable_policy(names[estimator], POLICY if estimator == "ekf" else None)
     for number, exported in enumerate(
         (
-            export_c(model, estimator, policy=policy or exportable_policy("lead", None)),
+            export_c(model, estimator, policy=policy),
             export_c(load_vehicle("crazyflie"), estimator, gate=None),
             *(export_c(model.with_effects(one), estimator) for one in model.effects[:2]),
         )
@@ -270,6 +290,10 @@ def test_effects_in_c_are_those_in_python(tmp_path):
             third, fourth = (
                 (state, np.zeros(6)) if effect.kind == "wrench" else (rotors, np.zeros(112))
             )
+            if effect.kind == "sensing":
+                third = rng.uniform(0.2, 2.0, SAMPLE_SIZE)
+                third[7:11] /= np.linalg.norm(third[7:11])
+                third[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
             if effect.kind == "rotor input":
                 fourth[:5] = 1.0, 410.0, 420.0, 430.0, 440.0
             given = [x.astype(np.float32) for x in (c, vehicle, third, fourth)]
@@ -359,7 +383,7 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
 
 def test_what_cannot_be_exported_is_said_in_a_line():
     model = load_vehicle("ardrone2")
-    for effect in ("latency", "battery_sag", "marker_offset", "fan_jet", "slung_payload"):
+    for effect in ("latency", "battery_sag", "clock_offset", "fan_jet", "slung_payload"):
         declared = model.with_effects(parse_setting(effect, model))
         with pytest.raises(InputError, match=rf"{effect} .*rotor_drag") as refused:
             export_c(declared)

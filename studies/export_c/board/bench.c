@@ -14,6 +14,9 @@ extern uint32_t _data, _data_end, _data_from, _bss, _bss_end, _stack_top;
 #define INSTRUCTIONS(ticks) ((ticks) * 5u / 8u) /* at 64 ns an instruction and 40 ns a tick */
 
 static ww_filter filter;
+#ifdef WW_POLICY_PERIOD
+static ww_policy_memory policy;
+#endif
 
 static int semihost(int operation, const void *argument)
 {
@@ -84,6 +87,10 @@ static void fly(void)
     semihost(4, "\nsize ");
     say_word(sizeof(ww_filter));
     semihost(4, "\n");
+#ifdef WW_POLICY_PERIOD
+    uint32_t longest = 0;
+    ww_policy_init(&policy);
+#endif
     paint();
     (void)ww_init(&filter, flight[0] + 5, flight[0] + 8);
     for (int k = 1; k < FLIGHT_STEPS; k++) {
@@ -101,6 +108,14 @@ static void fly(void)
         ticks[2] = since(before);
 #endif
         ww_get(&filter, &e);
+#ifdef WW_POLICY_PERIOD
+        if (k % 16 == 0) {
+            before = SYSTICK[2];
+            (void)ww_policy(&policy, &e);
+            before = since(before);
+            longest = before > longest ? before : longest;
+        }
+#endif
         semihost(4, "step ");
         for (int i = 0; i < 3; i++) {
             say_word(INSTRUCTIONS(ticks[i]));
@@ -113,6 +128,12 @@ static void fly(void)
     }
     semihost(4, "stack ");
     say_word(painted_over());
+#ifdef WW_POLICY_PERIOD
+    semihost(4, "\npolicy ");
+    say_word(INSTRUCTIONS(longest));
+    semihost(4, "\npolicysize ");
+    say_word(sizeof(ww_policy_memory));
+#endif
     semihost(4, "\nend\n");
     semihost(0x18, (const void *)0x20026); /* the application ends */
 }

@@ -1,0 +1,133 @@
+"""The covariance of the filter with a constant gain while its gain is not constant: after a gap, a
+restart, a refused measurement.
+
+It is that of the model linearised at hover, in the frame of the vehicle's heading. So it depends on
+what was measured and when, and not on where the vehicle flies to: a filter in C with single
+precision comes back to its constant gain at the same step, and needs no Jacobian. Where the vehicle
+is tilted far or turns fast, it is an approximation, as the constant gain itself is.
+"""
+
+import math
+
+import numpy as np
+
+from ..runtime.compiled import Record, compiled, compiled_without_gil
+from .covariance import add_noise
+from .ekf import acceleration_jacobian
+from .error_state import symmetrise
+from .estimate import Array
+from .filter_record import N, drive, propagate
+
+CATCH_UP = 32  # predictions that make up for a gap; a longer one is made up for in longer ones
+_NOTHING = 1e-9  # of the largest part of an acceleration's deviation: rounding of a derivative
+_NO_HEADING = 1e-6  # of a quaternion squared: thrust points down, and there is none
+
+
+@compiled
+def carry_at_hover(f: Record, dt: float) -> None:
+    """Carry the covariance ``dt`` s ahead by the model at hover."""
+    P, A, G, J = f.P, f.S, f.H, f.hover
+    for i in range(12):
+        for j in range(N):
+            A[i, j] = 0.0
+    for i in range(3):
+        A[i, 3 + i] = 0.25 * dt  # an MRP is a quarter of an angle
+        for j in range(N):
+            A[3 + i, j] = dt * J[i, j]
+            A[9 + i, j] = dt * J[3 + i, j]
+            A[6 + i, j] = 0.5 * dt * A[9 + i, j]
+        A[6 + i, 9 + i] += dt
+    # F P F' = P + A P + (A P)' + A P A', where A = F - 1 is sparse
+    for i in range(12):
+        for j in range(N):
+            G[i, j] = 0.0
+        for k in range(N):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(N):
+                    G[i, j] += a * P[k, j]
+    for i in range(12):
+        for j in range(N):
+            P[i, j] += G[i, j]
+            P[j, i] += G[i, j]
+        for k in range(N):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(12):
+                    P[j, i] += a * G[j, k]
+    for i in range(3):
+        for j in range(3):
+            f.centre_rotation[i, j] = 1.0 if i == j else 0.0
+    add_noise(f, f.centre_rotation, dt)
+    symmetrise(P)
+
+
+@compiled
+def catch_up(f: Record) -> None:
+    """Carry the covariance over the time that has not been measured since."""
+    since = max(f.gap[0], f.gap[1])
+    if since <= 0.0:
+        return
+    steps = since / f.period
+    count = 1
+    if steps >= 1.5:
+        count = CATCH_UP
+        if steps < CATCH_UP:
+            count = int(steps + 0.5)
+    for _ in range(count):
+        carry_at_hover(f, since / count)
+
+
+@compiled
+def heading(q: Array) -> tuple[float, float]:
+    """Return cosine and sine of half the turn about the vertical that is in an attitude; no turn
+    where the vehicle hangs head down.
+    """
+    square = q[0] * q[0] + q[3] * q[3]
+    if square < _NO_HEADING:
+        return 1.0, 0.0
+    scale = 1.0 / math.sqrt(square)
+    return q[0] * scale, q[3] * scale
+
+
+@compiled
+def turn_world(f: Record, sample: Array, w: float, z: float) -> None:
+    """Turn the world about the vertical: estimate, sample (11,) and remembered poses; cosine ``w``
+    and sine ``z`` of half the angle.
+    """
+    cosine, sine = w * w - z * z, 2.0 * w * z
+    x, seen, doubted = f.x, f.seen, f.doubted
+    for v in (x[0:3], x[7:10], x[13:16], x[16:19], sample[4:7], seen[0:3], doubted[0:3]):
+        v[0], v[1] = cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1]
+    for q in (x[3:7], sample[7:11], seen[3:7], doubted[3:7]):
+        q[0], q[3] = w * q[0] - z * q[3], w * q[3] + z * q[0]
+        q[1], q[2] = w * q[1] - z * q[2], w * q[2] + z * q[1]
+
+
+@compiled_without_gil
+def _jacobian_at(record: np.ndarray, voltage: float, out: Array) -> None:
+    f = record[0]
+    drive(f, f.last_speeds, f.period, voltage)
+    propagate(f, f.x, f.period, f.centre)
+    acceleration_jacobian(f, f.S)
+    for i in range(3):
+        for j in range(N):
+            out[i, j] = f.S[3 + i, j]
+            out[3 + i, j] = f.S[9 + i, j]
+
+
+def jacobian_at_hover(record: np.ndarray, voltage: float, deviations: Array) -> Array:
+    """Return the derivatives (6, 18) of angular (body) and linear acceleration by the error state
+    of a filter whose record hovers facing along x; what rounding leaves is zero.
+
+    Args:
+        record: of the filter; it is changed.
+        voltage: V.
+        deviations: (18,) of the error state, by which parts of an acceleration are compared.
+    """
+    out = np.zeros((6, N))
+    record[0]["S"] = 0.0
+    _jacobian_at(record, voltage, out)
+    size = np.abs(out) * deviations
+    out[size < _NOTHING * size.max(axis=1, keepdims=True)] = 0.0
+    return out
