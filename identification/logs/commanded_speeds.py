@@ -18,6 +18,9 @@ from .flight_log import FlightLog
 Array = NDArray[np.float64]
 
 _FLYING = 0.5  # of the 90 % quantile of the thrust: less is ground, take-off or landing
+# s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Dips left out
+# would leave the high thrusts alone, whose mean is above the weight
+_DIP = 1.0
 
 
 def with_commanded_speeds(log: FlightLog, vehicle: Vehicle | None, factor: float) -> FlightLog:
@@ -80,6 +83,17 @@ def _scale(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
     _, x, y, _ = log.quaternion[log.valid].T
     vertical = relative[log.valid].sum(axis=1) * (1.0 - 2.0 * (x * x + y * y))
     total = relative[log.valid].sum(axis=1)
-    flying = total > _FLYING * float(np.quantile(total, 0.9))
+    flying = _without_dips(log.t[log.valid], total > _FLYING * float(np.quantile(total, 0.9)))
     mean = float(np.mean(vertical[flying])) if flying.any() else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
+
+
+def _without_dips(t: Array, high: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which samples (N,) are high, or low for a moment between high ones."""
+    rows = np.flatnonzero(high)
+    if not len(rows):
+        return high
+    later = np.searchsorted(rows, np.arange(len(t)))  # the next high one
+    inside = (later > 0) & (later < len(rows))
+    sooner, later = rows[np.maximum(later - 1, 0)], rows[np.minimum(later, len(rows) - 1)]
+    return np.asarray(high | (inside & (t[later] - t[sooner] <= _DIP)))

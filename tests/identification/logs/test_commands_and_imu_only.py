@@ -9,6 +9,7 @@ import pytest
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve, Vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
@@ -99,3 +100,23 @@ def test_a_motor_curve_that_is_none_is_refused(curve: str, words: str) -> None:
     text = dump_vehicle(load_vehicle("crazyflie")) + f"motor_curve: {curve}\n"
     with pytest.raises(InputError, match=words):
         parse_vehicle(text)
+
+
+def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
+    """Thrust that swings from 0.2 to 1.8 of the weight has the weight as its mean; without its dips
+    the mean is above it, and the scale would be too small.
+    """
+    vehicle, t = load_vehicle("ardrone2"), 0.01 * np.arange(2000)
+    weights = 1.0 + 0.8 * np.sin(2.0 * np.pi * t)
+    weights[t < 2.0] = 0.05  # on the ground, rotors idling
+    command = np.tile(np.sqrt(weights / 4.0 * vehicle.weight / 3.0)[:, None], (1, 4))
+    log = FlightLog(
+        t,
+        np.zeros((len(t), 3)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)),
+        np.full((len(t), 4), np.nan),
+        command=command,
+    )
+    read = with_commanded_speeds(log, vehicle, 1.0)
+    full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
+    np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
