@@ -120,3 +120,20 @@ def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
     read = with_commanded_speeds(log, vehicle, 1.0)
     full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
     np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
+
+
+def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path: Path) -> None:
+    """Commands beside an IMU, the most common log: thrust in flight is the mass times what the
+    accelerometer feels along the rotors' axis; the note says what that cannot tell.
+    """
+    vehicle = load_vehicle("ardrone2")
+    felt = 9.81 + 2.0 * np.sin(0.1 * np.arange(200))
+    command = np.tile(np.sqrt(vehicle.mass * felt / 4.0 / 2.5)[:, None], (1, 4))
+    accelerometer = np.column_stack([np.zeros(200), np.zeros(200), felt])
+    path = tmp_path / "imu.csv"
+    write_log(inertial_log(accelerometer=accelerometer, command=command), path)
+    log = read_log(path, vehicle=vehicle)
+    assert log.commanded
+    full = vehicle.k * np.square(log.rotor_speeds / command)
+    np.testing.assert_allclose(full, 2.5, rtol=1e-9)  # N of a motor at full command
+    assert any("Mass or a factor on thrust cannot be found" in note for note in log.notes)
