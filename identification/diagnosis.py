@@ -47,6 +47,7 @@ from .inference.equivalence import (
 )
 from .inference.imu_limits import hidden_by_bias, with_errors_of_fusion
 from .inference.innovations import Innovations, contradicted_by_innovations
+from .inference.joint_equivalence import pair_doubts
 from .inference.likelihood_refit import (
     delay_alternatives,
     delay_doubts,
@@ -163,7 +164,11 @@ def diagnose(
     report("looking for structure in the residual")
     signs, unconfirmed = find_structure(search, fit)
     fit = refitted_by_likelihood(search, fit)
-    name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
+    name_doubts = [
+        *composite_doubts(flights, fit),
+        *unlisted_equivalent_doubts(search, fit),
+        *pair_doubts(search, fit),
+    ]
     if not flights.commanded:
         name_doubts += implausible_coefficients(search, fit)
     if flights.filtered and fit.effects:
