@@ -84,9 +84,9 @@ def rotorpy(found: Identified) -> str:
 def drone_models(found: Identified) -> str:
     """Return a table for drone-models' ``data/params.toml`` (0.1.0, ``first_principles``).
 
-    Rotors are in the Crazyflie's order, polynomials in rpm with the index as the power, ``L`` the distance from
-    either axis; ``rotor_dyn_coef`` (1/s, and of squares, as they speed up and slow down), and
-    ``drag_matrix`` (N/(m/s), body axes, negative).
+    Rotors are in the Crazyflie's order, polynomials in rpm with the index as the power, ``L`` is
+    the distance from either axis, ``rotor_dyn_coef`` 1/s (and of squares, speeding up and slowing
+    down), ``drag_matrix`` N/(m/s) along body axes, negative.
     """
     v = found.vehicle
     order = list(_CRAZYFLIE)
