@@ -45,7 +45,7 @@ from .inference.equivalence import (
     unidentifiable_rivals,
     unlisted_equivalent_doubts,
 )
-from .inference.imu_limits import hidden_by_bias, with_errors_of_fusion
+from .inference.imu_limits import hidden_by_bias, hidden_causes, with_errors_of_fusion
 from .inference.innovations import Innovations, contradicted_by_innovations
 from .inference.joint_equivalence import pair_doubts
 from .inference.likelihood_refit import (
@@ -168,6 +168,7 @@ def diagnose(
         *composite_doubts(flights, fit),
         *unlisted_equivalent_doubts(search, fit),
         *pair_doubts(search, fit),
+        *hidden_causes(search, fit),
     ]
     if not flights.commanded:
         name_doubts += implausible_coefficients(search, fit)

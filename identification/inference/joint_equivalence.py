@@ -35,19 +35,20 @@ def pair_doubts(search: Search, fit: FittedEffects) -> list[str]:
     return found
 
 
-def used_coefficients(fit: FittedEffects, effect: str) -> int:
-    """Return how many of an effect's coefficients differ from zero beyond their uncertainty."""
-    return sum(
-        name != CENTRAL
+def used_coefficients(fit: FittedEffects, effect: str) -> list[str]:
+    """Return which of an effect's coefficients differ from zero beyond their uncertainty."""
+    return [
+        name
+        for name, value in fit.setting[effect].items()
+        if name != CENTRAL
         and abs(value) > EQUIVALENCE.most_std_apart * fit.std.get((effect, name), 0.0)
         and value != 0.0
-        for name, value in fit.setting[effect].items()
-    )
+    ]
 
 
 def _pairs(search: Search, fit: FittedEffects, effect: str) -> list[tuple[str, str]]:
     """Return the pairs of effects that explain what an effect explains, given all others."""
-    used = used_coefficients(fit, effect)
+    used = len(used_coefficients(fit, effect))
     others = [
         e
         for e in search.library

@@ -24,7 +24,7 @@ def test_coefficients_within_their_noise_are_not_used(
         {"rotor_efficiency": dict(zip(names, values, strict=True))},
         {("rotor_efficiency", name): 0.01 for name in names},
     )
-    assert used_coefficients(fit, "rotor_efficiency") == expected
+    assert len(used_coefficients(fit, "rotor_efficiency")) == expected
 
 
 @pytest.mark.slow
