@@ -56,7 +56,7 @@ def test_an_unknown_heading_is_in_the_deviation_of_a_steady_force():
 
 
 def test_a_name_is_doubted_where_a_cause_that_does_not_show_would_look_like_it():
-    """Rotors that fly in each other's wake lose thrust: without a pose that is a larger mass. A mass
+    """Rotors in each other's wake lose thrust: without a pose that is a larger mass. A mass
     that is much larger than what they make of it is not doubted for them.
     """
     wake = {c.name: c.typical[0] for c in get("rotor_interaction").coefficients}
