@@ -148,6 +148,7 @@ def convert(
         name
         for name, there in (
             ("pose", flight.has_pose),
+            ("position", not flight.has_pose and bool(np.isfinite(flight.position).any())),
             ("rotor speeds", flight.has_rotor_speeds),
             ("motor commands", flight.command is not None),
             ("voltage", flight.voltage is not None),

@@ -10,7 +10,7 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError, unknown_name
-from .terminal import ReaderOption, console, note, offering, run, say, working
+from .terminal import MapOption, ReaderOption, console, note, offering, run, say, working
 
 if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
@@ -39,14 +39,14 @@ def parse_window(text: str) -> tuple[Path, tuple[float, float]]:
     return Path(match[1]), (begin, end)
 
 
-def _read(path: Path, reader: str | None) -> "FlightLog":
+def _read(path: Path, reader: str | None, log_map: str | None) -> "FlightLog":
     import warnings
 
     from ..identification.logs.reading import read_log
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        return read_log(path, reader)
+        return read_log(path, reader, map=log_map)
 
 
 def identify(
@@ -66,6 +66,7 @@ def identify(
         ),
     ] = None,
     reader: ReaderOption = None,
+    map: MapOption = None,
     begin: Annotated[
         float, typer.Option("--from", min=0.0, help="Use each log from here on, s after its start.")
     ] = 0.0,
@@ -106,7 +107,7 @@ def identify(
     if not common[0] < common[1]:
         raise InputError(f"--to {end:g}: expected a time after --from {begin:g}")
     parts = [parse_window(text) for text in logs]
-    flights = [_read(path, reader) for path, _ in parts]
+    flights = [_read(path, reader, map) for path, _ in parts]
     windows = [w if math.isfinite(w[1]) else common for _, w in parts]
     with working("identifying") as progress:
         found = fit(flights, mass, where, windows, out.stem, report=progress)

@@ -2,6 +2,7 @@
 flight drawn again.
 """
 
+import math
 import shlex
 import sys
 import warnings
@@ -416,8 +417,10 @@ def _diagnose(
     )
     table.add_row(
         "1 s prediction (m)",
-        f"{before.rollout_1s_position_rms:.3g}",
-        f"{after.rollout_1s_position_rms:.3g}",
+        *(  # none where no pose says how it went on
+            f"{x:.3g}" if math.isfinite(x) else "–"
+            for x in (before.rollout_1s_position_rms, after.rollout_1s_position_rms)
+        ),
         "",
     )
     console.print(table)

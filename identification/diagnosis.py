@@ -44,8 +44,9 @@ from .inference.equivalence import (
     unidentifiable_rivals,
     unlisted_equivalent_doubts,
 )
-from .inference.imu_limits import hidden_by_bias, with_errors_of_fusion
+from .inference.imu_limits import hidden_by_bias, hidden_causes, with_errors_of_fusion
 from .inference.innovations import Innovations, contradicted_by_innovations
+from .inference.joint_equivalence import pair_doubts
 from .inference.likelihood_refit import (
     delay_alternatives,
     delay_doubts,
@@ -165,7 +166,12 @@ def diagnose(
     report("looking for structure in the residual")
     signs, unconfirmed = find_structure(search, fit)
     fit = refitted_by_likelihood(search, fit)
-    name_doubts = [*composite_doubts(flights, fit), *unlisted_equivalent_doubts(search, fit)]
+    name_doubts = [
+        *composite_doubts(flights, fit),
+        *unlisted_equivalent_doubts(search, fit),
+        *pair_doubts(search, fit),
+        *hidden_causes(search, fit),
+    ]
     if not flights.commanded:
         name_doubts += implausible_coefficients(search, fit)
     if flights.filtered and fit.effects:

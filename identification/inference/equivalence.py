@@ -81,7 +81,7 @@ def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     whole = flights.residual(fit.setting)
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
-    limit = _limit(search, part)
+    limit = limit_of(search, part)
     if flights.commanded:  # they tell less: the other one must explain most of it
         alone = search.refit(less)
         limit = min(
@@ -177,7 +177,7 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
         )
         columns = flights.columns(fit.setting, search.model_columns(fit.effects), 0.1)
         g = gram(flights, fit.setting, search.whiten, columns, turned - whole)
-        if g.error(np.arange(len(g.columns))) < _limit(
+        if g.error(np.arange(len(g.columns))) < limit_of(
             search, flights.residual(fit.without(effect).setting) - whole
         ):
             found.append(
@@ -201,7 +201,7 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
     return found
 
 
-def _limit(search: Search, part: Array) -> float:
+def limit_of(search: Search, part: Array) -> float:
     """Return the deviance from which on two explanations of ``part`` (rows, 6) are told apart."""
     return max(
         EQUIVALENCE.least_deviance,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from ...runtime.errors import InputError
 from .gram_matrix import Gram, gram
+from .joint_equivalence import used_coefficients
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -35,6 +36,8 @@ class ImuLimitsSettings:
     """How the errors of a fused motion are drawn."""
 
     draws: int = 8  # a standard deviation of them is then known to a quarter
+    # typical sizes, up to which an effect that such a log does not show may be there all the same
+    hidden_size: float = 2.0
 
 
 IMU_LIMITS = ImuLimitsSettings()
@@ -71,6 +74,45 @@ def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
         return left >= SEARCH.least_deviance_reduction
 
     return frozenset(e for e, c in whole.items() if shows(c, []) and not shows(c, biases))
+
+
+def hidden_causes(search: Search, fit: FittedEffects) -> list[str]:
+    """Return, as sentences, which named effects an effect that these logs do not show may stand
+    behind: at twice its typical size or less it would be taken for the named one, as large as that.
+
+    What it would be taken for is the least-squares fit of its part of the residual on the named
+    effects, with the velocity and attitude of the fusion.
+    """
+    flights = search.flights
+    wanted = search.model_columns(fit.effects) if flights.inertial and fit.effects else []
+    if not wanted:
+        return []
+    base = flights.residual(fit.setting)
+    columns = flights.columns(fit.setting, wanted, 0.1)
+    behind: dict[str, list[str]] = {}
+    for hidden in sorted(flights.needs_pose - flights.without_trace - set(fit.effects)):
+        if is_nonlinear(hidden):
+            continue
+        try:
+            part = base - flights.residual({**fit.setting, hidden: _typical(flights, hidden)})
+        except InputError:  # no vehicle is like that
+            continue
+        g = gram(flights, fit.setting, search.whiten, columns, part)
+        total, at = g.blocks.sum(axis=0), g.index(wanted)
+        induced = np.linalg.lstsq(total[np.ix_(at, at)], total[at, -1], rcond=None)[0]
+        taken_for = dict(zip(wanted, IMU_LIMITS.hidden_size * np.abs(induced), strict=True))
+        for effect in fit.effects:
+            used = used_coefficients(fit, effect)
+            if used and all(
+                taken_for.get((effect, name), 0.0) >= abs(fit.setting[effect][name])
+                for name in used
+            ):
+                behind.setdefault(effect, []).append(hidden)
+    return [
+        f"{effect}: {' or '.join(hidden)}, which these logs do not show, would look like it. Log "
+        "the pose to tell them apart"
+        for effect, hidden in behind.items()
+    ]
 
 
 def with_errors_of_fusion(search: Search, fit: FittedEffects) -> FittedEffects:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...dynamics.effects import Need, Role, get, names, needing
+from ...dynamics.effects import Need, Role, get, names, needing, playing
 from ...dynamics.effects.base import Coefficient
 from ...dynamics.vehicle import EffectSetting, Vehicle
 from ...runtime.errors import InputError
@@ -323,7 +323,12 @@ class Flights:
         not_identifiable = {e for e, share in shares.items() if share > _most_noise_share(e)}
         if self.inertial:
             not_identifiable |= self._lost_in_drift(noisy, weight)
-            self.needs_pose = frozenset(not_identifiable - (quietly - self.without_trace))
+            lacking: set[str] = set()  # what no pose would bring back
+            if all(log.voltage is None for log in self.logs):
+                lacking |= set(playing(Role.THRUST_OVER_VOLTAGE))
+            if self.commanded:
+                lacking |= needing(*NOT_COMMANDED)
+            self.needs_pose = frozenset(not_identifiable - (quietly - self.without_trace) - lacking)
         if self.commanded:
             not_identifiable |= needing(*NOT_COMMANDED)
         if self.filtered:

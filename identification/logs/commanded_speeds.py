@@ -4,7 +4,8 @@ assumption that the log then states.
 Without a curve only the ratio of thrusts is assumed, ``f u^2 + (1 - f) u`` of a command u from 0 to
 1. The scale follows from flying: over a flight that begins and ends at rest the mean vertical
 thrust is the weight, so the thrust along each time's own rotor axis is counted by its vertical
-part; a tilted flight needs more than its weight.
+part; a tilted flight needs more than its weight. Where there is no pose, the accelerometer says
+what acts along the rotors' axis: in flight its mean, times the mass, is the mean thrust.
 """
 
 from dataclasses import replace
@@ -18,9 +19,14 @@ from .flight_log import FlightLog
 Array = NDArray[np.float64]
 
 _FLYING = 0.5  # of the 90 % quantile of the thrust: less is ground, take-off or landing
+# s, up to which less is a dip in flight: without thrust a vehicle falls 5 m meanwhile. Without the
+# dips high thrusts alone would remain, whose mean is above the weight
+_DIP = 1.0
 
 
-def with_commanded_speeds(log: FlightLog, vehicle: Vehicle | None, factor: float) -> FlightLog:
+def with_commanded_speeds(
+    log: FlightLog, vehicle: Vehicle | None, factor: float = 1.0
+) -> FlightLog:
     """Return a log whose rotor speeds are worked out from its commands, where it has no others.
 
     Args:
@@ -46,24 +52,34 @@ def with_commanded_speeds(log: FlightLog, vehicle: Vehicle | None, factor: float
         )
         speeds = vehicle.commanded_speeds(log.command, log.voltage)
         return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
-    if not log.has_pose:
+    relative = factor * np.square(log.command) + (1.0 - factor) * log.command
+    if log.has_pose:
+        scale, where = _scale_by_weight(log, relative, vehicle), "a pose"
+        balance = (
+            f"the mean vertical thrust in flight is the weight of {vehicle.name} "
+            f"({vehicle.weight:.4g} N)"
+        )
+    elif log.accelerometer is not None:
+        scale, where = _scale_by_accelerometer(log, relative, vehicle), "an accelerometer"
+        balance = (
+            f"the mean thrust in flight is the mass of {vehicle.name} ({vehicle.mass:.4g} kg) "
+            "times the accelerometer along the rotors' axis"
+        )
+    else:
         text = (
-            f"no rotor speeds: the log has motor commands and no pose, and the vehicle "
-            f"{vehicle.name} states no motor_curve; state it to turn commands into thrust"
+            f"no rotor speeds: the log has motor commands, no pose and no accelerometer, and the "
+            f"vehicle {vehicle.name} states no motor_curve; state it to turn commands into thrust"
         )
         return replace(log, notes=(*log.notes, text))
-    relative = factor * np.square(log.command) + (1.0 - factor) * log.command
-    scale = _scale(log, relative, vehicle)
     if scale is None:
-        text = "no rotor speeds: the motor commands are 0 wherever there is a pose"
+        text = f"no rotor speeds: the motor commands are 0 wherever there is {where}"
         return replace(log, notes=(*log.notes, text))
     note = (
         "thrust model: no rotor speeds in the log; the relative thrust of a motor command u is "
-        f"assumed to be {_words(factor)}, and its unknown scale is set so that the mean vertical "
-        f"thrust in flight is the weight of {vehicle.name} ({vehicle.weight:.4g} N): {scale:.4g} N "
-        "a motor at full command. Mass or a factor on thrust cannot be found from this log, nor a "
-        "thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of commands, without "
-        "the motors' lag. State motor_curve in the vehicle file to mend that"
+        f"assumed to be {_words(factor)}, and its unknown scale is set so that {balance}: "
+        f"{scale:.4g} N a motor at full command. Mass or a factor on thrust cannot be found from "
+        "this log, nor a thrust curve or the battery's sag; rotor speeds are sqrt(thrust / k) of "
+        "commands, without the motors' lag. State motor_curve in the vehicle file to mend that"
     )
     speeds = np.sqrt(scale * relative / vehicle.k)
     return replace(log, rotor_speeds=speeds, commanded=True, notes=(*log.notes, note))
@@ -75,11 +91,40 @@ def _words(factor: float) -> str:
     return "u^2" if factor == 1.0 else f"{factor:g} u^2 + {1.0 - factor:.4g} u"
 
 
-def _scale(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
+def _scale_by_weight(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
     """Return N of a motor at full command, or None where no motor runs."""
     _, x, y, _ = log.quaternion[log.valid].T
-    vertical = relative[log.valid].sum(axis=1) * (1.0 - 2.0 * (x * x + y * y))
     total = relative[log.valid].sum(axis=1)
-    flying = total > _FLYING * float(np.quantile(total, 0.9))
+    flying = _flying(log.t[log.valid], total)
+    vertical = total * (1.0 - 2.0 * (x * x + y * y))
     mean = float(np.mean(vertical[flying])) if flying.any() else 0.0
     return vehicle.weight / mean if mean > 0.0 else None
+
+
+def _scale_by_accelerometer(log: FlightLog, relative: Array, vehicle: Vehicle) -> float | None:
+    """Return N of a motor at full command, or None where no motor runs."""
+    assert log.accelerometer is not None
+    read = np.isfinite(log.accelerometer[:, 2])
+    if not read.any():
+        return None
+    total, sensed = relative[read].sum(axis=1), log.accelerometer[read, 2]
+    flying = _flying(log.t[read], total)
+    mean = float(np.mean(total[flying])) if flying.any() else 0.0
+    felt = float(np.mean(sensed[flying])) if flying.any() else 0.0
+    return vehicle.mass * felt / mean if mean > 0.0 and felt > 0.0 else None
+
+
+def _flying(t: Array, total: Array) -> NDArray[np.bool_]:
+    """Return which samples (N,) are in flight, by a relative thrust."""
+    return _without_dips(t, total > _FLYING * float(np.quantile(total, 0.9)))
+
+
+def _without_dips(t: Array, high: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which samples (N,) are high, or low for a moment between high ones."""
+    rows = np.flatnonzero(high)
+    if not len(rows):
+        return high
+    later = np.searchsorted(rows, np.arange(len(t)))  # the next high one
+    inside = (later > 0) & (later < len(rows))
+    sooner, later = rows[np.maximum(later - 1, 0)], rows[np.minimum(later, len(rows) - 1)]
+    return np.asarray(high | (inside & (t[later] - t[sooner] <= _DIP)))

@@ -551,7 +551,7 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
         return "commands", "us", True, "by the columns' names"
     if group.unit == "percent":
         return "commands", "percent", True, "by the columns' names"
-    is_command = any(w in names for w in ("pwm", "cmd", "command", "servo", "out", "throttle"))
+    is_command = any(word in names for word in _COMMAND_WORDS)
     pulses = low >= 850.0 and high <= 2250.0
     if is_command and pulses:
         return "commands", "us", True, f"values from {low:.4g} to {high:.4g}"
@@ -569,9 +569,10 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
             why = f"in it the rotors carry the weight of {vehicle.name}"
             # numbers of 1000 to 2000 may be pulses as well, whatever they would carry
             named = any(w in names for w in ("omega", "speed", "rotor"))
-            if pulses and not named:
-                why += ", though they may be pulses in us"
-            return "rotors", fitting[0], named or not pulses, why
+            doubt = "pulses in us" if pulses else "percents" if high <= 100.0 else ""
+            if doubt and not named:
+                why += f", though they may be {doubt}"
+            return "rotors", fitting[0], named or not doubt, why
     if middle > GUESS.counts and high <= 65535.5 and not is_command:
         why = f"values up to {high:.6g}, which may be 16 bits of a command, or rpm"
         return "commands", "counts", False, why
@@ -582,6 +583,7 @@ def motor_unit(group: Group, values: Array, vehicle: Vehicle | None) -> tuple[st
     return "rotors", "rad/s", False, f"the median is {middle:.4g}; it might be rpm or Hz"
 
 
+_COMMAND_WORDS = ("pwm", "cmd", "command", "servo", "out", "throttle", "duty", "actuator")
 _HINTS = {  # words in names, and whose order they speak for
     "motor[0]": "betaflight",
     "motor.m1": "crazyflie",

@@ -10,6 +10,7 @@ import numpy as np
 from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
 from ...runtime.errors import InputError
+from .commanded_speeds import with_commanded_speeds
 from .flight_log import (
     ACCELEROMETER,
     COMMANDS,
@@ -183,17 +184,12 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
                 f"negative; "
                 f"expected {expected} at least 0"
             )
-    computed = command is not None and vehicle is not None and vehicle.motor_curve is not None
-    commanded = computed and ROTORS[0] not in columns
-    if commanded and command is not None and vehicle is not None:
-        rotor_speeds = vehicle.commanded_speeds(command, columns.get("vbat"))
-    return FlightLog(
+    log = FlightLog(
         t=columns["t"],
         position=pose[:, :3].copy(),
         quaternion=quaternion,
         rotor_speeds=rotor_speeds,
         command=command,
-        commanded=commanded,
         voltage=columns.get("vbat"),
         force=np.column_stack([columns[name] for name in TRUTH[:3]]) if truth else None,
         torque=np.column_stack([columns[name] for name in TRUTH[3:]]) if truth else None,
@@ -210,6 +206,7 @@ def _canonical(table: Table, vehicle: Vehicle | None) -> FlightLog:
         valid=attitude,
         vehicle=_vehicle_name(table),
     )
+    return with_commanded_speeds(log, vehicle)
 
 
 def _has_several_rates(pose: Array) -> bool:

@@ -168,7 +168,7 @@ def _channels(log: FlightLog) -> list[Channel]:
     speeds = log.rotor_speeds if log.has_rotor_speeds else None
     rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
     given: list[tuple[str, str, Array | None]] = [
-        ("position", "m", np.where(log.valid[:, None], log.position, np.nan)),
+        ("position", "m", log.position),
         ("attitude (tilt)", "deg", _tilt(log)),
         (rotors, "rad/s", speeds),
         ("motor commands", "0 to 1", log.command),
@@ -224,8 +224,6 @@ def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:
             *doubts,
             "no vehicle is given: units and frames were not checked against its rotors",
         ]
-    if not log.has_pose:
-        return doubts
     try:
         doubts += screen_log(log, vehicle)
     except InputError as error:

@@ -29,8 +29,9 @@ def plot_log(log: FlightLog, path: Path) -> Path:
 
     rotors = "rotor speeds" + (" of commands" if log.commanded else "")
     places = ("1 front-left", "2 rear-left", "3 rear-right", "4 front-right")
+    placed = np.isfinite(log.position).any()  # also where no attitude is
     panels: list[tuple[str, Array | None, tuple[str, ...]]] = [
-        ("position (m)", log.position if log.has_pose else None, ("x", "y", "z")),
+        ("position (m)", log.position if placed else None, ("x", "y", "z")),
         ("thrust axis (x, y of 1)", _axis(log) if log.has_pose else None, ("x", "y")),
         (f"{rotors}\n(rad/s)", log.rotor_speeds if log.has_rotor_speeds else None, places),
         ("motor commands\n(0 to 1)", log.command, places),

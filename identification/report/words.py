@@ -105,8 +105,8 @@ def headline(diagnosis: Diagnosis) -> str:
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
         if diagnosis.remainder == "random":
-            return "The model's error looks random: no effect in the library explains it."
-        return "The model's error has structure that no effect in the library explains."
+            return f"The model's error looks random: no effect {_asked(diagnosis)} explains it."
+        return f"The model's error has structure that no effect {_asked(diagnosis)} explains."
     told = [_undecided(diagnosis, undecided)] if undecided else []
     if sure:
         told.append(
@@ -122,6 +122,11 @@ def headline(diagnosis: Diagnosis) -> str:
             else ", and an unexplained error is left"
         )
     return " ".join(f"{sentence}." for sentence in told)
+
+
+def _asked(diagnosis: Diagnosis) -> str:
+    """Return of which effects it was asked whether they explain an error."""
+    return "that these logs can show" if diagnosis.needs_pose else "in the library"
 
 
 def _undecided(diagnosis: Diagnosis, effects: Sequence[NamedEffect]) -> str:
@@ -207,11 +212,11 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
             "no test found structure in it."
         )
     if not diagnosis.structure:
-        return "The residual has structure that no effect in the library explains."
+        return f"The residual has structure that no effect {_asked(diagnosis)} explains."
     strongest = diagnosis.structure[0]
     return (
-        "The residual has structure that no effect in the library explains; the strongest is in "
-        f"{strongest.where} ({percent(strongest.gain)} of the residual)."
+        f"The residual has structure that no effect {_asked(diagnosis)} explains; the strongest is "
+        f"in {strongest.where} ({percent(strongest.gain)} of the residual)."
     )
 
 

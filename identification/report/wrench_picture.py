@@ -54,6 +54,8 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
 
     height.plot(series.t, series.position[:, 2], color="black", lw=1.2)
     height.set_ylabel("height (m)" if known else "height (not known)")
+    if not known:
+        height.set_yticks([])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
     _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
     force.set_ylabel("external force (N)")

@@ -29,3 +29,14 @@ def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
     """Return a coefficient of a vehicle's effects of a role; 0 where it has none."""
     own = [e for e in vehicle.effects if get(e.name).role == role]
     return sum(float(get(e.name).vector(e.coefficients)[index]) for e in own)
+
+
+def linear_drag(vehicle: Vehicle) -> tuple[float, float, float]:
+    """Return the drag along body x, y and z at hover, of rotors and body together, N/(m/s)."""
+    turning = 4.0 * vehicle.hover_rate
+    along = ((Role.ROTOR_DRAG, 0), (Role.ROTOR_DRAG, 1), (Role.INFLOW_THRUST, 0))
+    x, y, z = (
+        turning * coefficient_of(vehicle, role, index) + coefficient_of(vehicle, Role.BODY_DRAG, i)
+        for i, (role, index) in enumerate(along)
+    )
+    return x, y, z

@@ -71,3 +71,20 @@ def test_commands_stay_commands_when_they_are_converted(
     )  # fmt: skip
     assert "cmd1" in out.read_text().split("\n")[0]
     assert "omega1" not in out.read_text().split("\n")[0]
+
+
+def test_positions_without_an_attitude_are_a_channel_and_an_imu_is_checked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Five positions a second beside an accelerometer that reads in g."""
+    t = 0.01 * np.arange(1500)
+    position = np.where(np.arange(1500)[:, None] % 20 == 0, np.sin(np.outer(t, [1, 2, 3])), np.nan)
+    sensors = 0.01 * np.sin(np.outer(t, [3, 5, 7, 11, 13, 17])) + [0, 0, 1, 0, 0, 0]
+    speeds = 376.0 + 5.0 * np.sin(np.outer(t, [7, 8, 9, 10]))
+    names = "t,px,py,pz,ax,ay,az,gx,gy,gz,omega1,omega2,omega3,omega4"
+    rows = np.column_stack([t, position, sensors, speeds])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=names, comments="")
+    found = run(capsys, "check", tmp_path / "a.csv", "--vehicle", "ardrone2", "--out", tmp_path)
+    channels: dict[str, dict[str, float]] = found["channels"]  # type: ignore[assignment]
+    assert channels["position"]["rate_hz"] == pytest.approx(5.0)
+    assert any("ax, ay, az look like g" in text for text in found["doubts"])  # type: ignore[attr-defined]

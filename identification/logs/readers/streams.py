@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError
+from ..commanded_speeds import with_commanded_speeds
 from ..flight_log import FlightLog, Mask, time_notes
 
 Array = NDArray[np.float64]
@@ -130,7 +131,8 @@ def flight_log(
         accelerometer: (N, 3) m/s2.
         gyro: (N, 3) rad/s.
         command: (N, 4), 0 to 1, in the kit's order.
-        vehicle: one with a motor curve turns commands into rotor speeds where none are known.
+        vehicle: turns commands into rotor speeds where none are known, by its motor curve or by an
+            assumption that the notes state; None: they stay unknown.
         commanded: ``rotors`` were computed from commands.
         extra: what else was read, by name.
         vehicle_name: the vehicle that flew, where the reader knows it.
@@ -195,18 +197,8 @@ def flight_log(
             voltage = None
     volts = None if voltage is None else voltage.at(t)[:, 0]
     commands = None if command is None else command.at(t)
-    if rotors is not None:
-        speeds = np.abs(rotors.at(t))
-    elif commands is not None and vehicle is not None and vehicle.motor_curve is not None:
-        speeds, commanded = vehicle.commanded_speeds(commands, volts), True
-        notes += (f"rotor speeds: computed from the commands by the motor curve of {vehicle.name}",)
-    else:
-        speeds = np.full((len(t), 4), np.nan)
-        notes += (
-            "no rotor speeds: the commands stand for them. A motor_curve in the vehicle's file "
-            "turns them into thrust; without one neither mass nor a factor on thrust can be found",
-        )
-    return FlightLog(
+    speeds = np.full((len(t), 4), np.nan) if rotors is None else np.abs(rotors.at(t))
+    log = FlightLog(
         t=t - t[0],
         position=values[:, :3],
         quaternion=values[:, 3:] / np.where(valid, length, 1.0)[:, None],
@@ -223,6 +215,7 @@ def flight_log(
         command=commands,
         vehicle=vehicle_name,
     )
+    return with_commanded_speeds(log, vehicle)
 
 
 def _rows(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....dynamics.effects import Role
-from ..effect_settings import coefficient_of
+from ..effect_settings import coefficient_of, linear_drag
 from ..result import IDENTIFIED, Identified
 
 AIR_DENSITY = 1.225  # kg/m3, at sea level, as both autopilots take it
@@ -34,11 +34,8 @@ class Autopilot:
 def autopilot_of(found: Identified) -> Autopilot:
     """Return drag and thrust as autopilots define them."""
     vehicle = found.vehicle
-    linear, quadratic = [], []
-    for i in range(2):  # along x and y
-        turning = 4.0 * vehicle.hover_rate * coefficient_of(vehicle, Role.ROTOR_DRAG, i)
-        linear.append((turning + coefficient_of(vehicle, Role.BODY_DRAG, i)) / vehicle.mass)
-        quadratic.append(coefficient_of(vehicle, Role.BODY_DRAG, 3 + i))
+    linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
+    quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]  # along x and y
     momentum = float(np.mean(linear)) if max(linear) > 0.0 else None
     ballistic = None
     if min(quadratic) > 0.0:

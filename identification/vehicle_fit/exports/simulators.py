@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ....dynamics.effects import Role
-from ..effect_settings import coefficient_of, effect_of
+from ..effect_settings import coefficient_of, effect_of, linear_drag
 from ..result import IDENTIFIED, Identified
 
 _PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
@@ -82,8 +82,11 @@ def rotorpy(found: Identified) -> str:
 
 
 def drone_models(found: Identified) -> str:
-    """Return a table for drone-models' ``data/params.toml``: rotors in the Crazyflie's order,
-    polynomials in rpm with the index as the power, ``L`` the distance from either axis.
+    """Return a table for drone-models' ``data/params.toml`` (0.1.0, ``first_principles``).
+
+    Rotors are in the Crazyflie's order, polynomials in rpm with the index as the power, ``L`` is
+    the distance from either axis, ``rotor_dyn_coef`` 1/s (and of squares, speeding up and slowing
+    down), ``drag_matrix`` N/(m/s) along body axes, negative.
     """
     v = found.vehicle
     order = list(_CRAZYFLIE)
@@ -94,7 +97,10 @@ def drone_models(found: Identified) -> str:
             -v.spin[order],
         ]
     )
-    lag = found[effect_of(Role.LAG)]
+    lag, drag = found[effect_of(Role.LAG)], linear_drag(v)
+    missing = ["pwm_min", "pwm_max", "thrust_min", "thrust_max", "prop_inertia"]
+    missing += [] if lag.status == IDENTIFIED else ["rotor_dyn_coef"]
+    missing += [] if any(drag) else ["drag_matrix"]
     lines = [
         *_no_speeds(found),
         *_assumed(found),
@@ -102,19 +108,25 @@ def drone_models(found: Identified) -> str:
         f"gravity_vec = [0.0, 0.0, {-v.gravity:g}]",
         f"mass = {v.mass:.6g}",
         f"L = {v.arm_l:.6g}",
-        "J = [",
-        *(f"    [{', '.join(f'{x:.6g}' for x in row)}]," for row in v.inertia),
-        "]",
+        *_matrix("J", v.inertia),
         f"rpm2thrust = [0.0, 0.0, {v.k[0] * _PER_RPM:.6g}]",
         f"rpm2torque = [0.0, 0.0, {v.p[0] * _PER_RPM:.6g}]",
-        *([f"thrust_tau = {lag.value:.6g}"] if lag.status == IDENTIFIED else []),
-        "mixing_matrix = [",
-        *(f"    [{', '.join(f'{x:.1f}' for x in row)}]," for row in rows),
-        "]",
-        "# not known from these logs: pwm_min, pwm_max, thrust_min, thrust_max, prop_inertia"
-        + ("" if lag.status == IDENTIFIED else ", thrust_tau"),
+        *(
+            [f"rotor_dyn_coef = [{1.0 / lag.value:.6g}, 0.0, {1.0 / lag.value:.6g}, 0.0]"]
+            if lag.status == IDENTIFIED
+            else []
+        ),
+        *(_matrix("drag_matrix", -np.diag(drag)) if any(drag) else []),
+        *_matrix("mixing_matrix", rows),
+        f"# not known from these logs: {', '.join(missing)}",
     ]
     return "\n".join(lines)
+
+
+def _matrix(name: str, values: np.ndarray) -> list[str]:
+    """Return a matrix as lines of TOML, of floats alone."""
+    rows = (", ".join(repr(float(f"{x:.6g}") + 0.0) for x in row) for row in values)
+    return [f"{name} = [", *(f"    [{row}]," for row in rows), "]"]
 
 
 def gazebo(found: Identified) -> str:

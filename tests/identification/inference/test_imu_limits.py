@@ -6,8 +6,13 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.imu_flights import imu_flight, pose_removed
 from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import get
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.identification.inference.imu_limits import hidden_by_bias, with_errors_of_fusion
+from windwrench.identification.inference.imu_limits import (
+    hidden_by_bias,
+    hidden_causes,
+    with_errors_of_fusion,
+)
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.search import FittedEffects, Search
 
@@ -48,3 +53,17 @@ def test_an_unknown_heading_is_in_the_deviation_of_a_steady_force():
     assert error.max() > 3.0 * std.max()  # what the balance alone says
     assert np.all(error < 3.0 * more)
     assert np.all(more < 0.1)
+
+
+def test_a_name_is_doubted_where_a_cause_that_does_not_show_would_look_like_it():
+    """Rotors in each other's wake lose thrust: without a pose that is a larger mass. A mass
+    that is much larger than what they make of it is not doubted for them.
+    """
+    wake = {c.name: c.typical[0] for c in get("rotor_interaction").coefficients}
+    flown = imu_flight(VEHICLE, (EffectSetting("rotor_interaction", wake),), trajectory="excite")
+    begun = FittedEffects({"mass": {"dm": 0.03}})
+    search = search_on(pose_removed(flown), ["mass"], begun)
+    fit = search.refit(begun)
+    assert any("rotor_interaction" in text for text in hidden_causes(search, fit))
+    heavy = FittedEffects({"mass": {"dm": 0.3}}, fit.std)
+    assert not any("rotor_interaction" in text for text in hidden_causes(search, heavy))

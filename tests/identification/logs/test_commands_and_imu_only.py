@@ -9,6 +9,7 @@ import pytest
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve, Vehicle
 from windwrench.dynamics.vehicle_file import dump_vehicle, parse_vehicle
+from windwrench.identification.logs.commanded_speeds import with_commanded_speeds
 from windwrench.identification.logs.flight_log import FlightLog, write_log
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
@@ -99,3 +100,40 @@ def test_a_motor_curve_that_is_none_is_refused(curve: str, words: str) -> None:
     text = dump_vehicle(load_vehicle("crazyflie")) + f"motor_curve: {curve}\n"
     with pytest.raises(InputError, match=words):
         parse_vehicle(text)
+
+
+def test_the_scale_of_commands_counts_the_dips_between_high_thrusts() -> None:
+    """Thrust that swings from 0.2 to 1.8 of the weight has the weight as its mean; without its dips
+    the mean is above it, and the scale would be too small.
+    """
+    vehicle, t = load_vehicle("ardrone2"), 0.01 * np.arange(2000)
+    weights = 1.0 + 0.8 * np.sin(2.0 * np.pi * t)
+    weights[t < 2.0] = 0.05  # on the ground, rotors idling
+    command = np.tile(np.sqrt(weights / 4.0 * vehicle.weight / 3.0)[:, None], (1, 4))
+    log = FlightLog(
+        t,
+        np.zeros((len(t), 3)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1)),
+        np.full((len(t), 4), np.nan),
+        command=command,
+    )
+    read = with_commanded_speeds(log, vehicle, 1.0)
+    full = vehicle.k[0] * np.square(read.rotor_speeds[:, 0] / command[:, 0])
+    np.testing.assert_allclose(full, 3.0, rtol=0.01)  # N of a motor at full command
+
+
+def test_without_pose_and_curve_the_accelerometer_sets_the_scale(tmp_path: Path) -> None:
+    """Commands beside an IMU, the most common log: thrust in flight is the mass times what the
+    accelerometer feels along the rotors' axis; the note says what that cannot tell.
+    """
+    vehicle = load_vehicle("ardrone2")
+    felt = 9.81 + 2.0 * np.sin(0.1 * np.arange(200))
+    command = np.tile(np.sqrt(vehicle.mass * felt / 4.0 / 2.5)[:, None], (1, 4))
+    accelerometer = np.column_stack([np.zeros(200), np.zeros(200), felt])
+    path = tmp_path / "imu.csv"
+    write_log(inertial_log(accelerometer=accelerometer, command=command), path)
+    log = read_log(path, vehicle=vehicle)
+    assert log.commanded
+    full = vehicle.k * np.square(log.rotor_speeds / command)
+    np.testing.assert_allclose(full, 2.5, rtol=1e-9)  # N of a motor at full command
+    assert any("Mass or a factor on thrust cannot be found" in note for note in log.notes)

@@ -7,11 +7,11 @@ import pytest
 import yaml
 
 from windwrench.dynamics import load_vehicle
-from windwrench.identification.logs.column_names import take_apart
+from windwrench.identification.logs.column_names import Group, take_apart
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.layout_guess import open_any_table
 from windwrench.identification.logs.log_map import parse_map
-from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml
+from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
 from windwrench.runtime.errors import InputError
 from windwrench.studies.map_guesses.random_tables import flight, random_table, save
 from windwrench.studies.map_guesses.study import fields_of, judge
@@ -84,3 +84,24 @@ def test_a_table_without_motors_or_pose_is_refused_with_what_is_missing(tmp_path
     path.write_text("a,b\n0,1\n0,2\n0,2\n")
     with pytest.raises(InputError, match="no column looks like a time"):
         guessed(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "highest", "expected"),
+    [("duty", 80.0, ("commands", "percent")), ("m", 80.0, None), ("m", 120.0, ("rotors", "Hz"))],
+)
+def test_percents_are_not_silently_taken_for_turns_a_second(
+    name: str, highest: float, expected: tuple[str, str] | None
+) -> None:
+    """Numbers below 100 that would carry the weight in Hz may be percents all the same."""
+    vehicle = load_vehicle("ardrone2")
+    hover = np.sqrt(vehicle.weight / vehicle.k.sum()) / (2.0 * np.pi)
+    values = np.full((100, 4), hover)
+    values[0] = highest
+    group = Group(tuple(f"{name}{i}" for i in range(1, 5)), name, numbered=True)
+    kind, unit, sure, why = motor_unit(group, values, vehicle)
+    if expected is None:
+        assert not sure
+        assert "percents" in why
+    else:
+        assert (kind, unit) == expected
