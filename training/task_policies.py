@@ -37,6 +37,9 @@ _WANDER, _KEEP = (
     0.9,
 )  # of the error added to half of the flights, a share of the largest action
 _CUT = 125  # decisions of a sequence that is learned from
+# signs of a frame of FanTracking2D turned by half a turn about the jet's axis, which changes the sign
+# of all that is taught
+_TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
 _GAINS = (1.2, 2.0, 3.0)  # 1/s, on what it says of the fan's offset; one is chosen
 VALIDATION = 10  # episodes
 SCENARIO = "base"
@@ -90,6 +93,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
             32,
             (3e-3, 1e-4 if last else 1e-3),
             order,
+            _TURNED if of_fan else None,
         )
         print(f"round {number}: {len(parts)} sequences, loss {loss:.4f}", flush=True)
     card = card_of(task, "gru", seed, rounds * episodes * known.decisions, scale, largest, False)

@@ -126,7 +126,8 @@ def test_statistics_of_an_episode_come_with_its_last_step():
     for action in ACTIONS[:3]:
         seen, rewards, lost, over, infos = envs.step(np.stack([action, -action]))
         summed += rewards
-    assert over.all() and not lost.any()
+    assert over.all()
+    assert not lost.any()
     np.testing.assert_allclose(infos["final_info"]["episode"]["r"], summed, rtol=1e-6)
     assert not np.array_equal(seen[0], infos["final_obs"][0])
     assert seen.shape == first.shape
