@@ -37,7 +37,7 @@ _WANDER, _KEEP = (
     0.9,
 )  # of the error added to half of the flights, a share of the largest action
 _CUT = 125  # decisions of a sequence that is learned from
-# signs of a frame of FanTracking2D after half a turn about the jet's axis, which changes the sign of
+# signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
 # all that is taught
 _TURNED = np.array([1, -1, -1, 1, -1, -1, -1, -1, -1, -1], dtype=np.float32)
 _GAINS = (1.2, 2.0, 3.0)  # 1/s, on what it says of the fan's offset; one is chosen
