@@ -56,7 +56,8 @@ class TaskPolicy:
         if self._recurrent:
             x = self._hidden = gru(self.weights, x, self._hidden)
         out = dense(self.weights, self._activation, x)
-        out = np.tanh(out) * self._largest if self._squash else out
+        if self._squash:
+            out = np.tanh(out) * np.float32(self._largest)
         return np.clip(out, -self._largest, self._largest).astype(np.float32)
 
 
