@@ -85,11 +85,11 @@ def test_shipped_policies_fly_better_than_hover(task):
     assert "gru-0" in shipped
     known, hover = TASKS[task], make_task_pilot("hover", task)
     env = known.environment("base")
-    seeds = range(910_000, 910_003)
+    seeds = range(910_000, 910_004)
     least = np.mean([fly_task_episode(env, hover, seed, known).rmse for seed in seeds])
     policy = make_task_pilot("gru-0", task)
     flown = [fly_task_episode(env, policy, seed, known) for seed in seeds]
-    assert np.mean([e.rmse for e in flown]) < 0.6 * least
+    assert np.mean([e.rmse for e in flown]) < 0.7 * least
     seen, size = SIZES[task]
     policy.reset()
     assert policy(np.zeros(seen, dtype=np.float32)).shape == (size,)
