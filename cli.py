@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
+from .commands.datasets import minari
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
@@ -80,6 +81,7 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     demo,
     fly,
     benchmark,
+    minari,
     check,
     convert,
     estimate,

@@ -116,6 +116,34 @@ class _Belief(ABC):
         return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)
 
 
+class GenericMotion:
+    """A fan of which nothing is known: it rests, or its velocity stays and drifts a little; now and
+    then this changes at once, to none, to the opposite, or to any other.
+
+    Args:
+        acceleration: m/s, standard deviation of the velocity's drift over a second.
+        jumps: 1/s, how often it changes at once.
+        speed: m/s, standard deviation of a fresh velocity.
+    """
+
+    def __init__(
+        self, acceleration: float = 0.025, jumps: float = 0.25, speed: float = 0.28
+    ) -> None:
+        self.acceleration, self.jumps, self.speed = acceleration, jumps, speed
+
+    def velocity_after(self, before: Array, rng: np.random.Generator) -> Array:
+        """Return velocities (n,) m/s a decision later."""
+        n = len(before)
+        drift = self.acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
+        after: Array = before + drift * rng.standard_normal(n)
+        jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
+        kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
+        after[jumped] = np.where(
+            kind < STOP, 0.0, np.where(kind < STOP + TURN, -before[jumped], fresh)
+        )
+        return after
+
+
 class Tracker(_Belief):
     """Knows nothing of how the fan moves: it rests, or its velocity stays and drifts a little; now
     and then this changes at once, to none, to the opposite, or to any other.
@@ -147,7 +175,7 @@ class Tracker(_Belief):
         reach: float = 1.6,
         particles: int = 1000,
     ) -> None:
-        self.acceleration, self.jumps, self.speed = acceleration, jumps, speed
+        self.motion, self.speed = GenericMotion(acceleration, jumps, speed), speed
         self.reach = reach
         super().__init__(gain, feed, damping, level, particles)
 
@@ -161,15 +189,8 @@ class Tracker(_Belief):
         self._velocity = np.where(rng.random(n) < STOP, 0.0, self.speed * rng.standard_normal(n))
 
     def _move(self) -> None:
-        rng, n = self._rng, self.particles
         before = self._velocity
-        drift = self.acceleration * np.sqrt(DECISION_PERIOD) * (before != 0.0)
-        self._velocity = before + drift * rng.standard_normal(n)
-        jumped = np.flatnonzero(rng.random(n) < self.jumps * DECISION_PERIOD)
-        kind, fresh = rng.random(len(jumped)), self.speed * rng.standard_normal(len(jumped))
-        self._velocity[jumped] = np.where(
-            kind < STOP, 0.0, np.where(kind < STOP + TURN, -before[jumped], fresh)
-        )
+        self._velocity = self.motion.velocity_after(before, self._rng)
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
@@ -192,6 +213,8 @@ class InformedTracker(_Belief):
         spread: of the particles that are drawn anew, as a share of their standard deviation.
         level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
         particles: how many.
+        leave: 1/s, how often a particle leaves the family: from then on it moves as those of
+            ``Tracker`` do. 0: the family is all that there is.
     """
 
     def __init__(
@@ -203,8 +226,10 @@ class InformedTracker(_Belief):
         spread: float = 0.1486,
         level: float = 0.0,
         particles: int = 1000,
+        leave: float = 0.03,
     ) -> None:
-        self.ahead, self.spread = ahead, spread
+        self.ahead, self.spread, self.leave = ahead, spread, leave
+        self._generic = GenericMotion()
         super().__init__(gain, feed, damping, level, particles)
 
     def brief(self, briefing: Briefing) -> None:
@@ -222,10 +247,20 @@ class InformedTracker(_Belief):
         self._bounds = low, high
         self._motion = rng.uniform(low, high, (n, 3))
         self._side = side
+        self._free = np.zeros(n, dtype=bool)  # of those that left the family
         self._go(0.0)
 
     def _move(self) -> None:
+        place, velocity = self._place, self._velocity
         self._go((self._sensing.count - 1) * DECISION_PERIOD)
+        if self.leave <= 0.0:
+            return
+        self._free |= self._rng.random(len(place)) < self.leave * DECISION_PERIOD
+        some = np.flatnonzero(self._free)
+        before = velocity[some]
+        after = self._generic.velocity_after(before, self._rng)
+        self._velocity[some] = after
+        self._place[some] = place[some] + 0.5 * DECISION_PERIOD * (before + after)
 
     def _go(self, time: float) -> None:
         """Put the particles where they are at a time (s), and see where they go."""
@@ -250,6 +285,9 @@ class InformedTracker(_Belief):
         return float(np.sqrt(shares @ (place - shares @ place) ** 2))
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
+        if self.leave > 0.0:
+            self._free = self._free[chosen]
+            self._place, self._velocity = self._place[chosen], self._velocity[chosen]
         self._kind, self._sign = self._kind[chosen], self._sign[chosen]
         self._side, self._motion = self._side[chosen], self._motion[chosen]
         low, high = self._bounds
@@ -258,7 +296,7 @@ class InformedTracker(_Belief):
         # the offset counts with its side: it may cross the axis
         self._motion[:, 2] *= self._side
         for kind in range(len(KINDS)):
-            some = np.flatnonzero(self._kind == kind)
+            some = np.flatnonzero((self._kind == kind) & ~self._free)
             if len(some) < _FEWEST:
                 continue
             x = self._motion[some]
@@ -296,7 +334,7 @@ class Limit(InformedTracker):
         spread: float = 0.15,
         particles: int = 2000,
     ) -> None:
-        super().__init__(gain, feed, damping, ahead, spread, 0.0, particles)
+        super().__init__(gain, feed, damping, ahead, spread, 0.0, particles, leave=0.0)
 
     def brief(self, briefing: Briefing) -> None:
         """Take all that is known."""

@@ -216,8 +216,8 @@ def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
     return path
 
 
-def load_policy(path: str | Path) -> TrainedPolicy:
-    """Read a policy from its ``.npz`` or its card.
+def read_policy(path: str | Path) -> tuple[Path, dict[str, Any], Weights]:
+    """Return a policy's file, card and weights, from its ``.npz`` or its card.
 
     Raises:
         InputError: a file is missing, not readable, of another format, larger than ``FileLimits``
@@ -251,6 +251,16 @@ def load_policy(path: str | Path) -> TrainedPolicy:
     ]
     if bad:
         raise InputError(f"{file}: {bad[0]} must be a vector or a matrix of finite numbers")
+    return file, card, weights
+
+
+def load_policy(path: str | Path) -> TrainedPolicy:
+    """Read a policy from its ``.npz`` or its card.
+
+    Raises:
+        InputError: as ``read_policy``, or card and weights do not go together.
+    """
+    file, card, weights = read_policy(path)
     try:
         return TrainedPolicy(card, weights, str(file))
     except (KeyError, IndexError, TypeError, ValueError, OverflowError) as error:

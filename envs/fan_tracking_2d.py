@@ -29,7 +29,7 @@ CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
 _VERTICAL = 0.5  # of the scenario's speeds and travels that the fan moves up and down with
 _LIMITS_2D = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0)
 _BOUND = np.array(_LIMITS_2D)
-_SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
+SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
 _TRACKING_WIDTH = 0.3  # m
 _CHANGE_COST = 0.05  # per (m/s)^2
 _AWAY = 1.0  # m, off its distance
@@ -161,7 +161,7 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.settings, self.estimator = settings, estimator
         self.render_mode, self.width, self.height = render_mode, width, height
         self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
-        self._scales = np.array(_SCALES_2D if normalize else np.ones(10), dtype=np.float32)
+        self._scales = np.array(SCALES_2D if normalize else np.ones(10), dtype=np.float32)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
         bound = np.array(_LIMITS_2D, dtype=np.float32) / self._scales
         self.observation_space = gym.spaces.Box(-bound, bound, (10,), np.float32)

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.task_laws import TASK_LAWS, make_task_law
+from ..controllers.task_policy import load_task_policy, shipped_task_policies
+from ..controllers.trained_policy import is_policy_path
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.scenarios import SCENARIOS
 from ..envs.wind_hover import WindHoverEnv
@@ -102,12 +104,21 @@ def task_of(name: str) -> Task:
 
 
 def make_task_pilot(name: str, task: str) -> Any:
-    """Return a new law of a task by its name, or by FILE.py:CLASS of a file that is then run.
+    """Return a new law of a task by its name, or by FILE.py:CLASS of a file that is then run; or a
+    trained policy by its name or the path of its file.
 
     Raises:
-        InputError: no law has this name, or the file holds none.
+        InputError: no law has this name, the file holds none, or a policy of another task.
     """
-    return load_controller(name) if is_file_name(name) else make_task_law(name, task)
+    if is_file_name(name):
+        return load_controller(name)
+    shipped = shipped_task_policies(task)
+    if name not in shipped and not is_policy_path(name):
+        return make_task_law(name, task)
+    policy = load_task_policy(shipped.get(name, name))
+    if policy.task != task:
+        raise InputError(f"{name}: a policy of {policy.task}, not of {task}")
+    return policy
 
 
 def fly_task_episode(

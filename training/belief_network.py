@@ -69,7 +69,9 @@ class BeliefNetwork(torch.nn.Module):
         return said[..., : self.taught], deviations, state
 
     def policy_weights(self, shares: Array) -> Weights:
-        """Return the weights of the policy that commands ``shares`` (taught,) of the means."""
+        """Return the weights of the policy that commands ``shares`` (taught,), or (commands,
+        taught), of the means.
+        """
         weights: Weights = {
             f"{self._name}_{name}": array_of(tensor)
             for name, tensor in (
@@ -82,7 +84,7 @@ class BeliefNetwork(torch.nn.Module):
         weights |= dense_weights(self.dense)
         last = layers_of(weights) - 1
         for name in (f"weight{last}", f"bias{last}"):
-            weights[name] = shares[None] @ weights[name][: self.taught]
+            weights[name] = np.atleast_2d(shares) @ weights[name][: self.taught]
         return weights
 
 

@@ -150,6 +150,12 @@ def _imu_logs() -> str:
     return _between_marks("imu-logs", tables(kept("imu-logs/imu_logs.json")))
 
 
+def _clients() -> str:
+    from windwrench.studies.clients.page import tables
+
+    return _between_marks("clients", tables(kept("clients/results.json")))
+
+
 def _identify() -> str:
     from windwrench.studies.identified_vehicles.page import tables
 
@@ -174,6 +180,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "imu": _imu,
     "faults": _faults,
     "export-c": _export_c,
+    "clients": _clients,
 }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from windwrench.runtime.whole_files import replaced
 
+from .published_log import control_gains
 from .simulation import LAWS, PUBLISHED, SEEDS, WINDS, Assumed, fit, fly
 
 _BEGIN, _END = "<!-- tables: begin -->\n", "<!-- tables: end -->"
@@ -25,26 +26,30 @@ def main() -> None:
     """Write the page's tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--page", type=Path, default=Path("docs/real-ranking.md"))
+    parser.add_argument("--log", type=Path, help="a published flight's table: print its gains")
     given = parser.parse_args()
+    if given.log is not None:
+        for axis, gains in zip("xz", control_gains(given.log), strict=True):
+            print(f"{axis}: {gains}")
+        return
     assumed = Assumed()
-    gains = {law: fit(law, PUBLISHED[law][0], assumed) for law in PUBLISHED}
-    gains["L1"] = gains["PD"]
+    cutoff = fit(PUBLISHED["INDI"][0], assumed)
     lines = [
-        "| law | position gain (1/s2) | " + " | ".join(f"{w} m/s" for w in WINDS) + " |",
-        "| - | - |" + " - |" * len(WINDS),
+        "| law | " + " | ".join(f"{w} m/s" for w in WINDS) + " |",
+        "| - |" + " - |" * len(WINDS),
     ]
     means: dict[str, list[float]] = {}
     for law in LAWS:
-        flown = [[fly(law, gains[law], w, k, assumed) for k in range(SEEDS)] for w in WINDS]
+        flown = [[fly(law, cutoff, w, k, assumed) for k in range(SEEDS)] for w in WINDS]
         means[law] = [float(np.mean(some)) for some in flown]
         cells = " | ".join(map(_cell, flown))
-        lines.append(f"| {law}, simulated | {gains[law]:.1f} | {cells} |")
+        lines.append(f"| {law}, simulated | {cells} |")
         print(lines[-1], flush=True)
         if law in PUBLISHED:
             cells = " | ".join(f"{x:.3f}" for x in PUBLISHED[law])
-            lines.append(f"| {law}, published | | {cells} |")
+            lines.append(f"| {law}, published | {cells} |")
             off = [100.0 * (a / b - 1.0) for a, b in zip(means[law], PUBLISHED[law], strict=True)]
-            lines.append(f"| {law}, off by | | {' | '.join(f'{x:+.0f} %' for x in off)} |")
+            lines.append(f"| {law}, off by | {' | '.join(f'{x:+.0f} %' for x in off)} |")
     right = [
         wind
         for i, wind in enumerate(WINDS)
@@ -58,8 +63,9 @@ def main() -> None:
     ]
     text = (
         "\n".join(lines)
-        + f"\n\nOrder of PD and INDI as published: in {len(right)} of {len(WINDS)} winds. Within "
-        f"25 %: {len(inside)} of {len(PUBLISHED) * len(WINDS)} ({', '.join(inside)}).\n"
+        + f"\n\nINDI's cut-off, fitted without wind: {cutoff:.2f} Hz. Order of PD and INDI as "
+        f"published: in {len(right)} of {len(WINDS)} winds. "
+        f"Within 25 %: {len(inside)} of {len(PUBLISHED) * len(WINDS)} ({', '.join(inside)}).\n"
     )
     print(text)
     page = given.page.read_text(encoding="utf-8")

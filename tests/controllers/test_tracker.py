@@ -220,3 +220,24 @@ def test_a_fan_s_place_to_come_is_less_certain():
     for _ in range(15):
         observation = env.step(pilot(observation))[0]
     assert 0.0 < pilot.deviation_ahead(0.0) < pilot.deviation_ahead(1.5)
+
+
+def test_a_fan_that_leaves_the_family_is_found_again():
+    """It stands for 5 s and then goes, which no motion of the family does."""
+    path = np.concatenate([np.zeros(60), np.cumsum(np.full(30, 0.2 * 0.08))])
+    briefing = replace(BRIEFING, motions=Motions(("still",), offset=(0.0, 0.1)))
+    fan = np.repeat(np.repeat(path, TICKS)[None], 5, axis=0)
+    shown = observations(fan, briefing, np.random.default_rng(4), turns=False)
+    off = {}
+    for leave in (0.0, 0.1):
+        tracker = InformedTracker(leave=leave)
+        tracker.brief(briefing)
+        errors = []
+        for seen in shown:
+            tracker.reset()
+            for one in seen:
+                tracker(one)
+            errors.append(abs(tracker.mean[0] - path[-1]))
+        off[leave] = np.median(errors)
+    assert off[0.0] > 0.3
+    assert off[0.1] < 0.15

@@ -1,0 +1,1 @@
+"""Libraries of reinforcement learning on the fan-tracking task, each by itself."""

@@ -1,0 +1,95 @@
+"""Trained policies of the tasks beside FanTracking: read, flown in NumPy, and by name."""
+
+import numpy as np
+import pytest
+
+from windwrench.controllers.task_policy import (
+    TaskPolicy,
+    load_task_policy,
+    shipped_task_policies,
+)
+from windwrench.controllers.trained_policy import save_policy
+from windwrench.dynamics import InputError
+from windwrench.evaluation.task_benchmark import TASKS, fly_task_episode, make_task_pilot
+
+SIZES = {"FanTracking2D": (10, 2), "WindHover": (27, 3), "WindTrajectory": (27, 3)}
+CARD = {
+    "task": "WindHover",
+    "scale": [2.0] * 27,
+    "largest": 4.0,
+    "activation": "tanh",
+    "squash": False,
+}
+
+
+def weights(rng, seen=27, state=5, size=3):
+    shapes = {
+        "gru_input": (3 * state, seen),
+        "gru_hidden": (3 * state, state),
+        "gru_input_bias": (3 * state,),
+        "gru_hidden_bias": (3 * state,),
+        "weight0": (size, state),
+        "bias0": (size,),
+    }
+    return {k: rng.standard_normal(s).astype(np.float32) for k, s in shapes.items()}
+
+
+def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
+    rng = np.random.default_rng(0)
+    policy = TaskPolicy(CARD, weights(rng))
+    again = load_task_policy(save_policy(CARD, policy.weights, tmp_path / "mine.npz"))
+    seen = rng.standard_normal((4, 27)).astype(np.float32)
+    said = np.array([policy(x) for x in seen])
+    np.testing.assert_array_equal(said, [again(x) for x in seen])
+    assert np.all(np.abs(said) <= 4.0)
+    assert not np.array_equal(policy(seen[0]), said[0])  # it remembers
+    policy.reset()
+    np.testing.assert_array_equal(policy(seen[0]), said[0])
+
+
+def test_its_gru_is_that_of_torch():
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    rng = np.random.default_rng(1)
+    w = weights(rng)
+    cell = torch.nn.GRU(27, 5)
+    names = {"weight_ih_l0": "gru_input", "weight_hh_l0": "gru_hidden"}
+    names |= {"bias_ih_l0": "gru_input_bias", "bias_hh_l0": "gru_hidden_bias"}
+    cell.load_state_dict({k: torch.from_numpy(w[v]) for k, v in names.items()})
+    seen = rng.standard_normal((6, 27)).astype(np.float32)
+    with torch.no_grad():
+        states, _ = cell(torch.from_numpy(seen / 2.0))
+    policy = TaskPolicy(CARD, w)
+    for x, state in zip(seen, states.numpy(), strict=True):
+        wanted = np.clip(w["weight0"] @ state + w["bias0"], -4.0, 4.0)
+        np.testing.assert_allclose(policy(x), wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [({"scale": [1.0] * 26}, "as many numbers"), ({"largest": None}, "spoils an entry")],
+)
+def test_a_card_that_does_not_fit_is_refused(change, words):
+    with pytest.raises(InputError, match=words):
+        TaskPolicy(CARD | change, weights(np.random.default_rng(0)))
+
+
+def test_a_policy_of_another_task_is_refused(tmp_path):
+    path = save_policy(CARD, weights(np.random.default_rng(0)), tmp_path / "mine.npz")
+    with pytest.raises(InputError, match="a policy of WindHover, not of WindTrajectory"):
+        make_task_pilot(str(path), "WindTrajectory")
+
+
+@pytest.mark.parametrize("task", SIZES)
+def test_shipped_policies_fly_better_than_hover(task):
+    shipped = shipped_task_policies(task)
+    assert "gru-0" in shipped
+    known, hover = TASKS[task], make_task_pilot("hover", task)
+    env = known.environment("base")
+    seeds = range(910_000, 910_004)
+    least = np.mean([fly_task_episode(env, hover, seed, known).rmse for seed in seeds])
+    policy = make_task_pilot("gru-0", task)
+    flown = [fly_task_episode(env, policy, seed, known) for seed in seeds]
+    assert np.mean([e.rmse for e in flown]) < 0.7 * least
+    seen, size = SIZES[task]
+    policy.reset()
+    assert policy(np.zeros(seen, dtype=np.float32)).shape == (size,)
