@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchUKF, fit_noise
 from ..estimator.estimate import STATUSES
-from ..estimator.noise_fit import tuning_note
+from ..estimator.noise_fit import NoiseFitSettings, tuning_note
 from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
@@ -221,13 +221,19 @@ def _notes(
         yield ("the log has one of gyro and accelerometer only: the poses were smoothed without it")
 
 
-def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> NoiseFit:
+def tune_to_log(
+    log: FlightLog,
+    vehicle: Vehicle,
+    tuning: UKFTuning | None = None,
+    settings: NoiseFitSettings | None = None,
+) -> NoiseFit:
     """Find the tuning that suits a log; see ``estimator.noise_fit``.
 
     Args:
         log: the flight.
         vehicle: the declared vehicle.
         tuning: to compare with; default ``UKFTuning.for_vehicle(vehicle, log.period)``.
+        settings: of the fit; default ``NoiseFitSettings()``.
 
     Raises:
         InputError: the log is none to estimate a wrench from (``screen_for_estimate``), or too few
@@ -240,7 +246,7 @@ def tune_to_log(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = Non
             "expected 50 poses a second, or leave --tune out"
         )
     try:
-        return fit_noise(vehicle, *_columns(screened), tuning)
+        return fit_noise(vehicle, *_columns(screened), tuning, settings)
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
 
