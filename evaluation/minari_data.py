@@ -5,7 +5,7 @@ Episodes have seeds of the training range, so that nothing of a benchmark is in 
 
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,11 +55,9 @@ def check_dataset_request(
         InputError: Minari is not installed, an unknown name, or numbers out of range.
     """
     need("minari", "minari")
-    known = SCENARIOS if task == "FanTracking" else None
-    if known is None:
-        if task not in TASKS:
-            raise unknown_name("task", task, ["FanTracking", *TASKS])
-        known = TASKS[task].scenarios
+    if task not in ("FanTracking", *TASKS):
+        raise unknown_name("task", task, ["FanTracking", *TASKS])
+    known: Mapping[str, Any] = SCENARIOS if task == "FanTracking" else TASKS[task].scenarios
     for name in scenarios:
         if name not in known:
             raise unknown_name("scenario", name, known)
