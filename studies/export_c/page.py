@@ -152,8 +152,8 @@ def _lines(result: Result, data: Path) -> list[str]:
         "bytes** while it runs with its covariance. A task with a small stack overflows then, and "
         "not in a calm hover.",
         "* **The covariance of the constant gain is that of hover**, in C and in Python: after a gap "
-        "in steep or fast flight its deviations are approximate (half a second unseen at 25 degrees "
-        "of tilt: the vertical velocity's was half of the full filter's).",
+        "in steep or fast flight its deviations are approximate (a test holds those of half a second "
+        "unseen, in a flight that turns and translates, between 0.4 and 1.6 of the full filter's).",
         f"* **One call after a gap of 0.1 s took {1e6 * gap / CLOCK:,.0f} us** with the constant "
         "gain: it makes up for the gap in up to 32 predictions at once. EKF and UKF have no such call.",
         f"* An IMU sample costs more than a pose; with one at every step the most is "
