@@ -20,9 +20,9 @@ from windwrench.identification.motion.smoothing import CUTOFFS, derivative, low_
 from windwrench.identification.wrench_series import estimate_log, tune_to_log
 from windwrench.runtime.errors import InputError
 
-from .blade_element import priors
+from .blade_element import Coefficient, priors
 from .flights import Flight, pose_log, read_flight, velocity_log
-from .force_fit import Coefficient, ForceModel, Regression, Rows
+from .force_fit import ForceModel, Regression, Rows
 
 Array = NDArray[np.float64]
 
