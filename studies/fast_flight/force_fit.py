@@ -192,7 +192,7 @@ class Regression:
         shares = [*x[p:], -float(np.sum(x[p:]))]
         loss = (whole - 2.0 * float(x @ h) + float(x @ G @ x)) / count
         known = G / noise + np.diag(np.concatenate([self._precision, np.zeros(own)]))
-        covariance: Array = np.linalg.inv(known)[:p, :p]
+        covariance = np.asarray(np.linalg.inv(known)[:p, :p], dtype=np.float64)
         return x[:p], {n: float(s) for n, s in zip(names, shares, strict=True)}, covariance, loss
 
     def _bounded(self, G: Array, h: Array, noise: float, p: int) -> Array:
