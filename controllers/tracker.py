@@ -179,6 +179,16 @@ class Tracker(_Belief):
         self.reach = reach
         super().__init__(gain, feed, damping, level, particles)
 
+    @property
+    def acceleration(self) -> float:
+        """Standard deviation of the velocity's drift over a second, m/s."""
+        return self.motion.acceleration
+
+    @property
+    def jumps(self) -> float:
+        """How often the velocity changes at once, 1/s."""
+        return self.motion.jumps
+
     def brief(self, briefing: Briefing) -> None:
         """Take what is known of vehicle, sensors and fan, but neither its motions nor its gusts."""
         super().brief(nominal(briefing))

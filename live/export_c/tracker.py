@@ -52,8 +52,8 @@ def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mappin
     numbers = {
         "speed": law.speed,
         "reach": law.reach,
-        "drift": law.motion.acceleration * np.sqrt(DECISION_PERIOD),
-        "jumps": law.motion.jumps * DECISION_PERIOD,
+        "drift": law.acceleration * np.sqrt(DECISION_PERIOD),
+        "jumps": law.jumps * DECISION_PERIOD,
         "stop": STOP,
         "turn": STOP + TURN,
         "few": FEW,

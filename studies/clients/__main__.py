@@ -94,7 +94,7 @@ def main() -> None:
             print(json.dumps(results[-1]), flush=True)
     if not given.only:
         with replaced(DATA) as partial:
-            partial.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+            partial.write_text(json.dumps(results, separators=(",", ":")) + "\n", encoding="utf-8")
         write_page(results)
     if any("failed" in result for result in results):
         raise SystemExit(1)

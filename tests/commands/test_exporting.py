@@ -79,7 +79,7 @@ def test_declared_effects_are_in_it_or_refused(call, tmp_path):
     [
         (("--vehicle", "ardrone2", "--estimator", "efk"), ("efk", "ekf")),
         (("--vehicle", "ardrone2", "--effects", "some"), ("some", "declared", "none")),
-        (("--vehicle", "ardrone2", "--policy", "tracker"), ("tracker", "lead")),
+        (("--vehicle", "ardrone2", "--policy", "tracker-informed"), ("tracker-informed", "lead")),
         (("--vehicle", "ardrone2", "--policy", "sac-99"), ("sac-99", "sac-0")),
         (("--vehicle", "ardrone2", "--policy", "nothing.npz"), ("nothing.json",)),
         (("--vehicle", "ardrone2", "--rate", "-5"), ("rate",)),
@@ -100,7 +100,7 @@ def test_a_mistake_is_one_line_and_writes_nothing(call, tmp_path, arguments, wor
     assert not out.exists()
 
 
-def test_the_tracker_is_refused_until_there_is_one(call, tmp_path):
-    code, _, err = call("--vehicle", "ardrone2", "--policy", "tracker", "--out", tmp_path / "x")
-    assert code == 2
-    assert "cannot be exported yet" in err
+def test_the_tracker_comes_with_its_particles(call, tmp_path):
+    code, _, _ = call("--vehicle", "ardrone2", "--policy", "tracker", "--out", tmp_path / "x")
+    assert code == 0
+    assert "ww_policy" in (tmp_path / "x" / "windwrench_filter.c").read_text()

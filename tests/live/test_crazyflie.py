@@ -51,16 +51,16 @@ def run(play, vehicle=VEHICLE, text="crazyflie:fake://here", **settings):
     while thread.is_alive() and not (FakeLink.opened and FakeLink.opened[0].started):
         thread.join(0.01)
     if thread.is_alive():
-        play(FakeLink.opened[0], lambda n: wait(session, n, thread))
+        play(FakeLink.opened[0], lambda n, kind="row": wait(session, n, thread, kind))
     session.stop()
     thread.join()
     return session, outputs, failed
 
 
-def wait(session, count, thread):
-    """Until so many rows were taken."""
+def wait(session, count, thread, kind="row"):
+    """Until so many of a kind were taken."""
     while thread.is_alive() and (
-        "row" not in session.tallies.rates or session.tallies.rates["row"].count < count
+        kind not in session.tallies.rates or session.tallies.rates[kind].count < count
     ):
         thread.join(0.01)
 
@@ -141,6 +141,7 @@ def test_gyro_and_accelerometer_come_in_si():
             values |= {"acc.x": 0.0, "acc.y": 0.0, "acc.z": 1.0}
             link.log(5 * k, values)
         taken(100)
+        taken(91, "imu")
 
     session, _, failed = run(play, text="crazyflie:fake://here?imu=1")
     assert not failed
