@@ -7,11 +7,13 @@ import re
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
+from windwrench.studies.numbers import hand_written
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -182,6 +184,9 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "faults": _faults,
     "export-c": _export_c,
     "clients": _clients,
+    "reproduction": partial(hand_written.reproduction, kept),
+    "tasks": partial(hand_written.tasks, kept),
+    "tutorials/your-log": partial(hand_written.map_guesses, kept),
 }
 
 
