@@ -79,10 +79,10 @@ def _comparisons(result: Result) -> list[str]:
         f"* Normal against normal, a place is likeliest: "
         f"{share(sum(not row['right'] for row in normal), len(normal))}.",
         "",
-        "The intervals are wide: no more flights are at hand. And these flights are no blind test: "
-        "the scatter between unchanged flights (`ChangeSettings.scatter`), and that it differs from "
-        "vehicle to vehicle, were set with them known. The simulated changes below are the blind "
-        "test.",
+        "The intervals are wide: no more flights are at hand. And these flights are no blind "
+        "test: the scatter between unchanged flights (`ChangeSettings.scatter`), and that it "
+        "differs from vehicle to vehicle, were set with them known. The simulated changes "
+        "below are the blind test.",
         "",
         "| flight | truth | likeliest | probability | likeliest place if something changed | "
         "left - right | front - rear | diagonals | total |",
