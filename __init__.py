@@ -11,7 +11,7 @@ with leaving_at_once(is_command()):
 
     from .runtime.moved_modules import keep_old_paths
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 _TASKS = {  # pytest imports this file a second time, as a folder's
     "FanTracking": (
