@@ -3,6 +3,9 @@ kind of fan, and for those that say so, how the fan is known to move.
 """
 
 from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
@@ -21,6 +24,25 @@ class FilterNoise:
     position: float = 0.001  # m, one measurement
     attitude: float = 0.005  # rad, one measurement
     period: float = 0.005  # s, of a step
+
+    @classmethod
+    def of(cls, tuning: Any, period: float) -> Self:
+        """Return what a filter is told whose step takes ``period`` s and whose ``tuning`` is an
+        ``estimator.UKFTuning``, one number or three for each noise.
+        """
+
+        def along(value: Any, axis: int) -> float:
+            return float(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))[axis])
+
+        return cls(
+            along(tuning.motor_torque_noise, 2),
+            along(tuning.torque_walk, 2),
+            along(tuning.thrust_noise, 1),
+            along(tuning.force_walk, 1),
+            along(tuning.position_noise, 1),
+            along(tuning.attitude_noise, 2),
+            period,
+        )
 
 
 @dataclass(frozen=True)

@@ -177,7 +177,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
             code = translate(effect, needed)
         except (UntranslatableError, OSError) as error:
             raise InputError(
-                f"{vehicle.name}: effects: {effect.name} {error}, which cannot be exported; "
+                f"{vehicle.name}: effects: {effect.name} cannot be written in C: it {error}; "
                 f"expected some of {', '.join(exportable_effects())}, or --effects none"
             ) from None
         models[effect.name] = code

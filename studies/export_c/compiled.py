@@ -1,6 +1,7 @@
 """An exported C filter, compiled on this machine and driven from Python."""
 
 import ctypes
+import re
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -17,7 +18,8 @@ from windwrench.live.export_c import Exported
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
 Array = NDArray[np.float64]
-_FLOATS = ctypes.POINTER(ctypes.c_float)
+# a number in single precision, and what of libm takes one
+_SINGLE = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+|\b(?:sqrt|sin|cos|fabs))f\b")
 
 
 def missing(*programs: str) -> list[str]:
@@ -25,10 +27,14 @@ def missing(*programs: str) -> list[str]:
     return [program for program in programs if shutil.which(program) is None]
 
 
-def write(exported: Exported, folder: Path) -> Path:
-    """Write the files of an export into a folder; return it."""
+def write(exported: Exported, folder: Path, double: bool = False) -> Path:
+    """Write the files of an export into a folder, as they are or with each ``float`` a ``double``;
+    return it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in exported.files.items():
+        if double:
+            text = re.sub(r"\bfloat\b", "double", _SINGLE.sub(r"\1", text))
         (folder / name).write_text(text, encoding="utf-8")
     return folder
 
@@ -49,29 +55,29 @@ def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
     return done.stdout
 
 
-def _estimate_type(imu: bool) -> Any:
+def _estimate_type(imu: bool, real: Any) -> Any:
     names = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
-    fields: list[tuple[str, Any]] = [
-        (n, ctypes.c_float * (4 if n == "quaternion" else 3)) for n in names
-    ]
-    fields += [(f"std_{n}", ctypes.c_float * 3) for n in PARTS]
-    fields += [("nis", ctypes.c_float), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
+    fields: list[tuple[str, Any]] = [(n, real * (4 if n == "quaternion" else 3)) for n in names]
+    fields += [(f"std_{n}", real * 3) for n in PARTS]
+    fields += [("nis", real), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
     if imu:
         biases = ("gyro_bias", "accelerometer_bias", "std_gyro_bias", "std_accelerometer_bias")
-        fields += [(name, ctypes.c_float * 3) for name in biases]
+        fields += [(name, real * 3) for name in biases]
         fields += [("imu_refused", ctypes.c_uint)]
     return type("Estimate", (ctypes.Structure,), {"_fields_": fields})
 
 
-def _floats(values: Any) -> Any:
-    return None if values is None else (ctypes.c_float * len(values))(*map(float, values))
-
-
 class CompiledFilter:
-    """An export, compiled, with the methods of the Python filter; each returns what C returns."""
+    """An export, compiled, with the methods of the Python filter; each returns what C returns.
 
-    def __init__(self, exported: Exported, folder: Path, compiler: str = "gcc") -> None:
-        write(exported, folder)
+    In ``double`` precision it shows what of a difference between C and Python is rounding.
+    """
+
+    def __init__(
+        self, exported: Exported, folder: Path, compiler: str = "gcc", double: bool = False
+    ) -> None:
+        write(exported, folder, double)
+        self._real: Any = ctypes.c_double if double else ctypes.c_float
         header = exported.files["windwrench_filter.h"]
         lines = ['#include "windwrench_filter.h"']
         with_policy = "ww_policy" in header
@@ -89,31 +95,38 @@ class CompiledFilter:
             cwd=folder,
         )
         self.c: Any = ctypes.CDLL(str(library.resolve()))
-        self.c.ww_predict.argtypes = [ctypes.c_void_p, _FLOATS, ctypes.c_float]
+        self.c.ww_predict.argtypes = [ctypes.c_void_p, ctypes.POINTER(self._real), self._real]
         self.bytes = int(self.c.size_of_filter())
         self._memory = ctypes.create_string_buffer(self.bytes)
-        self._now = _estimate_type("gyro_bias" in header)()
+        self._now = _estimate_type("gyro_bias" in header, self._real)()
         if with_policy:
-            self.c.ww_policy.restype = ctypes.c_float
+            self.c.ww_policy.restype = self._real
             self.policy_bytes = int(self.c.size_of_policy())
             self._policy = ctypes.create_string_buffer(self.policy_bytes)
             self.c.ww_policy_init(self._policy)
 
+    def _numbers(self, values: Any) -> Any:
+        return None if values is None else (self._real * len(values))(*map(float, values))
+
     def reset(self, position: Any, quaternion: Any) -> int:
         """Call ww_init."""
-        return int(self.c.ww_init(self._memory, _floats(position), _floats(quaternion)))
+        return int(self.c.ww_init(self._memory, self._numbers(position), self._numbers(quaternion)))
 
     def predict(self, rotor_speeds: Any, dt: float) -> int:
         """Call ww_predict."""
-        return int(self.c.ww_predict(self._memory, _floats(rotor_speeds), dt))
+        return int(self.c.ww_predict(self._memory, self._numbers(rotor_speeds), dt))
 
     def correct(self, position: Any, quaternion: Any) -> int:
         """Call ww_correct_pose."""
-        return int(self.c.ww_correct_pose(self._memory, _floats(position), _floats(quaternion)))
+        return int(
+            self.c.ww_correct_pose(self._memory, self._numbers(position), self._numbers(quaternion))
+        )
 
     def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
         """Call ww_correct_imu."""
-        return int(self.c.ww_correct_imu(self._memory, _floats(gyro), _floats(accelerometer)))
+        return int(
+            self.c.ww_correct_imu(self._memory, self._numbers(gyro), self._numbers(accelerometer))
+        )
 
     def policy(self, estimate: Any) -> float:
         """Call ww_policy."""

@@ -10,7 +10,7 @@ import numpy as np
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.runtime.provenance import commit
 from windwrench.studies.export_c import firmware
-from windwrench.studies.export_c.compiled import CompiledFilter, compare
+from windwrench.studies.export_c.compiled import PARTS, CompiledFilter, compare
 from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
 
 BOARD_STEPS = 1_000
@@ -44,13 +44,21 @@ def _agreement(
     for estimator in ESTIMATORS:
         for name in FLIGHTS:
             exported = export_c(vehicle_of(name), estimator)
-            c = CompiledFilter(exported, folder / f"c{len(rows)}")
-            worst = compare(c, exported.filter, flight(name, steps, seed), 4)
+            flown = flight(name, steps, seed)
+            single, double = (
+                compare(
+                    CompiledFilter(exported, folder / kind / f"{len(rows)}", double=double),
+                    exported.filter,
+                    flown,
+                )
+                for kind, double in (("single", False), ("double", True))
+            )
             rows.append(
                 {
                     "estimator": estimator,
                     "flight": name,
-                    **{key: float(f"{value:.3g}") for key, value in worst.items()},
+                    **{key: float(f"{value:.3g}") for key, value in single.items()},
+                    "in_double": float(f"{max(double[name] for name in PARTS):.3g}"),
                 }
             )
             report("flights", len(rows) / (len(ESTIMATORS) * len(FLIGHTS)))

@@ -17,6 +17,7 @@ from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.runtime.errors import InputError
 from windwrench.studies.export_c import firmware
 from windwrench.studies.export_c.compiled import (
+    PARTS,
     STRICT,
     CompiledFilter,
     compare,
@@ -71,6 +72,18 @@ def test_c_and_python_agree_along_long_flights(estimator, name, tmp_path):
     # now and then a NIS comes so near to a bound that the two decide differently, and agree again
     # later: the page counts how often
     assert worst["over"] < 0.03
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_what_c_and_python_differ_by_is_single_precision(estimator, tmp_path):
+    """On the flight where they differ most: some poses of it have no attitude for a while."""
+    needs("gcc")
+    name = "crazyflie, 50 poses a second"
+    exported = export_c(vehicle_of(name), estimator)
+    c = CompiledFilter(exported, tmp_path, double=True)
+    worst = compare(c, exported.filter, flight(name, QUICK))
+    assert worst["status"] == 0.0
+    assert max(worst[part] for part in (*PARTS, "std")) < 1e-3
 
 
 @pytest.mark.parametrize("estimator", ["constant-gain", "ekf"])
@@ -385,7 +398,9 @@ def test_what_cannot_be_exported_is_said_in_a_line():
     model = load_vehicle("ardrone2")
     for effect in ("latency", "battery_sag", "clock_offset", "fan_jet", "slung_payload"):
         declared = model.with_effects(parse_setting(effect, model))
-        with pytest.raises(InputError, match=rf"{effect} .*rotor_drag") as refused:
+        with pytest.raises(
+            InputError, match=rf"{effect} cannot be written in C: it .*rotor_drag"
+        ) as refused:
             export_c(declared)
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="recurrent"):
