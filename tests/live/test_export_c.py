@@ -15,7 +15,7 @@ from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZ
 from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
 from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.runtime.errors import InputError
-from windwrench.studies.export_c import firmware
+from windwrench.studies.export_c import firmware, web
 from windwrench.studies.export_c.compiled import (
     PARTS,
     STRICT,
@@ -392,6 +392,23 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
             )
             assert board.status[k - 1] == e.status
             assert np.all(np.abs(board.estimates[k - 1] - mine) < LARGEST * std)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_in_a_browser_it_says_the_same(estimator, tmp_path):
+    needs(*web.TOOLS)
+    name = "ardrone2, turning"
+    flown = flight(name, 500)
+    exported = export_c(vehicle_of(name), estimator)
+    there = web.fly(web.build(exported, tmp_path / "web"), flown)
+    c = CompiledFilter(exported, tmp_path / "here")
+    c.reset(flown["position"][0], flown["quaternion"][0])
+    for k in range(1, 500):
+        c.predict(flown["rotor_speeds"][k], flown["dt"][k])
+        c.correct(flown["position"][k], flown["quaternion"][k])
+        e = c.estimate
+        assert np.all(np.abs(there[k, 13:16] - e.torque) < LARGEST * np.array(e.std_torque))
+        assert np.all(np.abs(there[k, 16:19] - e.force) < LARGEST * np.array(e.std_force))
 
 
 def test_what_cannot_be_exported_is_said_in_a_line():
