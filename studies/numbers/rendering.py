@@ -144,7 +144,7 @@ def _leaderboard() -> str:
 def _filtered_logs() -> str:
     from windwrench.studies.filtered_logs.page import tables
 
-    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json")))
+    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json.gz")))
 
 
 def _imu_logs() -> str:
