@@ -176,15 +176,8 @@ def _task_benchmark(
     from ..controllers.task_laws import TASK_LAWS
     from ..envs.fan_tracking import EPISODE_SECONDS
     from ..evaluation.side_by_side import write_leaderboard
-    from ..evaluation.task_benchmark import (
-        check_task_request,
-        draw_task_leaderboard,
-        fly_task,
-        markdown,
-        task_leaderboard,
-        task_of,
-        wanted_laws,
-    )
+    from ..evaluation.task_benchmark import check_task_request, fly_task, task_of, wanted_laws
+    from ..evaluation.task_leaderboard import draw_task_leaderboard, markdown, task_leaderboard
 
     known = task_of(task)
     if cluster is not None:

@@ -31,7 +31,7 @@ def reproduction(kept: Kept) -> str:
 
 def tasks(kept: Kept) -> str:
     """Return the page of the tasks, whose tables are those of ``windwrench benchmark --task``."""
-    from windwrench.evaluation.task_benchmark import TaskRow, markdown
+    from windwrench.evaluation.task_leaderboard import TaskRow, markdown
 
     found = []
     for task in _TASKS:
