@@ -19,13 +19,12 @@ from ..envs.wind_hover import WindHoverEnv
 from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_trajectory import WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
-from .episodes import FIRST_TEST_SEED, benchmark_seeds
+from .episodes import benchmark_seeds, check_episodes
 from .side_by_side import each_flown
 
 Array = NDArray[np.float64]
 
 _CHUNK = 5  # episodes that a worker flies at a time
-_SEEDS = (2**32 - FIRST_TEST_SEED) // 10_000 - 1  # of a benchmark, the last
 
 
 @dataclass(frozen=True)
@@ -127,10 +126,7 @@ def check_task_request(
         InputError: an unknown name, no episodes, or a seed out of range.
     """
     known = task_of(task)
-    if episodes < 1:
-        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed <= _SEEDS:
-        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS}, got {seed}")
+    check_episodes(episodes, seed)
     for name in controllers:
         make_task_pilot(name, task)
     for name in scenarios:

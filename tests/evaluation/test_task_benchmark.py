@@ -10,9 +10,15 @@ from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.task_laws import TASK_LAWS, make_task_law, task_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithForce, WindOracle
 from windwrench.dynamics import InputError
-from windwrench.evaluation.episodes import FIRST_TEST_SEED
+from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds
 from windwrench.evaluation.side_by_side import write_leaderboard
-from windwrench.evaluation.task_benchmark import TASKS, TaskEpisode, fly_task, fly_task_episode
+from windwrench.evaluation.task_benchmark import (
+    TASKS,
+    TaskEpisode,
+    check_task_request,
+    fly_task,
+    fly_task_episode,
+)
 from windwrench.evaluation.task_leaderboard import (
     draw_task_leaderboard,
     markdown,
@@ -144,6 +150,14 @@ def test_a_lost_vehicle_s_remaining_time_counts():
 def test_what_cannot_be_flown_is_named(given, words):
     with pytest.raises(InputError, match=words):
         fly_task(*given, jobs=1)
+
+
+def test_any_seed_of_32_bits_is_flown():
+    check_task_request("WindHover", ["pid"], ["base"], 1, 2**32 - 1)
+    with pytest.raises(InputError, match="between 0 and 4294967295"):
+        check_task_request("WindHover", ["pid"], ["base"], 1, 2**32)
+    for task in TASKS.values():
+        assert task.environment("base").reset(seed=benchmark_seeds(2**32 - 1, 1)[0])
 
 
 def test_every_law_has_gains_that_were_found_on_validation_episodes():
