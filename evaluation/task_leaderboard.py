@@ -177,7 +177,16 @@ def _told(change: float, interval: tuple[float, float]) -> str:
     return f"{100 * change:+.0f} % ({100 * interval[0]:+.0f} to {100 * interval[1]:+.0f})"
 
 
-_COLOURS = ("#30638e", "#2a9d8f", "#edae49", "#d1495b", "#8d5a97", "#8c8c8c", "#6a994e")
+_COLOURS = (
+    "#30638e",
+    "#2a9d8f",
+    "#edae49",
+    "#d1495b",
+    "#8d5a97",
+    "#8c8c8c",
+    "#6a994e",
+    "#1d1d1d",
+)
 
 
 def draw_task_leaderboard(
@@ -212,7 +221,7 @@ def draw_task_leaderboard(
             left.plot(row.rmse_ci95_m, [i, i], color="black", lw=2.2, solid_capstyle="butt")
             left.plot(row.rmse_m, i, "o", color=colour[row.controller], mec="black", ms=8, zorder=5)
             label = f"{row.rmse_m:.3f} m" + (
-                f", {100 * row.lost_fraction:.0f} % lost" if row.lost_fraction else ""
+                f", {100 * row.lost_fraction:.1f} % lost" if row.lost_fraction else ""
             )
             left.annotate(
                 label, (1.01, i), xycoords=("axes fraction", "data"), va="center", fontsize=9
