@@ -28,6 +28,7 @@ from .task_benchmark import TASKS, TaskEpisode, TaskResults, wanted_laws
 
 _RESAMPLES = 4_000
 _ENDS = ("hover", "oracle")  # of the score
+_CLEAR = 0.05  # p-value, corrected
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ class TaskRow:
     best_law: str  # the designed law with the smallest mean RMSE in this scenario, of those flown
     change_over_best: float
     change_over_best_ci95: tuple[float, float]
-    p_over_best: float  # of no change, corrected (Holm); null for laws, and for policies of a kind
+    p_over_best: (
+        float | None
+    )  # of no change, corrected (Holm); null for laws, and for policies of a kind
     policies: int  # that this row counts together
     most_lost_fraction: float  # of the policy that loses most
 
@@ -127,7 +130,7 @@ def _row(
         best_law=best,
         change_over_best=float(relative_change(x, rmse[best])),
         change_over_best_ci95=interval_of(over_best),
-        p_over_best=math.nan if name in TASK_LAWS[task] else sign_probability(over_best),
+        p_over_best=None if name in TASK_LAWS[task] else sign_probability(over_best),
         policies=len(x),
         most_lost_fraction=max(lost),
     )
@@ -135,15 +138,60 @@ def _row(
 
 def _corrected(rows: Sequence[TaskRow]) -> list[TaskRow]:
     """Return the rows with p-values corrected (Holm) for all that a page shows of them."""
-    claims = [row for row in shown(rows) if row.p_over_best == row.p_over_best]
+    claims = [row for row in shown(rows) if row.p_over_best is not None]
     p = dict(zip(map(id, claims), holm([row.p_over_best for row in claims]), strict=True))
-    return [replace(row, p_over_best=float(p.get(id(row), math.nan))) for row in rows]
+    return [replace(row, p_over_best=p.get(id(row))) for row in rows]
 
 
 def shown(rows: Sequence[TaskRow]) -> list[TaskRow]:
     """Return the rows without policies that the row of their kind counts."""
     kinds = {row.controller for row in rows if row.policies > 1}
     return [row for row in rows if row.controller.rpartition("-")[0] not in kinds]
+
+
+def summary(rows: Sequence[TaskRow]) -> str:
+    """Return what the rows say as a list, a scenario a line: losses first, then which policies are
+    better or worse than the best designed law at a corrected p-value below 0.05.
+    """
+    lines = []
+    for scenario in dict.fromkeys(row.scenario for row in rows):
+        some = [row for row in shown(rows) if row.scenario == scenario]
+        lost: dict[str, list[str]] = {}
+        for row in sorted(some, key=lambda row: -row.lost_fraction):
+            lost.setdefault(_lost(row), []).append(f"`{row.controller}`")
+        parts = [
+            f"{', '.join(names)} {'none' if told == '0.0 %' else told}"
+            for told, names in lost.items()
+        ]
+        told = "; ".join(parts) if len(lost) > 1 else f"all {next(iter(lost))}"
+        if list(lost) == ["0.0 %"]:
+            told = "nothing"
+        judged = [row for row in some if row.p_over_best is not None and row.p_over_best < _CLEAR]
+        better = [row for row in judged if row.change_over_best < 0]
+        worse = [row for row in judged if row.change_over_best > 0]
+        lines.append(
+            f"* **{scenario}**, {some[0].episodes} episodes each. Lost: {told}. Against the best "
+            f"designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
+            f"better {_listed(better)}."
+        )
+    return "\n".join(lines) + "\n" if lines else ""
+
+
+def _listed(rows: Sequence[TaskRow]) -> str:
+    return (
+        ", ".join(
+            f"`{row.controller}` {_told(row.change_over_best, row.change_over_best_ci95)}"
+            for row in rows
+        )
+        or "none"
+    )
+
+
+def _lost(row: TaskRow) -> str:
+    told = f"{100 * row.lost_fraction:.1f} %"
+    if row.most_lost_fraction > row.lost_fraction:
+        told += f" (most {100 * row.most_lost_fraction:.1f} %)"
+    return told
 
 
 def markdown(rows: Sequence[TaskRow]) -> str:
@@ -157,18 +205,16 @@ def markdown(rows: Sequence[TaskRow]) -> str:
     ]
     for row in shown(rows):
         low, high = row.rmse_ci95_m
-        lost, p = f"{100 * row.lost_fraction:.1f} %", row.p_over_best
-        if row.most_lost_fraction > row.lost_fraction:
-            lost += f" (most {100 * row.most_lost_fraction:.1f} %)"
+        p = row.p_over_best
         lines.append(
             f"| {row.scenario} | {row.controller} | "
             f"{'-' if row.controller in TASK_LAWS[row.task] else row.policies} | "
-            f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f}) | {row.median_rmse_m:.3f} | {lost} | "
+            f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f}) | {row.median_rmse_m:.3f} | {_lost(row)} | "
             f"{row.score:.2f} | {100 * row.wins_over_rival:.0f} % | "
             f"{row.improvement_over_rival:.2f} | "
             f"{_told(row.change_over_rival, row.change_ci95)} | "
             f"{_told(row.change_over_best, row.change_over_best_ci95)} | "
-            f"{'-' if p is None or math.isnan(p) else f'{p:.3f}'} |"
+            f"{'-' if p is None else f'{p:.3f}'} |"
         )
     return "\n".join(lines) + "\n"
 

@@ -162,7 +162,7 @@ def _clients() -> str:
 def _identify() -> str:
     from windwrench.studies.identified_vehicles.page import tables
 
-    return _between_marks("identify", tables(kept("identify/identified_vehicles.json")))
+    return _between_marks("identify", tables(kept("identify/identified_vehicles.json.gz")))
 
 
 # made by results whose sentences have other words by now: their numbers are compared

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from windwrench.evaluation.task_leaderboard import (
     draw_task_leaderboard,
     markdown,
     shown,
+    summary,
     task_leaderboard,
 )
 from windwrench.evaluation.task_tuning import FIRST_VALIDATION_SEED, tune_task
@@ -105,9 +108,14 @@ def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
     low, high = sac.rmse_ci95_m
     assert all(high - low > np.ptp(row.rmse_ci95_m) for row in singles)  # other seeds, too
     assert sac.p_over_best < 0.05
-    assert all(math.isnan(row.p_over_best) for row in rows if row is not sac)
+    assert all(row.p_over_best is None for row in rows if row is not sac)
     assert {row.controller for row in shown(rows)} == {"sac", "pid", "pid-force"}
     assert "8.3 % (most 25.0 %)" in markdown(rows)
+    told = summary(rows)
+    assert "Lost: `sac` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
+    assert re.search(r"`pid-force`: clearly worse none; clearly better `sac` -\d+ %", told)
+    nothing = [replace(row, lost_fraction=0.0, most_lost_fraction=0.0) for row in rows]
+    assert "Lost: nothing." in summary(nothing)
     draw_task_leaderboard(rows, results, tmp_path / "a.png", 0.04)
 
 

@@ -74,7 +74,7 @@ def test_a_picture_shows_every_row(draw, name, panels):
     [
         (filtered_logs_page, "filtered-logs", "filtered_logs.json.gz"),
         (imu_logs_page, "imu-logs", "imu_logs.json"),
-        (identified_page, "identify", "identified_vehicles.json"),
+        (identified_page, "identify", "identified_vehicles.json.gz"),
     ],
 )
 def test_a_pages_tables_are_made_from_its_data(study, name, data, tmp_path):
