@@ -138,8 +138,8 @@ def _row(
 
 def _corrected(rows: Sequence[TaskRow]) -> list[TaskRow]:
     """Return the rows with p-values corrected (Holm) for all that a page shows of them."""
-    claims = [row for row in shown(rows) if row.p_over_best is not None]
-    p = dict(zip(map(id, claims), holm([row.p_over_best for row in claims]), strict=True))
+    claims = {id(row): row.p_over_best for row in shown(rows) if row.p_over_best is not None}
+    p = dict(zip(claims, holm(list(claims.values())).tolist(), strict=True))
     return [replace(row, p_over_best=p.get(id(row))) for row in rows]
 
 
