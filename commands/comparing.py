@@ -176,14 +176,12 @@ def _task_benchmark(
     from ..controllers.task_laws import TASK_LAWS
     from ..envs.fan_tracking import EPISODE_SECONDS
     from ..evaluation.side_by_side import write_leaderboard
-    from ..evaluation.task_benchmark import (
-        check_task_request,
+    from ..evaluation.task_benchmark import check_task_request, fly_task, task_of, wanted_laws
+    from ..evaluation.task_leaderboard import (
         draw_task_leaderboard,
-        fly_task,
         markdown,
+        summary,
         task_leaderboard,
-        task_of,
-        wanted_laws,
     )
 
     known = task_of(task)
@@ -206,7 +204,7 @@ def _task_benchmark(
     period = EPISODE_SECONDS / known.decisions
     draw_task_leaderboard(rows, results, folder / "leaderboard.png", period)
     with replaced(folder / "leaderboard.md") as partial:
-        partial.write_text(markdown(rows), encoding="utf-8")
+        partial.write_text(f"{summary(rows)}\n{markdown(rows)}", encoding="utf-8")
     table = Table(
         "scenario",
         "controller",

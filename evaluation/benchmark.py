@@ -18,8 +18,15 @@ from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.scenarios import get_scenario
 from ..envs.watched_fan_tracking import scenario_env
 from ..runtime.compiled import is_on_disk
-from ..runtime.errors import InputError, unknown_name
-from .episodes import DECISIONS, FIRST_TEST_SEED, Episode, benchmark_seeds, fly_episode
+from ..runtime.errors import unknown_name
+from .episodes import (
+    DECISIONS,
+    FIRST_TEST_SEED,
+    Episode,
+    benchmark_seeds,
+    check_episodes,
+    fly_episode,
+)
 from .side_by_side import each_flown
 from .side_by_side import write_leaderboard as write_leaderboard  # from here, too, as at first
 
@@ -27,7 +34,6 @@ _CHUNK = 5  # episodes that a worker flies at a time
 _SAMPLE = 25  # decisions by which a duration is told
 # what scores, wins and shares are relative to
 _REFERENCES = ("hover", "admittance", "limit", "oracle")
-_SEEDS = 2**32
 _RESAMPLES = 4_000
 
 Results = dict[tuple[str, str], list[Episode]]
@@ -98,10 +104,7 @@ def check_request(
     Raises:
         InputError: an unknown name, no episodes, or a seed out of range.
     """
-    if episodes < 1:
-        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed < _SEEDS:
-        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {seed}")
+    check_episodes(episodes, seed)
     for name in controllers:
         make_pilot(name)
     for name in scenarios:

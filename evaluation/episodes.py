@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..controllers import Controller
 from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET, FanTrackingEnv
 from ..envs.plant import TICK
+from ..runtime.errors import InputError
 from .briefing import briefing_of
 
 Array = NDArray[np.float64]
@@ -16,6 +17,7 @@ DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)
 # Seeds of episodes that score controllers; those of training and validation lie below, so none is
 # shared.
 FIRST_TEST_SEED = 1_000_000
+_SEEDS = 2**32  # of a benchmark
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,18 @@ def fly_episode(
         np.array(forces),
         np.array(torques),
     )
+
+
+def check_episodes(episodes: int, seed: int) -> None:
+    """Check how many episodes a benchmark is asked for, and its seed, which may be any of 32 bits.
+
+    Raises:
+        InputError: no episodes, or a seed out of range.
+    """
+    if episodes < 1:
+        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
+    if not 0 <= seed < _SEEDS:
+        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {seed}")
 
 
 def benchmark_seeds(seed: int, episodes: int) -> list[int]:

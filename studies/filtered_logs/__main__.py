@@ -18,12 +18,12 @@ if __name__ == "__main__":
         "--saved",
         type=Path,
         default=None,
-        help="filtered_logs.json of an earlier run, to go on from",
+        help="filtered_logs.json.gz of an earlier run, to go on from",
     )
     given = parser.parse_args()
     if given.saved is not None:
         resume(given.out, given.saved)
     outcomes = run(given.out, range(given.seeds), given.jobs, given.flights)
-    save(outcomes, given.out / "filtered_logs.json")
+    save(outcomes, given.out / "filtered_logs.json.gz")
     put_between(tables(outcomes), given.page)
     print(tables(outcomes))

@@ -1,7 +1,9 @@
 """The study: practice flights, each diagnosed as measured and behind each filter."""
 
+import gzip
 import json
 import time
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,9 @@ from windwrench.identification import FlightLog
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.motion.noise_spectrum import noise_spectra, pose_was_filtered
 from windwrench.runtime.errors import InputError
+from windwrench.runtime.file_limits import LIMITS
 from windwrench.runtime.page_files import write_json
-from windwrench.runtime.regular_files import read_json
+from windwrench.runtime.regular_files import read_bytes
 from windwrench.runtime.whole_files import replaced
 from windwrench.studies.filtered_logs.filters import FILTERS
 from windwrench.studies.resumed_tasks import run_tasks
@@ -89,7 +92,7 @@ def resume(folder: Path, saved: Path) -> None:
     if path.exists():
         return
     by_flight: dict[tuple[str, str, int], list[Any]] = {}
-    for outcome in read_json(saved, "outcomes of this study"):
+    for outcome in read_saved(saved):
         flight = (outcome["effect"], outcome["trajectory"], outcome["seed"])
         by_flight.setdefault(flight, []).append(outcome)
     lines = [
@@ -101,7 +104,23 @@ def resume(folder: Path, saved: Path) -> None:
         partial.write_text("".join(lines), encoding="utf-8")
 
 
+def read_saved(path: Path) -> list[dict[str, Any]]:
+    """Return outcomes that ``save`` wrote.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    what = "outcomes of this study, gzipped"
+    try:
+        outcomes: list[dict[str, Any]] = json.loads(
+            gzip.decompress(read_bytes(path, what, LIMITS.json_text))
+        )
+    except (OSError, EOFError, zlib.error, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as {what}: {error}") from error
+    return outcomes
+
+
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the outcomes as JSON."""
+    """Write the outcomes as gzipped JSON; ``path`` ends with ``.json.gz``."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_json(list(outcomes), path)

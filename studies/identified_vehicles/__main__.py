@@ -15,6 +15,6 @@ if __name__ == "__main__":
     parser.add_argument("--page", type=Path, default=None, help="page whose table is made anew")
     given = parser.parse_args()
     outcomes = run(given.out, given.runs, given.jobs)
-    save(outcomes, given.out / "identified_vehicles.json")
+    save(outcomes, given.out / "identified_vehicles.json.gz")
     put_between(tables(outcomes), given.page)
     print(tables(outcomes))

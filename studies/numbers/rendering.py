@@ -144,7 +144,7 @@ def _leaderboard() -> str:
 def _filtered_logs() -> str:
     from windwrench.studies.filtered_logs.page import tables
 
-    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json")))
+    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json.gz")))
 
 
 def _imu_logs() -> str:
@@ -162,7 +162,7 @@ def _clients() -> str:
 def _identify() -> str:
     from windwrench.studies.identified_vehicles.page import tables
 
-    return _between_marks("identify", tables(kept("identify/identified_vehicles.json")))
+    return _between_marks("identify", tables(kept("identify/identified_vehicles.json.gz")))
 
 
 # made by results whose sentences have other words by now: their numbers are compared

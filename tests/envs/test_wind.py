@@ -341,16 +341,24 @@ def test_rotorpy_gets_the_same_field():
 @pytest.mark.slow
 def test_pyflyt_itself_flies_in_it():
     core = pytest.importorskip("PyFlyt.core", reason="PyFlyt is not installed: pip install PyFlyt")
-    world = core.Aviary(
-        start_pos=np.array([[0.0, 0.0, 1.0]]),
-        start_orn=np.zeros((1, 3)),
-        drone_type="quadx",
-        wind_type=pyflyt_wind_type(Uniform((2.0, 0.0, 0.0))),
-    )
-    world.set_mode(0)
-    for _ in range(20):
-        world.step()
-    assert world.state(0)[3][0] > 0.01
+
+    def drift(speed):
+        world = core.Aviary(
+            start_pos=np.array([[0.0, 0.0, 1.0]]),
+            start_orn=np.zeros((1, 3)),
+            drone_type="quadx",
+            wind_type=pyflyt_wind_type(Uniform((speed, 0.0, 0.0))),
+        )
+        world.set_mode(0)
+        for _ in range(20):
+            world.step()
+        along = world.state(0)[3][0]
+        world.disconnect()
+        return along
+
+    assert drift(8.0) > 0.01
+    assert drift(8.0) / drift(4.0) == pytest.approx(4.0, rel=0.05)  # PyFlyt's drag is quadratic
+    assert abs(drift(0.0)) < 1e-6
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,14 +12,20 @@ from windwrench.controllers import wind_observation as seen
 from windwrench.controllers.task_laws import TASK_LAWS, make_task_law, task_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithForce, WindOracle
 from windwrench.dynamics import InputError
-from windwrench.evaluation.episodes import FIRST_TEST_SEED
+from windwrench.evaluation.episodes import FIRST_TEST_SEED, benchmark_seeds
 from windwrench.evaluation.side_by_side import write_leaderboard
 from windwrench.evaluation.task_benchmark import (
     TASKS,
-    draw_task_leaderboard,
+    TaskEpisode,
+    check_task_request,
     fly_task,
     fly_task_episode,
+)
+from windwrench.evaluation.task_leaderboard import (
+    draw_task_leaderboard,
     markdown,
+    shown,
+    summary,
     task_leaderboard,
 )
 from windwrench.evaluation.task_tuning import FIRST_VALIDATION_SEED, tune_task
@@ -73,6 +81,44 @@ def test_the_file_has_the_documented_keys_and_pages_have_losses(tmp_path, result
     assert len(table) == 2 + len(LAWS)
 
 
+def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
+    rng, episodes = np.random.default_rng(0), 12
+
+    def flown(level, lost=0):
+        return [
+            TaskEpisode(k, k < lost, 0.0, np.full(5, level), float(level * rng.uniform(0.9, 1.1)))
+            for k in range(episodes)
+        ]
+
+    policies = [f"sac-{k}" for k in range(3)]
+    results = {
+        (name, "base"): flown(level)
+        for name, level in {"hover": 0.2, "pid": 0.1, "pid-force": 0.08, "oracle": 0.07}.items()
+    }
+    results |= {
+        (name, "base"): flown(level, lost)
+        for name, level, lost in zip(policies, (0.05, 0.06, 0.07), (0, 3, 0), strict=True)
+    }
+    rows = task_leaderboard("WindHover", results, ["pid", "pid-force", *policies], 0)
+    sac = next(row for row in rows if row.controller == "sac")
+    singles = [row for row in rows if row.controller in policies]
+    assert (sac.policies, sac.best_law) == (3, "pid-force")
+    assert sac.rmse_m == pytest.approx(np.mean([row.rmse_m for row in singles]))
+    assert (sac.lost_fraction, sac.most_lost_fraction) == (pytest.approx(3 / 36), 3 / 12)
+    low, high = sac.rmse_ci95_m
+    assert all(high - low > np.ptp(row.rmse_ci95_m) for row in singles)  # other seeds, too
+    assert sac.p_over_best < 0.05
+    assert all(row.p_over_best is None for row in rows if row is not sac)
+    assert {row.controller for row in shown(rows)} == {"sac", "pid", "pid-force"}
+    assert "8.3 % (most 25.0 %)" in markdown(rows)
+    told = summary(rows)
+    assert "Lost: `sac` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
+    assert re.search(r"`pid-force`: clearly worse none; clearly better `sac` -\d+ %", told)
+    nothing = [replace(row, lost_fraction=0.0, most_lost_fraction=0.0) for row in rows]
+    assert "Lost: nothing." in summary(nothing)
+    draw_task_leaderboard(rows, results, tmp_path / "a.png", 0.04)
+
+
 class Deserter:
     def reset(self):
         pass
@@ -112,6 +158,14 @@ def test_a_lost_vehicle_s_remaining_time_counts():
 def test_what_cannot_be_flown_is_named(given, words):
     with pytest.raises(InputError, match=words):
         fly_task(*given, jobs=1)
+
+
+def test_any_seed_of_32_bits_is_flown():
+    check_task_request("WindHover", ["pid"], ["base"], 1, 2**32 - 1)
+    with pytest.raises(InputError, match="between 0 and 4294967295"):
+        check_task_request("WindHover", ["pid"], ["base"], 1, 2**32)
+    for task in TASKS.values():
+        assert task.environment("base").reset(seed=benchmark_seeds(2**32 - 1, 1)[0])
 
 
 def test_every_law_has_gains_that_were_found_on_validation_episodes():

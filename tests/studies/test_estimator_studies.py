@@ -12,6 +12,7 @@ from windwrench.dynamics import load_vehicle
 from windwrench.runtime.errors import InputError
 from windwrench.studies.faults import page as faults_page
 from windwrench.studies.faults import study as faults_study
+from windwrench.studies.filtered_logs import filtered_logs as filtered_logs_study
 from windwrench.studies.filtered_logs import filters
 from windwrench.studies.filtered_logs import page as filtered_logs_page
 from windwrench.studies.identified_vehicles import page as identified_page
@@ -21,6 +22,7 @@ from windwrench.studies.inertial import study as inertial_study
 from windwrench.studies.log_estimates import flights as log_flights
 from windwrench.studies.log_estimates import page as log_page
 from windwrench.studies.log_estimates import study as log_study
+from windwrench.studies.numbers.rendering import kept
 from windwrench.studies.page_tables import put_between
 from windwrench.studies.resumed_tasks import run_tasks
 from windwrench.studies.scored_flights import kind as kind_of
@@ -70,18 +72,29 @@ def test_a_picture_shows_every_row(draw, name, panels):
 @pytest.mark.parametrize(
     ("study", "name", "data"),
     [
-        (filtered_logs_page, "filtered-logs", "filtered_logs.json"),
+        (filtered_logs_page, "filtered-logs", "filtered_logs.json.gz"),
         (imu_logs_page, "imu-logs", "imu_logs.json"),
-        (identified_page, "identify", "identified_vehicles.json"),
+        (identified_page, "identify", "identified_vehicles.json.gz"),
     ],
 )
 def test_a_pages_tables_are_made_from_its_data(study, name, data, tmp_path):
-    outcomes = json.loads((DOCS / name / data).read_text(encoding="utf-8"))
+    outcomes = kept(f"{name}/{data}")
     page = tmp_path / "page.md"
     committed = (DOCS / f"{name}.md").read_text(encoding="utf-8")
     page.write_text(committed, encoding="utf-8")
     put_between(study.tables(outcomes), page)
     assert page.read_text(encoding="utf-8") == committed
+
+
+def test_a_study_of_filtered_logs_goes_on_from_what_was_saved(tmp_path):
+    saved = DOCS / "filtered-logs" / "filtered_logs.json.gz"
+    filtered_logs_study.resume(tmp_path, saved)
+    done = (tmp_path / "flights.jsonl").read_text(encoding="utf-8").splitlines()
+    per_flight = len(filters.FILTERS)
+    assert len(done) == len(kept("filtered-logs/filtered_logs.json.gz")) // per_flight
+    (tmp_path / "cut.json.gz").write_bytes(saved.read_bytes()[:1000])
+    with pytest.raises(InputError, match=r"cut\.json\.gz: cannot be read"):
+        filtered_logs_study.read_saved(tmp_path / "cut.json.gz")
 
 
 def test_a_page_without_marks_is_refused(tmp_path):
