@@ -202,7 +202,40 @@ def _verdict(rows: Sequence[Row], lines: Sequence[Line]) -> str:
         sentences.append(text)
     if not sentences:
         return ""
-    return "## Who wins\n\n" + "\n".join(sentences)
+    return "## Who wins\n\n" + "\n".join([_target(rows), *sentences])
+
+
+def _target(rows: Sequence[Row]) -> str:
+    """Say whether each policy of a kind is at or below the tracker in both worlds and loses nothing,
+    of the kind that comes closest.
+    """
+    kinds: dict[str, list[Row]] = {}
+    for world in _MAIN:
+        for row in rows:
+            if row.world == world and row.group == "learned":
+                kinds.setdefault(row.name, []).append(row)
+
+    def below(row: Row) -> int:
+        rival = _get(rows, row.against["tracker"].rival, row.world)
+        return 0 if rival is None else sum(seed <= rival.rmse_m for seed in row.by_seed)
+
+    def lost(row: Row) -> int:
+        return round(row.lost_fraction * row.seeds * row.episodes)
+
+    def holds(name: str) -> bool:
+        return all(below(row) == row.seeds and not lost(row) for row in kinds[name])
+
+    name = max(kinds, key=lambda kind: (min(map(below, kinds[kind])), -sum(map(lost, kinds[kind]))))
+    told = "; ".join(
+        f"on {row.world} {below(row)} of {row.seeds}, {lost(row)} of {row.seeds * row.episodes} "
+        "episodes lost"
+        for row in kinds[name]
+    )
+    return (
+        f"* **Target of learning: {'reached' if holds(name) else 'missed'}.** Asked was a kind of policy each of whose seeds has a mean RMSE "
+        f"at or below that of the best tracker that does not know the motions, on base and on fast, and which loses nothing. {name} comes "
+        f"closest: {told}."
+    )
 
 
 def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
