@@ -54,7 +54,10 @@ FILTER = np.dtype(
         ("doubted", "f8", (7,)),  # and those refused last
         ("refused", "f8"),  # measurements in a row
         ("lasting", "f8"),  # s for which those refused have agreed with each other
-        ("returning", "f8"),  # 1: the last of them left those before, and is as likely as any
+        ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
+        ("jumps", "f8"),  # of them, from one to the next
+        ("stray", "f8", (7,)),  # what these add up to, m and a quaternion
+        ("room", "f8", (6,)),  # of (rho, x): by how much the vehicle may have moved in them
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made

@@ -9,8 +9,9 @@ by what each of them breaks:
   are then held, with a prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: it is far from what the filter expects and from the pose just
   before it, by more than a vehicle can move in the time. A gate refuses it, and what goes on from
-  it: a filter that has not seen for a while would else take those for likely. After several in a
-  row a pose is believed again once the next one goes on from it.
+  it: a filter that has not seen for a while would else take those for likely. Poses are believed
+  again once the jumps cancel: then they are back from where they jumped to, however far the vehicle
+  has moved meanwhile and however wrong the filter's wrench is.
 * A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
   is continuous, and the wrench is wrong. It is taken in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
@@ -27,7 +28,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..dynamics.rotation import attitude_error
+from ..dynamics.rotation import attitude_error, quaternion_from_mrp, quaternion_multiply
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
@@ -37,7 +38,11 @@ from .estimate import COASTING, REJECTED, RESTARTED, Array
 
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
+_NOISE = 72.0  # times a pose's variance: the difference of two, at six standard deviations, squared
 _LOST = 0.9  # of a prior's variance: known no better than that
+# poses that go on from each other before they are believed again: of poses 10 cm off in directions
+# of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
+AGREEING = 3
 
 
 @dataclass(frozen=True)
@@ -250,27 +255,20 @@ def judge(
     taken = with_position | with_attitude
     lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
     gap, first = f.gap, f.refused < 0.5
-    pushed = first & continues(
+    reachable = continues(
         f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
     )
-    jumped = choose(alarming, choose(pushed, 0.0, 1.0), 0.0)
+    back = first
+    if f.gated > 0:
+        back = _returned(f, position, quaternion, with_position, with_attitude, alarming, reachable)
+    going_on = choose(first, choose(reachable, 1.0, 0.0), choose(back, 1.0, 0.0)) > 0.5
+    # among refused ones a likely pose too has to come back first
+    asked = alarming | (taken & (f.refused > 0.5))
+    refused = choose(asked & (choose(lost | going_on, 1.0, 0.0) < 0.5), 1.0, 0.0)
     aliased = with_attitude & turns_between(f)
-    contradicted = alarming & (pushed & ((nis > f.restart_at) | aliased))
+    contradicted = alarming & (going_on & ((nis > f.restart_at) | aliased))
     if f.gated > 0:
-        agreed = continues(
-            f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
-        )
-        # likely in itself, after others that were refused: one of those, or back from them?
-        likely = choose(taken, 1.0, 0.0) * choose(alarming, 0.0, 1.0) * choose(first, 0.0, 1.0)
-        among = choose(
-            _nearer_to_doubted(f, position, quaternion, with_position, with_attitude), 1.0, 0.0
-        )
-        back = choose(f.refused < 1.5, 1.0 - among, choose(agreed, f.returning, 0.0))
-        jumped = jumped + likely * (1.0 - back)
-        f.returning = likely * (1.0 - among)
-    refused = choose(lost, 0.0, jumped)
-    if f.gated > 0:
-        lasting = choose(first, 0.0, choose(agreed, f.lasting + gap[2], 0.0))
+        lasting = choose(f.in_row > 1.5, f.lasting + gap[2], 0.0)
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
         for i in range(3):
             f.doubted[i] = choose((refused > 0.5) & with_position, position[i], f.doubted[i])
@@ -301,25 +299,75 @@ def judge(
 
 
 @compiled
-def _nearer_to_doubted(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+def _returned(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    with_position: bool,
+    with_attitude: bool,
+    alarming: bool,
+    reachable: bool,
 ) -> bool:
-    """Return whether a pose lies nearer to where the refused ones went on to than to the predicted
-    one, in the measurement's standard deviations.
+    """Return whether poses are back from where they jumped to: the jumps since the last pose that
+    was believed cancel, and the filter could have got here.
+
+    How likely a pose is says little after half a second without one, and where a vehicle could have
+    got to in that time even less; what jumps from one pose to the next add up to is known to their
+    noise however long ago the first of them was. Poses at random may cancel and even agree with the
+    one before by chance, so of more than one that were refused three have to go on from each other.
     """
-    x, error = f.x, f.mean
-    attitude_error(quaternion, f.doubted[3:7], error[0:3])
-    attitude_error(quaternion, x[3:7], error[3:6])
-    nearer = choose(with_position, 0.0, 0.0)
+    x, P, gap, stray, room, miss = f.x, f.P, f.gap, f.stray, f.room, f.mean
+    taken, first = with_position | with_attitude, f.refused < 0.5
+    for i in range(7):
+        f.doubted[i] = choose(first, f.seen[i], f.doubted[i])
+        stray[i] = choose(first, 1.0 if i == 3 else 0.0, stray[i])
+    for i in range(6):
+        room[i] = choose(first, 0.0, room[i])
+    f.jumps = choose(first, 0.0, f.jumps)
+    follows = continues(
+        f,
+        position,
+        quaternion,
+        f.doubted,
+        choose(first, gap[0], gap[2]),
+        choose(first, gap[1], gap[2]),
+        with_position,
+        with_attitude,
+    )
+    in_row = choose(first, 1.0, choose(follows, f.in_row + 1.0, 1.0))
+    f.in_row = choose(taken, in_row, f.in_row)
+    jumped = choose(follows, 0.0, 1.0) > 0.5
+    quaternion_from_mrp(miss[0:3], f.q)
+    quaternion_multiply(f.q, stray[3:7], f.point[0:4])
+    for i in range(4):
+        stray[3 + i] = choose(jumped & with_attitude, f.point[i], stray[3 + i])
+    f.jumps += choose(jumped, 1.0, 0.0)
     for i in range(3):
-        gained = (error[3 + i] * error[3 + i] - error[i] * error[i]) / f.noise[i]
-        nearer += choose(with_attitude, gained, 0.0)
-        predicted = position[i] - x[i]
-        doubted = position[i] - f.doubted[i] - f.gap[2] * x[7 + i]
-        gained = (predicted * predicted - doubted * doubted) / f.noise[3 + i]
-        nearer += choose(with_position, gained, 0.0)
-    among: bool = nearer > 0.0
-    return among
+        stray[i] += choose(jumped & with_position, miss[3 + i], 0.0)
+    # from jump to jump the noise of poses is new, and how wrong twist and push are is not
+    for i in range(6):
+        moved = math.sqrt(miss[6 + i]) - math.sqrt(_NOISE * f.noise[i])
+        room[i] += choose(jumped & (with_attitude if i < 3 else with_position), moved, 0.0)
+    sign = choose(stray[3] >= 0.0, 1.0, -1.0)
+    scale = 1.0 / (1.0 + sign * stray[3])  # (16)
+    attitude_error(quaternion, x[3:7], miss[0:3])
+    away, gained = choose(taken, 0.0, 1.0), choose(taken, 0.0, 0.0)
+    for i in range(6):
+        if i < 3:
+            measured, row, total, off = with_attitude, i, scale * stray[4 + i], miss[i]
+        else:
+            measured, row, total = with_position, 3 + i, stray[i - 3]
+            off = position[i - 3] - x[i - 3]
+        most = room[i] * room[i] + f.jumps * _NOISE * f.noise[i]
+        away += choose(measured & (total * total > most), 1.0, 0.0)
+        # NIS if the pose still is where it jumped to, less that if it never was
+        odds = total * (total - 2.0 * off) / (P[row, row] + f.noise[i])
+        gained += choose(measured, odds, 0.0)
+    over = (away < 0.5) | (gained > f.alarm[0])
+    sure = (f.refused < 1.5) | (f.in_row > AGREEING - 0.5)
+    likely = choose(alarming, 0.0, 1.0) > 0.5
+    back: bool = (f.refused > 0.5) & over & (sure & (likely | reachable))
+    return back
 
 
 @compiled
@@ -349,26 +397,28 @@ def continues(
 ) -> bool:
     """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
     of a vehicle that moves as estimated, give or take six standard deviations and a push.
+
+    Leaves in ``f.mean`` by how much it misses, MRP and m (6,), and the squares of what it may (6,).
     """
     x, P, error = f.x, f.P, f.mean
     attitude_error(quaternion, before[3:7], error[0:3])
     far = choose(with_position, 0.0, 0.0)
     rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
     for i in range(6):
-        # the difference of two measurements, at six standard deviations
-        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
+        slack = math.sqrt(_NOISE * f.noise[i])
         if i < 3:
-            age, measured, miss = attitude_age, with_attitude, error[i]
+            age, measured = attitude_age, with_attitude
             slack = slack + 0.25 * age * (
                 rate + 6.0 * math.sqrt(P[3 + i, 3 + i]) + f.push[0] * (f.response + 0.5 * age)
             )
         else:
             age, measured = position_age, with_position
-            miss = position[i - 3] - before[i - 3] - age * x[4 + i]
+            error[i] = position[i - 3] - before[i - 3] - age * x[4 + i]
             slack = slack + age * (
                 6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
             )
-        far += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
+        error[6 + i] = slack * slack
+        far += choose(measured & (error[i] * error[i] > error[6 + i]), 1.0, 0.0)
     near: bool = far < 0.5
     return near
 
