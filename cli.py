@@ -70,8 +70,9 @@ def windwrench(
         ),
     ] = False,
 ) -> None:
-    """Quadrotor wrench estimation: simulate flights in a fan's jet, compare controllers, estimate
-    the external wrench on a flight log, and find what a vehicle's model lacks.
+    """Estimate the external force and torque (the wrench) on a quadrotor, in flight or from a log.
+    Find what the model of the vehicle lacks. Simulate flights in wind; compare and train
+    controllers.
 
     Example: windwrench fly --scenario base --seed 4
     """

@@ -47,7 +47,7 @@ def check(
     ] = None,
     out: Out = Path("results/check"),
 ) -> dict[str, Any]:
-    """Say what a flight log holds: how it was read and why so, channels, rates, gaps and doubts.
+    """Say what a flight log holds. How it was read and why; its channels, rates, gaps and doubts.
     For a table of unknown columns a map is guessed; write a picture of the channels.
 
     Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
@@ -119,7 +119,7 @@ def convert(
         Path, typer.Option("--out", help="Flight log to write: .csv, .csv.gz or .parquet.")
     ] = Path("results/flight.csv.gz"),
 ) -> dict[str, Any]:
-    """Write a log in the kit's own format, from any that can be read.
+    """Write any log that can be read in the kit's own format.
 
     Example: windwrench convert theirs.csv --map rpm --out flight.csv.gz
     """

@@ -55,7 +55,7 @@ def minari(
     ] = "FanTracking",
     out: Out = Path("results/minari"),
 ) -> list[Any]:
-    """Write episodes of controllers as Minari datasets, one for each controller and scenario.
+    """Write flown episodes as Minari datasets. One for each controller and scenario.
 
     Example: windwrench minari --task WindHover --controllers pid,l1 --episodes 50
     """

@@ -94,8 +94,8 @@ def export_c(
         bool, typer.Option("--overwrite", help="Replace C files that are there already.")
     ] = False,
 ) -> dict[str, Any]:
-    """Write the filter as C: one header and one C99 source in single precision, without a heap, for
-    a flight controller; with an example and a CMake file.
+    """Write the filter as C for a flight controller. One header and one C99 source, in single
+    precision and without a heap; with an example and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ekf --out filter
     """

@@ -95,7 +95,7 @@ def fly(
     view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
-    """Fly one episode in the jet or in the wind; write a picture of it.
+    """Fly one episode in the jet or in the wind. Write a picture of it.
 
     Example: windwrench fly --scenario static --controller admittance --gif
     """

@@ -99,7 +99,7 @@ def live(
         typer.Option(min=0.0, help="Give up after so many seconds without an estimate; 0: never."),
     ] = 10.0,
 ) -> dict[str, Any]:
-    """Estimate the wrench while the vehicle flies: show it, send it back, record the flight. Prints
+    """Estimate the wrench while the vehicle flies. Show it, send it back, record the flight. Prints
     a page on a terminal, else a line for each estimate, the columns of wrench.csv.
 
     Example: windwrench live sim:base

@@ -409,12 +409,10 @@ def _diagnose(
         f"{after.force_rms:.3g}",
         f"{found.floor_force_rms:.3g}",
     )
-    table.add_row(
-        "torque (Nm)",
-        f"{before.torque_rms:.3g}",
-        f"{after.torque_rms:.3g}",
-        f"{found.floor_torque_rms:.3g}",
-    )
+    torques = (before.torque_rms, after.torque_rms, found.floor_torque_rms)
+    # zero before and after: these logs cannot tell it
+    told = [f"{x:.3g}" for x in torques] if any(torques[:2]) else ["–", "–", ""]
+    table.add_row("torque (Nm)", *told)
     table.add_row(
         "1 s prediction (m)",
         *(  # none where no pose says how it went on

@@ -21,7 +21,7 @@ from .briefing import Air, Briefing
 from .fan_motion import KINDS, place_after
 from .observation import DECISION_PERIOD, MAX_COMMAND
 from .sensor_model import Sensing, sensor_model
-from .tracker_filter import MEMORY, resample
+from .tracker_filter import MEMORY, resample, respread
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,6 @@ FEW = 0.5  # share of effective particles below which they are drawn anew
 # take any other velocity
 STOP, TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
-_SMALLEST = 1e-12 * np.eye(3)  # of a covariance
 
 
 class _Belief(ABC):
@@ -301,30 +300,19 @@ class InformedTracker(_Belief):
         self._kind, self._sign = self._kind[chosen], self._sign[chosen]
         self._side, self._motion = self._side[chosen], self._motion[chosen]
         low, high = self._bounds
-        keep = np.sqrt(1.0 - self.spread**2)
-        noise = self._rng.standard_normal(self._motion.shape)
-        # the offset counts with its side: it may cross the axis
-        self._motion[:, 2] *= self._side
-        for kind in range(len(KINDS)):
-            some = np.flatnonzero((self._kind == kind) & ~self._free)
-            if len(some) < _FEWEST:
-                continue
-            x = self._motion[some]
-            x[:, 0] *= self._sign[some]
-            mean = x.mean(axis=0)
-            apart = x - mean
-            covariance = apart.T @ apart / len(some) + _SMALLEST
-            root = np.linalg.cholesky(covariance)
-            x = mean + keep * apart + self.spread * noise[some] @ root.T
-            self._sign[some] = np.where(x[:, 0] < 0.0, -1.0, 1.0)
-            x[:, 0] = np.abs(x[:, 0])
-            self._motion[some] = x
-        self._side = np.where(self._motion[:, 2] < 0.0, -1.0, 1.0)
-        self._motion[:, 2] = np.abs(self._motion[:, 2])
-        # reflected at their bounds
-        over = np.where(self._motion > high, 2.0 * high - self._motion, self._motion)
-        over = np.where(over < low, 2.0 * low - over, over)
-        self._motion = np.clip(over, low, high)
+        respread(
+            self._motion,
+            self._kind,
+            self._sign,
+            self._side,
+            self._free,
+            len(KINDS),
+            _FEWEST,
+            self.spread,
+            self._rng.standard_normal(self._motion.shape),
+            low,
+            high,
+        )
 
 
 class Limit(InformedTracker):

@@ -121,12 +121,17 @@ def with_caption(picture: Picture, caption: Caption) -> Picture:
     write(
         margin,
         below - 8 * size,
-        f"{length:g} m at the vehicle; as an arrow {length / caption.scales[0]:.3g} N or "
-        f"{1e3 * length / caption.scales[1]:.3g} mNm",
+        f"this long: {length:g} m at the vehicle, {_short(length / caption.scales[0])} N, "
+        f"{_short(1e3 * length / caption.scales[1])} mNm",
         small,
         "lb",
     )
     return np.asarray(image, dtype=np.uint8)
+
+
+def _short(value: float) -> str:
+    """Return a number with two digits at least and no exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
 
 
 def _newtons(force: Array) -> str:

@@ -2,19 +2,19 @@
 
 One row a sample, time strictly increasing. Columns of the file:
 
-=============================  =======  ==========================================================================
-``t``                          s        time
-``px, py, pz``                 m        position of the geometric centre, world, z up
-``qw, qx, qy, qz``             1        attitude, body to world, scalar first; its sign means nothing
-``omega1 ... omega4``          rad/s    rotor speeds: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right
-``vbat`` (optional)            V        battery voltage
-``fx, fy, fz`` (optional)      N        true external force, world
-``tx, ty, tz`` (optional)      Nm       true external torque, world; force and torque come together or not at all
-``ax, ay, az`` (optional)      m/s2     accelerometer at the centre: specific force, body; +g along z in a hover
-``gx, gy, gz`` (optional)      rad/s    gyro: angular velocity, body
-``cmd1 ... cmd4`` (optional)   1        motor commands, 0 to 1, in the rotors' order
-``vehicle=NAME`` (optional)    1        1 in every row: the vehicle that flew, named by the column's own name
-=============================  =======  ==========================================================================
+| column                       | unit  | meaning                                                                   |
+| ---------------------------- | ----- | ------------------------------------------------------------------------- |
+| ``t``                        | s     | time                                                                      |
+| ``px, py, pz``               | m     | position of the geometric centre, world, z up                             |
+| ``qw, qx, qy, qz``           | 1     | attitude, body to world, scalar first; its sign means nothing             |
+| ``omega1 ... omega4``        | rad/s | rotor speeds: 1 front-left, 2 rear-left, 3 rear-right, 4 front-right      |
+| ``vbat`` (optional)          | V     | battery voltage                                                           |
+| ``fx, fy, fz`` (optional)    | N     | true external force, world                                                |
+| ``tx, ty, tz`` (optional)    | Nm    | true external torque, world; force and torque come together or not at all |
+| ``ax, ay, az`` (optional)    | m/s2  | accelerometer at the centre: specific force, body; +g along z in a hover  |
+| ``gx, gy, gz`` (optional)    | rad/s | gyro: angular velocity, body                                              |
+| ``cmd1 ... cmd4`` (optional) | 1     | motor commands, 0 to 1, in the rotors' order                              |
+| ``vehicle=NAME`` (optional)  | 1     | 1 in every row: the vehicle that flew, named by the column's own name     |
 
 A row whose seven pose fields are all empty is one in which motion capture lost the vehicle, or one between two poses.
 The pose's columns may be left out altogether where accelerometer and gyro are there, or the quaternion's alone, and the

@@ -5,30 +5,29 @@ speeds or motor commands. ``optional: true`` in a section skips it where none of
 there. ``signs: [1, -1, 1]`` in a section of several columns turns single ones over; ``scale``
 multiplies what the column holds before its unit is applied.
 
-=================  ================================================================================
-``about``          what kind of table it is, for people
-``vehicle``        name of the vehicle that flew
-``recognise``      columns by which a table of this kind is known without being told
-``world``          enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
-``body``           flu (forward, left, up) or frd (forward, right, down)
-``time``           column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0);
-                   or rate_hz alone, where the table has no time
-``position``       columns (x, y, z), unit (m, mm, cm, ft)
-``attitude``       columns, and order (wxyz or xyzw); or columns (roll, pitch, yaw: about x, y, z),
-                   euler (order of the turns, each about the axis that the last has moved: zyx is
-                   yaw, pitch, roll) and unit (deg, rad). A column ``=0`` stands for an angle that
-                   is not in the table. sense: body_to_world or world_to_body
-``rotors``         measured speeds: columns, order (a name of ``rotor_orders`` or four motors'
-                   numbers: those at front-left, rear-left, rear-right, front-right), unit (rad/s,
-                   rpm, Hz, eRPM with pole_pairs)
-``commands``       columns, order, unit (us, normalised, duty, percent, dshot, counts), range (what
-                   stands for 0 and for full command), thrust_factor (f of the relative thrust
-                   f u^2 + (1 - f) u that is assumed where the vehicle states no motor curve)
-``battery``        column, unit (V, mV, cV), cells (where the voltage is that of one cell)
-``accelerometer``  columns, unit (m/s2, g, raw with scale in m/s2), body (where another than above)
-``gyro``           columns, unit (rad/s, deg/s, raw with scale in rad/s), body
-``force, torque``  true external wrench in the world, N and Nm
-=================  ================================================================================
+* ``about``: what kind of table it is, for people
+* ``vehicle``: name of the vehicle that flew
+* ``recognise``: columns by which a table of this kind is known without being told
+* ``world``: enu (z up; also nwu, flu), ned (z down; also frd), y_up (motion capture)
+* ``body``: flu (forward, left, up) or frd (forward, right, down)
+* ``time``: column, unit (s, ms, us, ns, min), offset (s; default: the flight begins at 0); or
+  rate_hz alone, where the table has no time
+* ``position``: columns (x, y, z), unit (m, mm, cm, ft)
+* ``attitude``: columns, and order (wxyz or xyzw); or columns (roll, pitch, yaw: about x, y, z),
+  euler (order of the turns, each about the axis that the last has moved: zyx is yaw, pitch, roll)
+  and unit (deg, rad). A column ``=0`` stands for an angle that is not in the table. sense:
+  body_to_world or world_to_body
+* ``rotors``: measured speeds: columns, order (a name of ``rotor_orders`` or four motors' numbers:
+  those at front-left, rear-left, rear-right, front-right), unit (rad/s, rpm, Hz, eRPM with
+  pole_pairs)
+* ``commands``: columns, order, unit (us, normalised, duty, percent, dshot, counts), range (what
+  stands for 0 and for full command), thrust_factor (f of the relative thrust f u^2 + (1 - f) u that
+  is assumed where the vehicle states no motor curve)
+* ``battery``: column, unit (V, mV, cV), cells (where the voltage is that of one cell)
+* ``accelerometer``: columns, unit (m/s2, g, raw with scale in m/s2), body (where another than
+  above)
+* ``gyro``: columns, unit (rad/s, deg/s, raw with scale in rad/s), body
+* ``force, torque``: true external wrench in the world, N and Nm
 """
 
 import math

@@ -16,14 +16,14 @@ _LONGEST = 190  # letters of a piece of advice on the first screen
 def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return how sure each name is, and what the answer rests on."""
     sure = [e for e in diagnosis.effects if not e.tentative and not e.indistinguishable_from]
-    told = []
+    told = _probability(diagnosis)
     if sure:
         spreads = in_words([words for effect in sure for words in _spreads(effect)])
         told.append(
             f"{in_words([e.name for e in sure])}: no other effect of the library explains the "
             f"flight as well{f' ({spreads}, standard deviations)' if spreads else ''}."
         )
-    told += doubt_sentences(diagnosis)
+    told += _doubts(diagnosis)
     if not diagnosis.effects:
         told.append(
             "The residual was tested for random disturbances and for structure, and "
@@ -39,6 +39,28 @@ def sureness_sentences(diagnosis: Diagnosis) -> list[str]:
             f"{blocks} {'block' if blocks == 1 else 'blocks'}, {duration(total)}, that no fit used."
         )
     return told
+
+
+def _probability(diagnosis: Diagnosis) -> list[str]:
+    """Return how probable the names are, and that something unknown acts; nothing where that was
+    not asked.
+    """
+    stated = diagnosis.probabilities
+    if stated is None:
+        return []
+    names = [f"{e.name} {percent(stated.names.get(e.name, 0.0))}" for e in diagnosis.effects]
+    acts = f"Probability that it acts: {in_words(names)}. " if names else ""
+    return [f"{acts}Probability of a cause outside the library: {percent(stated.unknown)}."]
+
+
+def _doubts(diagnosis: Diagnosis) -> list[str]:
+    """Return what the names do not settle, in two sentences: the headline has the alternatives."""
+    undecided = [e.name for e in diagnosis.effects if e.indistinguishable_from]
+    told = doubt_sentences(diagnosis)
+    if len(undecided) < 2:
+        return told
+    alike = f"For {in_words(undecided)}, another effect explains these logs equally well."
+    return [alike, *told[len(undecided) :]]
 
 
 def _spreads(effect: NamedEffect) -> list[str]:

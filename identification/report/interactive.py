@@ -19,6 +19,7 @@ from .plot_numbers import (
     amplitude_spectra,
     axis_limits,
     binned,
+    drawn_channels,
     first_times,
     held_out_runs,
     signature_points,
@@ -86,7 +87,7 @@ def _over_time(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "channels": [
             _channel(traces, i, names, columns, *axis_limits(traces, i))
-            for i in range(len(CHANNELS))
+            for i in drawn_channels(traces)
         ],
     }
 

@@ -15,7 +15,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
-from ..findings import Diagnosis, NamedEffect
+from ..findings import Diagnosis, NamedEffect, Probabilities
 from .first_screen import next_step, sureness_sentences
 from .interactive import plot_data, scripted
 from .pictures import (
@@ -89,7 +89,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         test_logs=diagnosis.test_logs,
         seconds=duration(diagnosis.seconds),
         cutoff=f"{diagnosis.cutoff_hz:.3g} Hz",
-        effects=[_effect(effect) for effect in diagnosis.effects],
+        effects=[_effect(effect, diagnosis.probabilities) for effect in diagnosis.effects],
         table=error_table(diagnosis),
         missing=any(MISSING in (row["before"], row["after"]) for row in error_table(diagnosis)),
         held_out=_held_out(diagnosis),
@@ -195,7 +195,9 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
     table = []
     for what, unit, *numbers in rows:
         factor, unit = scale_of(numbers, unit) if unit else (1.0, "")
-        texts = [rounded(factor * number) for number in numbers]
+        # an error of zero before and after is one that these logs cannot tell
+        told = any(numbers[:2])
+        texts = [rounded(factor * number) if told else MISSING for number in numbers]
         if not unit:
             texts[2] = "6"
         table.append(
@@ -204,13 +206,13 @@ def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
                 "unit": unit,
                 "before": texts[0],
                 "after": texts[1],
-                "floor": "" if math.isnan(numbers[2]) else texts[2],
+                "floor": texts[2] if told and math.isfinite(numbers[2]) else "",
             }
         )
     return table
 
 
-def _effect(effect: NamedEffect) -> dict[str, Any]:
+def _effect(effect: NamedEffect, stated: Probabilities | None) -> dict[str, Any]:
     rows = []
     for name, value in effect.coefficients.items():
         unit = effect.units.get(name, "")
@@ -230,6 +232,7 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         "name": effect.name,
         "others": in_words(effect.indistinguishable_from, "or"),
         "tentative": effect.tentative,
+        "probability": percent(stated.names.get(effect.name, 0.0)) if stated else "",
         "summary": effect_summary(effect.name),
         "evidence": evidence,
         "rows": rows,

@@ -23,6 +23,7 @@ from .plot_numbers import (
     amplitude_spectra,
     axis_limits,
     binned,
+    drawn_channels,
     first_times,
     held_out_runs,
     signature_points,
@@ -101,7 +102,8 @@ def draw_over_time(diagnosis: Diagnosis) -> list[Picture]:
         return []
     starts = first_times(traces)
     pictures = []
-    for i, channel in enumerate(CHANNELS):
+    for i in drawn_channels(traces):
+        channel = CHANNELS[i]
         factor, unit, limit = axis_limits(traces, i)
         figure, panel = _panel(3.4, 1.75)
         for number, (trace, start) in enumerate(zip(traces, starts, strict=True), 1):

@@ -42,6 +42,19 @@ def axis_limits(traces: Sequence[Trace], i: int) -> tuple[float, str, float]:
     return factor, unit, 1.08 * largest or 1.0 / factor
 
 
+def drawn_channels(traces: Sequence[Trace]) -> list[int]:
+    """Return the channels that were compared: force, torque or both.
+
+    The torque is zero throughout where the logs cannot tell it, as where rotor speeds are commands.
+    """
+    return [
+        i
+        for group in (range(3), range(3, 6))
+        if any(x[:, group].any() for trace in traces for x in (trace.before, trace.after))
+        for i in group
+    ]
+
+
 def held_out_runs(trace: Trace, t: Array) -> list[tuple[float, float]]:
     """Return from when to when samples were held out, on an axis ``t`` (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], trace.held_out, [False]]).astype(int)))
@@ -77,6 +90,8 @@ def amplitude_spectra(diagnosis: Diagnosis) -> list[Spectra]:
     grid = np.linspace(1.0 / min(longest, 8.0), max(diagnosis.cutoff_hz, 1.0), 160)
     found = []
     for what, group, unit in (("force", slice(0, 3), "N"), ("torque", slice(3, 6), "Nm")):
+        if group.start not in drawn_channels(traces):
+            continue
         before, after = (_spectrum(traces, side, group, grid) for side in ("before", "after"))
         found.append(Spectra(what, *scale_of([float(np.max(before))], unit), grid, before, after))
     return found

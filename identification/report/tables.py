@@ -7,7 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..findings import CHANNELS, Candidate, Diagnosis, Signature, Trace
-from .plot_numbers import SYMBOLS, amplitude_spectra, axis_limits, binned, signature_points
+from .plot_numbers import (
+    SYMBOLS,
+    amplitude_spectra,
+    axis_limits,
+    binned,
+    drawn_channels,
+    signature_points,
+)
 from .words import percent, rounded
 
 Array = NDArray[np.float64]
@@ -56,8 +63,8 @@ def tables_over_time(diagnosis: Diagnosis) -> list[Table]:
         f", the first {_MOST_PIECES} of {len(traces)} pieces" if len(traces) > _MOST_PIECES else ""
     )
     return [
-        Table(f"Residual {SYMBOLS[channel]}, rms ({unit}){more}", head, rows)
-        for channel, (_, unit), rows in zip(CHANNELS, scales, found, strict=True)
+        Table(f"Residual {SYMBOLS[CHANNELS[i]]}, rms ({scales[i][1]}){more}", head, found[i])
+        for i in drawn_channels(traces)
     ]
 
 

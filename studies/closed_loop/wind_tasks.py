@@ -60,6 +60,14 @@ SETTINGS = (
     ),
     Setting("trajectory-base", "WindTrajectory, `base`", "WindTrajectory", "base"),
     Setting("hover-calm", "WindHover, `calm`", "WindHover", "calm"),
+    Setting(
+        "hover-calm-quick",
+        "WindHover, `calm`, attitude loop twice as quick",
+        "WindHover",
+        "calm",
+        _QUICK,
+    ),
+    Setting("hover-base", "WindHover, `base`", "WindHover", "base"),
 )
 
 

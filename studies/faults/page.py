@@ -23,18 +23,19 @@ def write_page(result: Result, data: Path, page: Path) -> None:
             result["version"],
         ),
         "",
-        "A hover under an upward force of a tenth of the weight, that is seen badly: poses that "
-        "stay away for up to 30 s, jump by 1 mm to 1 km once, for good or back and forth, upside "
-        "down or at random, a position or an attitude alone, rotor speeds that are wrong; starts "
-        "up to 180 degrees off; steps of 1 ms to 0.1 s; with gates and without. Every step is "
-        "checked: the state is finite and the covariance positive definite.",
+        "Does an estimator recover after bad measurements? The vehicle hovers under an "
+        "upward force of a tenth of the weight. Faults are: no pose for up to 30 s; poses "
+        "that jump by 1 mm to 1 km, once, for good or back and forth; poses upside down or "
+        "at random; a position or an attitude alone; wrong rotor speeds; and starts up to "
+        "180 degrees off. Steps take 1 ms to 0.1 s, with gates and without. At every step "
+        "the state must be finite and the covariance positive definite.",
         "",
         "## After one to three faults",
         "",
-        "Wrong: two rise times after good samples are back (and 0.7 s with a gate, which needs "
-        "0.6 s to believe a jump) a component of the wrench is off by more than three of its own "
-        "standard deviations, or the estimator is not tracking. All estimators get the same "
-        "sequences.",
+        "An estimator is *wrong* if, two rise times after good samples are back, a component "
+        "of the wrench is off by more than three of its own standard deviations, or it is "
+        "not tracking. With a gate it has 0.7 s more: the gate needs 0.6 s to believe a "
+        "jump. All estimators get the same sequences.",
         "",
         "| estimator | sequences | not finite | wrong | 95 % | of these at steps of 50 ms or more "
         "| faults most often among them |",
@@ -50,13 +51,13 @@ def write_page(result: Result, data: Path, page: Path) -> None:
         )
     lines += [
         "",
-        "Rotor speeds that lie make a wrench of a whole weight that never acted, and poses that "
-        "are upside down or turn at random for longer than the gate's patience are believed, with "
-        "the wrench that they mean. Where such a wrench is contradicted, its standard deviation "
-        "becomes as large as itself; where it is not, it dies away with the filter's rise time, to "
-        "1 % after two of them, and its standard deviation, which knows of the random walk alone, "
-        "does not say so. An estimated mass is forgotten with what contradicts it "
-        "([the filter](estimator.md)).",
+        "Wrong rotor speeds make a wrench of a whole weight that never acted. Poses that are "
+        "upside down, or turn at random, for longer than the gate refuses them are believed, "
+        "with the wrench that they imply. Where later poses contradict such a wrench, its "
+        "standard deviation becomes as large as itself. Where they do not, it decays with "
+        "the filter's rise time, to 1 % after two of them. Its standard deviation, which "
+        "knows of the random walk alone, does not show that. An estimated mass goes back to "
+        "its prior when it is contradicted ([the filter](estimator.md)).",
         "",
         "## A long flight",
         "",

@@ -113,7 +113,8 @@ def _faults(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         cells = (
             f"{1e3 * row[k]['rms_N']:.0f} (largest {1e3 * row[k]['largest_N']:.0f})" for k in labels
         )
-        out.append(f"| {row['fault']} | " + " | ".join(cells) + " |")
+        fault = row["fault"].replace("a push", "a transient disturbance")
+        out.append(f"| {fault} | " + " | ".join(cells) + " |")
     return [*out, ""]
 
 

@@ -27,6 +27,7 @@ from windwrench.studies.learning.leaderboard_pictures import (
     draw_curves,
     draw_intervals,
     draw_profiles,
+    draw_summary,
     draw_tracking,
 )
 from windwrench.studies.learning.study import Places, entries_of, is_done
@@ -53,11 +54,15 @@ def write_page(
         for name in plan["learned"]
         if (file := _middle_policy(rows, name, places)) is not None
     }
-    pictures = [folder / f"{name}.png" for name in ("curves", "intervals", "profiles", "tracking")]
+    pictures = [
+        folder / f"{name}.png"
+        for name in ("curves", "intervals", "profiles", "tracking", "summary")
+    ]
     draw_curves(results, lines, pictures[0])
     draw_intervals([row for row in rows if row.world in _MAIN], pictures[1])
     draw_profiles(lines, _scenarios(rows, plan), pictures[2])
     draw_tracking(policies, pictures[3])
+    draw_summary(rows, pictures[4])
     write_text(_text(results, plan, places, folder.name, lines, rows), path)
     return [path, *pictures]
 
@@ -84,6 +89,7 @@ def _text(
     parts = [
         _head(plan),
         _verdict(rows, lines),
+        f"![RMSE of a few controllers on base and fast, with intervals]({folder}/summary.png)",
         _tables(rows),
         _pictures(folder),
         _limit(results, rows, plan),
@@ -132,14 +138,9 @@ def _middle_policy(rows: Sequence[Row], name: str, places: Places) -> Path | Non
 def _head(plan: Mapping[str, Any]) -> str:
     return f"""# Leaderboard: designed controllers and learned policies
 
-Who holds a quadrotor best in the jet of a moving fan that it knows only by the estimated wrench? Every number below is from the result
-files in `docs/results/learning`; `windwrench leaderboard` writes this page from them, and
-`windwrench leaderboard --train` does whatever is missing. {plan["episodes"]} paired test episodes a world, on seeds that
-neither training nor tuning sees; a lost vehicle's remaining time counts at 2.5 m; everybody flies with the full filter.
-Every interval on this page is a 95 % interval over policies and episodes: both are drawn anew, a policy with all its episodes and an
-episode for all policies (hierarchical bootstrap); a designed controller is one policy, and episodes alone vary.
-The lines sac-fast and recurrent-imitation, and all trackers and laws with lead, were added once results on these episodes were known;
-the gains of these laws come from validation episodes alone."""
+Who holds a quadrotor best in the jet of a moving fan, if it knows the fan by the estimated wrench alone? Lower RMSE of the
+distance from the fan's axis is better. Each world (a scenario of the task) has {plan["episodes"]} paired test episodes, on seeds that neither training nor
+tuning sees. In parentheses: 95 % intervals. [How it was measured](#how)."""
 
 
 def _get(rows: Sequence[Row], name: str, world: str) -> Row | None:
@@ -180,32 +181,32 @@ def _verdict(rows: Sequence[Row], lines: Sequence[Line]) -> str:
         beaten = sum(row.against["tracker"].interval[0] > 0 for row in learned)
         ahead = sum(row.against["tracker"].interval[1] < 0 for row in learned)
         even = (
-            "no clear difference from"
+            "no clear difference"
             if lead.interval[0] <= 0 <= lead.interval[1]
-            else ("below" if lead.change < 0 else "above")
+            else ("better" if lead.change < 0 else "worse")
         )
         text = (
             f"* **{world}**: {beaten} of {len(learned)} kinds of learned policies are clearly worse than the tracker "
-            f"`{tracker.rival}`, which knows nothing of how the fan moves, {ahead} clearly better. The best of them, {best.name} "
-            f"({best.rmse_m:.3f} m), is {_said(tracker)} against it, and {_said(lead)} against `{lead.rival}`, a law of three "
-            f"numbers: {even} it."
+            f"`{tracker.rival}`, which knows nothing of how the fan moves; {ahead} clearly better. The best of them is {best.name} "
+            f"({best.rmse_m:.3f} m). Its RMSE is {_said(tracker)} against that tracker, and {_said(lead)} against `{lead.rival}`, "
+            f"a law of three numbers: {even}."
         )
         informed = [row for row in some if row.name.startswith("tracker-informed")]
         one = _against_informed(best.name, lines, world)
         if informed and one is not None:
             text += (
                 f" A tracker that knows the family of motions reaches {informed[0].rmse_m:.3f} m, "
-                f"{_said(informed[0].against['tracker'])} against the one that does not; {best.name}, "
-                f"which was trained on motions of that family, is {_said(one)} against it."
+                f"{_said(informed[0].against['tracker'])} against the one that does not. {best.name} "
+                f"was trained on motions of that family, and is {_said(one)} against it."
             )
         sentences.append(text)
     if not sentences:
         return ""
-    return "## What beats what\n\n" + "\n".join(sentences)
+    return "## Who wins\n\n" + "\n".join(sentences)
 
 
 def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
-    """State what was asked of the comparison, and whether it holds."""
+    """State the targets of the comparison, and which were met."""
     asked: list[tuple[str, bool, str, float | None]] = []
     for line in lines:
         learner = line.name in ("sac", "sac-wide", "sac-fast")
@@ -244,7 +245,7 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
         return ""
     tested = {n: one[3] for n, one in enumerate(asked) if one[3] is not None}
     corrected = dict(zip(tested, holm(list(tested.values())), strict=True))
-    table = ["| asked | holds | measured | p, corrected |", "| ----- | ----- | -------- | - |"]
+    table = ["| target | met | measured | p, corrected |", "| ----- | ----- | -------- | - |"]
     answers = []
     for n, (what, holds, measured, _) in enumerate(asked):
         holds = holds and corrected.get(n, 0.0) < _LEVEL
@@ -252,9 +253,9 @@ def _answers(rows: Sequence[Row], lines: Sequence[Line]) -> str:
         answers.append((holds, f"| {what} | {'yes' if holds else '**no**'} | {measured} | {p} |"))
     table += [line for holds, line in sorted(answers, key=lambda one: one[0])]
     return (
-        "## What was asked\n\nWhat does not hold stands first. In parentheses: what it was trained "
-        f"on. A comparison holds if its p-value, corrected for all {len(tested)} comparisons of "
-        "this table (Holm), is below 0.05 as well.\n\n" + "\n".join(table)
+        "## Targets of learning\n\nThose that were missed stand first. In parentheses: what it was "
+        f"trained on. A comparison is met only if its p-value, corrected for all {len(tested)} "
+        "comparisons of this table (Holm), is below 0.05 as well.\n\n" + "\n".join(table)
     )
 
 
@@ -270,11 +271,11 @@ def _lost(row: Row) -> str:
 def _tables(rows: Sequence[Row]) -> str:
     parts = [
         "## Base and fast",
-        "Change: of the mean RMSE against the law of each kind with the gains that are best in that "
-        "very world (chosen on the test episodes, which favours the law). Wins: paired episodes "
-        "with a smaller RMSE than the best admittance law. P: probability of improvement over it. To "
-        "the limit: share of the way from the admittance law as it comes to `limit`, which knows "
-        "all that the wrench can tell.",
+        "*Against* a law: the change of the mean RMSE. The law has the gains that are best in this "
+        "world, chosen on the test episodes, which favours it. *Wins*: share of the paired episodes "
+        "with a smaller RMSE than the best admittance law. *P*: probability of improvement over "
+        "that law. *To the limit*: share of the way from the untuned admittance law to `limit`, "
+        "which knows all that the wrench can tell.",
     ]
     for world in _MAIN:
         some = [row for row in rows if row.world == world]
@@ -556,6 +557,13 @@ def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> 
     missing = [e for e in entries_of(plan) if not is_done(e, plan, places)]
     text = """## How
 
+* Every number is from the result files in `docs/results/learning`. `windwrench leaderboard` writes this page from them, and
+  `windwrench leaderboard --train` does whatever is missing.
+* Every controller flies with the full filter. A lost vehicle's remaining time counts at 2.5 m.
+* Intervals are over policies and episodes (hierarchical bootstrap): both are drawn anew, a policy with all its episodes and an episode for
+  all policies. A designed controller is one policy, so episodes alone vary.
+* The lines sac-fast and recurrent-imitation, and all trackers and laws with lead, were added once results on these episodes were known. The
+  gains of these laws come from validation episodes alone.
 * Seeds of episodes: training below 900 000, validation from there, test from 1 000 000 on. The best of a run's validations,
   not the last, is the policy that is scored.
 * The designed controllers' gains are tuned on 60 validation episodes (`windwrench tune`); what was found, and the

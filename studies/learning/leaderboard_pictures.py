@@ -39,6 +39,15 @@ _TRACKED = (
     "limit",
     "oracle",
 )
+_SUMMARY = (  # the two ends, and the best known of each kind
+    "oracle",
+    "limit",
+    "recurrent-imitation",
+    "tracker-tuned",
+    "sac",
+    "lead",
+    "admittance",
+)
 _THOUSANDS = (5, 10, 20, 50, 100, 200, 400)
 _WORLD, _SEED = "fast", FIRST_TEST_SEED + 3  # of the tracking picture
 
@@ -121,6 +130,30 @@ def draw_intervals(rows: Sequence[Row], path: Path) -> None:
         axes.set_xlabel("RMSE (m): mean, 95 % interval, seeds")
         axes.grid(axis="x", lw=0.4)
         axes.spines[["top", "right"]].set_visible(False)
+    _save(figure, path)
+
+
+def draw_summary(rows: Sequence[Row], path: Path) -> None:
+    """Draw the mean RMSE of a few controllers with its interval, to be read where it is small."""
+    figure = Figure(figsize=(7, 4.4), layout="constrained")
+    axes = figure.subplots()
+    names = [name for name in _SUMMARY if any(row.name == name for row in rows)]
+    for world, hue, shift in (("base", "#3a6ea5", -0.15), ("fast", "#d9822b", 0.15)):
+        some = {row.name: row for row in rows if row.world == world}
+        for i, name in enumerate(names):
+            if name not in some:
+                continue
+            row, y = some[name], i + shift
+            axes.plot(row.interval, [y, y], color=hue, lw=6, alpha=0.4, solid_capstyle="butt")
+            axes.plot(row.rmse_m, y, "o", color=hue, ms=9, label=None if i else f"{world} fans")
+    axes.set_yticks(range(len(names)), names, fontsize=15)
+    axes.invert_yaxis()
+    axes.set_xlim(left=0)
+    axes.tick_params(axis="x", labelsize=13)
+    axes.set_xlabel("RMSE (m), mean and 95 % interval", fontsize=14)
+    axes.grid(axis="x", lw=0.4)
+    axes.legend(frameon=False, fontsize=14, loc="upper right")
+    axes.spines[["top", "right"]].set_visible(False)
     _save(figure, path)
 
 

@@ -8,7 +8,7 @@ import argparse
 import sys
 
 from windwrench.studies.numbers.quotes import read_quotes, unknown_numbers, wrong_quotes
-from windwrench.studies.numbers.rendering import PAGES, differing_lines
+from windwrench.studies.numbers.rendering import PAGES, differing_lines, write_again
 from windwrench.studies.numbers.staleness import in_a_checkout, missing_sources, remarks
 
 
@@ -20,7 +20,17 @@ def main() -> int:
         "older than the code they speak of.",
     )
     parser.add_argument("--strict", action="store_true", help="old pages are an error, too")
+    parser.add_argument(
+        "--write",
+        metavar="PAGE",
+        nargs="+",
+        choices=list(PAGES),
+        default=[],
+        help="first write these pages anew from their kept results",
+    )
     given = parser.parse_args()
+    for name in given.write:
+        write_again(name)
     errors = []
     for name in PAGES:
         different = differing_lines(name)

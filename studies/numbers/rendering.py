@@ -7,10 +7,13 @@ import re
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from windwrench.runtime.page_files import write_text
 from windwrench.runtime.provenance import made_by
+from windwrench.studies.numbers import hand_written
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -181,7 +184,22 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "faults": _faults,
     "export-c": _export_c,
     "clients": _clients,
+    "reproduction": partial(hand_written.reproduction, kept),
+    "tasks": partial(hand_written.tasks, kept),
+    "tutorials/your-log": partial(hand_written.map_guesses, kept),
 }
+
+
+def write_again(name: str) -> None:
+    """Write a page anew from its kept results, after its words changed or two branches met.
+
+    Args:
+        name: one of ``PAGES``. What made its results stays as it is on the page.
+    """
+    page = DOCS / f"{name}.md"
+    made = re.compile(r"^Made by `.*$", re.MULTILINE)
+    old = iter(made.findall(page.read_text(encoding="utf-8")))
+    write_text(made.sub(lambda new: next(old, new[0]), PAGES[name]()), page)
 
 
 def differing_lines(name: str) -> list[str]:

@@ -32,9 +32,9 @@ def write_page(result: Result, data: Path, page: Path) -> None:
             result["version"],
         ),
         "",
-        "A weak or cut propeller, a weight under an arm, a motor that fails in flight: what this "
-        "kit finds of them, on flights of others where the truth is known, and on simulated ones. "
-        "Losses come first.",
+        "A weak or cut propeller, a weight under an arm, a motor that fails in flight: how often "
+        "this kit finds them, on measured flights of others where the truth is known, and on "
+        "simulated ones. What it misses comes first.",
         "",
         *_comparisons(result),
         *_searches(result),
@@ -79,10 +79,10 @@ def _comparisons(result: Result) -> list[str]:
         f"* Normal against normal, a place is likeliest: "
         f"{share(sum(not row['right'] for row in normal), len(normal))}.",
         "",
-        "The intervals are wide: these are all flights that were at hand, and the scatter between "
-        "unchanged flights (`ChangeSettings.scatter`) was set with them known. That one vehicle's "
-        "flights may scatter by more or less than that, as its own unchanged flights show, came "
-        "later and with them known, too; the drawn trims below are what it was held to.",
+        "The intervals are wide: no more flights are at hand. And these flights are no blind "
+        "test: the scatter between unchanged flights (`ChangeSettings.scatter`), and that it "
+        "differs from vehicle to vehicle, were set with them known. The simulated changes "
+        "below are the blind test.",
         "",
         "| flight | truth | likeliest | probability | likeliest place if something changed | "
         "left - right | front - rear | diagonals | total |",

@@ -56,6 +56,14 @@ def test_every_option_says_what_it_is_for(name):
     assert [p.name for p in command.params if not getattr(p, "help", None)] == []
 
 
+def test_the_list_of_commands_has_whole_sentences_at_80_columns(call, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, text, _ = call("--help")
+    listed = text.split("Commands:")[1].split("Exit codes")[0].strip().splitlines()
+    assert len(listed) > 15
+    assert [line for line in listed if not line.endswith(".") or line.endswith("...")] == []
+
+
 def test_help_says_what_exit_codes_mean(call):
     code, text, _ = call("--help")
     assert code == 0

@@ -5,6 +5,7 @@ results.
 import json
 
 import pytest
+import yaml
 
 from tests.support.paths import ROOT
 from windwrench.studies.numbers import quotes as quoting
@@ -36,8 +37,8 @@ def test_a_number_that_is_changed_on_a_page_is_seen(tmp_path, monkeypatch):
 
 
 def test_every_page_with_kept_results_is_made_again_from_them():
-    """But those whose tables the paper's, the tasks' and the speed's own commands write."""
-    others = {"reproduction", "live", "map-guesses", "results"}
+    """But those of which prose quotes the figures, or whose page has another name."""
+    others = {"live", "map-guesses", "results"}
     kept = {path.parent.name for path in (ROOT / "docs").glob("*/*.json*")}
     assert kept - others <= set(rendering.PAGES)
 
@@ -50,6 +51,26 @@ def test_figures_in_prose_are_those_of_their_results():
 @pytest.mark.parametrize("page", NOT_RESULTS)
 def test_every_number_in_prose_has_a_source(page):
     assert quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page]) == []
+
+
+def test_every_page_says_where_its_numbers_come_from():
+    listed = yaml.safe_load(quoting.FILE.read_text(encoding="utf-8"))
+    by_hand = listed["by hand"]
+    known = [
+        *(f"docs/{name}.md" for name in rendering.PAGES),
+        *{quote.page for quote in QUOTES} - {"README.md"},
+        *set(NOT_RESULTS) - {quote.page for quote in QUOTES} - {"README.md"},
+        *by_hand,
+        *listed["without results"],
+    ]
+    pages = {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    assert sorted(known) == sorted(page for page in pages if "/api/" not in page)
+    for page, source in by_hand.items():
+        made = source.replace("python -m ", "").replace("python ", "").split()[0]
+        there = made == "windwrench" or any(
+            (ROOT / name).exists() for name in (made, made.replace(".", "/"))
+        )
+        assert there, f"{page}: {source}"
 
 
 def test_an_exception_that_is_not_needed_goes():

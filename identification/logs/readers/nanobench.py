@@ -27,16 +27,14 @@ the voltage applied as the table says (Vicon, 4 Hz low pass, 29-32 s each above 
 B7 oval). The mass is the one that balances thrust and specific force on average; the scatter is the standard deviation of
 thrust / that mass less specific force:
 
-===========================================  ==========================  =========================
-curve                                        mass, g                     scatter, m/s2
-===========================================  ==========================  =========================
-Foerster, PWM * V / 4.2 V (taken)            37.1, 36.7, 37.0, 38.6      0.07, 0.08, 0.08, 0.10
-Foerster, PWM * V / 3.7 V                    44.9, 44.3, 44.7, 46.6      0.07, 0.08, 0.08, 0.10
-Foerster, PWM alone                          50.7, 52.5, 52.0, 49.5      0.18, 0.17, 0.19, 0.38
-Bitcraze test stand, quadratic in duty * V   49.6, 48.9, 49.3, 51.6      0.07, 0.08, 0.09, 0.10
-Bitcraze firmware before 2025 (inverted)     55.4, 54.6, 55.3, 58.0      0.26, 0.17, 0.23, 0.24
-Bitcraze firmware 2025, 2.1+ propellers      43.4, 42.5, 43.1, 45.5      0.09, 0.11, 0.12, 0.13
-===========================================  ==========================  =========================
+| curve                                      | mass, g                | scatter, m/s2          |
+| ------------------------------------------ | ---------------------- | ---------------------- |
+| Foerster, PWM * V / 4.2 V (taken)          | 37.1, 36.7, 37.0, 38.6 | 0.07, 0.08, 0.08, 0.10 |
+| Foerster, PWM * V / 3.7 V                  | 44.9, 44.3, 44.7, 46.6 | 0.07, 0.08, 0.08, 0.10 |
+| Foerster, PWM alone                        | 50.7, 52.5, 52.0, 49.5 | 0.18, 0.17, 0.19, 0.38 |
+| Bitcraze test stand, quadratic in duty * V | 49.6, 48.9, 49.3, 51.6 | 0.07, 0.08, 0.09, 0.10 |
+| Bitcraze firmware before 2025 (inverted)   | 55.4, 54.6, 55.3, 58.0 | 0.26, 0.17, 0.23, 0.24 |
+| Bitcraze firmware 2025, 2.1+ propellers    | 43.4, 42.5, 43.1, 45.5 | 0.09, 0.11, 0.12, 0.13 |
 
 The product with the voltage halves the scatter at least; which curve then decides little but the level. The mass
 stated is 27 g, and with its marker deck the vehicle may have had 30 to 35 g: every curve promises more thrust than

@@ -17,22 +17,21 @@ file given as the reader's option, ``rosbag:FILE.yaml``::
    of several inertial sensors or others that which no other name extends by ``_raw``; a note says so;
 4. where that leaves several, the bag is refused and they are listed.
 
-=========  =============================================================================================================
-pose       geometry_msgs/PoseStamped, geometry_msgs/TransformStamped (body in world), nav_msgs/Odometry or
-           px4_msgs/VehicleOdometry. ``frame: flu`` is ROS's own: world z up, body forward, left, up. ``ned``: world z down,
-           body forward, right, down, which is VehicleOdometry's. Without a pose, an inertial sensor must be there
-rotors     mav_msgs/Actuators (``angular_velocities``), actuator_msgs/Actuators (``velocity``), px4_msgs/EscStatus,
-           mavros_msgs/ESCStatus (rpm), or a std_msgs multi-array, the last only with a ``unit``:
-           ``rad/s``, ``rpm`` or ``rev/s``. ``order``: by name (``px4-x``, ``betaflight`` ...), or which elements, from 1, are
-           rotors 1 front-left, 2 rear-left, 3 rear-right, 4 front-right; default [1, 2, 3, 4], of PX4's and MAVROS's
-           types ``px4-x``
-command    px4_msgs/ActuatorMotors (0 to 1, NaN: off), mavros_msgs/RCOut (us), actuator_msgs/Actuators (``normalized``), or a
-           multi-array with a ``unit``: ``normalized`` or ``us``. ``range``: values of the commands 0 and 1, of pulses 1000
-           and 2000 us unless it is given
-voltage    sensor_msgs/BatteryState
-imu        sensor_msgs/Imu, without its attitude: specific force (m/s2) and angular velocity (rad/s), as ROS's REP 145 has
-           them; or px4_msgs/SensorCombined (forward, right, down)
-=========  =============================================================================================================
+* ``pose``: geometry_msgs/PoseStamped, geometry_msgs/TransformStamped (body in world),
+  nav_msgs/Odometry or px4_msgs/VehicleOdometry. ``frame: flu`` is ROS's own: world z up, body
+  forward, left, up. ``ned``: world z down, body forward, right, down, which is VehicleOdometry's.
+  Without a pose, an inertial sensor must be there
+* ``rotors``: mav_msgs/Actuators (``angular_velocities``), actuator_msgs/Actuators (``velocity``),
+  px4_msgs/EscStatus, mavros_msgs/ESCStatus (rpm), or a std_msgs multi-array, the last only with a
+  ``unit``: ``rad/s``, ``rpm`` or ``rev/s``. ``order``: by name (``px4-x``, ``betaflight`` ...), or
+  which elements, from 1, are rotors 1 front-left, 2 rear-left, 3 rear-right, 4 front-right; default
+  [1, 2, 3, 4], of PX4's and MAVROS's types ``px4-x``
+* ``command``: px4_msgs/ActuatorMotors (0 to 1, NaN: off), mavros_msgs/RCOut (us),
+  actuator_msgs/Actuators (``normalized``), or a multi-array with a ``unit``: ``normalized`` or
+  ``us``. ``range``: values of the commands 0 and 1, of pulses 1000 and 2000 us unless it is given
+* ``voltage``: sensor_msgs/BatteryState
+* ``imu``: sensor_msgs/Imu, without its attitude: specific force (m/s2) and angular velocity
+  (rad/s), as ROS's REP 145 has them; or px4_msgs/SensorCombined (forward, right, down)
 
 A sample's time is its header's (of PX4's types its ``timestamp_sample`` or ``timestamp``), where that runs within a second of the
 bag's clock, else the time it was recorded.

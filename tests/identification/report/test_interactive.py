@@ -15,11 +15,11 @@ import pytest
 
 from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
-from windwrench.identification.findings import CHANNELS
+from windwrench.identification.findings import CHANNELS, Probabilities
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.first_screen import next_step, sureness_sentences
 from windwrench.identification.report.interactive import plot_data, telling_samples
-from windwrench.identification.report.page import report_page
+from windwrench.identification.report.page import error_table, report_page
 from windwrench.identification.report.tables import tables_over_time
 from windwrench.identification.report.words import rounded
 
@@ -158,8 +158,46 @@ def test_the_first_screen_says_how_sure_and_what_next():
     advised = replace(made, verdict="partly explained", advice=("Fly higher. " * 40,))
     assert next_step(advised).endswith("Fly higher.")
     assert len(next_step(advised)) < 200
+    stated = Probabilities({effect.name: 0.95}, (), 0.03)
+    assert sureness_sentences(replace(made, probabilities=stated))[0] == (
+        "Probability that it acts: rotor_drag 95\N{NO-BREAK SPACE}%. "
+        "Probability of a cause outside the library: 3.0\N{NO-BREAK SPACE}%."
+    )
     bare = replace(made, verdict="nothing to explain", effects=())
     assert next_step(bare).startswith("Keep the model as it is")
+
+
+def test_many_doubts_take_two_sentences():
+    made = made_diagnosis(made_trace(effects=("rotor_drag", "mass")))
+    doubtful = tuple(
+        replace(effect, indistinguishable_from=("wind",), tentative=True) for effect in made.effects
+    )
+    assert sureness_sentences(replace(made, effects=doubtful))[:2] == [
+        "For rotor_drag and mass, another effect explains these logs equally well.",
+        "rotor_drag and mass are tentative: the true cause may be an effect that the library "
+        "lacks.",
+    ]
+
+
+def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
+    trace = made_trace()
+    silent = {"before": trace.before.copy(), "after": trace.after.copy()}
+    for x in silent.values():
+        x[:, 3:] = 0.0
+    made = made_diagnosis(replace(trace, **silent))
+    drawn = plot_data(made)
+    assert [channel["key"] for channel in drawn["time"]["channels"]] == [
+        "time-Fx",
+        "time-Fy",
+        "time-Fz",
+    ]
+    assert [spectrum["key"] for spectrum in drawn["frequency"]] == ["frequency-force"]
+    assert len(tables_over_time(made)) == 3
+    torque = error_table(made)[1]
+    assert (torque["before"], torque["after"], torque["floor"]) == ("–", "–", "")
+    page = report_page(made, "command")
+    assert 'id="plot-time-Fz"' in page
+    assert "plot-time-tau_x" not in page
 
 
 ACT = """
@@ -199,13 +237,16 @@ ACT = """
 
 
 @needs_browser
-def test_keys_zoom_and_switches_in_a_browser(tmp_path):
+@pytest.mark.parametrize(
+    ("width", "dark"), [(390, True), pytest.param(1280, False, marks=pytest.mark.slow)]
+)
+def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
     trace = made_trace(effects=("rotor_drag", "wind"))
     made = made_diagnosis(trace)
-    found = look(report_page(made, "command"), 390, tmp_path, dark=True, act=ACT)
+    found = look(report_page(made, "command"), width, tmp_path, dark=dark, act=ACT)
     assert found["complaints"] == []
     assert found["wide"] == []
-    assert sum(map(int, re.findall(r"\d+", found["background"])[:3])) < 200
+    assert (sum(map(int, re.findall(r"\d+", found["background"])[:3])) < 200) == dark
     done = found["done"]
     rms = [np.sqrt(np.mean(x[:, 0] ** 2)) for x in (trace.before, trace.after)]
     old, new = (rounded(x, 2) for x in rms)
