@@ -55,9 +55,8 @@ FILTER = np.dtype(
         ("refused", "f8"),  # measurements in a row
         ("lasting", "f8"),  # s for which those refused have agreed with each other
         ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
-        ("jumps", "f8"),  # of them, from one to the next
-        ("stray", "f8", (7,)),  # what these add up to, m and a quaternion
-        ("room", "f8", (6,)),  # of (rho, x): by how much the vehicle may have moved in them
+        # of (rho, x): what those from one to the next add up to, and what these may miss by
+        ("jumps", "f8", (2, 6)),
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made

@@ -11,7 +11,9 @@ by what each of them breaks:
   before it, by more than a vehicle can move in the time. A gate refuses it, and what goes on from
   it: a filter that has not seen for a while would else take those for likely. Poses are believed
   again once the jumps cancel: then they are back from where they jumped to, however far the vehicle
-  has moved meanwhile and however wrong the filter's wrench is.
+  has moved meanwhile and however wrong the filter's wrench is. Or once the innovation says that
+  they never were away: what just exceeds a vehicle's motion may be the motion that a clock blurs,
+  and what does not follow from where it jumped to has not jumped.
 * A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
   is continuous, and the wrench is wrong. It is taken in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
@@ -28,7 +30,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..dynamics.rotation import attitude_error, quaternion_from_mrp, quaternion_multiply
+from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
@@ -38,7 +40,6 @@ from .estimate import COASTING, REJECTED, RESTARTED, Array
 
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
-_NOISE = 72.0  # times a pose's variance: the difference of two, at six standard deviations, squared
 _LOST = 0.9  # of a prior's variance: known no better than that
 # poses that go on from each other before they are believed again: of poses 10 cm off in directions
 # of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
@@ -308,22 +309,27 @@ def _returned(
     alarming: bool,
     reachable: bool,
 ) -> bool:
-    """Return whether poses are back from where they jumped to: the jumps since the last pose that
-    was believed cancel, and the filter could have got here.
+    """Return whether poses are back from where they jumped to, or never were away.
 
     How likely a pose is says little after half a second without one, and where a vehicle could have
     got to in that time even less; what jumps from one pose to the next add up to is known to their
-    noise however long ago the first of them was. Poses at random may cancel and even agree with the
-    one before by chance, so of more than one that were refused three have to go on from each other.
+    noise however long ago the first of them was. So poses are back where the jumps since the last
+    one that was believed cancel.
+
+    Jumps that do not cancel leave two hypotheses: the pose still is off by their sum, or it never
+    was. Each has its innovation. The second is believed where it is the likelier by as much as the
+    gate asks of a pose; a covariance that has grown beyond the sum of the jumps cannot say so.
+
+    Poses at random may cancel and even agree with the one before by chance, so of more than one
+    that were refused three have to go on from each other.
     """
-    x, P, gap, stray, room, miss = f.x, f.P, f.gap, f.stray, f.room, f.mean
+    x, P, gap, jumps, miss = f.x, f.P, f.gap, f.jumps, f.mean
     taken, first = with_position | with_attitude, f.refused < 0.5
     for i in range(7):
         f.doubted[i] = choose(first, f.seen[i], f.doubted[i])
-        stray[i] = choose(first, 1.0 if i == 3 else 0.0, stray[i])
     for i in range(6):
-        room[i] = choose(first, 0.0, room[i])
-    f.jumps = choose(first, 0.0, f.jumps)
+        for k in range(2):
+            jumps[k, i] = choose(first, 0.0, jumps[k, i])
     follows = continues(
         f,
         position,
@@ -337,31 +343,22 @@ def _returned(
     in_row = choose(first, 1.0, choose(follows, f.in_row + 1.0, 1.0))
     f.in_row = choose(taken, in_row, f.in_row)
     jumped = choose(follows, 0.0, 1.0) > 0.5
-    quaternion_from_mrp(miss[0:3], f.q)
-    quaternion_multiply(f.q, stray[3:7], f.point[0:4])
-    for i in range(4):
-        stray[3 + i] = choose(jumped & with_attitude, f.point[i], stray[3 + i])
-    f.jumps += choose(jumped, 1.0, 0.0)
-    for i in range(3):
-        stray[i] += choose(jumped & with_position, miss[3 + i], 0.0)
-    # from jump to jump the noise of poses is new, and how wrong twist and push are is not
     for i in range(6):
-        moved = math.sqrt(miss[6 + i]) - math.sqrt(_NOISE * f.noise[i])
-        room[i] += choose(jumped & (with_attitude if i < 3 else with_position), moved, 0.0)
-    sign = choose(stray[3] >= 0.0, 1.0, -1.0)
-    scale = 1.0 / (1.0 + sign * stray[3])  # (16)
+        counts = jumped & (with_attitude if i < 3 else with_position)
+        for k in range(2):
+            jumps[k, i] += choose(counts, miss[6 * k + i], 0.0)
     attitude_error(quaternion, x[3:7], miss[0:3])
     away, gained = choose(taken, 0.0, 1.0), choose(taken, 0.0, 0.0)
     for i in range(6):
+        stray = abs(jumps[0, i])
         if i < 3:
-            measured, row, total, off = with_attitude, i, scale * stray[4 + i], miss[i]
+            measured, row, off = with_attitude, i, miss[i]
         else:
-            measured, row, total = with_position, 3 + i, stray[i - 3]
-            off = position[i - 3] - x[i - 3]
-        most = room[i] * room[i] + f.jumps * _NOISE * f.noise[i]
-        away += choose(measured & (total * total > most), 1.0, 0.0)
-        # NIS if the pose still is where it jumped to, less that if it never was
-        odds = total * (total - 2.0 * off) / (P[row, row] + f.noise[i])
+            measured, row, off = with_position, 3 + i, position[i - 3] - x[i - 3]
+        away += choose(measured & (stray > jumps[1, i]), 1.0, 0.0)
+        # NIS if the pose still is where it jumped to, less that if it never was; in either direction,
+        # since half a turn has none
+        odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + f.noise[i])
         gained += choose(measured, odds, 0.0)
     over = (away < 0.5) | (gained > f.alarm[0])
     sure = (f.refused < 1.5) | (f.in_row > AGREEING - 0.5)
@@ -398,14 +395,15 @@ def continues(
     """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
     of a vehicle that moves as estimated, give or take six standard deviations and a push.
 
-    Leaves in ``f.mean`` by how much it misses, MRP and m (6,), and the squares of what it may (6,).
+    Leaves in ``f.mean`` by how much it misses, MRP and m (6,), and by how much it may (6,).
     """
     x, P, error = f.x, f.P, f.mean
     attitude_error(quaternion, before[3:7], error[0:3])
     far = choose(with_position, 0.0, 0.0)
     rate = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12])
     for i in range(6):
-        slack = math.sqrt(_NOISE * f.noise[i])
+        # the difference of two measurements, at six standard deviations
+        slack = 6.0 * math.sqrt(2.0 * f.noise[i])
         if i < 3:
             age, measured = attitude_age, with_attitude
             slack = slack + 0.25 * age * (
@@ -417,8 +415,8 @@ def continues(
             slack = slack + age * (
                 6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
             )
-        error[6 + i] = slack * slack
-        far += choose(measured & (error[i] * error[i] > error[6 + i]), 1.0, 0.0)
+        error[6 + i] = slack
+        far += choose(measured & (error[i] * error[i] > slack * slack), 1.0, 0.0)
     near: bool = far < 0.5
     return near
 

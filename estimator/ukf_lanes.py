@@ -34,8 +34,6 @@ _KEPT = (  # what a filter must not forget from one step to the next
     "lasting",
     "in_row",
     "jumps",
-    "stray",
-    "room",
 )
 _SHARED = (
     "body",
@@ -117,14 +115,14 @@ def _move_estimate(source: Record, target: Record) -> None:
     for i in range(7):
         target.seen[i] = source.seen[i]
         target.doubted[i] = source.doubted[i]
-        target.stray[i] = source.stray[i]
-    for i in range(6):
-        target.room[i] = source.room[i]
+    for k in range(2):
+        for i in range(6):
+            target.jumps[k, i] = source.jumps[k, i]
     for i in range(3):
         target.gap[i] = source.gap[i]
     target.status, target.restarts = source.status, source.restarts
     target.refused, target.lasting = source.refused, source.lasting
-    target.in_row, target.jumps = source.in_row, source.jumps
+    target.in_row = source.in_row
 
 
 def _step_work(address: int) -> None:
