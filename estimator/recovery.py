@@ -356,8 +356,8 @@ def _returned(
         else:
             measured, row, off = with_position, 3 + i, position[i - 3] - x[i - 3]
         away += choose(measured & (stray > jumps[1, i]), 1.0, 0.0)
-        # NIS if the pose still is where it jumped to, less that if it never was; in either direction,
-        # since half a turn has none
+        # NIS if the pose still is where it jumped to, less that if it never was; in either
+        # direction, since half a turn has none
         odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + f.noise[i])
         gained += choose(measured, odds, 0.0)
     over = (away < 0.5) | (gained > f.alarm[0])
