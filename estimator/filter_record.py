@@ -54,7 +54,9 @@ FILTER = np.dtype(
         ("doubted", "f8", (7,)),  # and those refused last
         ("refused", "f8"),  # measurements in a row
         ("lasting", "f8"),  # s for which those refused have agreed with each other
-        ("returning", "f8"),  # 1: the last of them left those before, and is as likely as any
+        ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
+        # of (rho, x): what those from one to the next add up to, and what these may miss by
+        ("jumps", "f8", (2, 6)),
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made

@@ -644,7 +644,7 @@ def _believed(f: Record, o: Record, z: Array, parts: int, dt: float) -> int:
         strange = not continues(f, z[4:7], z[7:11], f.seen, f.gap[0], f.gap[1], position, attitude)
         late = (position and f.gap[0] > f.patience) or (attitude and f.gap[1] > f.patience)
         # no covariance of an innovation says how strange: as far as can be
-        if (strange or late) and not judge(
+        if (strange or late or f.refused > 0.5) and not judge(
             f, z[4:7], z[7:11], position, attitude, math.inf, strange
         ):
             status = f.status

@@ -9,8 +9,11 @@ by what each of them breaks:
   are then held, with a prior's covariance, and the next measurement restarts them.
 * An *outlier* is a pose that jumps: it is far from what the filter expects and from the pose just
   before it, by more than a vehicle can move in the time. A gate refuses it, and what goes on from
-  it: a filter that has not seen for a while would else take those for likely. After several in a
-  row a pose is believed again once the next one goes on from it.
+  it: a filter that has not seen for a while would else take those for likely. Poses are believed
+  again once the jumps cancel: then they are back from where they jumped to, however far the vehicle
+  has moved meanwhile and however wrong the filter's wrench is. Or once the innovation says that
+  they never were away: what just exceeds a vehicle's motion may be the motion that a clock blurs,
+  and what does not follow from where it jumped to has not jumped.
 * A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
   is continuous, and the wrench is wrong. It is taken in, gate or not.
 * A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
@@ -38,6 +41,9 @@ from .estimate import COASTING, REJECTED, RESTARTED, Array
 N = 18  # error state (rho, omega, x, v, torque, force)
 NOISE = 12  # noise inputs of the prediction: motor torque, torque walk, thrust, force walk
 _LOST = 0.9  # of a prior's variance: known no better than that
+# poses that go on from each other before they are believed again: of poses 10 cm off in directions
+# of their own one in a hundred goes on from the one before by chance, and two in a row 1e-4
+AGREEING = 3
 
 
 @dataclass(frozen=True)
@@ -250,27 +256,20 @@ def judge(
     taken = with_position | with_attitude
     lost = (with_position & lost_position(f)) | (with_attitude & lost_attitude(f))
     gap, first = f.gap, f.refused < 0.5
-    pushed = first & continues(
+    reachable = continues(
         f, position, quaternion, f.seen, gap[0], gap[1], with_position, with_attitude
     )
-    jumped = choose(alarming, choose(pushed, 0.0, 1.0), 0.0)
+    back = first
+    if f.gated > 0:
+        back = _returned(f, position, quaternion, with_position, with_attitude, alarming, reachable)
+    going_on = choose(first, choose(reachable, 1.0, 0.0), choose(back, 1.0, 0.0)) > 0.5
+    # among refused ones a likely pose too has to come back first
+    asked = alarming | (taken & (f.refused > 0.5))
+    refused = choose(asked & (choose(lost | going_on, 1.0, 0.0) < 0.5), 1.0, 0.0)
     aliased = with_attitude & turns_between(f)
-    contradicted = alarming & (pushed & ((nis > f.restart_at) | aliased))
+    contradicted = alarming & (going_on & ((nis > f.restart_at) | aliased))
     if f.gated > 0:
-        agreed = continues(
-            f, position, quaternion, f.doubted, gap[2], gap[2], with_position, with_attitude
-        )
-        # likely in itself, after others that were refused: one of those, or back from them?
-        likely = choose(taken, 1.0, 0.0) * choose(alarming, 0.0, 1.0) * choose(first, 0.0, 1.0)
-        among = choose(
-            _nearer_to_doubted(f, position, quaternion, with_position, with_attitude), 1.0, 0.0
-        )
-        back = choose(f.refused < 1.5, 1.0 - among, choose(agreed, f.returning, 0.0))
-        jumped = jumped + likely * (1.0 - back)
-        f.returning = likely * (1.0 - among)
-    refused = choose(lost, 0.0, jumped)
-    if f.gated > 0:
-        lasting = choose(first, 0.0, choose(agreed, f.lasting + gap[2], 0.0))
+        lasting = choose(f.in_row > 1.5, f.lasting + gap[2], 0.0)
         f.lasting = choose(refused > 0.5, lasting, f.lasting)
         for i in range(3):
             f.doubted[i] = choose((refused > 0.5) & with_position, position[i], f.doubted[i])
@@ -301,25 +300,71 @@ def judge(
 
 
 @compiled
-def _nearer_to_doubted(
-    f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
+def _returned(
+    f: Record,
+    position: Array,
+    quaternion: Array,
+    with_position: bool,
+    with_attitude: bool,
+    alarming: bool,
+    reachable: bool,
 ) -> bool:
-    """Return whether a pose lies nearer to where the refused ones went on to than to the predicted
-    one, in the measurement's standard deviations.
+    """Return whether poses are back from where they jumped to, or never were away.
+
+    How likely a pose is says little after half a second without one, and where a vehicle could have
+    got to in that time even less; what jumps from one pose to the next add up to is known to their
+    noise however long ago the first of them was. So poses are back where the jumps since the last
+    one that was believed cancel.
+
+    Jumps that do not cancel leave two hypotheses: the pose still is off by their sum, or it never
+    was. Each has its innovation. The second is believed where it is the likelier by as much as the
+    gate asks of a pose; a covariance that has grown beyond the sum of the jumps cannot say so.
+
+    Poses at random may cancel and even agree with the one before by chance, so of more than one
+    that were refused three have to go on from each other.
     """
-    x, error = f.x, f.mean
-    attitude_error(quaternion, f.doubted[3:7], error[0:3])
-    attitude_error(quaternion, x[3:7], error[3:6])
-    nearer = choose(with_position, 0.0, 0.0)
-    for i in range(3):
-        gained = (error[3 + i] * error[3 + i] - error[i] * error[i]) / f.noise[i]
-        nearer += choose(with_attitude, gained, 0.0)
-        predicted = position[i] - x[i]
-        doubted = position[i] - f.doubted[i] - f.gap[2] * x[7 + i]
-        gained = (predicted * predicted - doubted * doubted) / f.noise[3 + i]
-        nearer += choose(with_position, gained, 0.0)
-    among: bool = nearer > 0.0
-    return among
+    x, P, gap, jumps, miss = f.x, f.P, f.gap, f.jumps, f.mean
+    taken, first = with_position | with_attitude, f.refused < 0.5
+    for i in range(7):
+        f.doubted[i] = choose(first, f.seen[i], f.doubted[i])
+    for i in range(6):
+        for k in range(2):
+            jumps[k, i] = choose(first, 0.0, jumps[k, i])
+    follows = continues(
+        f,
+        position,
+        quaternion,
+        f.doubted,
+        choose(first, gap[0], gap[2]),
+        choose(first, gap[1], gap[2]),
+        with_position,
+        with_attitude,
+    )
+    in_row = choose(first, 1.0, choose(follows, f.in_row + 1.0, 1.0))
+    f.in_row = choose(taken, in_row, f.in_row)
+    jumped = choose(follows, 0.0, 1.0) > 0.5
+    for i in range(6):
+        counts = jumped & (with_attitude if i < 3 else with_position)
+        for k in range(2):
+            jumps[k, i] += choose(counts, miss[6 * k + i], 0.0)
+    attitude_error(quaternion, x[3:7], miss[0:3])
+    away, gained = choose(taken, 0.0, 1.0), choose(taken, 0.0, 0.0)
+    for i in range(6):
+        stray = abs(jumps[0, i])
+        if i < 3:
+            measured, row, off = with_attitude, i, miss[i]
+        else:
+            measured, row, off = with_position, 3 + i, position[i - 3] - x[i - 3]
+        away += choose(measured & (stray > jumps[1, i]), 1.0, 0.0)
+        # NIS if the pose still is where it jumped to, less that if it never was; in either
+        # direction, since half a turn has none
+        odds = stray * (stray - 2.0 * abs(off)) / (P[row, row] + f.noise[i])
+        gained += choose(measured, odds, 0.0)
+    over = (away < 0.5) | (gained > f.alarm[0])
+    sure = (f.refused < 1.5) | (f.in_row > AGREEING - 0.5)
+    likely = choose(alarming, 0.0, 1.0) > 0.5
+    back: bool = (f.refused > 0.5) & over & (sure & (likely | reachable))
+    return back
 
 
 @compiled
@@ -349,6 +394,8 @@ def continues(
 ) -> bool:
     """Return whether a pose can follow an earlier one (7,) that was measured some seconds before,
     of a vehicle that moves as estimated, give or take six standard deviations and a push.
+
+    Leaves in ``f.mean`` by how much it misses, MRP and m (6,), and by how much it may (6,).
     """
     x, P, error = f.x, f.P, f.mean
     attitude_error(quaternion, before[3:7], error[0:3])
@@ -358,17 +405,18 @@ def continues(
         # the difference of two measurements, at six standard deviations
         slack = 6.0 * math.sqrt(2.0 * f.noise[i])
         if i < 3:
-            age, measured, miss = attitude_age, with_attitude, error[i]
+            age, measured = attitude_age, with_attitude
             slack = slack + 0.25 * age * (
                 rate + 6.0 * math.sqrt(P[3 + i, 3 + i]) + f.push[0] * (f.response + 0.5 * age)
             )
         else:
             age, measured = position_age, with_position
-            miss = position[i - 3] - before[i - 3] - age * x[4 + i]
+            error[i] = position[i - 3] - before[i - 3] - age * x[4 + i]
             slack = slack + age * (
                 6.0 * math.sqrt(P[6 + i, 6 + i]) + f.push[1] * (f.response + 0.5 * age)
             )
-        far += choose(measured & (miss * miss > slack * slack), 1.0, 0.0)
+        error[6 + i] = slack
+        far += choose(measured & (error[i] * error[i] > slack * slack), 1.0, 0.0)
     near: bool = far < 0.5
     return near
 

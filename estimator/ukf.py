@@ -483,7 +483,7 @@ class WrenchUKF:
         reset_imu(self.record)
         reset_model(f)
         undo_first_pose(self.record)
-        for name in ("status", "restarts", "gap", "refused", "lasting", "returning"):
+        for name in ("status", "restarts", "gap", "refused", "lasting", "in_row", "jumps"):
             f[name] = 0.0
         f["seen"] = f["x"][:7]
 

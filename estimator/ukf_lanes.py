@@ -32,7 +32,8 @@ _KEPT = (  # what a filter must not forget from one step to the next
     "doubted",
     "refused",
     "lasting",
-    "returning",
+    "in_row",
+    "jumps",
 )
 _SHARED = (
     "body",
@@ -114,11 +115,14 @@ def _move_estimate(source: Record, target: Record) -> None:
     for i in range(7):
         target.seen[i] = source.seen[i]
         target.doubted[i] = source.doubted[i]
+    for k in range(2):
+        for i in range(6):
+            target.jumps[k, i] = source.jumps[k, i]
     for i in range(3):
         target.gap[i] = source.gap[i]
     target.status, target.restarts = source.status, source.restarts
     target.refused, target.lasting = source.refused, source.lasting
-    target.returning = source.returning
+    target.in_row = source.in_row
 
 
 def _step_work(address: int) -> None:

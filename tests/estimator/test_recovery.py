@@ -42,23 +42,38 @@ def live_through(*arguments):
 LENIENT = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True}
 
 
-@pytest.mark.parametrize("kind", FILTERS)
-@settings(max_examples=6, **LENIENT)
-@given(
+SEQUENCES = given(
     vehicle=st.sampled_from(sorted(VEHICLES)),
     dt=st.sampled_from(STEPS),
     gate=st.sampled_from(GATES),
     faults=st.lists(FAULTS, min_size=1, max_size=4),
     turn=st.sampled_from(TURNS),
 )
-def test_nothing_makes_numbers_overflow_or_a_covariance_indefinite(
-    kind, vehicle, dt, gate, faults, turn
-):
+
+
+def live_on(kind, vehicle, dt, gate, faults, turn):
     flight = Flight(kind, VEHICLES[vehicle], dt, gate)
     flight.estimator.reset(flight.position, [np.cos(turn / 2), np.sin(turn / 2), 0.0, 0.0])
     for fault in faults:
         flight.suffer(*fault)  # checks every step
     flight.recover(0.2)
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+@settings(max_examples=6, **LENIENT)
+@SEQUENCES
+def test_nothing_makes_numbers_overflow_or_a_covariance_indefinite(
+    kind, vehicle, dt, gate, faults, turn
+):
+    live_on(kind, vehicle, dt, gate, faults, turn)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FILTERS)
+@settings(max_examples=400, **LENIENT)
+@SEQUENCES
+def test_nor_do_thousands_of_sequences(kind, vehicle, dt, gate, faults, turn):
+    live_on(kind, vehicle, dt, gate, faults, turn)
 
 
 @pytest.mark.parametrize("gate", [None, 0.999])
@@ -107,6 +122,48 @@ def test_a_spin_of_a_turn_between_two_attitudes_is_not_believed(kind, fault):
     """
     for vehicle, dt in (("crazyflie", 0.1), ("ardrone2", 0.05)):
         live_through(kind, vehicle, dt, 0.999, [fault], 3.0)
+
+
+@pytest.mark.parametrize(
+    "burst", ["one offset", "one after another", "each its own", "upside down"]
+)
+@pytest.mark.parametrize("kind", ["ukf", "ekf", "observer"])
+def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
+    """Half a second of poses 10 cm off, while a force that the filter does not foresee sets in:
+    none is believed, and those that are back are, at once, though they are far from what is
+    expected.
+    """
+    vehicle, rng = VEHICLES["ardrone2"], np.random.default_rng(3)
+    begin, end, dt = 400, 500, 0.005
+    t = dt * np.maximum(0, np.arange(700) - 350)
+    poses = np.column_stack([0.2 * vehicle.gravity * t * t, 0.0 * t, 1.0 + 0.0 * t])
+    poses += 0.001 * rng.standard_normal(poses.shape)
+    drawn = rng.standard_normal((end - begin, 3))
+    away = {"one offset": drawn[:1], "each its own": drawn, "upside down": np.zeros((1, 3))}.get(
+        burst, drawn[[0] * 40 + [1] * 60]
+    )
+    away = 0.1 * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    said, force = {}, {}
+    for bad in (False, True):
+        estimator = FILTERS[kind](vehicle, period=dt, gate=0.9999)
+        estimator.reset(poses[0], [1, 0, 0, 0])
+        statuses, forces = [], []
+        for k, pose in enumerate(poses):
+            hit = begin <= k < end
+            q = [0.0, 1.0, 0.0, 0.0] if hit and burst == "upside down" else [1.0, 0.0, 0.0, 0.0]
+            place = pose + (np.broadcast_to(away, (end - begin, 3))[k - begin] if hit else 0.0)
+            gone = hit and not bad
+            e = estimator.step(
+                np.full(4, vehicle.hover_rate), None if gone else place, None if gone else q
+            )
+            statuses.append(e.status)
+            forces.append(e.force[0])
+        assert e.restarts == 0
+        said[bad], force[bad] = statuses, np.array(forces)
+    assert set(said[True][begin:end]) == {"rejected"}
+    back = said[True].index("tracking", end)
+    assert back <= end + 2
+    assert np.all(np.abs(force[True] - force[False])[end + 20 :] < 0.05 * vehicle.weight)
 
 
 def test_a_doubted_wrench_may_be_none_at_all():
