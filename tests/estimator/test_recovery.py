@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from windwrench.dynamics import InputError
-from windwrench.estimator import Recovery, WrenchUKF, WrenchUKFBatch
+from windwrench.estimator import Recovery, UKFTuning, WrenchUKF, WrenchUKFBatch
 from windwrench.studies.faults.sequences import (
     FILTERS,
     GATES,
@@ -164,6 +164,24 @@ def test_a_burst_of_bad_poses_costs_what_a_gap_costs(kind, burst):
     back = said[True].index("tracking", end)
     assert back <= end + 2
     assert np.all(np.abs(force[True] - force[False])[end + 20 :] < 0.05 * vehicle.weight)
+
+
+@pytest.mark.parametrize(("late", "seed"), [(0.005, 1), (0.006, 0), (0.008, 0), (0.015, 1)])
+def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
+    """At 1.5 m/s one pose in fifty is measured some milliseconds before its time stamp: it is off
+    by just more than a vehicle can move. Those after it are good, and believed soon.
+    """
+    vehicle, rng, dt, speed = VEHICLES["crazyflie"], np.random.default_rng(seed), 0.004, 1.5
+    ukf = WrenchUKF(vehicle, UKFTuning.for_vehicle(vehicle, dt), period=dt, gate=0.9999)
+    ukf.reset([0, 0, 1], [1, 0, 0, 0], velocity=[speed, 0, 0])
+    speeds, said, hit = np.full(4, vehicle.hover_rate), [], 0
+    for k in range(1, 1500):
+        lag = late * rng.exponential() if rng.random() < 0.02 else 0.0
+        hit += lag > 0.0
+        position = [speed * (dt * k - lag), 0.0, 1.0] + 0.0005 * rng.standard_normal(3)
+        said.append(ukf.step(speeds, position, [1, 0, 0, 0]).status)
+    assert "restarted" not in said
+    assert 0 < said.count("rejected") <= 1.2 * hit
 
 
 def test_a_doubted_wrench_may_be_none_at_all():
