@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DPI = 110
-_COLOURS = 256  # of a picture; lines and their soft edges need no more
+_COLOURS = 128  # of a picture; lines and their soft edges need no more
 
 
 def write_json(data: Any, path: Path, allow_nan: bool = False) -> None:
@@ -40,7 +40,7 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_png(figure: "Figure", path: Path) -> None:
-    """Write a figure as a PNG of at most 256 colours, whole or not at all.
+    """Write a figure as a PNG of at most 128 colours, whole or not at all.
 
     Raises:
         InputError: the file cannot be written.
@@ -55,7 +55,7 @@ def write_png(figure: "Figure", path: Path) -> None:
 
 
 def with_few_colours(picture: Any) -> Any:
-    """Return a picture (a PIL image, RGB) with the 256 colours that come nearest to its own."""
+    """Return a picture (a PIL image, RGB) with the 128 colours that come nearest to its own."""
     from PIL import Image
 
     return picture.quantize(

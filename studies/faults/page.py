@@ -24,17 +24,21 @@ def write_page(result: Result, data: Path, page: Path) -> None:
         ),
         "",
         "Does an estimator recover after bad measurements? The vehicle hovers under an "
-        "upward force of a tenth of the weight. Faults are: no pose for up to 30 s; poses "
-        "that jump by 1 mm to 1 km, once, for good or back and forth; poses upside down or "
-        "at random; a position or an attitude alone; wrong rotor speeds; and starts up to "
-        "180 degrees off. Steps take 1 ms to 0.1 s, with gates and without. At every step "
-        "the state must be finite and the covariance positive definite.",
+        "upward force of a tenth of the weight. Steps take 1 ms to 0.1 s, with gates and "
+        "without. At every step the state must be finite and the covariance positive definite. "
+        "Faults are:",
+        "",
+        "* no pose for up to 30 s, or a position or an attitude alone;",
+        "* poses that jump by 1 mm to 1 km, once, for good or back and forth;",
+        "* poses that are upside down or turned at random;",
+        "* wrong rotor speeds;",
+        "* starts up to 180 degrees off.",
         "",
         "## After one to three faults",
         "",
-        "An estimator is *wrong* if, two rise times after good samples are back, a component "
-        "of the wrench is off by more than three of its own standard deviations, or it is "
-        "not tracking. With a gate it has 0.7 s more: the gate needs 0.6 s to believe a "
+        "An estimator is judged two rise times after good samples are back. It is *wrong* if it "
+        "is not tracking, or a component of the wrench is off by more than three of its own "
+        "standard deviations. With a gate it has 0.7 s more: the gate needs 0.6 s to accept a "
         "jump. All estimators get the same sequences.",
         "",
         "| estimator | sequences | not finite | wrong | 95 % | of these at steps of 50 ms or more "
@@ -52,7 +56,7 @@ def write_page(result: Result, data: Path, page: Path) -> None:
     lines += [
         "",
         "Wrong rotor speeds make a wrench of a whole weight that never acted. Poses that are "
-        "upside down, or turn at random, for longer than the gate refuses them are believed, "
+        "upside down, or turn at random, for longer than the gate refuses them are accepted, "
         "with the wrench that they imply. Where later poses contradict such a wrench, its "
         "standard deviation becomes as large as itself. Where they do not, it decays with "
         "the filter's rise time, to 1 % after two of them. Its standard deviation, which "

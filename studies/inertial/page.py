@@ -134,35 +134,35 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         "",
         "`correct_imu(gyro, accelerometer)` takes inertial measurements beside a slower pose, and "
         "the filter then also estimates the biases of both ([the filter](estimator.md)). This page "
-        f"measures what that buys, on flights of the {VEHICLE} that are drawn from the "
-        "filter's own model at 1 kHz: pose at 100 Hz, gyro noise 0.005 rad/s and accelerometer "
-        "noise 0.05 m/s2 a sample, biases drawn from their priors. Nothing here says what a real "
-        "vehicle's vibration costs.",
+        f"measures what that gains. Flights of the {VEHICLE} are drawn from the filter's own model "
+        "at 1 kHz, with a pose at 100 Hz and biases drawn from their priors. Noise is 0.005 rad/s "
+        "for the gyro and 0.05 m/s2 for the accelerometer, a sample. Vibration of a real vehicle "
+        "is not part of it.",
         "",
         "## What it does not do",
         "",
         f"* {_losses(sweep)}",
         f"* Of {len(checks) * len(DOF)} consistency figures below, {outside} lie outside their "
         "95 % band" + (" (bold)." if outside else "."),
-        "* An accelerometer cannot tell its bias from a constant force at one attitude unless a "
-        "position is measured too: " + _observed(result["observability"]),
+        "* At one attitude an accelerometer cannot tell its bias from a constant force, unless a "
+        "position is measured too. " + _observed(result["observability"]),
         f"* It costs time: a step takes {costs['step_us']:.1f} us without an IMU, "
         f"{costs['step_with_biases_us']:.1f} us with biases, and `correct_imu` "
         f"{costs['correct_imu_us']:.1f} us more.",
         "",
         "## Rise time at equal spread",
         "",
-        f"A step of {0.72:.2f} N and 30 mNm; the time in which the mean estimate of "
-        f"{result['runs']} flights rises from 10 to 90 %, for the tuning whose scatter at rest is "
-        "as stated, with the 95 % interval (flights drawn anew, 1,000 times). The rotors' true "
-        "noise is a tenth of the default tuning's; the filter is told the one or the other.",
+        f"A step of {0.72:.2f} N and 30 mNm. Stated is the time in which the mean estimate of "
+        f"{result['runs']} flights rises from 10 to 90 %, with its 95 % interval (bootstrap over "
+        "flights, 1,000 times), for the tuning whose scatter at rest is as stated. The rotors' "
+        "true noise is a tenth of the default tuning's; the filter is told the one or the other.",
         "",
         *_at_equal_spread(sweep),
         f"![Rise time against spread]({picture.relative_to(page.parent).as_posix()})",
         "",
         "## Consistency",
         "",
-        "Flights in which the model holds to the letter, with yaw at 1 rad/s: the mean over "
+        "Flights in which the model holds exactly, with yaw at 1 rad/s: the mean over "
         f"{checks[0]['runs']} flights of 2 s, and the 95 % band of a consistent filter "
         "(degrees of freedom in brackets).",
         "",

@@ -398,17 +398,13 @@ def page(result: Mapping[str, Any], folder: str) -> str:
 
 
 _WARNING = (
-    "**How blind this is.** Coefficients are fitted without the test flight. The way there is less "
-    "blind: the time by which"
-    " the reader puts the battery's voltage sooner, the thresholds for flights known from "
-    "commands, the band that weighs "
-    "their coefficients and the share that a slung load must explain were chosen with these same "
-    "flights at hand, and so "
-    "was the rule that thrust may also bend and fade once it is known to follow the battery. The "
-    "delay is not among them: "
-    "it is measured apart, from how the vehicles turn "
-    "(`identification/inference/turning_delay.py`), with nothing in it "
-    "that was set by these flights but its band. Flights that were not here are the real test.",
+    "**How blind this is.** Coefficients are fitted without the test flight. But these flights "
+    "were at hand when some settings were chosen: the time by which the reader puts the battery's "
+    "voltage sooner, the thresholds for flights known from commands, the band that weighs their "
+    "coefficients, and the share that a slung load must explain. So was the rule that thrust may "
+    "also bend and fade once it is known to follow the battery. The delay is measured apart, from "
+    "how the vehicles turn (`identification/inference/turning_delay.py`); only its band was set by "
+    "these flights. Flights that were not here are the real test.",
 )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from windwrench import __version__
 from windwrench.runtime.provenance import git
-from windwrench.studies.numbers.rendering import DOCS
+from windwrench.studies.numbers.rendering import DOCS, PAGES
 
 ROOT = DOCS.parent
 MADE = re.compile(
@@ -15,6 +15,8 @@ MADE = re.compile(
     re.MULTILINE,
 )
 _NAMED = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
+# what shows kept results: a test compares such a page with them, so it cannot make them older
+_SHOWS = re.compile(r"(?:^|[/_])(?:page|pictures?|section)\.py$|_page\.py$|/__init__\.py$")
 _COMMANDS = {  # what writes a page, where its name does not say so
     "trials": "studies/trials",
     "real-flights": "studies/measured_flights",
@@ -42,7 +44,8 @@ def remarks() -> list[Remark]:
     """Return a remark for each page whose sources changed after it, or which another version made.
 
     A page that a command made is compared at the commits that it states, another one at the last
-    commit that changed it. Sources are the code of the command and the modules that the page names.
+    commit that changed it. Sources are the code of the command and the modules that the page names,
+    but for those that only show kept results.
     """
     found = []
     for path in (ROOT / "README.md", *sorted(DOCS.rglob("*.md"))):
@@ -85,8 +88,10 @@ def _changed(page: str, since: str, sources: set[str]) -> list[Remark]:
     if not (since and there):
         return []
     later = git(ROOT, "log", "--format=", "--name-only", f"{since}..HEAD", "--", *there).split()
+    if page.removeprefix("docs/").removesuffix(".md") in PAGES:
+        later = [name for name in later if not _SHOWS.search(name)]
     names = ", ".join(sorted(set(later)))
-    return [Remark(page, f"since {since} changed: {names}")] if names else []
+    return [Remark(page, f"since {since} changed: {names}")] if later else []
 
 
 def in_a_checkout(root: Path = ROOT) -> bool:

@@ -68,8 +68,8 @@ def _comparisons(result: Result) -> list[str]:
         "vehicle, one or two.",
         "",
         f"* **Missed**: on {len(small)} of {len(changed)} changed flights *nothing* is likelier "
-        f"than any place{_named(small)}. A light weight's mark is one to three times what an "
-        "unchanged vehicle usually varies by from flight to flight (a battery is never put in "
+        f"than any place{_named(small)}. A light weight changes the trim by one to three times the "
+        "usual scatter of an unchanged vehicle from flight to flight (a battery is never put in "
         "twice at the same place).",
         f"* The likeliest of all answers is right: "
         f"{share(sum(row['right'] for row in changed), len(changed))}.",
@@ -80,9 +80,9 @@ def _comparisons(result: Result) -> list[str]:
         f"{share(sum(not row['right'] for row in normal), len(normal))}.",
         "",
         "The intervals are wide: no more flights are at hand. And these flights are no blind "
-        "test: the scatter between unchanged flights (`ChangeSettings.scatter`), and that it "
-        "differs from vehicle to vehicle, were set with them known. The simulated changes "
-        "below are the blind test.",
+        "test: the scatter between unchanged flights (`ChangeSettings.scatter`), and its "
+        "difference from vehicle to vehicle, were set with these flights. The simulated "
+        "changes below are the blind test.",
         "",
         "| flight | truth | likeliest | probability | likeliest place if something changed | "
         "left - right | front - rear | diagonals | total |",
@@ -99,8 +99,9 @@ def _comparisons(result: Result) -> list[str]:
         "### Are the probabilities right?",
         "",
         f"Drawn trims ({result['changes']}): vehicles, batteries, propellers and thrust curves at "
-        "random, one to three flights before and after; in half of them a rotor lost, or a weight "
-        "of, 1 to 40 %. Requests come from statics and not from the comparison's own model.",
+        "random, with one to three flights before and after. In half of them a rotor lost 1 to "
+        "40 % of its thrust, or a weight of 1 to 40 % of the vehicle's was added. Requests come "
+        "from statics and not from the comparison's own model.",
         "",
         f"* Sure of a wrong place: {share(drawn['sure_of_a_wrong_place'], drawn['sure'])} of what "
         f"was sure; sure of nothing where a little had changed: "
@@ -166,13 +167,13 @@ def _searches(result: Result) -> list[str]:
         lines.append(f"| {row['log']} | {known} | {found} | {chance:.3f} | {onset} | {left} |")
     lines += [
         "",
-        "Two logs of one kind, and the search was made with them at hand: they show that it works "
-        "on such logs, not how often.",
+        "These are two logs of one kind, and the search was developed on them. They show that it "
+        "works on such logs, not how often.",
         "",
-        f"Simulated flights ({result['flights']} with a fault of 5 to 100 % at a random time, half "
-        "as many without, half as many with a force and torque that no rotor makes): vehicles of "
-        "0.03 to 3 kg, thrust curves, lags, gusts, sensors and rates of the log (commands at 10 to "
-        "250 Hz) at random, in a simulator of its own (`studies/real_faults/flights.py`).",
+        f"Simulated flights: {result['flights']} with a fault of 5 to 100 % at a random time, half "
+        "as many without, half as many with a force and torque that no rotor makes. Vehicles have "
+        "0.03 to 3 kg. Thrust curves, lags, gusts, sensors and rates of the log (commands at 10 to "
+        "250 Hz) are random, in a simulator of its own (`studies/real_faults/flights.py`).",
         "",
         f"* **Wrong rotor named with a fault**: "
         f"{share(sum(bool(r['named']) and r['named'] != r['rotor'] for r in faults), len(faults))}"

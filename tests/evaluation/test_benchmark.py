@@ -10,6 +10,7 @@ import pytest
 from windwrench.controllers import make_controller
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
+from windwrench.evaluation import benchmark
 from windwrench.evaluation.benchmark import (
     check_request,
     count_flights,
@@ -225,3 +226,20 @@ def test_an_episode_s_arrays_are_of_one_length():
     assert lengths == {DECISIONS}
     assert episode.time[-1] == pytest.approx(20.0)
     assert episode.total_reward <= DECISIONS
+
+
+def test_a_stated_duration_holds_no_compiling(monkeypatch):
+    """What a flight compiles on its way is not counted, wherever on the way."""
+    now, known = 0.0, 0
+
+    def fly(env, controller, seed, decisions):
+        nonlocal now, known
+        now += 0.01 * decisions + 60.0 * max(0, decisions - known)
+        known = max(known, decisions)
+
+    monkeypatch.setattr(benchmark, "is_on_disk", lambda function: True)
+    monkeypatch.setattr(benchmark, "fly_episode", fly)
+    monkeypatch.setattr(benchmark.time, "perf_counter", lambda: now)
+    controllers = len({"hover", *benchmark._REFERENCES})
+    seconds = benchmark.sampled_seconds(["hover"], ["base"], 1, jobs=1)
+    assert seconds == pytest.approx(controllers * 0.01 * DECISIONS)
