@@ -1,4 +1,4 @@
-"""The wrench filter of one vehicle as a C header and a C99 source, in single precision.
+"""The wrench filter of one vehicle as a C header and a C99 source, in single or double precision.
 
 Templates hold the equations, written after the Python filter; every number comes from the Python
 filter's own record (``estimator.filter_record``), so there is one place for each. Effects are
@@ -37,6 +37,7 @@ from .effect_code import (
     exportable_effects,
     translate,
 )
+from .precision import FUNCTIONS, PRECISIONS, in_precision
 from .tracker import tracker_policy
 
 FILTERS: dict[str, type[WrenchUKF]] = {
@@ -68,6 +69,7 @@ class Exported:
     files: Mapping[str, str]
     filter: WrenchUKF
     effects: tuple[str, ...]
+    precision: str = "single"
 
 
 def export_c(
@@ -78,6 +80,7 @@ def export_c(
     gate: float | None = 0.9999,
     policy: Mapping[str, Any] | None = None,
     command: str = "windwrench export-c",
+    precision: str = "single",
 ) -> Exported:
     """Return the files of a vehicle's filter in C.
 
@@ -89,6 +92,8 @@ def export_c(
         gate: as of ``WrenchUKF``.
         policy: of ``exportable_policy``, or None.
         command: the command line that asked for it, for the files' heads.
+        precision: one of ``PRECISIONS``, of every number in it: single (float), or double, for
+            processors that calculate with double numbers as fast.
 
     Raises:
         InputError: a setting is out of range, an effect cannot be exported, or single precision
@@ -96,6 +101,8 @@ def export_c(
     """
     if estimator not in FILTERS:
         raise InputError(f"estimator: expected one of {', '.join(ESTIMATORS)}, got {estimator!r}")
+    if precision not in PRECISIONS:
+        raise InputError(f"precision: expected {' or '.join(PRECISIONS)}, got {precision!r}")
     rate = vehicle.mocap.rate_hz if rate is None else rate
     for name, value in (("rate", rate), ("rise_time", rise_time)):
         if not (math.isfinite(value) and value > 0.0):
@@ -113,6 +120,8 @@ def export_c(
         "command": _one_line(command),
         "title": f"{_TITLES[estimator]}, for the vehicle {_one_line(vehicle.name)}.",
         "estimator": estimator,
+        "precision": precision,
+        "functions": ", ".join(f if precision == "double" else f"{f}f" for f in FUNCTIONS),
         "imu": imu,
         "gated": gate is not None,
         "gate": 0.0 if gate is None else gate,
@@ -148,9 +157,10 @@ def export_c(
         autoescape=False,  # C, no page
     )
     files = {
-        name: environment.get_template(source).render(context) for name, source in FILES.items()
+        name: in_precision(environment.get_template(source).render(context), precision)
+        for name, source in FILES.items()
     }
-    return Exported(files, made, tuple(e.name for e in vehicle.effects))
+    return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
 
 
 def _one_line(text: str) -> str:

@@ -17,7 +17,7 @@ from windwrench.live.export_c import Exported
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
 Array = NDArray[np.float64]
-_FLOATS = ctypes.POINTER(ctypes.c_float)
+_NUMBERS = {"single": ctypes.c_float, "double": ctypes.c_double}
 
 
 def missing(*programs: str) -> list[str]:
@@ -49,22 +49,16 @@ def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
     return done.stdout
 
 
-def _estimate_type(imu: bool) -> Any:
+def _estimate_type(imu: bool, number: Any) -> Any:
     names = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
-    fields: list[tuple[str, Any]] = [
-        (n, ctypes.c_float * (4 if n == "quaternion" else 3)) for n in names
-    ]
-    fields += [(f"std_{n}", ctypes.c_float * 3) for n in PARTS]
-    fields += [("nis", ctypes.c_float), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
+    fields: list[tuple[str, Any]] = [(n, number * (4 if n == "quaternion" else 3)) for n in names]
+    fields += [(f"std_{n}", number * 3) for n in PARTS]
+    fields += [("nis", number), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
     if imu:
         biases = ("gyro_bias", "accelerometer_bias", "std_gyro_bias", "std_accelerometer_bias")
-        fields += [(name, ctypes.c_float * 3) for name in biases]
+        fields += [(name, number * 3) for name in biases]
         fields += [("imu_refused", ctypes.c_uint)]
     return type("Estimate", (ctypes.Structure,), {"_fields_": fields})
-
-
-def _floats(values: Any) -> Any:
-    return None if values is None else (ctypes.c_float * len(values))(*map(float, values))
 
 
 class CompiledFilter:
@@ -89,31 +83,40 @@ class CompiledFilter:
             cwd=folder,
         )
         self.c: Any = ctypes.CDLL(str(library.resolve()))
-        self.c.ww_predict.argtypes = [ctypes.c_void_p, _FLOATS, ctypes.c_float]
+        self._number: Any = _NUMBERS[exported.precision]
+        pointer: Any = ctypes.POINTER(self._number)
+        self.c.ww_predict.argtypes = [ctypes.c_void_p, pointer, self._number]
         self.bytes = int(self.c.size_of_filter())
         self._memory = ctypes.create_string_buffer(self.bytes)
-        self._now = _estimate_type("gyro_bias" in header)()
+        self._now = _estimate_type("gyro_bias" in header, self._number)()
         if with_policy:
-            self.c.ww_policy.restype = ctypes.c_float
+            self.c.ww_policy.restype = self._number
             self.policy_bytes = int(self.c.size_of_policy())
             self._policy = ctypes.create_string_buffer(self.policy_bytes)
             self.c.ww_policy_init(self._policy)
 
+    def _array(self, values: Any) -> Any:
+        return None if values is None else (self._number * len(values))(*map(float, values))
+
     def reset(self, position: Any, quaternion: Any) -> int:
         """Call ww_init."""
-        return int(self.c.ww_init(self._memory, _floats(position), _floats(quaternion)))
+        return int(self.c.ww_init(self._memory, self._array(position), self._array(quaternion)))
 
     def predict(self, rotor_speeds: Any, dt: float) -> int:
         """Call ww_predict."""
-        return int(self.c.ww_predict(self._memory, _floats(rotor_speeds), dt))
+        return int(self.c.ww_predict(self._memory, self._array(rotor_speeds), dt))
 
     def correct(self, position: Any, quaternion: Any) -> int:
         """Call ww_correct_pose."""
-        return int(self.c.ww_correct_pose(self._memory, _floats(position), _floats(quaternion)))
+        return int(
+            self.c.ww_correct_pose(self._memory, self._array(position), self._array(quaternion))
+        )
 
     def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
         """Call ww_correct_imu."""
-        return int(self.c.ww_correct_imu(self._memory, _floats(gyro), _floats(accelerometer)))
+        return int(
+            self.c.ww_correct_imu(self._memory, self._array(gyro), self._array(accelerometer))
+        )
 
     def policy(self, estimate: Any) -> float:
         """Call ww_policy."""

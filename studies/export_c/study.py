@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.live.export_c import ESTIMATORS, PRECISIONS, export_c, exportable_policy
 from windwrench.runtime.provenance import commit
 from windwrench.studies.export_c import firmware
 from windwrench.studies.export_c.compiled import CompiledFilter, compare
@@ -43,16 +43,14 @@ def _agreement(
     rows: list[dict[str, Any]] = []
     for estimator in ESTIMATORS:
         for name in FLIGHTS:
-            exported = export_c(vehicle_of(name), estimator)
-            c = CompiledFilter(exported, folder / f"c{len(rows)}")
-            worst = compare(c, exported.filter, flight(name, steps, seed), 4)
-            rows.append(
-                {
-                    "estimator": estimator,
-                    "flight": name,
-                    **{key: float(f"{value:.3g}") for key, value in worst.items()},
-                }
-            )
+            flown = flight(name, steps, seed)
+            row: dict[str, Any] = {"estimator": estimator, "flight": name}
+            for precision in PRECISIONS:
+                exported = export_c(vehicle_of(name), estimator, precision=precision)
+                c = CompiledFilter(exported, folder / f"{precision}{len(rows)}")
+                worst = compare(c, exported.filter, flown)
+                row[precision] = {key: float(f"{value:.3g}") for key, value in worst.items()}
+            rows.append(row)
             report("flights", len(rows) / (len(ESTIMATORS) * len(FLIGHTS)))
     return rows
 

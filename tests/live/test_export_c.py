@@ -1,6 +1,7 @@
 """The exported C filter against the Python one, and what may not happen to it."""
 
 import ctypes
+import re
 import subprocess
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from windwrench.live.export_c.effect_code import exportable_effects
 from windwrench.runtime.errors import InputError
 from windwrench.studies.export_c import firmware
 from windwrench.studies.export_c.compiled import (
+    PARTS,
     STRICT,
     CompiledFilter,
     compare,
@@ -57,6 +59,20 @@ def test_c_and_python_agree_along_a_flight_with_faults(estimator, name, tmp_path
     worst = compare(CompiledFilter(exported, tmp_path), exported.filter, flown, 10)
     assert worst["restarts"] > 0 or "brisk" not in name
     assert_same(worst)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_in_double_c_and_python_are_the_same_numbers(estimator, tmp_path):
+    """On the flight that takes single precision farthest off: what differs is rounding alone."""
+    needs("gcc")
+    name = "crazyflie, 50 poses a second"
+    exported = export_c(vehicle_of(name), estimator, precision="double")
+    code = re.sub(r"/\*.*?\*/", "", exported.files["windwrench_filter.c"], flags=re.S)
+    assert not re.search(r"\bfloat\b|[0-9.][fF]\b|sqrtf", code)
+    worst = compare(CompiledFilter(exported, tmp_path), exported.filter, flight(name, QUICK), 1)
+    assert worst["status"] == 0.0
+    assert worst["restarts"] > 5
+    assert max(worst[part] for part in (*PARTS, "std")) < 1e-6
 
 
 @pytest.mark.slow
@@ -135,6 +151,7 @@ def test_compilers_find_nothing_to_say(estimator, compiler, tmp_path):
         (
             export_c(model, estimator, policy=policy),
             export_c(load_vehicle("crazyflie"), estimator, gate=None),
+            export_c(model, estimator, policy=policy, precision="double"),
             *(export_c(model.with_effects(one), estimator) for one in model.effects[:2]),
         )
     ):
@@ -394,6 +411,8 @@ def test_what_cannot_be_exported_is_said_in_a_line():
         export_c(model, rate=-1.0)
     with pytest.raises(InputError, match="estimator"):
         export_c(model, "kalman")
+    with pytest.raises(InputError, match="precision"):
+        export_c(model, precision="half")
 
 
 def test_names_cannot_end_the_comment_that_holds_them(tmp_path):
