@@ -48,7 +48,7 @@ _KEYWORDS = {
 
 
 class UntranslatableError(Exception):
-    """An effect does something that is not translated; the message says what."""
+    """An effect does something that is not translated; the message goes on from its name."""
 
 
 class _Function:
@@ -214,8 +214,10 @@ class _Function:
             raise UntranslatableError(f"has an expression {type(node).__name__}")
         name = node.func.id
         part = getattr(parts, name, None)
+        if part is parts.delay:
+            raise UntranslatableError("looks back among earlier samples, which the C does not keep")
         if part is None or not hasattr(part, "py_func"):
-            raise UntranslatableError(f"calls {name}")
+            raise UntranslatableError(f"calls the function {name}, which the C has not")
         if name not in self.needed:
             self.needed[name] = ""  # its place; calls do not go round in a circle
             self.needed[name] = _Function(part.py_func, f"ww_{name}", self.needed).code()
@@ -249,9 +251,7 @@ class _Function:
         if isinstance(node, ast.BinOp):
             left = self.expression(node.left, integer)
             if isinstance(node.op, ast.Pow):
-                if isinstance(node.right, ast.Constant) and node.right.value == 2:
-                    return f"({left} * {left})"
-                raise UntranslatableError("raises to a power other than 2")
+                return self.power(left, node.right)
             operator = self.operator(node.op)
             return f"({left} {operator} {self.expression(node.right, integer)})"
         if isinstance(node, ast.UnaryOp):
@@ -269,11 +269,17 @@ class _Function:
             return f"({test} ? {yes} : {no})"
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
             if node.value.id not in self.arrays:
-                raise UntranslatableError(f"reads a table {node.value.id}")
+                raise _no_table(node.value.id)
             return f"{node.value.id}[{self.expression(node.slice, integer=True)}]"
         if isinstance(node, ast.Call):
             return self.call(node)
         raise UntranslatableError(f"has an expression {type(node).__name__}")
+
+    def power(self, base: str, exponent: ast.expr) -> str:
+        """Return a positive number raised to any power, or any number to a small whole one."""
+        if isinstance(exponent, ast.Constant) and exponent.value in (2, 3, 4):
+            return f"({' * '.join([base] * exponent.value)})"
+        return f"ww_power({base}, {self.expression(exponent)})"
 
     def name_of(self, name: str, integer: bool) -> str:
         """Return what a name is in C: an index, a constant of the effect's file, or a variable."""
@@ -285,7 +291,7 @@ class _Function:
                 return f"WW_{name}"
             if isinstance(value, int | float):
                 return str(value) if integer else literal(value)
-            raise UntranslatableError(f"reads a table {name}")
+            raise _no_table(name)
         return name
 
     def call(self, node: ast.Call) -> str:
@@ -298,12 +304,18 @@ class _Function:
             and function.value.id == "math"
         ):
             if function.attr not in _MATHS:
-                raise UntranslatableError(f"calls math.{function.attr}")
+                raise UntranslatableError(f"calls math.{function.attr}, which the C has not")
             return f"{_MATHS[function.attr]}({', '.join(arguments)})"
         name = function.id if isinstance(function, ast.Name) else "a method"
         if name in ("min", "max") and len(arguments) == 2:
             return f"{'smaller' if name == 'min' else 'larger'}({', '.join(arguments)})"
-        raise UntranslatableError(f"calls {name}")
+        raise UntranslatableError(f"calls {name}, which the C has not")
+
+
+def _no_table(name: str) -> UntranslatableError:
+    return UntranslatableError(
+        f"looks up a table ({name}); the C has an effect's coefficients alone"
+    )
 
 
 def _is_float(argument: ast.arg) -> bool:
@@ -328,9 +340,11 @@ def translate(effect: Effect, needed: dict[str, str]) -> str:
         UntranslatableError: it does something else than what is translated.
     """
     if effect.kind == "sensing" and effect.memory:
-        raise UntranslatableError("remembers what was measured")
+        raise UntranslatableError(
+            "looks back among earlier measurements, which the C does not keep"
+        )
     if effect.advance is not None:
-        raise UntranslatableError("has a state of its own")
+        raise UntranslatableError("has a motion of its own, which the C does not carry on")
     if effect.model is None:
         raise UntranslatableError("has no model")
     return _Function(effect.model.__wrapped__, f"effect_{effect.name}", needed).code()

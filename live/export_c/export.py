@@ -51,6 +51,13 @@ _TITLES = {
     "ekf": "The extended Kalman filter",
     "ukf": "The unscented Kalman filter",
 }
+# templates of what libm has too, and how each is called; those that call others first
+_FUNCTIONS = (
+    ("power", "ww_power("),
+    ("logarithm", "ww_log("),
+    ("exponential", "ww_exp("),
+    ("arctangent", "ww_atan2("),
+)
 # the file that is written, and its template
 FILES = {
     "windwrench_filter.h": "windwrench_filter.h.j2",
@@ -145,6 +152,8 @@ def export_c(
         "effect_code": effect_code,
         "policy": policy,
         "uses_exp": "ww_exp(" in effect_code,
+        "uses_log": "ww_log(" in effect_code,
+        "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
     }
     context["uses_smaller"] = "smaller(" in effect_code or policy is not None
     context["constants"] = _constants(made, estimator, context)
@@ -187,8 +196,10 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
             code = translate(effect, needed)
         except (UntranslatableError, OSError) as error:
             raise InputError(
-                f"{vehicle.name}: effects: {effect.name} {error}, which cannot be exported; "
-                f"expected some of {', '.join(exportable_effects())}, or --effects none"
+                f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
+                "the vehicle without it (--effects none: without any), or estimate in Python, where"
+                " ekf, ukf and constant-gain take every effect. C has "
+                f"{', '.join(exportable_effects())}"
             ) from None
         models[effect.name] = code
         found[effect.kind].append(effect)
@@ -196,11 +207,11 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
     code = "\n".join([*needed.values(), *models.values()])
     if not code:
         return [], [], [], ""
-    parts = [
-        (Path(__file__).parent / "templates" / f"{name}.c.j2").read_text(encoding="utf-8")
-        for name, called in (("exponential", "ww_exp("), ("arctangent", "ww_atan2("))
-        if called in code
-    ]
+    functions: list[str] = []
+    for name, called in _FUNCTIONS:  # a function stands before what calls it
+        if any(called in other for other in (code, *functions)):
+            file = Path(__file__).parent / "templates" / f"{name}.c.j2"
+            functions.insert(0, file.read_text(encoding="utf-8"))
     # what the template of the effects names
     always = "WW_STEP WW_ROTOR_TIME "
     if found["wrench"]:
@@ -217,7 +228,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         found["wrench"],
         found["rotor input"],
         found["sensing"],
-        "\n".join([definitions(always + code) + "\n", *parts, code]),
+        "\n".join([definitions(always + code) + "\n", *functions, code]),
     )
 
 

@@ -87,7 +87,7 @@ class CompiledFilter:
         pointer: Any = ctypes.POINTER(self._number)
         self.c.ww_predict.argtypes = [ctypes.c_void_p, pointer, self._number]
         self.bytes = int(self.c.size_of_filter())
-        self._memory = ctypes.create_string_buffer(self.bytes)
+        self.memory = ctypes.create_string_buffer(self.bytes)
         self._now = _estimate_type("gyro_bias" in header, self._number)()
         if with_policy:
             self.c.ww_policy.restype = self._number
@@ -100,22 +100,22 @@ class CompiledFilter:
 
     def reset(self, position: Any, quaternion: Any) -> int:
         """Call ww_init."""
-        return int(self.c.ww_init(self._memory, self._array(position), self._array(quaternion)))
+        return int(self.c.ww_init(self.memory, self._array(position), self._array(quaternion)))
 
     def predict(self, rotor_speeds: Any, dt: float) -> int:
         """Call ww_predict."""
-        return int(self.c.ww_predict(self._memory, self._array(rotor_speeds), dt))
+        return int(self.c.ww_predict(self.memory, self._array(rotor_speeds), dt))
 
     def correct(self, position: Any, quaternion: Any) -> int:
         """Call ww_correct_pose."""
         return int(
-            self.c.ww_correct_pose(self._memory, self._array(position), self._array(quaternion))
+            self.c.ww_correct_pose(self.memory, self._array(position), self._array(quaternion))
         )
 
     def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
         """Call ww_correct_imu."""
         return int(
-            self.c.ww_correct_imu(self._memory, self._array(gyro), self._array(accelerometer))
+            self.c.ww_correct_imu(self.memory, self._array(gyro), self._array(accelerometer))
         )
 
     def policy(self, estimate: Any) -> float:
@@ -125,7 +125,7 @@ class CompiledFilter:
     @property
     def estimate(self) -> Any:
         """What ww_get writes; the next call writes over it."""
-        self.c.ww_get(self._memory, ctypes.byref(self._now))
+        self.c.ww_get(self.memory, ctypes.byref(self._now))
         return self._now
 
 

@@ -166,7 +166,7 @@ def _lines(result: Result, data: Path) -> list[str]:
         "the noise to a log.",
         "* Effects that cannot be exported: "
         + "; ".join(f"{n} ({why})" for n, why in refused.items() if why)
-        + ". `--effects none` leaves out all that are declared. Recurrent policies, and those that "
+        + ". In Python every estimator takes them. `--effects none` leaves out all that are declared. Recurrent policies, and those that "
         "see what is not in the estimate, are refused too.",
         "* `--policy tracker` knows the fan and the air of the scenario `base`, and no others.",
         "* A gap of exactly 0.1 s or 0.6 s may be judged a step earlier or later than in Python: a "

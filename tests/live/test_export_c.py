@@ -1,6 +1,7 @@
 """The exported C filter against the Python one, and what may not happen to it."""
 
 import ctypes
+import math
 import re
 import subprocess
 from dataclasses import replace
@@ -22,6 +23,7 @@ from windwrench.studies.export_c.compiled import (
     STRICT,
     CompiledFilter,
     compare,
+    differences,
     missing,
     run,
     write,
@@ -106,6 +108,34 @@ def test_c_undoes_what_a_pose_is_declared_to_suffer(estimator, tmp_path):
     plain = export_c(model, estimator).filter
     compare(c, plain, flown, 1000)
     assert np.linalg.norm(plain.estimate.position - exported.filter.estimate.position) > 0.02
+
+
+def test_c_is_told_the_voltage_of_a_battery_that_sags(tmp_path):
+    needs("gcc")
+    name = "ardrone2, turning"
+    model = vehicle_of(name)
+    model = model.with_effects(parse_setting("battery_sag:n=1.7", model))
+    exported = export_c(model, "ekf")
+    c, python = CompiledFilter(exported, tmp_path), exported.filter
+    c.c.ww_set_voltage.argtypes = [ctypes.c_void_p, ctypes.c_float]
+    flown = flight(name, 400)
+    for one in (c, python):
+        one.reset(flown["position"][0], flown["quaternion"][0])
+    untold = []
+    for k in range(1, 400):
+        volts = float(np.float32(11.1 if k < 100 else 12.4 - 0.01 * k))
+        volts = math.nan if k > 350 else volts
+        if k >= 100:  # until then both take it for full
+            c.c.ww_set_voltage(c.memory, volts)
+        c.predict(flown["rotor_speeds"][k], flown["dt"][k])
+        python.predict(flown["rotor_speeds"][k], flown["dt"][k], 0.0 if k > 350 else volts)
+        for one in (c, python):
+            one.correct(flown["position"][k], flown["quaternion"][k])
+        worst = differences(c, python)
+        assert worst.pop("status") == 0.0
+        assert max(worst.values()) < LARGEST
+        untold.append(python.estimate.force[2])
+    assert untold[340] - untold[90] > 0.2  # N, that the sagging rotors do not lift
 
 
 @pytest.mark.parametrize("estimator", ["ekf", "ukf"])
@@ -312,6 +342,7 @@ def test_effects_in_c_are_those_in_python(tmp_path):
                 third[7:11] /= np.linalg.norm(third[7:11])
                 third[12:16] = 1.0, 1.0, 1.0, rng.choice([-1.0, 1.0])
             if effect.kind == "rotor input":
+                rotors[5] = 10.0
                 fourth[:5] = 1.0, 410.0, 420.0, 430.0, 440.0
             given = [x.astype(np.float32) for x in (c, vehicle, third, fourth)]
             double = [x.astype(np.float64) for x in given]
@@ -400,9 +431,15 @@ def test_on_a_cortex_m4_it_says_the_same_within_its_limits(tmp_path):
 
 def test_what_cannot_be_exported_is_said_in_a_line():
     model = load_vehicle("ardrone2")
-    for effect in ("latency", "battery_sag", "clock_offset", "fan_jet", "slung_payload"):
+    for effect, why in (
+        ("latency", "earlier samples"),
+        ("clock_offset", "earlier measurements"),
+        ("fan_jet", "a table"),
+        ("slung_payload", "a motion of its own"),
+    ):
         declared = model.with_effects(parse_setting(effect, model))
-        with pytest.raises(InputError, match=rf"{effect} .*rotor_drag") as refused:
+        expected = rf"^ardrone2: effects: {effect} cannot .*{why}.*--effects none.*rotor_drag"
+        with pytest.raises(InputError, match=expected) as refused:
             export_c(declared)
         assert "\n" not in str(refused.value)
     with pytest.raises(InputError, match="recurrent"):
