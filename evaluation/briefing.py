@@ -3,8 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ..controllers.briefing import Air, Briefing, FilterNoise, Jet, Motions
 from ..dynamics.vehicle import Mocap
 from ..envs.fan_tracking import DISTANCE, FanTrackingEnv
@@ -23,21 +21,10 @@ def briefing_of(env: Any) -> Briefing:
     pose = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
     tuning = UKFTuning.for_vehicle(replace(vehicle, mocap=pose), TICK, scenario.rise_time)
 
-    def along(value: Any, axis: int) -> float:
-        return float(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))[axis])
-
     settings = world.settings or PlantSettings.for_vehicle(vehicle)
     return Briefing(
         vehicle,
-        FilterNoise(
-            along(tuning.motor_torque_noise, 2),
-            along(tuning.torque_walk, 2),
-            along(tuning.thrust_noise, 1),
-            along(tuning.force_walk, 1),
-            along(tuning.position_noise, 1),
-            along(tuning.attitude_noise, 2),
-            TICK,
-        ),
+        FilterNoise.of(tuning, TICK),
         Air(
             settings.disturbance_force,
             settings.disturbance_torque,

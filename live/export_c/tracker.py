@@ -22,20 +22,7 @@ def briefing_of(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Briefing:
     """Return what the tracker of a vehicle is told, whose wrench filter has this tuning and period
     (s): beside that, the fan and the air of the scenario ``base``.
     """
-
-    def along(value: Any, axis: int) -> float:
-        return float(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))[axis])
-
-    noise = FilterNoise(
-        along(tuning.motor_torque_noise, 2),
-        along(tuning.torque_walk, 2),
-        along(tuning.thrust_noise, 1),
-        along(tuning.force_walk, 1),
-        along(tuning.position_noise, 1),
-        along(tuning.attitude_noise, 2),
-        period,
-    )
-    return nominal(Briefing(vehicle=vehicle, noise=noise))
+    return nominal(Briefing(vehicle=vehicle, noise=FilterNoise.of(tuning, period)))
 
 
 def tracker_policy(vehicle: Vehicle, tuning: UKFTuning, period: float) -> Mapping[str, Any]:
