@@ -9,7 +9,7 @@ import numpy as np
 
 from windwrench.live.export_c import ESTIMATORS, PRECISIONS, export_c, exportable_policy
 from windwrench.runtime.provenance import commit
-from windwrench.studies.export_c import firmware
+from windwrench.studies.export_c import firmware, webassembly
 from windwrench.studies.export_c.compiled import CompiledFilter, compare
 from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
 
@@ -34,6 +34,7 @@ def run(steps: int, seed: int, report: Callable[[str, float], None]) -> dict[str
             "seed": seed,
             "agreement": agreement,
             "board": _board(seed, Path(folder), report),
+            "browser": _browser(seed, Path(folder)),
         }
 
 
@@ -93,6 +94,24 @@ def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> lis
                 row["policies"] = [_policy(name, estimator, here, calm.code) for name in POLICIES]
             rows.append(row)
             report("board", len(rows) / (2 * len(ESTIMATORS)))
+    return rows
+
+
+def _browser(seed: int, folder: Path) -> list[dict[str, Any]]:
+    """Return the bytes of each filter as WebAssembly, and how far it is from C for this machine."""
+    rows = []
+    for estimator in ESTIMATORS:
+        exported, flown = (
+            export_c(vehicle_of(BOARD_FLIGHT), estimator),
+            flight(BOARD_FLIGHT, 2_000, seed),
+        )
+        here = folder / f"browser-{estimator}"
+        size, said = webassembly.fly(exported, flown, here)
+        apart, statuses = webassembly.apart(said, exported, flown, here)
+        rows.append(
+            {"estimator": estimator, "bytes": size, "apart": float(f"{apart:.3g}")}
+            | {"status": statuses, "steps": len(said)}
+        )
     return rows
 
 

@@ -1,0 +1,3 @@
+/* both are instructions with -mbulk-memory */
+#define memcpy __builtin_memcpy
+#define memset __builtin_memset
