@@ -1,4 +1,4 @@
-"""The exported filter as WebAssembly, under Node.js: the same numbers as compiled for this machine."""
+"""The exported filter as WebAssembly, under Node.js: the numbers that C says on this machine."""
 
 import numpy as np
 import pytest
