@@ -20,6 +20,12 @@ def _estimators() -> list[str]:
     return list(ESTIMATORS)
 
 
+def _precisions() -> list[str]:
+    from ..live.export_c import PRECISIONS
+
+    return list(PRECISIONS)
+
+
 def _policies() -> list[str]:
     from ..live.export_c.policies import LAWS
 
@@ -87,6 +93,13 @@ def export_c(
             help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none."
         ),
     ] = 0.9999,
+    precision: Annotated[
+        str,
+        typer.Option(
+            help="single (float), or double, where the processor has a unit for it.",
+            autocompletion=offering(_precisions),
+        ),
+    ] = "single",
     out: Annotated[
         Path, typer.Option("--out", help="Folder for the C files; created if it does not exist.")
     ] = Path("results/export_c"),
@@ -95,14 +108,14 @@ def export_c(
     ] = False,
 ) -> dict[str, Any]:
     """Write the filter as C for a flight controller. One header and one C99 source, in single
-    precision and without a heap; with an example and a CMake file.
+    precision unless said otherwise, and without a heap; with an example and a CMake file.
 
     Example: windwrench export-c --vehicle ardrone2 --estimator ekf --out filter
     """
     from dataclasses import replace
 
     from ..dynamics.vehicle_file import load_vehicle
-    from ..live.export_c import ESTIMATORS, exportable_policy
+    from ..live.export_c import ESTIMATORS, PRECISIONS, exportable_policy
     from ..live.export_c import export_c as export
     from ..live.export_c.export import FILES
     from ..runtime.errors import unknown_name
@@ -110,6 +123,8 @@ def export_c(
 
     if estimator not in ESTIMATORS:
         raise unknown_name("estimator", estimator, ESTIMATORS)
+    if precision not in PRECISIONS:
+        raise unknown_name("precision", precision, PRECISIONS)
     if effects not in _EFFECTS:
         raise InputError(f"--effects {effects}: expected {' or '.join(_EFFECTS)}")
     if gate != 0.0 and not 0.5 <= gate < 1.0:
@@ -130,6 +145,7 @@ def export_c(
             gate or None,
             flown,
             shlex.join(["windwrench", *sys.argv[1:]]),
+            precision,
         )
     results_folder(out, vehicle=model.name, estimator=estimator, files=list(FILES))
     for name, text in found.files.items():
@@ -147,6 +163,7 @@ def export_c(
         "estimator": estimator,
         "effects": list(found.effects),
         "policy": policy,
+        "precision": precision,
         "period_s": found.filter.period,
         "files": [str(out / name) for name in found.files],
     }

@@ -3,12 +3,36 @@ kind of fan, and for those that say so, how the fan is known to move.
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Protocol, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..dynamics.vehicle_file import load_vehicle
+
+
+class FilterTuning(Protocol):
+    """What ``FilterNoise`` reads of a wrench filter's tuning (``estimator.UKFTuning``): standard
+    deviations in one of its steps, a number or one along each axis.
+    """
+
+    @property
+    def motor_torque_noise(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def torque_walk(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def thrust_noise(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def force_walk(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def position_noise(self) -> ArrayLike: ...  # noqa: D102
+    @property
+    def attitude_noise(self) -> ArrayLike: ...  # noqa: D102
+
+
+def _along(value: ArrayLike, axis: int) -> float:
+    return float(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))[axis])
 
 
 @dataclass(frozen=True)
@@ -26,21 +50,15 @@ class FilterNoise:
     period: float = 0.005  # s, of a step
 
     @classmethod
-    def of(cls, tuning: Any, period: float) -> Self:
-        """Return what a filter is told whose step takes ``period`` s and whose ``tuning`` is an
-        ``estimator.UKFTuning``, one number or three for each noise.
-        """
-
-        def along(value: Any, axis: int) -> float:
-            return float(np.broadcast_to(np.asarray(value, dtype=np.float64), (3,))[axis])
-
+    def of(cls, tuning: FilterTuning, period: float) -> Self:
+        """Return what a wrench filter of this tuning was told, whose step takes ``period`` s."""
         return cls(
-            along(tuning.motor_torque_noise, 2),
-            along(tuning.torque_walk, 2),
-            along(tuning.thrust_noise, 1),
-            along(tuning.force_walk, 1),
-            along(tuning.position_noise, 1),
-            along(tuning.attitude_noise, 2),
+            _along(tuning.motor_torque_noise, 2),
+            _along(tuning.torque_walk, 2),
+            _along(tuning.thrust_noise, 1),
+            _along(tuning.force_walk, 1),
+            _along(tuning.position_noise, 1),
+            _along(tuning.attitude_noise, 2),
             period,
         )
 

@@ -59,8 +59,8 @@ class Recovery:
         restart_at: standard deviations beyond which no push is followed by linear corrections: the
             filter restarts. One of a weight makes 70 on a filter that rises in 1 s.
         attitude_std: rad: standard deviation of the attitude beyond which a vehicle that is not
-            seen is no longer predicted: where its thrust points has become a guess, and sigma
-            points reach half a turn.
+            seen, or of which positions alone are, is no longer predicted: where its thrust points
+            has become a guess, and sigma points reach half a turn.
         velocity_std: m/s and rad/s: standard deviations of velocity and angular velocity of a
             vehicle of which only the pose is known; a small multirotor in brisk flight. At long
             periods the latter, and that of the torque, are less: no more than attitudes a period
@@ -161,7 +161,7 @@ def after_prediction(f: Record, dt: float) -> None:
             for j in range(N):
                 P[i, j] *= scale
                 P[j, i] *= scale
-    if any_of((gap[0] > f.patience) | (gap[1] > f.patience)):
+    if any_of((gap[0] > f.patience) | (gap[1] > f.patience) | (gap[0] < gap[1])):
         position, attitude = lost_position(f), lost_attitude(f)
         _forget(f, position, attitude)
         for i in range(3):
@@ -217,12 +217,14 @@ def lost_position(f: Record) -> bool:
 
 @compiled
 def lost_attitude(f: Record) -> bool:
-    """Return the same of attitude and angular velocity."""
+    """Return the same of attitude and angular velocity; or whether the attitude has become a guess
+    while positions went on. These then are explained by a turn more or less as well as by a force,
+    from sigma points that reach half a turn: rates run away and rounding errors grow.
+    """
     P, lost = f.P, f.lost
-    wide = P[0, 0] > lost[0]
-    for i in range(1, 6):
-        wide = wide | (P[i, i] > lost[i])
-    lost_now: bool = wide & (f.gap[1] > f.patience)
+    guessed = (P[0, 0] > lost[0]) | (P[1, 1] > lost[1]) | (P[2, 2] > lost[2])
+    wide = guessed | (P[3, 3] > lost[3]) | (P[4, 4] > lost[4]) | (P[5, 5] > lost[5])
+    lost_now: bool = (wide & (f.gap[1] > f.patience)) | (guessed & (f.gap[0] < f.gap[1]))
     return lost_now
 
 

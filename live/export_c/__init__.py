@@ -2,5 +2,6 @@
 
 from .export import ESTIMATORS, Exported, export_c
 from .policies import exportable_policy
+from .precision import PRECISIONS
 
-__all__ = ["ESTIMATORS", "Exported", "export_c", "exportable_policy"]
+__all__ = ["ESTIMATORS", "PRECISIONS", "Exported", "export_c", "exportable_policy"]

@@ -9,7 +9,7 @@ _WIDTH = 100  # columns
 
 
 def literal(value: float, what: str = "a number") -> str:
-    """Return a number as a C literal in single precision, the shortest that reads as the same.
+    """Return a number as a C literal with all its digits, within what single precision holds.
 
     Raises:
         InputError: single precision does not hold it; ``what`` names it.
@@ -20,8 +20,7 @@ def literal(value: float, what: str = "a number") -> str:
         raise InputError(f"{what}: single precision does not hold {value:g}")
     if np.isinf(number):
         return "INFINITY" if number > 0 else "-INFINITY"
-    text = str(number)
-    return f"{text if '.' in text or 'e' in text else text + '.0'}f"
+    return f"{float(value)!r}F"
 
 
 def table(values: ArrayLike, what: str = "a number") -> str:

@@ -39,8 +39,6 @@ _MATHS = {
     "fabs": "fabsf",
     "atan2": "ww_atan2",
 }
-# what the Python filter is told at a step, and the functions in C are not
-_NOT_GIVEN = {"ROTOR_VOLTAGE": "the battery's voltage"}
 # words of C that may be names in Python
 _KEYWORDS = {
     *("auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "goto"),
@@ -50,7 +48,7 @@ _KEYWORDS = {
 
 
 class UntranslatableError(Exception):
-    """An effect does something that is not translated; the message says what."""
+    """An effect does something that is not translated; the message goes on from its name."""
 
 
 class _Function:
@@ -153,9 +151,7 @@ class _Function:
                 ]
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             return [f"{self.part_call(node.value, None)};"]
-        raise UntranslatableError(
-            f"has a statement of a kind that is not translated ({type(node).__name__})"
-        )
+        raise UntranslatableError(f"has a statement {type(node).__name__}")
 
     def block(self, body: list[ast.stmt]) -> list[str]:
         """Return the indented lines of several statements."""
@@ -215,11 +211,13 @@ class _Function:
     def part_call(self, node: ast.expr, out: str | None) -> str:
         """Return the call of a function of ``parts``, which is translated too."""
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
-            raise UntranslatableError(_kind(node))
+            raise UntranslatableError(f"has an expression {type(node).__name__}")
         name = node.func.id
         part = getattr(parts, name, None)
+        if part is parts.delay:
+            raise UntranslatableError("looks back among earlier samples, which the C does not keep")
         if part is None or not hasattr(part, "py_func"):
-            raise UntranslatableError(f"calls the function {name}, which is not translated")
+            raise UntranslatableError(f"calls the function {name}, which the C has not")
         if name not in self.needed:
             self.needed[name] = ""  # its place; calls do not go round in a circle
             self.needed[name] = _Function(part.py_func, f"ww_{name}", self.needed).code()
@@ -241,9 +239,7 @@ class _Function:
     def operator(self, node: ast.AST) -> str:
         """Return an operator that is the same in C."""
         if type(node) not in _OPERATORS:
-            raise UntranslatableError(
-                f"has an operator that is not translated ({type(node).__name__})"
-            )
+            raise UntranslatableError(f"has an operator {type(node).__name__}")
         return _OPERATORS[type(node)]
 
     def expression(self, node: ast.expr, integer: bool = False) -> str:
@@ -255,9 +251,7 @@ class _Function:
         if isinstance(node, ast.BinOp):
             left = self.expression(node.left, integer)
             if isinstance(node.op, ast.Pow):
-                if isinstance(node.right, ast.Constant) and node.right.value == 2:
-                    return f"({left} * {left})"
-                raise UntranslatableError("raises to a power that is not 2")
+                return self.power(left, node.right)
             operator = self.operator(node.op)
             return f"({left} {operator} {self.expression(node.right, integer)})"
         if isinstance(node, ast.UnaryOp):
@@ -275,16 +269,20 @@ class _Function:
             return f"({test} ? {yes} : {no})"
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
             if node.value.id not in self.arrays:
-                raise UntranslatableError(f"looks up numbers in the table {node.value.id}")
+                raise _no_table(node.value.id)
             return f"{node.value.id}[{self.expression(node.slice, integer=True)}]"
         if isinstance(node, ast.Call):
             return self.call(node)
-        raise UntranslatableError(_kind(node))
+        raise UntranslatableError(f"has an expression {type(node).__name__}")
+
+    def power(self, base: str, exponent: ast.expr) -> str:
+        """Return a positive number raised to any power, or any number to a small whole one."""
+        if isinstance(exponent, ast.Constant) and exponent.value in (2, 3, 4):
+            return f"({' * '.join([base] * exponent.value)})"
+        return f"ww_power({base}, {self.expression(exponent)})"
 
     def name_of(self, name: str, integer: bool) -> str:
         """Return what a name is in C: an index, a constant of the effect's file, or a variable."""
-        if name in _NOT_GIVEN:
-            raise UntranslatableError(f"needs {_NOT_GIVEN[name]}, which `ww_predict` is not given")
         if name in self.integers:
             return self.places.get(name, name) if integer else f"(float){name}"
         if name in self.globals and name not in self.arrays:
@@ -293,7 +291,7 @@ class _Function:
                 return f"WW_{name}"
             if isinstance(value, int | float):
                 return str(value) if integer else literal(value)
-            raise UntranslatableError(f"looks up numbers in the table {name}")
+            raise _no_table(name)
         return name
 
     def call(self, node: ast.Call) -> str:
@@ -306,18 +304,18 @@ class _Function:
             and function.value.id == "math"
         ):
             if function.attr not in _MATHS:
-                raise UntranslatableError(
-                    f"calls the function math.{function.attr}, which is not translated"
-                )
+                raise UntranslatableError(f"calls math.{function.attr}, which the C has not")
             return f"{_MATHS[function.attr]}({', '.join(arguments)})"
         name = function.id if isinstance(function, ast.Name) else "a method"
         if name in ("min", "max") and len(arguments) == 2:
             return f"{'smaller' if name == 'min' else 'larger'}({', '.join(arguments)})"
-        raise UntranslatableError(f"calls the function {name}, which is not translated")
+        raise UntranslatableError(f"calls {name}, which the C has not")
 
 
-def _kind(node: ast.AST) -> str:
-    return f"has an expression of a kind that is not translated ({type(node).__name__})"
+def _no_table(name: str) -> UntranslatableError:
+    return UntranslatableError(
+        f"looks up a table ({name}); the C has an effect's coefficients alone"
+    )
 
 
 def _is_float(argument: ast.arg) -> bool:
@@ -343,12 +341,10 @@ def translate(effect: Effect, needed: dict[str, str]) -> str:
     """
     if effect.kind == "sensing" and effect.memory:
         raise UntranslatableError(
-            "needs measurements of before, which the filter in C does not keep"
+            "looks back among earlier measurements, which the C does not keep"
         )
     if effect.advance is not None:
-        raise UntranslatableError(
-            "moves by an equation of its own, which the filter in C does not integrate"
-        )
+        raise UntranslatableError("has a motion of its own, which the C does not carry on")
     if effect.model is None:
         raise UntranslatableError("has no model")
     return _Function(effect.model.__wrapped__, f"effect_{effect.name}", needed).code()

@@ -1,4 +1,4 @@
-"""The wrench filter of one vehicle as a C header and a C99 source, in single precision.
+"""The wrench filter of one vehicle as a C header and a C99 source, in single or double precision.
 
 Templates hold the equations, written after the Python filter; every number comes from the Python
 filter's own record (``estimator.filter_record``), so there is one place for each. Effects are
@@ -26,7 +26,6 @@ from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.hover_covariance import CATCH_UP
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
-from ...estimator.recovery import AGREEING as AGREEING_POSES
 from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
@@ -38,6 +37,7 @@ from .effect_code import (
     exportable_effects,
     translate,
 )
+from .precision import FUNCTIONS, PRECISIONS, in_precision
 from .tracker import tracker_policy
 
 FILTERS: dict[str, type[WrenchUKF]] = {
@@ -51,6 +51,13 @@ _TITLES = {
     "ekf": "The extended Kalman filter",
     "ukf": "The unscented Kalman filter",
 }
+# templates of what libm has too, and how each is called; those that call others first
+_FUNCTIONS = (
+    ("power", "ww_power("),
+    ("logarithm", "ww_log("),
+    ("exponential", "ww_exp("),
+    ("arctangent", "ww_atan2("),
+)
 # the file that is written, and its template
 FILES = {
     "windwrench_filter.h": "windwrench_filter.h.j2",
@@ -69,6 +76,7 @@ class Exported:
     files: Mapping[str, str]
     filter: WrenchUKF
     effects: tuple[str, ...]
+    precision: str = "single"
 
 
 def export_c(
@@ -79,6 +87,7 @@ def export_c(
     gate: float | None = 0.9999,
     policy: Mapping[str, Any] | None = None,
     command: str = "windwrench export-c",
+    precision: str = "single",
 ) -> Exported:
     """Return the files of a vehicle's filter in C.
 
@@ -90,6 +99,8 @@ def export_c(
         gate: as of ``WrenchUKF``.
         policy: of ``exportable_policy``, or None.
         command: the command line that asked for it, for the files' heads.
+        precision: one of ``PRECISIONS``, of every number in it: single (float), or double, for
+            processors that calculate with double numbers as fast.
 
     Raises:
         InputError: a setting is out of range, an effect cannot be exported, or single precision
@@ -97,6 +108,8 @@ def export_c(
     """
     if estimator not in FILTERS:
         raise InputError(f"estimator: expected one of {', '.join(ESTIMATORS)}, got {estimator!r}")
+    if precision not in PRECISIONS:
+        raise InputError(f"precision: expected {' or '.join(PRECISIONS)}, got {precision!r}")
     rate = vehicle.mocap.rate_hz if rate is None else rate
     for name, value in (("rate", rate), ("rise_time", rise_time)):
         if not (math.isfinite(value) and value > 0.0):
@@ -114,6 +127,8 @@ def export_c(
         "command": _one_line(command),
         "title": f"{_TITLES[estimator]}, for the vehicle {_one_line(vehicle.name)}.",
         "estimator": estimator,
+        "precision": precision,
+        "functions": ", ".join(f if precision == "double" else f"{f}f" for f in FUNCTIONS),
         "imu": imu,
         "gated": gate is not None,
         "gate": 0.0 if gate is None else gate,
@@ -124,7 +139,6 @@ def export_c(
         "kept": len(hover.kept(made.record[0])),
         "hover_speed": literal(float(made.record[0]["last_speeds"][0])),
         "agreeing": AGREEING,
-        "agreeing_poses": AGREEING_POSES,
         "offset": offset,
         "pairs": 12 if wrench else 6,
         "bent": 12 if wrench else 6 if offset else 3,
@@ -138,6 +152,8 @@ def export_c(
         "effect_code": effect_code,
         "policy": policy,
         "uses_exp": "ww_exp(" in effect_code,
+        "uses_log": "ww_log(" in effect_code,
+        "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
     }
     context["uses_smaller"] = "smaller(" in effect_code or policy is not None
     context["constants"] = _constants(made, estimator, context)
@@ -150,9 +166,10 @@ def export_c(
         autoescape=False,  # C, no page
     )
     files = {
-        name: environment.get_template(source).render(context) for name, source in FILES.items()
+        name: in_precision(environment.get_template(source).render(context), precision)
+        for name, source in FILES.items()
     }
-    return Exported(files, made, tuple(e.name for e in vehicle.effects))
+    return Exported(files, made, tuple(e.name for e in vehicle.effects), precision)
 
 
 def _one_line(text: str) -> str:
@@ -179,8 +196,10 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
             code = translate(effect, needed)
         except (UntranslatableError, OSError) as error:
             raise InputError(
-                f"{vehicle.name}: effects: {effect.name} cannot be written in C: it {error}; "
-                f"expected some of {', '.join(exportable_effects())}, or --effects none"
+                f"{vehicle.name}: effects: {effect.name} cannot be exported: it {error}; declare "
+                "the vehicle without it (--effects none: without any), or estimate in Python, where"
+                " ekf, ukf and constant-gain take every effect. C has "
+                f"{', '.join(exportable_effects())}"
             ) from None
         models[effect.name] = code
         found[effect.kind].append(effect)
@@ -188,11 +207,11 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
     code = "\n".join([*needed.values(), *models.values()])
     if not code:
         return [], [], [], ""
-    parts = [
-        (Path(__file__).parent / "templates" / f"{name}.c.j2").read_text(encoding="utf-8")
-        for name, called in (("exponential", "ww_exp("), ("arctangent", "ww_atan2("))
-        if called in code
-    ]
+    functions: list[str] = []
+    for name, called in _FUNCTIONS:  # a function stands before what calls it
+        if any(called in other for other in (code, *functions)):
+            file = Path(__file__).parent / "templates" / f"{name}.c.j2"
+            functions.insert(0, file.read_text(encoding="utf-8"))
     # what the template of the effects names
     always = "WW_STEP WW_ROTOR_TIME "
     if found["wrench"]:
@@ -209,7 +228,7 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         found["wrench"],
         found["rotor input"],
         found["sensing"],
-        "\n".join([definitions(always + code) + "\n", *parts, code]),
+        "\n".join([definitions(always + code) + "\n", *functions, code]),
     )
 
 

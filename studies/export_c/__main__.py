@@ -15,6 +15,7 @@ from windwrench.studies.export_c.compiled import missing
 from windwrench.studies.export_c.firmware import TOOLS
 from windwrench.studies.export_c.page import write_page
 from windwrench.studies.export_c.study import run
+from windwrench.studies.export_c.webassembly import tools_missing
 
 
 def study(
@@ -25,13 +26,13 @@ def study(
         bool, typer.Option("--page-only", help="Write the page from results that lie there.")
     ] = False,
 ) -> None:
-    """Compare the exported C filters with Python, and measure them on a Cortex-M4F (5 minutes)."""
+    """Compare the exported C filters with Python, and measure them on a Cortex-M4F (8 minutes)."""
     data = out / "results.json"
     if not page_only:
-        if lacking := missing("gcc", *TOOLS):
+        if lacking := [*missing("gcc", *TOOLS), *tools_missing()]:
             raise InputError(
                 f"not installed: {', '.join(lacking)}; expected gcc, Debian's "
-                "gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm"
+                "gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm, clang, lld and nodejs"
             )
         with share_bars_by_part() as report:
             write_json(run(steps, seed, report), data)

@@ -1,7 +1,6 @@
 """An exported C filter, compiled on this machine and driven from Python."""
 
 import ctypes
-import re
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -18,8 +17,7 @@ from windwrench.live.export_c import Exported
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 PARTS = ("attitude", "angular_velocity", "position", "velocity", "torque", "force")
 Array = NDArray[np.float64]
-# a number in single precision, and what of libm takes one
-_SINGLE = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+|\b(?:sqrt|sin|cos|fabs))f\b")
+_NUMBERS = {"single": ctypes.c_float, "double": ctypes.c_double}
 
 
 def missing(*programs: str) -> list[str]:
@@ -27,14 +25,10 @@ def missing(*programs: str) -> list[str]:
     return [program for program in programs if shutil.which(program) is None]
 
 
-def write(exported: Exported, folder: Path, double: bool = False) -> Path:
-    """Write the files of an export into a folder, as they are or with each ``float`` a ``double``;
-    return it.
-    """
+def write(exported: Exported, folder: Path) -> Path:
+    """Write the files of an export into a folder; return it."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in exported.files.items():
-        if double:
-            text = re.sub(r"\bfloat\b", "double", _SINGLE.sub(r"\1", text))
         (folder / name).write_text(text, encoding="utf-8")
     return folder
 
@@ -55,29 +49,23 @@ def run(*words: object, cwd: Path, timeout: float = 600.0) -> str:
     return done.stdout
 
 
-def _estimate_type(imu: bool, real: Any) -> Any:
+def _estimate_type(imu: bool, number: Any) -> Any:
     names = ("position", "quaternion", "velocity", "angular_velocity", "torque", "force")
-    fields: list[tuple[str, Any]] = [(n, real * (4 if n == "quaternion" else 3)) for n in names]
-    fields += [(f"std_{n}", real * 3) for n in PARTS]
-    fields += [("nis", real), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
+    fields: list[tuple[str, Any]] = [(n, number * (4 if n == "quaternion" else 3)) for n in names]
+    fields += [(f"std_{n}", number * 3) for n in PARTS]
+    fields += [("nis", number), ("status", ctypes.c_int), ("restarts", ctypes.c_uint)]
     if imu:
         biases = ("gyro_bias", "accelerometer_bias", "std_gyro_bias", "std_accelerometer_bias")
-        fields += [(name, real * 3) for name in biases]
+        fields += [(name, number * 3) for name in biases]
         fields += [("imu_refused", ctypes.c_uint)]
     return type("Estimate", (ctypes.Structure,), {"_fields_": fields})
 
 
 class CompiledFilter:
-    """An export, compiled, with the methods of the Python filter; each returns what C returns.
+    """An export, compiled, with the methods of the Python filter; each returns what C returns."""
 
-    In ``double`` precision it shows what of a difference between C and Python is rounding.
-    """
-
-    def __init__(
-        self, exported: Exported, folder: Path, compiler: str = "gcc", double: bool = False
-    ) -> None:
-        write(exported, folder, double)
-        self._real: Any = ctypes.c_double if double else ctypes.c_float
+    def __init__(self, exported: Exported, folder: Path, compiler: str = "gcc") -> None:
+        write(exported, folder)
         header = exported.files["windwrench_filter.h"]
         lines = ['#include "windwrench_filter.h"']
         with_policy = "ww_policy" in header
@@ -95,37 +83,39 @@ class CompiledFilter:
             cwd=folder,
         )
         self.c: Any = ctypes.CDLL(str(library.resolve()))
-        self.c.ww_predict.argtypes = [ctypes.c_void_p, ctypes.POINTER(self._real), self._real]
+        self._number: Any = _NUMBERS[exported.precision]
+        pointer: Any = ctypes.POINTER(self._number)
+        self.c.ww_predict.argtypes = [ctypes.c_void_p, pointer, self._number]
         self.bytes = int(self.c.size_of_filter())
-        self._memory = ctypes.create_string_buffer(self.bytes)
-        self._now = _estimate_type("gyro_bias" in header, self._real)()
+        self.memory = ctypes.create_string_buffer(self.bytes)
+        self._now = _estimate_type("gyro_bias" in header, self._number)()
         if with_policy:
-            self.c.ww_policy.restype = self._real
+            self.c.ww_policy.restype = self._number
             self.policy_bytes = int(self.c.size_of_policy())
             self._policy = ctypes.create_string_buffer(self.policy_bytes)
             self.c.ww_policy_init(self._policy)
 
-    def _numbers(self, values: Any) -> Any:
-        return None if values is None else (self._real * len(values))(*map(float, values))
+    def _array(self, values: Any) -> Any:
+        return None if values is None else (self._number * len(values))(*map(float, values))
 
     def reset(self, position: Any, quaternion: Any) -> int:
         """Call ww_init."""
-        return int(self.c.ww_init(self._memory, self._numbers(position), self._numbers(quaternion)))
+        return int(self.c.ww_init(self.memory, self._array(position), self._array(quaternion)))
 
     def predict(self, rotor_speeds: Any, dt: float) -> int:
         """Call ww_predict."""
-        return int(self.c.ww_predict(self._memory, self._numbers(rotor_speeds), dt))
+        return int(self.c.ww_predict(self.memory, self._array(rotor_speeds), dt))
 
     def correct(self, position: Any, quaternion: Any) -> int:
         """Call ww_correct_pose."""
         return int(
-            self.c.ww_correct_pose(self._memory, self._numbers(position), self._numbers(quaternion))
+            self.c.ww_correct_pose(self.memory, self._array(position), self._array(quaternion))
         )
 
     def correct_imu(self, gyro: Any, accelerometer: Any) -> int:
         """Call ww_correct_imu."""
         return int(
-            self.c.ww_correct_imu(self._memory, self._numbers(gyro), self._numbers(accelerometer))
+            self.c.ww_correct_imu(self.memory, self._array(gyro), self._array(accelerometer))
         )
 
     def policy(self, estimate: Any) -> float:
@@ -135,7 +125,7 @@ class CompiledFilter:
     @property
     def estimate(self) -> Any:
         """What ww_get writes; the next call writes over it."""
-        self.c.ww_get(self._memory, ctypes.byref(self._now))
+        self.c.ww_get(self.memory, ctypes.byref(self._now))
         return self._now
 
 

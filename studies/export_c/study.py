@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.live.export_c import ESTIMATORS, PRECISIONS, export_c, exportable_policy
 from windwrench.runtime.provenance import commit
-from windwrench.studies.export_c import firmware
-from windwrench.studies.export_c.compiled import PARTS, CompiledFilter, compare
+from windwrench.studies.export_c import firmware, webassembly
+from windwrench.studies.export_c.compiled import CompiledFilter, compare
 from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
 
 BOARD_STEPS = 1_000
@@ -34,6 +34,7 @@ def run(steps: int, seed: int, report: Callable[[str, float], None]) -> dict[str
             "seed": seed,
             "agreement": agreement,
             "board": _board(seed, Path(folder), report),
+            "browser": _browser(seed, Path(folder)),
         }
 
 
@@ -43,24 +44,14 @@ def _agreement(
     rows: list[dict[str, Any]] = []
     for estimator in ESTIMATORS:
         for name in FLIGHTS:
-            exported = export_c(vehicle_of(name), estimator)
             flown = flight(name, steps, seed)
-            single, double = (
-                compare(
-                    CompiledFilter(exported, folder / kind / f"{len(rows)}", double=double),
-                    exported.filter,
-                    flown,
-                )
-                for kind, double in (("single", False), ("double", True))
-            )
-            rows.append(
-                {
-                    "estimator": estimator,
-                    "flight": name,
-                    **{key: float(f"{value:.3g}") for key, value in single.items()},
-                    "in_double": float(f"{max(double[name] for name in PARTS):.3g}"),
-                }
-            )
+            row: dict[str, Any] = {"estimator": estimator, "flight": name}
+            for precision in PRECISIONS:
+                exported = export_c(vehicle_of(name), estimator, precision=precision)
+                c = CompiledFilter(exported, folder / f"{precision}{len(rows)}")
+                worst = compare(c, exported.filter, flown)
+                row[precision] = {key: float(f"{value:.3g}") for key, value in worst.items()}
+            rows.append(row)
             report("flights", len(rows) / (len(ESTIMATORS) * len(FLIGHTS)))
     return rows
 
@@ -103,6 +94,24 @@ def _board(seed: int, folder: Path, report: Callable[[str, float], None]) -> lis
                 row["policies"] = [_policy(name, estimator, here, calm.code) for name in POLICIES]
             rows.append(row)
             report("board", len(rows) / (2 * len(ESTIMATORS)))
+    return rows
+
+
+def _browser(seed: int, folder: Path) -> list[dict[str, Any]]:
+    """Return the bytes of each filter as WebAssembly, and how far it is from C for this machine."""
+    rows = []
+    for estimator in ESTIMATORS:
+        exported, flown = (
+            export_c(vehicle_of(BOARD_FLIGHT), estimator),
+            flight(BOARD_FLIGHT, 2_000, seed),
+        )
+        here = folder / f"browser-{estimator}"
+        size, said = webassembly.fly(exported, flown, here)
+        apart, statuses = webassembly.apart(said, exported, flown, here)
+        rows.append(
+            {"estimator": estimator, "bytes": size, "apart": float(f"{apart:.3g}")}
+            | {"status": statuses, "steps": len(said)}
+        )
     return rows
 
 

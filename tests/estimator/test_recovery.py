@@ -195,6 +195,30 @@ def test_a_doubted_wrench_may_be_none_at_all():
     assert np.sqrt(e.covariance[17, 17]) > abs(e.force[2]) > 0.9 * vehicle.weight
 
 
+@pytest.mark.parametrize("kind", ["ukf", "ekf"])
+def test_rates_do_not_run_away_where_positions_alone_are_measured(kind):
+    """A hover that is lost and found by two poses, and then by its positions: they tell neither an
+    attitude nor a rate, of which nothing is known but the prior's 10 rad/s.
+    """
+    vehicle, most = VEHICLES["crazyflie"], []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        estimator = FILTERS[kind](vehicle, period=0.02, gate=0.9999)
+        estimator.reset([0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0])
+        for k in range(177):
+            position = np.array([0.0, 0.0, 1.0]) + 0.001 * rng.standard_normal(3)
+            q = np.array([1.0, *(0.0025 * rng.standard_normal(3))])
+            lost = 50 <= k < 125
+            e = estimator.step(
+                np.full(4, vehicle.hover_rate),
+                None if lost else position,
+                None if lost or k >= 127 else q / np.linalg.norm(q),
+            )
+            most.append(np.linalg.norm(e.angular_velocity) if k >= 127 else 0.0)
+        assert estimator.estimate.restarts == 1
+    assert max(most) < 20.0
+
+
 def test_what_happened_is_said():
     vehicle = VEHICLES["ardrone2"]
     ukf, speeds, q = WrenchUKF(vehicle, gate=0.999), hover(vehicle), [1.0, 0.0, 0.0, 0.0]

@@ -1,3 +1,3 @@
-/* The compiler puts instructions or loops in their place */
+/* both are instructions with -mbulk-memory */
 #define memcpy __builtin_memcpy
 #define memset __builtin_memset
