@@ -26,6 +26,7 @@ from ...estimator.error_state import LARGEST_MRP_VARIANCE
 from ...estimator.filter_record import AGREEING, N
 from ...estimator.hover_covariance import CATCH_UP
 from ...estimator.imu import _PATIENCE as IMU_PATIENCE
+from ...estimator.recovery import AGREEING as AGREEING_POSES
 from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
@@ -139,6 +140,7 @@ def export_c(
         "kept": len(hover.kept(made.record[0])),
         "hover_speed": literal(float(made.record[0]["last_speeds"][0])),
         "agreeing": AGREEING,
+        "agreeing_poses": AGREEING_POSES,
         "offset": offset,
         "pairs": 12 if wrench else 6,
         "bent": 12 if wrench else 6 if offset else 3,
