@@ -273,12 +273,10 @@ def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
     remarks = [
         f"How the mass is hung on: at 7 s, all at once, at rest on a taut thread of {THREAD:g} m "
         f"below the front rotors' axis. "
-        "The lateral force is the size of the level part of the estimate, with the flight of the "
-        "same noise without the mass "
-        f"subtracted, in the mean of the flights; its transient is its largest value in the "
-        f"{_TRANSIENT:g} s after. Without "
-        f"that subtraction it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, "
-        f"noise and all.",
+        "The lateral force is the size of the level part of the estimate, in the mean of the "
+        "flights. From each flight that of the same noise without the mass is subtracted. Its "
+        f"transient is its largest value in the {_TRANSIENT:g} s after. Without that subtraction "
+        f"it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, noise included.",
         "Part of it is real. The mass tips the vehicle until the flight loop has trimmed, the "
         "vehicle drifts from above the mass, and the thread pulls sideways by up to "
         f"{max(row['true_lateral_N'] for row in rows):.2f} N in the mean of "
@@ -312,8 +310,7 @@ def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
             "0.01 Nm, 0.3 s) the spread "
             "hardly depends on the motion capture and falls slowly with the rise time, because the "
             "filter follows a real "
-            "wrench. With rotors that do as they are told it falls about in inverse proportion to "
-            "the rise time: "
+            "wrench. Without actuator noise it falls about in inverse proportion to the rise time: "
             f"{clean['force_std_N'] * 1e3:.1f} mN and {clean['torque_std_Nm'] * 1e3:.2f} mNm at 1 "
             f"s, and ten times the sensor "
             f"noise makes {noisy['force_std_N'] * 1e3:.1f} mN and "
