@@ -155,7 +155,8 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         f"A step of {0.72:.2f} N and 30 mNm. The rise time is that of the mean estimate of "
         f"{result['runs']} flights, from 10 to 90 %, with its 95 % interval (bootstrap over "
         "flights, 1,000 times). Each column has the tuning whose scatter at rest it states. The "
-        "rotors' true noise is a tenth of the default tuning's; the filter is told the one or the other.",
+        "rotors' true noise is a tenth of the default tuning's; the filter is told the one or the "
+        "other.",
         "",
         *_at_equal_spread(sweep),
         f"![Rise time against spread]({picture.relative_to(page.parent).as_posix()})",
