@@ -10,7 +10,9 @@ from typing import Any
 from ..runtime.whole_files import replaced
 
 _LEAST = 1.0  # s, below which a duration is not worth keeping
-_COUNTED = ("flights", "episodes", "trials", "diagnoses")  # of a plan, what time grows with
+# of a plan, what time grows with, and what must be the same for that
+_COUNTED = ("flights", "episodes", "trials", "diagnoses", "decisions")
+_ALIKE = ("algorithm", "law", "task")
 
 
 def _file() -> Path:
@@ -58,7 +60,8 @@ def expected_duration(command: str, plan: Mapping[str, Any]) -> str:
         return "not known: this command has not run on this machine"
     if before == json.loads(json.dumps(dict(plan), default=str)):
         return f"{duration_words(seconds)}, as the same run took here last time"
-    for name in _COUNTED:
+    alike = all(before.get(name) == plan.get(name) for name in _ALIKE)
+    for name in _COUNTED if alike else ():
         then, now = before.get(name), plan.get(name)
         if isinstance(then, int) and isinstance(now, int) and then > 0:
             return (

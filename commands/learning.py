@@ -192,7 +192,14 @@ def _learn(
     given = load_config(
         algorithm, [*(setting or []), *([f"steps={steps}"] if steps else [])], config
     )
-    folder = results_folder(out, algorithm=algorithm, scenario=scenario, seed=seed, config=given)
+    folder = results_folder(
+        out,
+        algorithm=algorithm,
+        scenario=scenario,
+        seed=seed,
+        decisions=given["steps"],
+        config=given,
+    )
     with progress_bar() as progress:
         task = progress.add_task(f"{algorithm}, {scenario}", total=given["steps"])
 

@@ -307,10 +307,9 @@ def run(seeds: int, progress: Progress) -> Result:
         comparison,
         [
             "The paper says that the filter extends to further sensors and to mass and inertia, "
-            "and shows neither. A gyro pays "
-            "for the torque and an accelerometer for the force, where the pose is noisy; with "
-            "both, the attitude need not "
-            "be measured at all for the two horizontal axes.",
+            "and shows neither. Where the pose is noisy, a gyro improves the torque and an "
+            "accelerometer the force. With both, the attitude need not be measured at all for the "
+            "two horizontal axes.",
             "At hover an unknown mass and a vertical force are the same: the split is decided by "
             "the tuning, not by the data. "
             "A flight with vertical acceleration tells them apart.",

@@ -235,11 +235,10 @@ def _remarks(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
         "is right to follow "
         f"it, so that part measures the vehicle rather than the filter. Without it "
         f"{calm[0] * 1e3:.1f} mN and "
-        f"{calm[1] * 1e3:.2f} mNm are left. It does not average out over the flights either: the "
-        f"means are off their targets "
-        f"by up to {plain[0] * 1e3:.1f} mN and {plain[1] * 1e3:.2f} mNm, but off the mass plus the "
-        f"mean of the actuator noise "
-        f"that really acted by up to {rest[0] * 1e3:.1f} mN and {rest[1] * 1e3:.2f} mNm.",
+        f"{calm[1] * 1e3:.2f} mNm are left. It does not average out over the flights either. The "
+        f"means are off their targets by up to {plain[0] * 1e3:.1f} mN and {plain[1] * 1e3:.2f} "
+        "mNm. Where the mean of the actuator noise that acted is added to the target, they are off "
+        f"by up to {rest[0] * 1e3:.1f} mN and {rest[1] * 1e3:.2f} mNm.",
         "The pair of rotors is a choice: here the mass hangs under rotors 1 and 4 (front), 0.129 m "
         "ahead of the centre, the "
         "arm that the targets imply. The torque is the one about the vehicle's level left axis, "

@@ -316,8 +316,8 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
         "of 95 %. Truth is all of the external wrench, unmodelled disturbance included; transient: "
         "7 to 9.5 s, steady: from "
         "11 s. The standard plant has an unmodelled actuator disturbance (0.03 N, 0.01 Nm, over "
-        "0.3 s), the exact one has "
-        "none; both have motor lag (with the true rate logged) and 8-bit rotor speeds.",
+        "0.3 s); the exact one has none. Both have motor lag (with the true rate logged) and 8-bit "
+        "rotor speeds.",
         "The paper's comparison, an observer tuned for low noise and then given the high: the "
         "steady-state error is "
         f"{_span(ratios, low, 'high', steady, 'exact')} times that of the filter on the exact "
@@ -354,9 +354,9 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
         f"transform gains nothing here.",
         "The optimiser (Nelder and Mead over logarithms) had flights of its own for each plant and "
         "noise level and minimised "
-        "the sum of all four errors, force as a share of 0.52 N and torque of 0.067 Nm. It knows "
-        "size and time scale of what "
-        "is to come: both re-tuned estimators are better than one can tune without that. The "
+        "the sum of all four errors, force as a share of 0.52 N and torque of 0.067 Nm. So it "
+        "knows size and time scale of the steps, and both re-tuned estimators are better than "
+        "one can tune without that. The "
         "flights were steered by the "
         "1 s filter, the same samples for all.",
     ]
@@ -367,10 +367,9 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
             f"model and the same noises comes to "
             f"{_span(ratios, public, 'low', (*transient, *steady))} at low and "
             f"{_span(ratios, public, 'high', (*transient, *steady))} at high noise: as accurate. "
-            f"It was helped twice: the "
-            "measured quaternion's sign is chosen to fit its estimate (its innovation is a plain "
-            "difference), and crazyflow's "
-            "model, which stumbles over one command for many sigma points, is given one for each."
+            "Two things were adapted for it. The measured quaternion's sign is chosen to fit its "
+            "estimate, since its innovation is a plain difference. And crazyflow's model, which "
+            "fails with one command for many sigma points, is given one for each."
         )
     else:
         remarks.append(

@@ -271,15 +271,13 @@ def run(seeds: int, progress: Progress) -> Result:
             f"the way and {SETTLE:g} s to settle; the vehicle faces the fan. The position loop's "
             f"integral holds it against "
             f"the jet to {figures['hover_offset_rms_m']:.3f} m.",
-            "The truth is the plant's whole external wrench: the jet with its gusts on the "
-            "tilting, drifting vehicle, and the "
-            "unmodelled actuator disturbance (0.03 N and 0.01 Nm over 0.3 s), which the filter "
-            "cannot tell from the wind. "
+            "The truth is the plant's whole external wrench. It has two parts: the jet with its "
+            "gusts on the tilting, drifting vehicle, and the unmodelled actuator disturbance (0.03 "
+            "N and 0.01 Nm over 0.3 s). The filter cannot tell the second from wind. "
             f"Against the jet's part alone the correlation is "
             f"{figures['correlation_force_x_with_jet_alone']:.3f} for f_x and "
-            f"{figures['correlation_torque_z_with_jet_alone']:.3f} for tau_z: the error of the map "
-            f"as a map of the fan, most "
-            "of it that disturbance, averaged over only 5 s.",
+            f"{figures['correlation_torque_z_with_jet_alone']:.3f} for tau_z. That is the error of "
+            "the map as a map of the fan. Most of it is that disturbance, averaged over only 5 s.",
             f"The jet counts as present where its mean force exceeds {JET_FORCE:g} N: "
             f"{int(inside.sum())} of the "
             f"{len(points)} points. Correlations are over the 5 s means of every point and flight; "

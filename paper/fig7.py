@@ -416,13 +416,11 @@ def _remarks(
         f"k tau_z is at most k times that on average, and at most {MAX_COMMAND:g} m/s, the largest "
         f"command. A faster fan runs "
         "away from any vehicle that flies by this control law.",
-        f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, {START:g} s "
-        f"of which the fan takes to "
-        f"gather speed, in at least {HELD_SHARE:.0%} of {seeds} paired seeds. A vehicle that is "
-        f"held lies on the torque's "
-        f"rising flank, inside {at:.2f} m; noise may carry it over the top and back, but at "
-        f"{HELD_OFFSET:g} m the torque is "
-        f"down to a fifth and few return. Speeds are found by halving, to {step:.0%} of the bound.",
+        f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, in at least "
+        f"{HELD_SHARE:.0%} of {seeds} paired seeds. The fan takes {START:g} s to reach its speed. "
+        f"A vehicle that is held stays where the torque grows with the offset, inside {at:.2f} m. "
+        f"Noise may carry it beyond and back, but at {HELD_OFFSET:g} m the torque is down to a "
+        f"fifth and few return. Speeds are found by halving, to {step:.0%} of the bound.",
         f"Which seeds are flown matters: each speed held in the standard air is the mean of "
         f"{REPEATS} searches with {seeds} seeds of their own, with Student's interval of 95 % in "
         f"brackets. Single searches at the same gain and rise time differ by up to "

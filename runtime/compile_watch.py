@@ -92,9 +92,10 @@ class CompileWatch:
 
     def _words(self, name: str, seconds: float) -> str:
         if self._told:
-            return f"compiling: {seconds:.0f} s, now {name.strip('_')}"
+            # in a terminal this takes the other's place at once: it says "once", too
+            return f"compiling, once: {seconds:.0f} s, now {name.strip('_')}"
         self._told = True
-        return "compiling its inner loops, once for this installation; later starts load them"
+        return "compiling, once for this installation; later starts load it"
 
 
 watch = CompileWatch(Lines())

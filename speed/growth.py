@@ -104,7 +104,7 @@ def over_vehicles(
         ["vehicles", "us a filter's step", "us an environment's tick"],
         rows,
         "Time for each vehicle: flat where cost is linear in their number. From 64 filters on, the "
-        "dearest batch "
+        "most expensive batch "
         f"costs {max(middle) / min(middle):.2f} times the cheapest, a vehicle.",
     )
 

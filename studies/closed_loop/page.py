@@ -97,9 +97,8 @@ def conclusions(results: Sequence[Result]) -> list[str]:
         if r["request"]["effect"] == "com_offset":
             text += (
                 " The filter now gives the torque about the true centre of mass, where the jet's "
-                "force has an arm; the "
-                "admittance controller steers to where that torque vanishes, "
-                "and that is no longer the "
+                "force has an arm. The "
+                "admittance controller steers to where that torque vanishes, which is not the "
                 "axis. A better estimate "
                 "is not a better command here, because the controller reads torque as offset."
             )

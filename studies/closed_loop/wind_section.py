@@ -60,12 +60,16 @@ def wind_section(folder: Path, where: str) -> list[str]:
         ),
         "",
         "It flies the settings below on what the diagnosis found (further down). "
-        "In the tasks in the wind the flight loop uses the model that its vehicle "
-        "declares: the wrench of the effects at the reference is taken off what the rotors have "
-        "to make, commands go through the inverse of what the rotors deliver (a lag is led, as if "
-        "the command were held for 20 ms), mass, inertia and centre of mass are the model's, and "
-        "what changes the pose is taken out before. The wrench that is left is estimated as "
-        "before.",
+        "In the tasks in the wind the flight loop uses the model that its vehicle declares:",
+        "",
+        "* the wrench of the declared effects at the reference is subtracted from what the rotors "
+        "have to make;",
+        "* commands go through the inverse of what the rotors deliver, and a motor lag is "
+        "compensated by a lead, as if the command were held for 20 ms;",
+        "* mass, inertia and centre of mass are the model's;",
+        "* sensing effects are removed from the pose first.",
+        "",
+        "The external wrench that is left is estimated as without these effects.",
         "",
         f"Before: the effect is not declared. After: as diagnosed. Exact: its true coefficients. "
         f"RMSE of the position in m, mean of {request['episodes']} paired episodes; x: mean after "
@@ -76,13 +80,13 @@ def wind_section(folder: Path, where: str) -> list[str]:
         "",
         *[f"* {_in_words(setting, result)}" for setting, result in found],
         "",
-        "Motor lag gains least: with the lag led or not, an attitude loop of these gains is not "
-        "limited by it. A surplus (battery sag: a full battery delivers 5 % more than declared) "
-        "and drag damp an undeclared vehicle's errors in `pid-force`; taking them out costs what "
-        "they gave. What is left with the exact model is the actuators' unmodelled disturbance "
+        "Motor lag gains least: an attitude loop of these gains is not limited by it. A surplus of "
+        "thrust (battery sag: a full battery delivers 5 % more than declared) and drag damp an "
+        "undeclared vehicle's errors in `pid-force`. With the effect declared, this damping is "
+        "lost. What is left with the exact model is the actuators' unmodelled disturbance "
         "(0.01 Nm, 0.03 N) and, in `base`, the wind: no model of an effect lowers that. The quick "
-        "attitude loop was added after the first results were seen, since it lowers that floor: "
-        "its attitude gains are 440 and 36 in place of 110 and 18, before and after alike.",
+        "attitude loop lowers that floor, and was added after the first results were seen. Its "
+        "attitude gains are 440 and 36 in place of 110 and 18, before and after alike.",
         "",
         f"![Tracking before and after, each effect]({where}/{_PICTURE}.png)",
         "",
@@ -142,8 +146,8 @@ def _in_words(setting: Setting, result: Mapping[str, Any]) -> str:
     return (
         f"**{setting.title}**: {parts[0]}. {parts[1][0].upper()}{parts[1][1:]}. The better of `l1` "
         f"and `indi`, without the effect, has a smaller mean than the flight loop alone with the "
-        f"amended model on {len(beats)}, than `pid-force` with it on {len(both)} of "
-        f"{len(result['effects'])}. Lost episodes: {lost}."
+        f"amended model on {len(beats)} of {len(result['effects'])} effects, and than `pid-force` "
+        f"with it on {len(both)}. Lost episodes: {lost}."
     )
 
 

@@ -152,10 +152,11 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         "",
         "## Rise time at equal spread",
         "",
-        f"A step of {0.72:.2f} N and 30 mNm. Stated is the time in which the mean estimate of "
-        f"{result['runs']} flights rises from 10 to 90 %, with its 95 % interval (bootstrap over "
-        "flights, 1,000 times), for the tuning whose scatter at rest is as stated. The rotors' "
-        "true noise is a tenth of the default tuning's; the filter is told the one or the other.",
+        f"A step of {0.72:.2f} N and 30 mNm. The rise time is that of the mean estimate of "
+        f"{result['runs']} flights, from 10 to 90 %, with its 95 % interval (bootstrap over "
+        "flights, 1,000 times). Each column has the tuning whose scatter at rest it states. The "
+        "rotors' true noise is a tenth of the default tuning's; the filter is told the one or the "
+        "other.",
         "",
         *_at_equal_spread(sweep),
         f"![Rise time against spread]({picture.relative_to(page.parent).as_posix()})",
@@ -218,5 +219,5 @@ def _observed(rows: Sequence[Mapping[str, Any]]) -> str:
         if row["after_s"] == last and "known" not in row["measured"]
     ]
     return (
-        f"after {last:g} s at hover the standard deviation of its bias is " + ", ".join(said) + "."
+        f"After {last:g} s at hover the standard deviation of its bias is " + ", ".join(said) + "."
     )

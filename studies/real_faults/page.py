@@ -33,8 +33,8 @@ def write_page(result: Result, data: Path, page: Path) -> None:
         ),
         "",
         "A weak or cut propeller, a weight under an arm, a motor that fails in flight: how often "
-        "this kit finds them, on measured flights of others where the truth is known, and on "
-        "simulated ones. What it misses comes first.",
+        "does this kit find them? It is tried on public measured flights whose truth is known, and "
+        "on simulated ones. What it misses comes first.",
         "",
         *_comparisons(result),
         *_searches(result),

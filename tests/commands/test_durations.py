@@ -26,6 +26,12 @@ def test_a_run_tells_of_the_same_and_of_larger_ones():
 
 
 def test_another_plan_that_cannot_be_compared_is_not_scaled():
+    keep_duration("train", {"algorithm": "sac", "decisions": 1000}, 30.0)
+    longer = {"algorithm": "sac", "decisions": 50_000}
+    assert expected_duration("train", longer) == (
+        "about 25 minutes, by the last run here: 1000 decisions in 30 s"
+    )
+    assert expected_duration("train", longer | {"algorithm": "ppo"}).startswith("not known")
     keep_duration("train", {"config": {"steps": 5}}, 600.0)
     assert expected_duration("train", {"config": {"steps": 9}}) == (
         "not known; the last run here, of another plan, took 10 minutes"
