@@ -1,0 +1,143 @@
+"""``python -m studies.motor_lag LOG:FROM-TO ...``: the lag of motors behind their commands by
+thrust alone, under four models, to say what a published lag rests on.
+
+The lag is that of a first-order system. It acts on the commands, behind which the thrust is a
+polynomial (as ``windwrench identify`` has it), or on the thrust that the commands ask for. Beside
+it there is a time offset between commands and accelerometer, or none. Nothing is weighted: least
+squares of the specific force along body z.
+"""
+
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.signal import lfilter
+from scipy.stats import t as student
+
+from windwrench.commands.identifying import parse_window
+from windwrench.identification.logs.reading import read_log
+from windwrench.runtime.errors import InputError
+from windwrench.studies.page_tables import table
+
+Array = NDArray[np.float64]
+
+WARM_UP = 1.0  # s before the window, by which the filter forgets where it began
+BLOCK = 5.0  # s: errors further apart are taken as independent
+POWERS = 3  # of the command in thrust: u^0, u^1, u^2
+START = (0.06, 0.01)  # s, lag and offset
+MODELS = {
+    (on, beside): f"lag on {on}, {'a time offset' if beside else 'no time offset'}"
+    for on in ("commands", "thrust")
+    for beside in (False, True)
+}
+
+
+def lagged(x: Array, lag: float, period: float) -> Array:
+    """Return ``x`` (n, ...) behind a first-order lag in s, at rest before the first sample."""
+    keep = np.exp(-period / lag)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], x, axis=0, zi=keep * x[:1])[0])
+
+
+def thrust_columns(command: Array, lag: float, offset: float, period: float, on: str) -> Array:
+    """Return (n, 3): the sums over rotors of the command's powers, late by lag and offset (s).
+
+    Args:
+        command: (n, 4), 0 to 1.
+        lag: s.
+        offset: s.
+        period: s.
+        on: ``commands``, or ``thrust``: the powers lag, not what they are powers of.
+    """
+    steps = np.arange(len(command))
+    late = np.stack([np.interp(steps - offset / period, steps, one) for one in command.T], axis=1)
+    if on == "commands":
+        late = lagged(late, lag, period)
+    powers = np.stack([(late**j).sum(axis=1) for j in range(POWERS)], axis=1)
+    return lagged(powers, lag, period) if on == "thrust" else powers
+
+
+def fitted(command: Array, force: Array, period: float, on: str, beside: bool) -> list[Array]:
+    """Return lag and offset in s, their 95 % half widths, and what is left (rms, m/s2).
+
+    Half widths are those of a jackknife over blocks of 5 s, at Student's factor for their count.
+
+    Args:
+        command: (n, 4), 0 to 1, from ``WARM_UP`` s before what is fitted.
+        force: (n,) specific force along body z, m/s2.
+        period: s.
+        on: what lags, ``commands`` or ``thrust``.
+        beside: fit a time offset, too.
+    """
+    first = round(WARM_UP / period)
+    y = force[first:]
+    block = (np.arange(len(y)) * period / BLOCK).astype(int)
+    count = max(int(len(y) * period / BLOCK), 2)
+
+    def left(parameters: Array, use: Array) -> float:
+        lag, offset = np.exp(parameters[0]), parameters[1] if beside else 0.0
+        x = thrust_columns(command, float(lag), float(offset), period, on)[first:][use]
+        best = np.linalg.lstsq(x, y[use], rcond=None)[0]
+        return float(np.mean(np.square(y[use] - x @ best)))
+
+    def fit(use: Array, start: Array) -> Array:
+        found = minimize(
+            left, start, (use,), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-7}
+        )
+        return np.asarray(found.x)
+
+    everything = np.ones(len(y), dtype=bool)
+    best = fit(everything, np.array([np.log(START[0]), START[1]] if beside else [np.log(START[0])]))
+
+    def told(parameters: Array) -> Array:
+        return np.array([np.exp(parameters[0]), parameters[1] if beside else 0.0])
+
+    without = np.array([told(fit(block != b, best)) for b in range(count)])
+    spread = np.sqrt((count - 1) / count * np.square(without - without.mean(axis=0)).sum(axis=0))
+    width = student.ppf(0.975, count - 1) * spread
+    return [told(best), width, np.sqrt(left(best, everything))]
+
+
+def rows(command: Array, force: Array, period: float) -> list[list[str]]:
+    """Return a line of the table for each model; arguments as of ``fitted``."""
+    out = []
+    for (on, beside), name in MODELS.items():
+        (lag, offset), (lag_width, offset_width), left = fitted(command, force, period, on, beside)
+        out.append(
+            [
+                name,
+                f"{1e3 * lag:.0f} ± {1e3 * lag_width:.0f} ms",
+                f"{1e3 * offset:.1f} ± {1e3 * offset_width:.1f} ms" if beside else "none",
+                f"{left:.3f} m/s2",
+            ]
+        )
+    return out
+
+
+def of_log(text: str) -> list[list[str]]:
+    """Return the table's lines of ``LOG:FROM-TO``, in s after the log's start.
+
+    Raises:
+        InputError: the log cannot be read, or its times are not two numbers.
+    """
+    path, (begin, end) = parse_window(text)
+    log = read_log(path)
+    time = log.t - log.t[0]
+    period = float(np.median(np.diff(time)))
+    even = np.arange(max(begin - WARM_UP, 0.0), min(end, float(time[-1])), period)
+    if log.command is None or log.accelerometer is None:
+        raise InputError(f"{path}: expected motor commands and an accelerometer")
+    command = np.stack([np.interp(even, time, one) for one in log.command.T], axis=1)
+    return rows(command, np.interp(even, time, log.accelerometer[:, 2]), period)
+
+
+def main(texts: Sequence[str]) -> None:
+    """Print the table of each log."""
+    for text in texts:
+        head = ("model", "lag, 95 %", "offset, 95 %", "left of the specific force, rms")
+        print(f"{text}\n\n{table(head, of_log(text))}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
