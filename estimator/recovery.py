@@ -465,12 +465,18 @@ def _restart(
 def remember(
     f: Record, position: Array, quaternion: Array, with_position: bool, with_attitude: bool
 ) -> None:
-    """Keep the pose that was believed last, and note that it was now."""
-    seen, gap = f.seen, f.gap
+    """Keep the pose that was believed last, and note that it was now. Refused ones are done with,
+    unless what jumped in them was not measured now: an attitude alone says nothing of a position.
+    """
+    seen, gap, jumps = f.seen, f.gap, f.jumps
     for i in range(3):
         seen[i] = choose(with_position, position[i], seen[i])
     for i in range(4):
         seen[3 + i] = choose(with_attitude, quaternion[i], seen[3 + i])
     gap[0] = choose(with_position, 0.0, gap[0])
     gap[1] = choose(with_attitude, 0.0, gap[1])
-    f.refused = choose(with_position | with_attitude, 0.0, f.refused)
+    away = choose(with_position, 0.0, 0.0)
+    for i in range(6):
+        unmeasured = choose(with_attitude if i < 3 else with_position, 0.0, 1.0) > 0.5
+        away += choose(unmeasured & (abs(jumps[0, i]) > jumps[1, i]), 1.0, 0.0)
+    f.refused = choose((with_position | with_attitude) & (away < 0.5), 0.0, f.refused)

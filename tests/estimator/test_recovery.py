@@ -184,6 +184,33 @@ def test_poses_of_a_blurred_clock_are_not_held_out(late, seed):
     assert 0 < said.count("rejected") <= 1.2 * hit
 
 
+@pytest.mark.parametrize("kind", ["ukf", "ekf", "observer"])
+def test_an_attitude_alone_does_not_end_the_doubt_of_a_position(kind):
+    """The first pose after half a second is off and likely, so it is believed; those that follow
+    have jumped then, until they have lasted. Attitudes without a position come between them.
+    """
+    vehicle, rng, dt = VEHICLES["ardrone2"], np.random.default_rng(0), 0.005
+    estimator = FILTERS[kind](vehicle, period=dt, gate=0.999)
+    estimator.reset([0, 0, 1], [1, 0, 0, 0])
+    speeds, q, said = np.full(4, vehicle.hover_rate), [1, 0, 0, 0], []
+    for k in range(700):
+        position = [0.0, 0.0, 1.0] + 0.001 * rng.standard_normal(3)
+        if 300 <= k < 400:
+            e = estimator.step(speeds, None, None)
+        elif k == 400:
+            e = estimator.step(speeds, position + np.array([0.29, -0.29, 0.29]), q)
+            assert e.status == "tracking"
+        else:
+            e = estimator.step(speeds, None if k % 25 == 0 else position, q)
+        said.append(e.status)
+        if k > 600:
+            assert np.all(np.abs(e.force) < 0.03 * vehicle.weight)
+    assert "rejected" in said[401:425]
+    assert said[425] == "tracking"
+    assert said[426] == "rejected"
+    assert estimator.estimate.restarts == 1
+
+
 def test_a_doubted_wrench_may_be_none_at_all():
     vehicle = VEHICLES["ardrone2"]
     ukf, speeds, q = WrenchUKF(vehicle), hover(vehicle), [1.0, 0.0, 0.0, 0.0]
