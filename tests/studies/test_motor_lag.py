@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.studies.motor_lag import fitted, lagged
+from windwrench.studies.motor_lag.study import fitted, lagged
 
 PERIOD, LAG, OFFSET = 0.005, 0.07, 0.012
 

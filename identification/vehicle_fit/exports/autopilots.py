@@ -41,7 +41,7 @@ def autopilot_of(found: Identified) -> Autopilot:
     quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]  # along x and y
     momentum = ballistic = None
     if max(*linear, *quadratic) > 0.0:
-        momentum = float(max(np.mean(linear), 0.0))
+        momentum = max(float(np.mean(linear)), 0.0)
         x, y = (
             0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else NO_BLUFF_BODY for c in quadratic
         )

@@ -17,6 +17,7 @@ from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.logs.readers import crazyflie_sd
 from windwrench.identification.logs.readers.nanobench import motor_thrust
 from windwrench.identification.logs.reading import read_log
+from windwrench.identification.report.log_check import check_log
 from windwrench.runtime.file_limits import LIMITS
 
 T = 30.0 + 0.002 * np.arange(1000)
@@ -111,6 +112,13 @@ def test_set_points_become_rotor_speeds_by_a_curve(write):
     log = read_log(path, None, replace(vehicle, motor_curve=curve))
     wanted = 0.2 * (OURS / 65535) ** 2
     np.testing.assert_allclose(vehicle.k * log.rotor_speeds[5] ** 2, wanted, rtol=1e-9)
+
+
+def test_a_check_judges_the_log_as_a_diagnosis_reads_it(write):
+    """The log names its vehicle, and with it commands become rotor speeds."""
+    found = check_log(write(sd_card({"imu": (T, fast(T))})))
+    assert found.log.has_rotor_speeds
+    assert not any("motor_curve" in text for text in found.doubts)
 
 
 def test_measured_rotor_speeds_come_first(write):

@@ -1,5 +1,4 @@
-"""``python -m studies.motor_lag LOG:FROM-TO ...``: the lag of motors behind their commands by
-thrust alone, under four models, to say what a published lag rests on.
+"""The lag of motors behind their commands by thrust alone, under four models.
 
 The lag is that of a first-order system. It acts on the commands, behind which the thrust is a
 polynomial (as ``windwrench identify`` has it), or on the thrust that the commands ask for. Beside
@@ -7,8 +6,7 @@ it there is a time offset between commands and accelerometer, or none. Nothing i
 squares of the specific force along body z.
 """
 
-import sys
-from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +14,8 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
-from windwrench.commands.identifying import parse_window
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.errors import InputError
-from windwrench.studies.page_tables import table
 
 Array = NDArray[np.float64]
 
@@ -115,13 +111,12 @@ def rows(command: Array, force: Array, period: float) -> list[list[str]]:
     return out
 
 
-def of_log(text: str) -> list[list[str]]:
-    """Return the table's lines of ``LOG:FROM-TO``, in s after the log's start.
+def of_log(path: Path, begin: float, end: float) -> list[list[str]]:
+    """Return the table's lines of a part of a log, in s after its start.
 
     Raises:
-        InputError: the log cannot be read, or its times are not two numbers.
+        InputError: the log cannot be read, or lacks motor commands or an accelerometer.
     """
-    path, (begin, end) = parse_window(text)
     log = read_log(path)
     time = log.t - log.t[0]
     period = float(np.median(np.diff(time)))
@@ -130,14 +125,3 @@ def of_log(text: str) -> list[list[str]]:
         raise InputError(f"{path}: expected motor commands and an accelerometer")
     command = np.stack([np.interp(even, time, one) for one in log.command.T], axis=1)
     return rows(command, np.interp(even, time, log.accelerometer[:, 2]), period)
-
-
-def main(texts: Sequence[str]) -> None:
-    """Print the table of each log."""
-    for text in texts:
-        head = ("model", "lag, 95 %", "offset, 95 %", "left of the specific force, rms")
-        print(f"{text}\n\n{table(head, of_log(text))}\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -1,0 +1,1 @@
+"""What lag of the motors a log shows by thrust alone, and what it rests on."""
