@@ -105,7 +105,8 @@ def wind_section(folder: Path, where: str) -> list[str]:
 
 def _reached(found: Sequence[tuple[Setting, Mapping[str, Any]]]) -> str:
     """Return where what was asked is reached, and where it is missed."""
-    reached, missed = [], []
+    reached: list[str] = []
+    missed: list[str] = []
     for setting, result in found:
         for law in LAWS:
             by = [compare(flown, law) for flown in result["effects"].values()]
