@@ -277,8 +277,9 @@ class _Function:
 
     def power(self, base: str, exponent: ast.expr) -> str:
         """Return a positive number raised to any power, or any number to a small whole one."""
-        if isinstance(exponent, ast.Constant) and exponent.value in (2, 3, 4):
-            return f"({' * '.join([base] * exponent.value)})"
+        given = exponent.value if isinstance(exponent, ast.Constant) else None
+        if isinstance(given, int) and 2 <= given <= 4:
+            return f"({' * '.join([base] * given)})"
         return f"ww_power({base}, {self.expression(exponent)})"
 
     def name_of(self, name: str, integer: bool) -> str:
