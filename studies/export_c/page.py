@@ -21,7 +21,7 @@ def _percent(value: float) -> str:
 
 def _worst(found: Result) -> float:
     """Return the largest difference of any part, in standard deviations."""
-    return max(found[part] for part in PARTS)
+    return max(float(found[part]) for part in PARTS)
 
 
 def _agreement(rows: list[Mapping[str, Any]]) -> list[str]:
