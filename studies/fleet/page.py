@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import linregress, t
 
+from windwrench.identification.fleet.drift import DRIFT
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import made_by
 from windwrench.studies.fleet.flights import EACH, KINDS
@@ -31,7 +32,7 @@ def write_page(result: Mapping[str, Any], folder: Path, page: Path) -> None:
     Raises:
         InputError: the page is not there or lacks the marks.
     """
-    data = page.with_suffix("") / "study.json"
+    data = page.with_suffix("") / "study.json.gz"
     data.parent.mkdir(exist_ok=True)
     write_json(result, data)
     shutil.copyfile(folder / "fleet.png", data.with_name("fleet.png"))
@@ -46,7 +47,7 @@ def write_page(result: Mapping[str, Any], folder: Path, page: Path) -> None:
 
 def _found(result: Mapping[str, Any]) -> str:
     """Return what was told of each kind of individual, losses first."""
-    rows = []
+    rows, missed, short = [], 0, 0
     for kind in KINDS:
         own = [one for one in result["truth"] if one["kind"] == kind]
         right = false = held = tried = 0
@@ -54,6 +55,9 @@ def _found(result: Mapping[str, Any]) -> str:
             told = [trend for trend in one["trends"] if trend["told"]]
             true = [tr for tr in told if [tr["effect"], tr["coefficient"]] == one["drifts"]]
             right += bool(true)
+            if one["drifts"] and not true:
+                missed += 1
+                short += one["diagnosed"] < DRIFT.least_flights
             # other coefficients of an effect that drifts are no false alarm of the effect
             effect = one["drifts"][0] if one["drifts"] else ""
             false += any(tr["effect"] != effect for tr in told)
@@ -93,6 +97,8 @@ def _found(result: Mapping[str, Any]) -> str:
             ),
             rows,
         )
+        + f"\n\nOf the {missed} drifts that were missed {short} are of vehicles with fewer than "
+        f"{DRIFT.least_flights} diagnosed flights, which a trend needs."
         + "\n\n![Coefficients from flight to flight](fleets/fleet.png)"
     )
 
@@ -169,8 +175,15 @@ def _mean(values: Any) -> str:
 
 
 def _refused(refused: Sequence[Mapping[str, Any]]) -> str:
-    rows = [[one["log"], one["reason"].replace("|", "/")] for one in refused]
+    """Return what was refused, the logs of one reason together."""
+    found: dict[str, list[str]] = {}
+    for one in refused:
+        reason = one["reason"].removeprefix(f"{one['log']}: ").replace("|", "/")
+        found.setdefault(reason.partition("; expected")[0], []).append(one["log"])
+    rows = [[str(len(logs)), reason, logs[0]] for reason, logs in found.items()]
+    rows.sort(key=lambda row: -int(row[0]))
     return (
         "### Which logs were refused\n\nOne log of 20 was spoiled on purpose: cut off, one second "
-        "long, a rotor speed that is no number, a column missing.\n\n" + table(("log", "why"), rows)
+        "long, a rotor speed that is no number, a column missing.\n\n"
+        + table(("logs", "why", "one of them"), rows)
     )

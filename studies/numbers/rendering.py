@@ -128,7 +128,7 @@ def _fleets() -> str:
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "fleets.md"
         page.write_bytes((DOCS / "fleets.md").read_bytes())
-        write_page(kept("fleets/study.json"), DOCS / "fleets", page)
+        write_page(kept("fleets/study.json.gz"), DOCS / "fleets", page)
         return page.read_text(encoding="utf-8")
 
 
