@@ -7,7 +7,7 @@ chosen on the fitted blocks of flight; the errors before and after are those of 
 that the fit never saw.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,6 +48,7 @@ from .inference.imu_limits import hidden_by_bias, hidden_causes, with_errors_of_
 from .inference.innovations import Innovations, contradicted_by_innovations
 from .inference.joint_equivalence import pair_doubts
 from .inference.likelihood_refit import (
+    DelayKind,
     delay_alternatives,
     delay_doubts,
     delay_kind,
@@ -166,21 +167,8 @@ def diagnose(
     report("looking for structure in the residual")
     signs, unconfirmed = find_structure(search, fit)
     fit = refitted_by_likelihood(search, fit)
-    name_doubts = [
-        *composite_doubts(flights, fit),
-        *unlisted_equivalent_doubts(search, fit),
-        *pair_doubts(search, fit),
-        *hidden_causes(search, fit),
-    ]
-    if not flights.commanded:
-        name_doubts += implausible_coefficients(search, fit)
-    if flights.filtered and fit.effects:
-        name_doubts.append(FILTERED_NAMES)
-    elif not flights.commanded:
-        name_doubts += [
-            *contradicted_by_innovations(flights, fit.setting),
-            *delay_doubts(search, fit, rotor_delay),
-        ]
+    doubts = _name_doubts(search, fit, rotor_delay)
+    name_doubts = [sentence for sentences in doubts.values() for sentence in sentences]
 
     before, after = (
         flights.residual(biases(fit.setting)),
@@ -242,6 +230,8 @@ def diagnose(
         else ("nothing to explain" if remainder == "none" else "unexplained")
     )
     notes += name_doubts
+    if large and (small := [e.name for e in effects if _is_small(e.evidence["energy_explained"])]):
+        doubts["small beside the residual"] = tuple(small)
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
@@ -293,10 +283,32 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
+        doubts=doubts,
         probabilities=_probabilities(flights, search, effects, remainder, report)
         if probabilities
         else None,
     )
+
+
+def _name_doubts(
+    search: Search, fit: FittedEffects, rotor_delay: DelayKind | None
+) -> dict[str, tuple[str, ...]]:
+    """Return for each check, by its name, the sentences that say why a name may be wrong."""
+    flights = search.flights
+    found: dict[str, Iterable[str]] = {
+        "composite": composite_doubts(flights, fit),
+        "unlisted equivalent": unlisted_equivalent_doubts(search, fit),
+        "pair": pair_doubts(search, fit),
+        "hidden cause": hidden_causes(search, fit),
+    }
+    if not flights.commanded:
+        found["implausible coefficient"] = implausible_coefficients(search, fit)
+    if flights.filtered and fit.effects:
+        found["filtered pose"] = [FILTERED_NAMES]
+    elif not flights.commanded:
+        found["innovations"] = contradicted_by_innovations(flights, fit.setting)
+        found["delay"] = delay_doubts(search, fit, rotor_delay)
+    return {check: sentences for check, words in found.items() if (sentences := tuple(words))}
 
 
 def _probabilities(
@@ -347,6 +359,12 @@ def _rms(wrench: Array) -> tuple[float, float]:
     )
 
 
+def _is_small(share: float) -> bool:
+    """Return whether an effect explains little beside the residual: ``share`` of both together."""
+    least = DIAGNOSIS.least_share_of_residual
+    return share < least / (1.0 + least)
+
+
 def _named(
     search: Search,
     fit: FittedEffects,
@@ -377,7 +395,7 @@ def _named(
         coefficients=values,
         std={k: std[k] for k in values},
         units={k: coefficient((effect, k)).unit for k in values},
-        tentative=structured or (noisy and gain < DIAGNOSIS.least_share_of_residual * error),
+        tentative=structured or (noisy and _is_small(gain / (gain + error))),
         indistinguishable_from=others,
         evidence={
             "energy_explained": gain / (gain + error),

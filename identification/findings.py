@@ -256,6 +256,8 @@ class Diagnosis:
             plain data (``rotor_faults/words.py``); empty where that was not looked for.
         needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
             beside the IMU.
+        doubts: why names are tentative, by the check that says so: sentences, which are notes as
+            well, or names. Beside these, ``structure`` is a doubt of all names.
         probabilities: of what was found; none where they were not asked for, or where rotors or
             pose were not measured as they were.
     """
@@ -285,6 +287,7 @@ class Diagnosis:
     floor_is_bound: bool = False
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
     needs_pose: tuple[str, ...] = ()
+    doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     probabilities: Probabilities | None = None
 
     def __repr__(self) -> str:

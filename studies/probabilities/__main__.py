@@ -31,8 +31,13 @@ _STRIDE, _CATALOGUE = 7, 33
 
 def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> list[Task]:
     """Return the flights of a run: simulator, kind and number each."""
-    out: list[Task] = [("own", _OF_TEN[i % len(_OF_TEN)], first + i) for i in range(own)]
-    for i in range(other):
+    out: list[Task] = []
+    # in turn, so that a run that is stopped has both
+    for i in range(max(own, other)):
+        if i < own:
+            out.append(("own", _OF_TEN[i % len(_OF_TEN)], first + i))
+        if i >= other:
+            continue
         place = i * _STRIDE % _CATALOGUE + _CATALOGUE * (catalogue + i // _CATALOGUE)
         out.append((simulator, "catalogue", place))
         if i % 4 == 0:

@@ -6,6 +6,7 @@ import importlib.util
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -19,10 +20,10 @@ from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.posterior.ranking import rank
+from windwrench.identification.posterior.ranking import Ranking, rank
 from windwrench.runtime.errors import InputError
 from windwrench.studies.trials.outsiders import OUTSIDERS
-from windwrench.studies.trials.practice_flights import practise, shown_in
+from windwrench.studies.trials.practice_flights import of_mass, practise, shown_in
 from windwrench.studies.trials.trials import EQUIVALENTS
 
 KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
@@ -30,6 +31,9 @@ _ATTEMPTS = 4  # at a flight that crashes
 _MOST_SETS = 40  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
 _STRONGEST_GUSTS = 3.0  # times the background's
+_MASSES = (0.1, 2.0)  # kg, between which a vehicle of half the flights lies
+# share of the log's pose noise that the flight loop sees, on half the flights: it has a gyro
+_SEEN_BY_GYRO = 0.1
 _NOISES = ((1e-3, 0.3), (1e-3, 0.3), (0.5e-3, 0.15), (2e-3, 0.5))  # m and degrees, as its own
 _TURBULENCE = (0.015, 3e-4, 0.25)  # N, Nm and s, as its own
 # what the other simulator calls no effect of a library, and this library has
@@ -75,16 +79,41 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
             for e in search.effects
         ],
         "remainder": search.remainder,
+        "doubts": {check: len(words) for check, words in search.doubts.items()},
+        "signs": [[s.test, s.where, float(f"{s.gain:.3g}")] for s in search.structure],
+        "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
+        "floor": [float(f"{x:.3g}") for x in (search.floor_force_rms, search.floor_torque_rms)],
+        "after": [float(f"{x:.3g}") for x in (search.after.force_rms, search.after.torque_rms)],
+        "pushed": len(search.pushes),
+        "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],
         "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
+        "fitted": _fitted(found, [e.name for e in search.effects]),
         "structure": round(found.structure, 3),
+        "varying": round(found.varying, 3),
         "tempering": round(found.tempering, 4),
         "cpu_s": [round(middle - begun, 2), round(ended - middle, 2)],
     }
 
 
+def _fitted(found: Ranking, effects: Sequence[str]) -> dict[str, Any]:
+    """Return coefficients and deviations of effects in the likeliest set that has each."""
+    out = {}
+    for e in effects:
+        best = next((s for s in found.sets if e in s.effects), None)
+        if best is not None:
+            out[e] = {
+                k: [float(f"{x:.6g}"), float(f"{best.std[e].get(k, 0.0):.6g}")]
+                for k, x in best.coefficients[e].items()
+            }
+    return out
+
+
 def _own(kind: str, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
     rng = np.random.default_rng((number, len(kind)))
     vehicle = load_vehicle("ardrone2")
+    if rng.random() < 0.5:
+        vehicle = of_mass(vehicle, float(np.exp(rng.uniform(*np.log(_MASSES)))))
+    seen = _SEEN_BY_GYRO if rng.random() < 0.5 else 1.0
     gust_time = float(np.exp(rng.uniform(*np.log(_GUST_TIMES))))
     turbulence = float(rng.uniform(0.0, _STRONGEST_GUSTS))
     what = {"third": "effect", "single": "effect", "left out": "effect"}.get(kind, kind)
@@ -103,11 +132,13 @@ def _own(kind: str, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], st
                 60.0,
                 turbulence,
                 gust_time=gust_time,
+                seen=seen,
             )
         except InputError:
             continue
         truth = {e.name: dict(e.coefficients) for e in p.effects}
-        flown = f"{p.trajectory}, gusts of {turbulence:.1f} and {gust_time:.2f} s"
+        flown = f"{p.trajectory}, gusts of {turbulence:.1f} and {gust_time:.2f} s, "
+        flown += f"{vehicle.mass:.3g} kg, {'gyro' if seen < 1.0 else 'pose'} in the loop"
         return p.log, p.vehicle, truth, p.outsider or "", flown
     raise InputError(f"no flight loop flies {kind} {number}")
 

@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.envs.recording import TRAJECTORIES, background, draw_trajectory, record_flight
+from windwrench.identification.inference.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
 from windwrench.studies.trials.outsiders import OUTSIDERS, outside_disturbance
@@ -69,6 +71,7 @@ _SHOWN: Mapping[str, tuple[str, ...]] = {
     "sloshing": ("excite", "fast"),
     "tether": ("excite", "gentle"),
 }
+_TYPICAL_MASSES = (0.465, 0.027)  # kg, of the vehicles that the library's typical sizes are of
 # coefficients that say where and of what kind a thing is, not how strong
 _NOT_SIZES: Mapping[str, tuple[str, ...]] = {
     "fan_jet": ("x", "y", "z", "heading", "kd", "area"),
@@ -143,6 +146,7 @@ def fly_practice(
     outsider_size: float = 1.0,
     imu: bool = False,
     gust_time: float | None = None,
+    seen: float = 1.0,
 ) -> FlightLog:
     """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
     with the true wrench.
@@ -159,11 +163,14 @@ def fly_practice(
         outsider_size: factor on the disturbance.
         imu: whether the log has gyro and accelerometer, true to the last digit.
         gust_time: s, correlation time of the turbulence; default: the plant's.
+        seen: share of the log's noise that the flight loop's own pose has. A loop that reads a gyro
+            sees more than a log of poses holds: with a small share it answers a gust before the
+            log shows it.
 
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
     """
-    for what, value in (("turbulence", turbulence), ("sensor", sensor)):
+    for what, value in (("turbulence", turbulence), ("sensor", sensor), ("seen", seen)):
         if not 0.0 <= value < np.inf:
             raise InputError(
                 f"fly_practice: {what} must be a finite number of at least 0, got {value}"
@@ -173,8 +180,8 @@ def fly_practice(
         vehicle,
         mocap=replace(
             noise,
-            sigma_pos_m=sensor * noise.sigma_pos_m,
-            sigma_att_rad=sensor * noise.sigma_att_rad,
+            sigma_pos_m=sensor * seen * noise.sigma_pos_m,
+            sigma_att_rad=sensor * seen * noise.sigma_att_rad,
         ),
     )
     if sensor == 0.0:
@@ -192,10 +199,18 @@ def fly_practice(
         )
     c = record_flight(flown, effects, trajectory, seconds, seed, settings, disturbance, imu=imu)
     added = "+".join([*(e.name for e in effects), *([outsider] if outsider else [])]) or "nothing"
+    position, quaternion = c["position"], c["quaternion"]
+    if seen < 1.0:  # what the log's pose has more
+        rng = np.random.default_rng((seed, 2))
+        more = sensor * np.sqrt(1.0 - seen**2) * rng.standard_normal((len(position), 6))
+        position = position + noise.sigma_pos_m * more[:, :3]
+        turned = Rotation.from_rotvec(noise.sigma_att_rad * more[:, 3:])
+        true = Rotation.from_quat(quaternion, scalar_first=True)
+        quaternion = (turned * true).as_quat(canonical=True, scalar_first=True)
     return FlightLog(
         c["t"],
-        c["position"],
-        c["quaternion"],
+        position,
+        quaternion,
         c["rotor_speeds"],
         c.get("voltage"),
         c["force"],
@@ -204,6 +219,28 @@ def fly_practice(
         gyro=c.get("gyro"),
         name=f"{added}_{trajectory}_{seed}",
         source="flown in MuJoCo by fly_practice",
+    )
+
+
+def of_mass(vehicle: Vehicle, mass: float) -> Vehicle:
+    """Return a vehicle of another mass (kg) and the same density, whose rotor tips are as fast.
+
+    Lengths go with the third root of mass, inertia with its power of 5/3, rotor speeds with the
+    inverse of length.
+    """
+    length = (mass / vehicle.mass) ** (1.0 / 3.0)
+    return replace(
+        vehicle,
+        mass=mass,
+        inertia=vehicle.inertia * length**5,
+        arm_l=vehicle.arm_l * length,
+        rotor_positions=vehicle.positions * length,
+        rotor_radius=vehicle.rotor_radius * length,
+        # a weight of length^3 at a rotor speed of 1/length; torque has an arm of a length more
+        k=vehicle.k * length**5,
+        p=vehicle.p * length**6,
+        omega_lsb=vehicle.omega_lsb / length,
+        omega_max=vehicle.omega_max / length,
     )
 
 
@@ -225,8 +262,15 @@ def draw_effect(name: str, vehicle: Vehicle, size: str, rng: np.random.Generator
     """
     if size not in SIZES:
         raise unknown_name("size", size, SIZES)
+    # the library's own vehicles have its typical sizes, others what lies between
     column = 1 if vehicle.mass < 0.1 else 0
-    coefficients = {c.name: c.typical[column] for c in get(name).coefficients}
+    like = replace(vehicle, mass=_TYPICAL_MASSES[column])
+    coefficients = {
+        c.name: c.typical[column]
+        * typical_size((name, c.name), vehicle)
+        / typical_size((name, c.name), like)
+        for c in get(name).coefficients
+    }
     if name == "rotor_efficiency":
         # one weak rotor, any of the four
         weak = rng.permutation(4)
@@ -256,6 +300,7 @@ def practise(
     turbulence: float | None = None,
     imu: bool = False,
     gust_time: float | None = None,
+    seen: float = 1.0,
 ) -> Practice:
     """Fly one practice flight.
 
@@ -271,6 +316,7 @@ def practise(
         turbulence: factor on the background; default: 0 or 1 at random.
         imu: as of ``fly_practice``.
         gust_time: as of ``fly_practice``.
+        seen: as of ``fly_practice``.
 
     Raises:
         InputError: an unknown name, or a crash.
@@ -312,6 +358,7 @@ def practise(
         SIZES[size],
         imu,
         gust_time,
+        seen,
     )
     name = "_".join((kind, *added, size, trajectory, str(seed)))
     return Practice(
