@@ -20,6 +20,7 @@ from windwrench.studies.trials.practice_flights import (
     SIZES,
     draw_effect,
     fly_practice,
+    of_mass,
     practice_set,
     practise,
 )
@@ -348,3 +349,43 @@ def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
     rotorpy_flights._parameters.cache_clear()
     with pytest.raises(InputError, match="pip install rotorpy"):
         rotorpy_flight("hover", 1.0)
+
+
+@pytest.mark.parametrize("mass", [0.1, 2.0])
+def test_a_vehicle_of_another_mass_hovers_with_rotor_tips_as_fast(mass):
+    like = load_vehicle("ardrone2")
+    vehicle = of_mass(like, mass)
+    tips = [v.hover_rate * v.rotor_radius for v in (like, vehicle)]
+    assert tips[1] == pytest.approx(tips[0])
+    # the density is the same, and so is the shape
+    assert vehicle.mass / vehicle.arm_l**3 == pytest.approx(like.mass / like.arm_l**3)
+    assert is_a_body(vehicle.inertia)
+    log = fly_practice(vehicle, seconds=4.0)
+    assert np.linalg.norm(log.force[:, :2], axis=1).max() < vehicle.weight / 10.0
+
+
+def test_effects_of_the_library_s_own_vehicles_have_its_typical_sizes():
+    for name, column in (("ardrone2", 0), ("crazyflie", 1)):
+        effect = draw_effect("rotor_drag", load_vehicle(name), "typical", np.random.default_rng(0))
+        typical = {c.name: c.typical[column] for c in get("rotor_drag").coefficients}
+        ratio = effect.coefficients["kdx"] / typical["kdx"]
+        assert 0.8 <= ratio <= 1.25
+    between = of_mass(load_vehicle("ardrone2"), 0.12)
+    large, small = next(c.typical for c in get("com_offset").coefficients if c.name == "cx")
+    drawn = draw_effect("com_offset", between, "typical", np.random.default_rng(0)).coefficients
+    assert 1.25 * small < abs(drawn["cx"]) < 0.8 * large
+
+
+def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
+    vehicle = replace(load_vehicle("ardrone2"), omega_lsb=0.0)
+    logs = [
+        fly_practice(vehicle, trajectory="hover", seconds=10.0, turbulence=0.0, seen=seen)
+        for seen in (1.0, 0.1)
+    ]
+    for log in logs:
+        jumps = np.diff(log.position, n=4, axis=0)
+        sigma = jumps.std() / np.sqrt(70.0)  # fourth differences of white noise
+        assert sigma == pytest.approx(vehicle.mocap.sigma_pos_m, rel=0.1)
+    # the rotors do not answer what the loop does not see
+    restless = [np.diff(log.rotor_speeds, axis=0).std() for log in logs]
+    assert restless[1] < 0.5 * restless[0]
