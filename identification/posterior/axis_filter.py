@@ -27,6 +27,7 @@ class AxisSettings:
     first_time: float = 0.4  # s, correlation time at which a search begins
     # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
     times: tuple[float, float] = (0.03, 3.0)
+    ridge: float = 1e-9  # relative, of gains that do the same
 
 
 AXIS = AxisSettings()
@@ -83,25 +84,51 @@ def steady(strength: float, time: float, white: float, period: float, gain: Arra
 
 
 @compiled_for_vectors
-def _sum_of_squares(
-    measured: Array, drive: Array, rate: float, keep: float, period: float, gain: Array, skip: int
-) -> float:
-    """Return the sum of squared innovations of one axis from sample ``skip`` on."""
-    x, v, d = measured[0], rate, 0.0
+def _products(
+    measured: Array,
+    drive: Array,
+    rate: float,
+    jumps: Array,
+    jump_state: np.ndarray,
+    keep: float,
+    period: float,
+    gain: Array,
+    skip: int,
+    out: Array,
+) -> None:
+    """Add to ``out`` (c + 1, c + 1) the products of what ``jumps`` (n, c) change in the predictions
+    of one axis' pose, and of its innovations (last), from sample ``skip`` on.
+
+    ``jump_state`` (c,) says which state a unit of each adds to before the pose of sample k is read:
+    0 the pose, 1 its rate, 2 the disturbance.
+    """
+    c = jumps.shape[1]
+    state, row = np.zeros((3, c + 1)), np.empty(c + 1)
+    state[0, c], state[1, c] = measured[0], rate
     half = 0.5 * period * period
-    total = 0.0
     for k in range(1, len(measured)):
-        a = drive[k - 1] + d
-        x += period * v + half * a
-        v += period * a
-        d *= keep
-        e = measured[k] - x
-        x += gain[0] * e
-        v += gain[1] * e
-        d += gain[2] * e
+        a = drive[k - 1]
+        for j in range(c + 1):
+            g = state[2, j] + (a if j == c else 0.0)
+            state[0, j] += period * state[1, j] + half * g
+            state[1, j] += period * g
+            state[2, j] *= keep
+        for j in range(c):
+            state[jump_state[j], j] += jumps[k, j]
+        for j in range(c):
+            row[j] = state[0, j]
+        row[c] = measured[k] - state[0, c]
+        for j in range(c):
+            state[0, j] -= gain[0] * row[j]
+            state[1, j] -= gain[1] * row[j]
+            state[2, j] -= gain[2] * row[j]
+        state[0, c] += gain[0] * row[c]
+        state[1, c] += gain[1] * row[c]
+        state[2, c] += gain[2] * row[c]
         if k >= skip:
-            total += e * e
-    return total
+            for i in range(c + 1):
+                for j in range(c + 1):
+                    out[i, j] += row[i] * row[j]
 
 
 def likeliest_noise(
@@ -112,8 +139,11 @@ def likeliest_noise(
     white: float,
     pose: float,
     disturbance: float,
-) -> AxisNoise:
-    """Return the noise of one axis at maximum likelihood.
+    jumps: Sequence[Array],
+    jump_state: NDArray[np.intp],
+) -> tuple[AxisNoise, Array]:
+    """Return the noise of one axis at maximum likelihood, and the gains (c,) of the jumps beside
+    it.
 
     Args:
         measured: pose of each piece (n,), m or rad.
@@ -123,23 +153,28 @@ def likeliest_noise(
         white: standard deviation of the white acceleration that is known: the rotors' rounding.
         pose: standard deviation of the pose at which the search begins.
         disturbance: that of the disturbance.
+        jumps: (n, c) of each piece, what a unit of each gain adds to the state before the pose of
+            sample k is read. What else is known of a disturbance leaves less of it to the pose.
+        jump_state: (c,) the state: 0 the pose, 1 its rate, 2 the disturbance.
     """
     skip = round(AXIS.settling_time / period)
     count = max(sum(len(x) - skip for x in measured), 1)
     gain = np.empty(3)
 
-    def sums(strength: float, time: float, shaken: float) -> float:
+    def sums(strength: float, time: float, shaken: float) -> tuple[float, Array]:
         steady(strength, time, shaken, period, gain)
         keep = math.exp(-period / time)
-        return sum(
-            _sum_of_squares(y, a, v, keep, period, gain, skip)
-            for y, a, v in zip(measured, drive, rate, strict=True)
-        )
+        total = np.zeros((len(jump_state) + 1,) * 2)
+        for y, a, v, x in zip(measured, drive, rate, jumps, strict=True):
+            _products(y, a, v, x, jump_state, keep, period, gain, skip, total)
+        normal = total[:-1, :-1] + AXIS.ridge * np.diag(np.diagonal(total)[:-1] + 1e-300)
+        gains = np.linalg.solve(normal, total[:-1, -1])
+        return float(total[-1, -1] - total[-1, :-1] @ gains), gains
 
     def loss(x: Array) -> float:
         inside = np.clip(x, low, high)
         beyond = float(np.abs(x - inside).sum())
-        return count * (math.log(max(sums(*np.exp(inside).tolist()), 1e-300)) + beyond)
+        return count * (math.log(max(sums(*np.exp(inside).tolist())[0], 1e-300)) + beyond)
 
     begun = np.array(
         [
@@ -162,9 +197,13 @@ def likeliest_noise(
         },
     )
     strength, time, shaken = np.exp(np.clip(best.x, low, high)).tolist()
-    innovation = math.sqrt(sums(strength, time, shaken) / count)
+    left, gains = sums(strength, time, shaken)
+    innovation = math.sqrt(left / count)
     noise = innovation / math.sqrt(steady(strength, time, shaken, period, gain))
-    return steady_noise(noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period)
+    found = steady_noise(
+        noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period
+    )
+    return found, gains
 
 
 def steady_noise(

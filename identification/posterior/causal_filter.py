@@ -87,6 +87,7 @@ def _run(
     begun: Array,
     gain: Array,
     keep: Array,
+    known: Array,
     mass: float,
     gravity: float,
     com: Array,
@@ -109,6 +110,17 @@ def _run(
     mid, both = np.empty(3), np.empty(4)
     half = 0.5 * period
     for k in range(len(speeds)):
+        # what the last sample's rotors said
+        for i in range(3):
+            p[i] += known[k, i, 0]
+            v[i] += known[k, i, 1]
+            d[i] += known[k, i, 2]
+            step[i] = known[k, 3 + i, 0]
+            w[i] += known[k, 3 + i, 1]
+            d[3 + i] += known[k, 3 + i, 2]
+        _turn(q, step, q2)
+        for i in range(4):
+            q[i] = q2[i]
         for i in range(3):
             predicted[k, i] = p[i]
         for i in range(4):
@@ -190,8 +202,18 @@ def _run(
         _turn(q2, step, q)
 
 
-def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...]) -> Track:
-    """Return a piece as the filter with a vehicle's model and six axes' noise sees it."""
+def run(
+    poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...], known: Array | None = None
+) -> Track:
+    """Return a piece as the filter with a vehicle's model and six axes' noise sees it.
+
+    Args:
+        poses: the piece.
+        vehicle: with the model.
+        noise: of each axis.
+        known: (n, 6, 3) what is added to pose, rate and disturbance of each axis before the pose of
+            sample k is read; default: nothing.
+    """
     models = np.zeros(1, dtype=_MODEL)
     body = load_model(models[0], vehicle)
     n = len(poses.t)
@@ -216,6 +238,7 @@ def run(poses: Poses, vehicle: Vehicle, noise: tuple[AxisNoise, ...]) -> Track:
         np.concatenate([poses.velocity, poses.angular_velocity]),
         np.array([x.gain for x in noise]),
         np.exp(-poses.period / np.array([x.time for x in noise], dtype=np.float64)),
+        np.zeros((n, 6, 3)) if known is None else known,
         body.mass,
         body.gravity,
         np.ascontiguousarray(body.com),

@@ -43,7 +43,10 @@ Array = NDArray[np.float64]
 
 WHOLE_PREFIX = "whole "  # a coefficient of an effect that acts at the centre, without a moment
 BETWEEN = "rotors between samples"
-MODEL_ERROR, GAIN, UNKNOWN = "model error", "rotor gain", "unknown "
+STATES = (0, 1, 2)  # of an axis: pose, rate, disturbance
+# rad of tilt for a rad/s2 of roll or pitch: the unit of gains of sideways states
+SIDEWAYS = 0.01
+MODEL_ERROR, GAIN, UNKNOWN = "model error", "rotor gain of", "unknown "
 
 
 @dataclass(frozen=True)
@@ -56,10 +59,11 @@ class LikelihoodSettings:
     model_error: float = 0.003
     # standard deviations of the gains on the rotors' innovations, by which pose, rate and
     # disturbance answer them, in what one period of such an acceleration makes
-    gains: tuple[float, float, float] = (10.0, 10.0, 10.0)
+    gains: tuple[float, float, float] = (1e4, 1e3, 1e2)
     # second differences of the rotor speeds, the standard deviation of what they may do between
     # samples beside a straight line
     between_samples: float = 0.5
+    noise_rounds: int = 2  # of the noise and of the flight as it is seen with it
     block: float = 3.0  # s, of the sums by which the likelihood's scatter is judged
     first_disturbance: float = 0.3  # m/s2 and rad/s2, at which the search for the noise begins
 
@@ -104,14 +108,19 @@ class Likelihood:
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
         self.noise = self._first_noise()
-        for _ in range(2):
-            self.tracks = [run(piece, self.vehicle, self.noise) for piece in self.pieces]
-            self.noise = self._likeliest()
         self.tracks = [run(piece, self.vehicle, self.noise) for piece in self.pieces]
+        for _ in range(LIKELIHOOD.noise_rounds):
+            self.noise, known = self._likeliest()
+            self.tracks = self._run(self.noise, known)
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = [self._acceleration(s, self.vehicle) for s in self.signals]
+
+    def _run(self, noise: tuple[AxisNoise, ...], known: Sequence[Array]) -> list[Track]:
+        return [
+            run(piece, self.vehicle, noise, x) for piece, x in zip(self.pieces, known, strict=True)
+        ]
 
     # Noise
 
@@ -141,9 +150,12 @@ class Likelihood:
         out = np.array([0.0, 0.0, wrench[0], *wrench[1:]]) / self.inertias
         return np.asarray(np.maximum(out, 1e-9))
 
-    def _likeliest(self, explained: Sequence[Array] | None = None) -> tuple[AxisNoise, ...]:
-        """Return the likeliest noise of each axis; ``explained`` (n, 2, 6) is what is known to move
-        the pose, and to accelerate, beside the model.
+    def _likeliest(
+        self, explained: Sequence[Array] | None = None
+    ) -> tuple[tuple[AxisNoise, ...], list[Array]]:
+        """Return the likeliest noise of each axis, and what the rotors' innovations add to the
+        states of each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
+        and to accelerate, beside the model.
         """
         angles = []
         for piece in self.pieces:
@@ -153,7 +165,11 @@ class Likelihood:
             )
         out = []
         white = self._rounding()
+        # rotors that answer a gust before the pose shows it leave less of it unknown
+        _, jumps, jump_state = self._jumps()
+        known = [np.zeros((len(x), 6, 3)) for x in jumps]
         for axis in range(6):
+            say = [j for j in range(len(jump_state)) if any(x[:, axis, j].any() for x in jumps)]
             measured = [
                 np.ascontiguousarray(p.position[:, axis] if axis < 3 else angle[:, axis - 3])
                 for p, angle in zip(self.pieces, angles, strict=True)
@@ -167,18 +183,24 @@ class Likelihood:
                 for p in self.pieces
             ]
             now = self.noise[axis]
-            out.append(
-                likeliest_noise(
-                    measured,
-                    drives,
-                    rates,
-                    self.period,
-                    max(float(white[axis]), now.white),
-                    now.pose,
-                    now.disturbance,
-                )
+            own = [np.ascontiguousarray(x[:, axis, say]) for x in jumps]
+            found, gains = likeliest_noise(
+                measured,
+                drives,
+                rates,
+                self.period,
+                max(float(white[axis]), now.white),
+                now.pose,
+                now.disturbance,
+                own,
+                jump_state[say],
             )
-        return tuple(out)
+            out.append(found)
+            for x, jump in zip(known, own, strict=True):
+                for state in STATES:
+                    at = jump_state[say] == state
+                    x[:, axis, state] = jump[:, at] @ gains[at]
+        return tuple(out), known
 
     # Columns
 
@@ -346,8 +368,8 @@ class Likelihood:
             )
             explained.append(x)
         noise, tracks = self.noise, self.tracks
-        self.noise = self._likeliest(explained)
-        heard = [run(piece, self.vehicle, self.noise).innovations for piece in self.pieces]
+        self.noise, known = self._likeliest(explained)
+        heard = [track.innovations for track in self._run(self.noise, known)]
         self.tracks = [
             replace(track, innovations=x) for track, x in zip(self.tracks, heard, strict=True)
         ]
@@ -368,50 +390,42 @@ class Likelihood:
         return parts
 
     def _jumps(self) -> tuple[list[Column], list[Array], NDArray[np.intp]]:
-        """Return the columns of the joint filter's gains that steady filters of single axes lack,
-        their jumps (n, 6, e) of each piece, and which state jumps.
+        """Return the columns of the gains on the rotors' innovations, their jumps (n, 6, e) of each
+        piece, and which state jumps.
 
-        The rotors' innovations say something of the axes that rotors drive. The attitude's say
-        where thrust has pushed sideways, and the position's sideways part which attitude did so.
+        Thrust and torques say something of the axes that they drive. And a loop that rolls or
+        pitches the vehicle has seen where it is, and what pushes it aside.
         """
-        pairs = list(zip(self.pieces, self.tracks, strict=True))
-        rotors = rotor_innovations(pairs, self.inertias[2:])
-        names: list[Column] = []
-        states: list[int] = []
-        for kind in (*(f"rotor {axis}" for axis in DRIVEN), "attitude x", "attitude y", "x", "y"):
-            names += [("", f"{GAIN} of {kind} {state}") for state in range(3)]
-            states += [0, 1, 2]
+        rotors = rotor_innovations(
+            list(zip(self.pieces, self.tracks, strict=True)), self.inertias[2:]
+        )
+        kinds = (*(f"axis {axis}" for axis in DRIVEN), "roll aside", "pitch aside")
+        names: list[Column] = [("", f"{GAIN} {kind} {state}") for kind in kinds for state in STATES]
         out = []
         units = np.array([self.period**2, self.period, 1.0])
-        g = self.flights.vehicle.gravity
+        tilt = SIDEWAYS * self.flights.vehicle.gravity
         for found, track in zip(rotors, self.tracks, strict=True):
-            n = len(found)
-            jumps = np.zeros((n, 6, len(names)))
             rotation = track.rotation
             # an innovation of sample k changes the state after it: the jump is before sample k + 1
             found = np.vstack([np.zeros(4), found[:-1]])
+            directions = np.zeros((len(found), 6, len(kinds)))
             for i, axis in enumerate(DRIVEN):
-                for state in range(3):
-                    at = 3 * i + state
-                    if axis == 2:
-                        jumps[:, :3, at] = units[state] * found[:, i, None] * rotation[:, :, 2]
-                    else:
-                        jumps[:, axis, at] = units[state] * found[:, i]
-            last = np.vstack([np.zeros(6), track.innovations[:-1]])
-            body = np.einsum("nij,ni->nj", rotation, last[:, :3])
-            for state in range(3):
-                jumps[:, :3, 12 + state] = -g * units[state] * last[:, 3, None] * rotation[:, :, 1]
-                jumps[:, :3, 15 + state] = g * units[state] * last[:, 4, None] * rotation[:, :, 0]
-                # about the other axis, by what pushes as much within a tenth of a second
-                jumps[:, 3, 18 + state] = -(10.0**state) * body[:, 1]
-                jumps[:, 4, 21 + state] = (10.0**state) * body[:, 0]
-            out.append(jumps)
-        return names, out, np.array(states)
+                if axis == 2:
+                    directions[:, :3, i] = found[:, i, None] * rotation[:, :, 2]
+                else:
+                    directions[:, axis, i] = found[:, i]
+            for i, axis in ((1, 1), (2, 0)):
+                directions[:, :3, 3 + i] = tilt * found[:, i, None] * rotation[:, :, axis]
+            jumps = directions[..., None] * units
+            out.append(jumps.reshape(len(found), 6, len(names)))
+        return names, out, np.tile(STATES, len(kinds))
 
     def _products(
         self, acting: Mapping[Column, list[Array]], moved: Mapping[Column, list[Array]]
     ) -> Sums:
         gains, jumps, jump_state = self._jumps()
+        own = len(STATES) * len(DRIVEN)  # what the rotors say of other axes stays as it was fitted
+        gains, jump_state, jumps = gains[:own], jump_state[:own], [x[:, :, :own] for x in jumps]
         names = (*acting, *moved, *gains)
         count = len(names)
         gain = np.array([x.gain for x in self.noise])

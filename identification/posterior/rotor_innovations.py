@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class FeedbackSettings:
     """The model by which the rotors answer the past."""
 
-    lags: int = 4  # samples of the rotors' past
+    lags: int = 20  # samples of the rotors' past
     # relative, of each regressor's own variance: against columns that are alike
     ridge: float = 1e-6
 
@@ -41,37 +41,49 @@ def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> lis
         pieces: as they were measured, and as the filter sees them.
         inertias: (4,) mass (kg) and moments of inertia (kg m2).
     """
-    sides = [_sides(poses, track, inertias) for poses, track in pieces]
+    sides = []
+    for poses, track in pieces:
+        now = _accelerations(poses, track, inertias)
+        sides.append((known_before(poses, track, now), now[FEEDBACK.lags :]))
+    out = []
+    for (_, y), predicted in zip(sides, fitted(sides), strict=True):
+        found = np.zeros((len(y) + FEEDBACK.lags, 4))
+        found[FEEDBACK.lags :] = y - predicted
+        out.append(found)
+    return out
+
+
+def fitted(sides: list[tuple[Array, Array]]) -> list[Array]:
+    """Return the least-squares predictions of each piece, of regressors (n, c) and what they
+    predict (n, 4).
+    """
     x, y = (np.concatenate(part) for part in zip(*sides, strict=True))
     mean, size = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-12)
     z = np.column_stack([(x - mean) / size, np.ones(len(x))])
     normal = z.T @ z
     normal += FEEDBACK.ridge * np.diag(np.diagonal(normal))
-    gain = np.linalg.solve(normal, z.T @ y)
-    out, row = [], 0
-    for poses, _ in pieces:
-        count = len(poses.t) - FEEDBACK.lags
-        found = np.zeros((len(poses.t), 4))
-        found[FEEDBACK.lags :] = (y - z @ gain)[row : row + count]
-        row += count
-        out.append(found)
-    return out
+    predicted = z @ np.linalg.solve(normal, z.T @ y)
+    return np.split(predicted, np.cumsum([len(part) for part, _ in sides])[:-1])
 
 
-def _sides(poses: Poses, track: Track, inertias: Array) -> tuple[Array, Array]:
-    """Return what is known before a sample's rotors, and their wrench at it, sample by sample."""
-    lags = FEEDBACK.lags
-    # the track has the rotors between samples: the wrench at sample k is twice that less the last
-    now = np.empty_like(track.rotors)
-    squares = np.square(poses.rotor_speeds)
+def _accelerations(poses: Poses, track: Track, inertias: Array) -> Array:
+    """Return what the rotors do at the samples (n, 4), as accelerations."""
+    # the track has the rotors between samples; their wrench is linear in the squares of the speeds
     wrench = np.linalg.lstsq(
         np.square(0.5 * (poses.rotor_speeds[:-1] + poses.rotor_speeds[1:])),
         track.rotors[:-1],
         rcond=None,
     )[0]
-    now = squares @ wrench / inertias
-    known = [now[lags - i - 1 : len(now) - i - 1] for i in range(lags)]
-    before = slice(lags - 1, len(now) - 1)
+    return np.asarray(np.square(poses.rotor_speeds) @ wrench / inertias)
+
+
+def known_before(poses: Poses, track: Track, rotors: Array) -> Array:
+    """Return what is known before a sample's rotors (n - lags, c): their past, ``rotors`` (n, 4),
+    and the filter's state.
+    """
+    lags = FEEDBACK.lags
+    known = [rotors[lags - i - 1 : len(rotors) - i - 1] for i in range(lags)]
+    before = slice(lags - 1, len(rotors) - 1)
     body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
     known += [
         track.rotation[before][:, 2, :2],
@@ -83,4 +95,4 @@ def _sides(poses: Poses, track: Track, inertias: Array) -> tuple[Array, Array]:
         # the loop may have read this sample's pose before the rotors were logged
         track.innovations[lags:],
     ]
-    return np.column_stack(known), now[lags:]
+    return np.column_stack(known)
