@@ -167,8 +167,8 @@ def diagnose(
     report("looking for structure in the residual")
     signs, unconfirmed = find_structure(search, fit)
     fit = refitted_by_likelihood(search, fit)
-    doubts = _name_doubts(search, fit, rotor_delay)
-    name_doubts = [sentence for sentences in doubts.values() for sentence in sentences]
+    doubted_by = _name_doubts(search, fit, rotor_delay)
+    name_doubts = [sentence for sentences in doubted_by.values() for sentence in sentences]
 
     before, after = (
         flights.residual(biases(fit.setting)),
@@ -231,7 +231,7 @@ def diagnose(
     )
     notes += name_doubts
     if large and (small := [e.name for e in effects if _is_small(e.evidence["energy_explained"])]):
-        doubts["small beside the residual"] = tuple(small)
+        doubted_by["small beside the residual"] = tuple(small)
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
@@ -283,7 +283,7 @@ def diagnose(
         floor_is_bound=not flights.inertial
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
-        doubts=doubts,
+        doubts=doubted_by,
         probabilities=_probabilities(flights, search, effects, remainder, report)
         if probabilities
         else None,

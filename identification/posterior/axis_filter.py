@@ -168,7 +168,7 @@ def likeliest_noise(
         for y, a, v, x in zip(measured, drive, rate, jumps, strict=True):
             _products(y, a, v, x, jump_state, keep, period, gain, skip, total)
         normal = total[:-1, :-1] + AXIS.ridge * np.diag(np.diagonal(total)[:-1] + 1e-300)
-        gains = np.linalg.solve(normal, total[:-1, -1])
+        gains: Array = np.asarray(np.linalg.solve(normal, total[:-1, -1]))
         return float(total[-1, -1] - total[-1, :-1] @ gains), gains
 
     def loss(x: Array) -> float:

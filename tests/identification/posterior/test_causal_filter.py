@@ -19,17 +19,18 @@ def vehicle():
 
 def hovering(vehicle, speeds=None):
     """Level poses without noise, pushed along x."""
-    t = PERIOD * np.arange(COUNT)
-    position = np.zeros((COUNT, 3))
+    count = COUNT if speeds is None else len(speeds)
+    t = PERIOD * np.arange(count)
+    position = np.zeros((count, 3))
     position[:, 0] = 0.5 * PUSH * t**2
     hover = np.sqrt(vehicle.weight / np.sum(vehicle.k))
     return Poses(
         t,
         PERIOD,
         position,
-        np.tile([1.0, 0.0, 0.0, 0.0], (COUNT, 1)),
-        np.full((COUNT, 4), hover) if speeds is None else speeds,
-        np.zeros(COUNT),
+        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        np.full((count, 4), hover) if speeds is None else speeds,
+        np.zeros(count),
         np.zeros(3),
         np.zeros(3),
     )
@@ -88,12 +89,25 @@ def test_sensitivities_are_derivatives_of_the_predictions(vehicle):
     np.testing.assert_allclose(change, size * out[:, 1, 0], atol=1e-9)
 
 
+def test_what_is_known_of_a_state_is_added_before_the_pose_is_read(vehicle):
+    poses, six = hovering(vehicle), noise()
+    known = np.zeros((COUNT, 6, 3))
+    known[200, 1, 0], known[200, 5, 0], known[400, 4, 1] = 0.01, 0.02, 0.1
+    before, after = run(poses, vehicle, six), run(poses, vehicle, six, known)
+    np.testing.assert_array_equal(before.predicted[:200], after.predicted[:200])
+    moved = after.innovations[200] - before.innovations[200]
+    assert moved == pytest.approx([0.0, -0.01, 0.0, 0.0, 0.0, -0.02], abs=1e-5)
+    turned = after.innovations[401, 4] - after.innovations[400, 4]
+    assert turned == pytest.approx(-0.1 * PERIOD, rel=0.2)
+
+
 def test_only_what_the_past_does_not_predict_is_a_rotors_innovation(vehicle):
+    count = 10 * COUNT
     rng = np.random.default_rng(2)
     hover = np.sqrt(vehicle.weight / np.sum(vehicle.k))
-    steps = 0.1 * rng.standard_normal((COUNT, 4))
-    speeds = np.full((COUNT, 4), hover)
-    for k in range(1, COUNT):
+    steps = 0.1 * rng.standard_normal((count, 4))
+    speeds = np.full((count, 4), hover)
+    for k in range(1, count):
         speeds[k] = hover + 0.9 * (speeds[k - 1] - hover) + steps[k]
     poses = hovering(vehicle, speeds)
     inertias = np.array([vehicle.mass, *np.diagonal(vehicle.inertia)])
