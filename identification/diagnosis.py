@@ -329,7 +329,7 @@ def _probabilities(
     report("asking how probable each effect is")
     found = rank(flights, search.library, report=report)
     sets = [(x.effects, x.probability) for x in found.sets]
-    return pooled(effects, remainder, sets, found.structure)
+    return pooled(effects, remainder, sets, found.structure, found.varying)
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

@@ -45,7 +45,8 @@ class PoolingSettings:
     random_alone: float = 2.45  # it is, and nothing is named
     doubted: float = 1.58  # a name is tentative
     structure: float = 0.08  # a nat of ``Ranking.structure``
-    structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
+    varying: float = 0.0  # a nat of ``Ranking.varying``
+    nats_range: tuple[float, float] = (-2.0, 15.0)  # of these two
     least: float = 0.001  # probability of an alternative that is reported
 
 
@@ -110,8 +111,8 @@ def features(named: Sequence[Named], found: Explanations) -> Array:
     )
 
 
-def signs(named: Sequence[Named], remainder: str, structure: float) -> Array:
-    """Return the signs (6,) that something unknown acts; the first is one."""
+def signs(named: Sequence[Named], remainder: str, structure: float, varying: float) -> Array:
+    """Return the signs (7,) that something unknown acts; the first is one."""
     return np.array(
         [
             1.0,
@@ -119,7 +120,8 @@ def signs(named: Sequence[Named], remainder: str, structure: float) -> Array:
             remainder == "random" and len(named) > 0,
             remainder == "random" and not named,
             any(e.tentative for e in named),
-            np.clip(structure, *POOLING.structure_range),
+            np.clip(structure, *POOLING.nats_range),
+            np.clip(varying, *POOLING.nats_range),
         ],
         dtype=np.float64,
     )
@@ -130,6 +132,7 @@ def pooled(
     remainder: str,
     sets: Sequence[tuple[Sequence[str], float]],
     structure: float,
+    varying: float,
     weights: PoolingSettings = POOLING,
 ) -> Probabilities:
     """Return how probable names, explanations and something unknown are.
@@ -139,6 +142,7 @@ def pooled(
         remainder: none, random or structured, by the search.
         sets: effects and probability of the posterior's sets.
         structure: of the posterior, ``Ranking.structure``.
+        varying: of the posterior, ``Ranking.varying``.
         weights: of the pool.
     """
     w = weights
@@ -146,8 +150,8 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    odds = signs(named, remainder, structure) @ np.array(
-        [w.unknown, w.structured, w.random, w.random_alone, w.doubted, w.structure]
+    odds = signs(named, remainder, structure, varying) @ np.array(
+        [w.unknown, w.structured, w.random, w.random_alone, w.doubted, w.structure, w.varying]
     )
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown

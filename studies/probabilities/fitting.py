@@ -25,7 +25,7 @@ _DECIMALS = 2  # of a weight
 # what is known of the weights before the flights: mean and standard deviation
 _BEFORE = ((0.5, 2.0, 0.0, -1.0), 1.0)
 _SIGN_STD = 1.8
-_STRUCTURE_STD = 0.2  # a nat
+_NATS_STD = 0.2  # a nat
 _LEAST = 1e-4  # no probability counts as less
 
 
@@ -67,7 +67,12 @@ def is_right(flight: dict[str, Any], name: str) -> bool:
 def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
     """Return the probabilities of a recorded flight."""
     return pooled(
-        names_of(flight), flight["remainder"], flight["sets"], flight["structure"], weights
+        names_of(flight),
+        flight["remainder"],
+        flight["sets"],
+        flight["structure"],
+        flight["varying"],
+        weights,
     )
 
 
@@ -104,9 +109,9 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     by_sets = minimize(
         loss_of_sets, mean, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-6}
     ).x
-    x = np.array([signs(names_of(f), f["remainder"], f["structure"]) for f in flights])
+    x = np.array([signs(names_of(f), f["remainder"], f["structure"], f["varying"]) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
-    scale = np.array([1e3, *(4 * [_SIGN_STD]), _STRUCTURE_STD])
+    scale = np.array([1e3, *(4 * [_SIGN_STD]), *(2 * [_NATS_STD])])
 
     def loss_of_signs(w: Array) -> float:
         odds = x @ w
@@ -114,7 +119,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    by_signs = minimize(loss_of_signs, np.zeros(6)).x
+    by_signs = minimize(loss_of_signs, np.zeros(7)).x
     a, b = by_sets.round(_DECIMALS).tolist(), by_signs.round(_DECIMALS).tolist()
     return replace(
         POOLING,
@@ -128,6 +133,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         random_alone=b[3],
         doubted=b[4],
         structure=b[5],
+        varying=b[6],
     )
 
 

@@ -276,6 +276,7 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "random_alone",
         "doubted",
         "structure",
+        "varying",
     )
     rows = [[f"`{x}`", f"{getattr(w, x):.2f}", f"{getattr(POOLING, x):.2f}"] for x in names]
     return table(["weight, nats", "fitted to all these flights", "in use"], rows)

@@ -36,6 +36,7 @@ def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", 
         "remainder": remainder,
         "sets": sets or [[[e.strip("?") for e in named], 1.0]],
         "structure": structure,
+        "varying": 0.0,
     }
 
 
