@@ -74,7 +74,7 @@ from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
-from .posterior.pooling import pooled
+from .posterior.pooling import Signs, pooled
 from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
 from .wrench_series import pose_notes
@@ -176,9 +176,7 @@ def diagnose(
     )  # no flight's own thrust scale or tilt
     held_out = ~flights.fit_rows
     floor = _rms(flights.visible_noise)
-    calm = vehicle.weight * np.repeat(
-        [DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * vehicle.arm_l], 3
-    )
+    calm = _calm(vehicle.weight, vehicle.arm_l)
     error_before, error_after = _rms(before[held_out]), _rms(after[held_out])
     # an IMU's own noise is far below the disturbances that count for none
     least_seen = np.hypot(floor, calm[[0, 3]]) if flights.inertial else np.array(floor)
@@ -204,9 +202,8 @@ def diagnose(
         if flights.commanded or flights.filtered
         else tuple(transient_disturbances(flights, fit.setting))
     )
-    disturbed = bool(transients) or any(
-        found.below(CUTOFFS.calm_hz) > most for found, most in zip(disturbances, calm, strict=False)
-    )
+    beyond = beyond_calm(disturbances, vehicle.weight, vehicle.arm_l)
+    disturbed = bool(transients) or beyond > 0.0
     remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
     large = noisy if flights.commanded or flights.filtered else disturbed
     effects = tuple(
@@ -284,10 +281,28 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
         doubts=doubted_by,
-        probabilities=_probabilities(flights, search, effects, remainder, report)
+        probabilities=_probabilities(flights, search, effects, remainder, beyond, report)
         if probabilities
         else None,
     )
+
+
+def _calm(weight: float, arm: float) -> Array:
+    """Return the disturbances (6,) that count for none, N and Nm."""
+    return weight * np.repeat([DIAGNOSIS.calm_force, DIAGNOSIS.calm_torque * arm], 3)
+
+
+def beyond_calm(disturbances: Sequence[Disturbance], weight: float, arm: float) -> float:
+    """Return the logarithm of the largest disturbance of the six channels over what counts for
+    none; ``-inf`` where none was fitted.
+
+    Args:
+        disturbances: one a channel.
+        weight: N, of the vehicle.
+        arm: m.
+    """
+    slow = [x.below(CUTOFFS.calm_hz) for x in disturbances]
+    return float(np.log(np.max(slow / _calm(weight, arm)))) if slow else -np.inf
 
 
 def _name_doubts(
@@ -316,6 +331,7 @@ def _probabilities(
     search: Search,
     effects: Sequence[NamedEffect],
     remainder: str,
+    beyond: float,
     report: Callable[[str], None],
 ) -> Probabilities | None:
     """Return how probable each name is; None where the logs hold no poses and rotor speeds as they
@@ -329,7 +345,7 @@ def _probabilities(
     report("asking how probable each effect is")
     found = rank(flights, search.library, report=report)
     sets = [(x.effects, x.probability) for x in found.sets]
-    return pooled(effects, remainder, sets, found.structure, found.varying)
+    return pooled(effects, sets, Signs(remainder, beyond, found.structure, found.varying))
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

@@ -41,12 +41,13 @@ class PoolingSettings:
     # sure, and what each sign adds
     unknown: float = -2.8
     structured: float = 2.03  # the residual depends on motion, load, place or time
-    random: float = -1.28  # it is larger than its noise beside what is named
-    random_alone: float = 2.45  # it is, and nothing is named
+    random: float = 0.0  # it is larger than its noise
     doubted: float = 1.58  # a name is tentative
+    disturbance: float = 1.0  # a nat of ``Signs.disturbance``
     structure: float = 0.08  # a nat of ``Ranking.structure``
     varying: float = 0.0  # a nat of ``Ranking.varying``
-    nats_range: tuple[float, float] = (-2.0, 15.0)  # of these two
+    disturbance_range: tuple[float, float] = (-1.0, 4.0)  # nats
+    nats_range: tuple[float, float] = (-2.0, 15.0)  # of the other two
     least: float = 0.001  # probability of an alternative that is reported
 
 
@@ -111,38 +112,50 @@ def features(named: Sequence[Named], found: Explanations) -> Array:
     )
 
 
-def signs(named: Sequence[Named], remainder: str, structure: float, varying: float) -> Array:
-    """Return the signs (7,) that something unknown acts; the first is one."""
-    return np.array(
-        [
-            1.0,
-            remainder == "structured",
-            remainder == "random" and len(named) > 0,
-            remainder == "random" and not named,
-            any(e.tentative for e in named),
-            np.clip(structure, *POOLING.nats_range),
-            np.clip(varying, *POOLING.nats_range),
-        ],
-        dtype=np.float64,
-    )
+@dataclass(frozen=True)
+class Signs:
+    """What speaks for something unknown.
+
+    Attributes:
+        remainder: none, random or structured, by the search.
+        disturbance: logarithm of the largest disturbance over what counts for none.
+        structure: of the posterior, ``Ranking.structure``.
+        varying: of the posterior, ``Ranking.varying``.
+    """
+
+    remainder: str
+    disturbance: float
+    structure: float
+    varying: float
+
+    def numbers(self, named: Sequence[Named]) -> Array:
+        """Return them as numbers (7,) beside the names of the search; the first is one."""
+        return np.array(
+            [
+                1.0,
+                self.remainder == "structured",
+                self.remainder == "random",
+                any(e.tentative for e in named),
+                np.clip(self.disturbance, *POOLING.disturbance_range),
+                np.clip(self.structure, *POOLING.nats_range),
+                np.clip(self.varying, *POOLING.nats_range),
+            ],
+            dtype=np.float64,
+        )
 
 
 def pooled(
     named: Sequence[Named],
-    remainder: str,
     sets: Sequence[tuple[Sequence[str], float]],
-    structure: float,
-    varying: float,
+    signs: Signs,
     weights: PoolingSettings = POOLING,
 ) -> Probabilities:
     """Return how probable names, explanations and something unknown are.
 
     Args:
         named: by the search.
-        remainder: none, random or structured, by the search.
         sets: effects and probability of the posterior's sets.
-        structure: of the posterior, ``Ranking.structure``.
-        varying: of the posterior, ``Ranking.varying``.
+        signs: of something unknown.
         weights: of the pool.
     """
     w = weights
@@ -150,8 +163,8 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    odds = signs(named, remainder, structure, varying) @ np.array(
-        [w.unknown, w.structured, w.random, w.random_alone, w.doubted, w.structure, w.varying]
+    odds = signs.numbers(named) @ np.array(
+        [w.unknown, w.structured, w.random, w.doubted, w.disturbance, w.structure, w.varying]
     )
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown

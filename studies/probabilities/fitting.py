@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.findings import Probabilities
+from windwrench.identification.diagnosis import beyond_calm
+from windwrench.identification.findings import Disturbance, Probabilities
 from windwrench.identification.posterior.pooling import (
     POOLING,
     PoolingSettings,
+    Signs,
     explanations,
     features,
     pooled,
-    signs,
 )
 from windwrench.studies.trials.trials import EQUIVALENTS
 
@@ -64,16 +65,20 @@ def is_right(flight: dict[str, Any], name: str) -> bool:
     return not acts_unknown(flight) and bool(stands_for(flight, name) & set(flight["truth"]))
 
 
-def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
-    """Return the probabilities of a recorded flight."""
-    return pooled(
-        names_of(flight),
+def signs_of(flight: dict[str, Any]) -> Signs:
+    """Return what speaks for something unknown on a recorded flight."""
+    gusts = [Disturbance("", rms, time) for rms, time in flight["gusts"]]
+    return Signs(
         flight["remainder"],
-        flight["sets"],
+        beyond_calm(gusts, *flight["weight"]),
         flight["structure"],
         flight["varying"],
-        weights,
     )
+
+
+def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
+    """Return the probabilities of a recorded flight."""
+    return pooled(names_of(flight), flight["sets"], signs_of(flight), weights)
 
 
 def _right_sets(flight: dict[str, Any], keys: Sequence[frozenset[str]]) -> NDArray[np.bool_]:
@@ -109,7 +114,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     by_sets = minimize(
         loss_of_sets, mean, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-6}
     ).x
-    x = np.array([signs(names_of(f), f["remainder"], f["structure"], f["varying"]) for f in flights])
+    x = np.array([signs_of(f).numbers(names_of(f)) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
     scale = np.array([1e3, *(4 * [_SIGN_STD]), *(2 * [_NATS_STD])])
 
@@ -130,8 +135,8 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         unknown=b[0],
         structured=b[1],
         random=b[2],
-        random_alone=b[3],
-        doubted=b[4],
+        doubted=b[3],
+        disturbance=b[4],
         structure=b[5],
         varying=b[6],
     )

@@ -273,8 +273,8 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "unknown",
         "structured",
         "random",
-        "random_alone",
         "doubted",
+        "disturbance",
         "structure",
         "varying",
     )

@@ -37,6 +37,8 @@ def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", 
         "sets": sets or [[[e.strip("?") for e in named], 1.0]],
         "structure": structure,
         "varying": 0.0,
+        "gusts": [],
+        "weight": [4.56, 0.126],
     }
 
 

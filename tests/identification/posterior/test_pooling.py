@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from windwrench.identification.posterior.pooling import POOLING, explanations, pooled, signs
+from windwrench.identification.posterior.pooling import POOLING, Signs, explanations, pooled
 
 
 @dataclass(frozen=True)
@@ -16,19 +16,21 @@ class Name:
 
 
 BOTH = [(("mass",), 0.9), (("mass", "inertia"), 0.1)]
+CALM = Signs("none", -1.0, -1.0, -1.0)
+LOUD = Signs("structured", 3.0, 15.0, 5.0)
 
 
 def test_what_both_say_is_likelier_than_what_one_says():
-    agreed = pooled([Name("mass")], "none", BOTH, -1.0, 0.0)
-    doubted = pooled([Name("mass", tentative=True)], "none", BOTH, -1.0, 0.0)
-    contradicted = pooled([Name("mass")], "none", [(("latency",), 1.0)], -1.0, 0.0)
+    agreed = pooled([Name("mass")], BOTH, CALM)
+    doubted = pooled([Name("mass", tentative=True)], BOTH, CALM)
+    contradicted = pooled([Name("mass")], [(("latency",), 1.0)], CALM)
     assert agreed.names["mass"] > 0.9
     assert agreed.names["mass"] > doubted.names["mass"] > contradicted.names["mass"]
     assert contradicted.names["latency"] < 0.9
 
 
 def test_probabilities_of_all_explanations_make_one():
-    found = pooled([Name("mass")], "structured", BOTH, 4.0, 0.0, replace(POOLING, least=0.0))
+    found = pooled([Name("mass")], BOTH, LOUD, replace(POOLING, least=0.0))
     assert sum(x.probability for x in found.alternatives) + found.unknown == pytest.approx(1.0)
     of_mass = [x.probability for x in found.alternatives if "mass" in x.effects]
     assert found.names["mass"] == pytest.approx(sum(of_mass))
@@ -55,19 +57,21 @@ def test_what_the_posterior_never_tried_is_as_bad_as_can_be():
     assert found[frozenset()] == pytest.approx(-POOLING.most_worse)
 
 
-def test_structure_makes_something_unknown_likelier():
-    quiet, loud = (
-        pooled([Name("mass")], r, BOTH, s, 0.0) for r, s in (("none", 0.0), ("structured", 20.0))
-    )
+def test_signs_make_something_unknown_likelier():
+    quiet = pooled([Name("mass")], BOTH, CALM)
+    loud = pooled([Name("mass", tentative=True)], BOTH, LOUD)
     assert quiet.unknown < 0.2 < 0.5 < loud.unknown
     assert loud.names["mass"] < quiet.names["mass"]
-    np.testing.assert_allclose(
-        signs([Name("mass")], "random", 99.0, -99.0), [1, 0, 1, 0, 0, *POOLING.nats_range[::-1]]
-    )
+
+
+def test_signs_have_their_ranges():
+    low, high = POOLING.nats_range
+    beyond = Signs("random", -np.inf, 99.0, -99.0).numbers([Name("mass")])
+    np.testing.assert_allclose(beyond, [1, 0, 1, 0, POOLING.disturbance_range[0], high, low])
 
 
 def test_nothing_found_is_an_explanation_too():
-    found = pooled([], "none", [((), 1.0)], -2.0, 0.0)
+    found = pooled([], [((), 1.0)], CALM)
     assert found.alternatives[0].effects == ()
     assert found.names == {}
     assert found.unknown + found.alternatives[0].probability == pytest.approx(1.0)
