@@ -15,9 +15,9 @@ A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coeff
 zero. Kinds: *rotor input* changes what the rotors deliver, *wrench* adds force and torque, *body* changes the rigid
 body, *sensing* changes what the log holds. World z is up; body x points forward, y left.
 
-An effect declares what it is, and a diagnosis goes by that, not by its name: its *family*, the *role* in which other effects know it, what
-logs must hold to show it, and which others leave much the same *trace* in slow flight. What can be confused in given flights is computed
-from them: `indistinguishable_from` in a report.
+An effect declares what it is, and a diagnosis goes by that, not by its name. It declares its *family* and the *role* in which other
+effects know it. It also declares what logs must hold to show it, and which others leave much the same *trace* in slow flight. What
+can be confused in given flights is computed from them: `indistinguishable_from` in a report.
 
 """
 

@@ -248,9 +248,9 @@ def write_markdown(
         "",
         "`x real time` is simulated seconds a second, summed over the environments. A batch takes "
         "filters side by "
-        "side, eight to a vector register, with the functions of the single filter. filterpy's "
-        "filter has 37 sigma "
-        "points and additive noise; its model is measured as one writes it down, with vectors and "
+        "side, eight to a vector register, with the functions of the single filter. The filter "
+        "of filterpy has 37 sigma "
+        "points and additive noise. Its model is measured as one writes it down, with vectors and "
         "`numpy.cross`, and "
         "with every product by component in plain Python numbers. `python -m "
         "windwrench.speed.filter_step` prints "

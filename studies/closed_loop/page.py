@@ -79,7 +79,7 @@ def conclusions(results: Sequence[Result]) -> list[str]:
         }
         out.append(
             f"**{measure.title[0].upper()}{measure.title[1:]}** "
-            + "; it ".join(f"{words[k]} {', '.join(names)}" for k, names in groups.items() if names)
+            + ". It ".join(f"{words[k]} {', '.join(names)}" for k, names in groups.items() if names)
             + "."
         )
     shifted = [
@@ -135,9 +135,9 @@ def _in_short(results: Sequence[Result]) -> str:
     return (
         f"Of {len(results)} effects, declaring what the diagnosis named lowers the wrench error "
         f"(force or torque) with "
-        f"{count(wrench, 'falls')}, by more than a tenth with {much}, and raises one of the two "
+        f"{count(wrench, 'falls')}, by more than a tenth with {much}. It raises one of the two "
         f"with "
-        f"{count(wrench, 'rises')}; it improves tracking with {count(tracking, 'falls')} and makes "
+        f"{count(wrench, 'rises')}. It improves tracking with {count(tracking, 'falls')} and makes "
         f"it worse with "
         f"{count(tracking, 'rises')}. The admittance controller reads "
         f"the yaw torque alone: what an "

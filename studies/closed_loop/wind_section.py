@@ -76,7 +76,9 @@ def wind_section(folder: Path, where: str) -> list[str]:
         "by mean before with its 95 % bootstrap interval. `l1` and `indi` adapt without knowing "
         "the effect (declared model, the same episodes).",
         "",
-        _reached(found),
+        *_reached(found),
+        "",
+        "Setting by setting:",
         "",
         *[f"* {_in_words(setting, result)}" for setting, result in found],
         "",
@@ -103,8 +105,8 @@ def wind_section(folder: Path, where: str) -> list[str]:
     return [*lines, "## The loop closed in fan tracking", ""]
 
 
-def _reached(found: Sequence[tuple[Setting, Mapping[str, Any]]]) -> str:
-    """Return where what was asked is reached, and where it is missed."""
+def _reached(found: Sequence[tuple[Setting, Mapping[str, Any]]]) -> list[str]:
+    """Return, as lines, where what was asked is reached, and where it is missed."""
     reached: list[str] = []
     missed: list[str] = []
     for setting, result in found:
@@ -114,11 +116,16 @@ def _reached(found: Sequence[tuple[Setting, Mapping[str, Any]]]) -> str:
             worse = sum(c["ci95"][0] > 1.0 + MARGIN for c in by)
             told = f"{setting.title}, {_TITLES[law]} ({much} of {len(by)}, worse: {worse})"
             (reached if much >= _ASKED and not worse else missed).append(told)
-    return (
+    lines = [
         f"Asked was a resolved improvement of a tenth with {_ASKED} of {len(DEFAULT_EFFECTS)} "
-        f"effects in one task, and none worse. Missed: {'; '.join(missed) or 'nowhere'}. "
-        f"Reached: {'; '.join(reached) or 'nowhere'}."
-    )
+        "effects in one task, and none worse."
+    ]
+    for word, where in (("Missed", missed), ("Reached", reached)):
+        if where:
+            lines += ["", f"{word}:", "", *(f"* {told}" for told in where)]
+        else:
+            lines += ["", f"{word}: nowhere."]
+    return lines
 
 
 def _in_words(setting: Setting, result: Mapping[str, Any]) -> str:
@@ -146,8 +153,8 @@ def _in_words(setting: Setting, result: Mapping[str, Any]) -> str:
     return (
         f"**{setting.title}**: {parts[0]}. {parts[1][0].upper()}{parts[1][1:]}. The better of `l1` "
         f"and `indi`, without the effect, has a smaller mean than the flight loop alone with the "
-        f"amended model on {len(beats)} of {len(result['effects'])} effects, and than `pid-force` "
-        f"with it on {len(both)}. Lost episodes: {lost}."
+        f"amended model on {len(beats)} of {len(result['effects'])} effects. It has a smaller mean "
+        f"than `pid-force` with that model on {len(both)}. Lost episodes: {lost}."
     )
 
 

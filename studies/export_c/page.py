@@ -47,11 +47,11 @@ def _browser(rows: list[Mapping[str, Any]]) -> str:
     other = sum(row["status"] for row in rows)
     return (
         "The source compiles to WebAssembly, for a page in a browser, with clang and LLVM's linker, "
-        "and without a C library: `studies/export_c/webassembly.py` has the command, and "
+        "and without a C library. `studies/export_c/webassembly.py` has the command, and "
         "`studies/export_c/browser/` the lines of C and JavaScript around it. Bytes of the module: "
-        f"{sizes}. Flown by Node.js along {rows[0]['steps']:,} steps with faults, estimates differ "
+        f"{sizes}. It was flown by Node.js along {rows[0]['steps']:,} steps with faults. Estimates differ "
         f"from those of the same C compiled for this machine by {_percent(apart)} % of a standard "
-        f"deviation at most, and statuses in {other} steps: sine and cosine are JavaScript's. "
+        f"deviation at most, and statuses in {other} steps. The reason: sine and cosine are JavaScript's. "
         "No page of this kit uses it."
     )
 
@@ -127,17 +127,17 @@ def _lines(result: Result, data: Path) -> list[str]:
         f"{small['tables']:,} of them tables: {over:,} more than the 8 kB aimed at."
         if over > 0
         else f"* The constant gain needs {small['code']:,} bytes of flash with `-Os`, {-over:,} fewer "
-        "than 8 kB, and that without declared effects; an effect, or a centre of mass that is off, "
+        "than 8 kB, and that without declared effects. An effect, or a centre of mass that is off, "
         "needs more (10 kB with four effects)."
     )
     felt = [sum(row["with_imu"].values()) for row in result["board"] if "with_imu" in row]
     gap = max(row["longest_call"] for row in result["board"] if row["estimator"] == "constant-gain")
     causes = (
         f"* **Now and then C and Python differ.** On {len(apart)} of {len(result['agreement'])} "
-        f"flights below ({'; '.join(row['estimator'] + ', ' + row['flight'] for row in apart)}) some "
-        "estimate differed by more than 1 % of its standard deviation, in at most "
-        f"{_percent(max(found['over'] for found in single))} % of a flight's steps; the most was "
-        f"{_percent(worst)} %. "
+        "flights below some estimate differed by more than 1 % of its standard deviation, in at "
+        f"most {_percent(max(found['over'] for found in single))} % of a flight's steps. The most "
+        f"was {_percent(worst)} %. These flights are: "
+        f"{'; '.join(row['estimator'] + ', ' + row['flight'] for row in apart)}. "
         if apart
         else "* C and Python agreed within 1 % of a standard deviation on all flights below. "
     ) + (
@@ -152,9 +152,9 @@ def _lines(result: Result, data: Path) -> list[str]:
     return [
         "# The filter in C, for a flight controller",
         "",
-        "`windwrench export-c` writes the filter of your vehicle as one header and one C99 source: "
-        "single precision unless told otherwise, no heap, no recursion, no global variables; of libm "
-        "`sqrtf`, `sinf`, `cosf`, `fabsf`.",
+        "`windwrench export-c` writes the filter of your vehicle as one header and one C99 source. "
+        "It has single precision unless told otherwise, no heap, no recursion and no global variables. "
+        "Of libm it needs `sqrtf`, `sinf`, `cosf`, `fabsf`.",
         "",
         "```sh",
         "windwrench export-c --vehicle ardrone2 --estimator ekf --policy sac-0 --out filter",
@@ -173,9 +173,9 @@ def _lines(result: Result, data: Path) -> list[str]:
         f"* **Its memory is {small['ram']:,} bytes, but its stack is {small['stack_with_faults']:,} "
         "bytes** while it runs with its covariance. A task with a small stack overflows then, and "
         "not in a calm hover.",
-        "* **The covariance of the constant gain is that of hover**, in C and in Python: after a gap "
-        "in steep or fast flight its deviations are approximate (a test holds those of half a second "
-        "unseen, in a flight that turns and translates, between 0.4 and 1.6 of the full filter's).",
+        "* **The covariance of the constant gain is that of hover**, in C and in Python. After a gap "
+        "in steep or fast flight its deviations are approximate. A test holds those of half a second "
+        "unseen, in a flight that turns and translates, between 0.4 and 1.6 of the full filter's.",
         f"* **One call after a gap of 0.1 s took {1e6 * gap / CLOCK:,.0f} us** with the constant "
         "gain: it makes up for the gap in up to 32 predictions at once. EKF and UKF have no such call.",
         f"* An IMU sample costs more than a pose; with one at every step the most is "
@@ -186,9 +186,9 @@ def _lines(result: Result, data: Path) -> list[str]:
         "* It was not tried in Simulink, in PX4 or on a Crazyflie.",
         "* Not in C: poses that come late (`TimedFilter`), the mass as a state, smoothing, fitting "
         "the noise to a log.",
-        "* Effects that cannot be exported: "
-        + "; ".join(f"{n} ({why})" for n, why in refused.items() if why)
-        + ". In Python every estimator takes them. `--effects none` leaves out all that are declared. Recurrent policies, and those that "
+        "* Effects that cannot be exported, each with its reason:",
+        *(f"    * {n} ({why})" for n, why in refused.items() if why),
+        "* In Python every estimator takes these effects. `--effects none` leaves out all that are declared. Recurrent policies, and those that "
         "see what is not in the estimate, are refused too.",
         "* `--policy tracker` knows the fan and the air of the scenario `base`, and no others.",
         "* A gap of exactly 0.1 s or 0.6 s may be judged a step earlier or later than in Python: a "
@@ -222,13 +222,13 @@ def _lines(result: Result, data: Path) -> list[str]:
         "scalar first, body to world. From PX4 (FRD in NED) turn both first.",
         "* `ww_policy`, where `--policy` is given, is called every 0.08 s with an estimate, and "
         "returns the velocity (m/s) that is commanded along the world's y axis. `lead` is "
-        "`u = -(11.35 x + 2.79 dx/dt)` with `x = tau_z / max(f_x, 0.183)`; `tracker` is a particle "
-        "filter on the fan's place and velocity (`controllers/tracker.py`) with "
-        f"{PARTICLES} particles and random numbers of its own (xorshift), and with the jet's map as "
+        "`u = -(11.35 x + 2.79 dx/dt)` with `x = tau_z / max(f_x, 0.183)`. `tracker` is a particle "
+        "filter on the fan's place and velocity (`controllers/tracker.py`). It has "
+        f"{PARTICLES} particles, random numbers of its own (xorshift), and the jet's map as "
         "a table. Given the same random numbers Python commands the same to 1e-3 m/s, until rounding "
         "once draws another particle.",
         "* `--precision double` writes the same source with `double` in place of `float` and all digits "
-        "of its numbers, for a processor that has a unit for it (Cortex-M7 with a double unit, "
+        "of its numbers. It is for a processor that has a unit for it (Cortex-M7 with a double unit, "
         "Cortex-A, a PC). It takes about twice the memory. What is left of rounding is the polynomials for "
         "exponential, logarithm and arctangent, which are those of single precision.",
         "* `ww_set_voltage`, where the effect `battery_sag` is declared, tells the battery's voltage.",
@@ -238,9 +238,9 @@ def _lines(result: Result, data: Path) -> list[str]:
         "may be yours.",
         "",
         "**Simulink.** Simulink's C Caller block calls plain C functions that a header declares. Name "
-        "the header and the source under Simulation Target in the model's settings; call the five "
-        "functions in the order above; keep one `ww_filter` a vehicle in your own C file, with a "
-        "function of plain arrays around the calls, so that the block sees arrays alone; give NaN "
+        "the header and the source under Simulation Target in the model's settings. Call the five "
+        "functions in the order above. Keep one `ww_filter` a vehicle in your own C file, with a "
+        "function of plain arrays around the calls, so that the block sees arrays alone. Give NaN "
         "for what was not measured. **This was not tried in Simulink.** What was tried is Python's "
         "`ctypes`: `tests/live/test_export_c.py` drives the same functions.",
         "",
@@ -253,18 +253,19 @@ def _lines(result: Result, data: Path) -> list[str]:
         + ", ".join(exportable_effects())
         + ".",
         "* The filter's own equations are written twice, in `estimator/` and in the templates of "
-        "`live/export_c/templates/`, and held together by tests: five flights with gaps, jumps, "
-        "turned poses and halves of poses, statuses and restarts included; each exportable effect; "
-        "the policies; gyro and accelerometer with bias, vibration and saturation.",
-        "* What differs on purpose: poses are taken in one number after the other, which is the same "
-        "in exact numbers and loses less in single precision; an IMU's biases are rows of the "
-        "covariance; derivatives of effects (EKF) are taken over wider steps; the unscented prediction is "
+        "`live/export_c/templates/`, and held together by tests. They cover five flights with gaps, jumps, "
+        "turned poses and halves of poses, statuses and restarts included. They also cover each "
+        "exportable effect, the policies, and gyro and accelerometer with bias, vibration and "
+        "saturation.",
+        "* Some things differ on purpose. Poses are taken in one number after the other, which is the "
+        "same in exact numbers and loses less in single precision. An IMU's biases are rows of the "
+        "covariance. Derivatives of effects (EKF) are taken over wider steps. The unscented prediction is "
         "that of a linear model and what the sigma points add to it, which is the same sum.",
         "",
         "## C against Python",
         "",
         f"The largest difference over {result['steps']:,} steps of each flight ({steps:,} a filter), "
-        "in per cent of the estimate's own standard deviation at that step; `std`: the largest "
+        "in per cent of the estimate's own standard deviation at that step. `std`: the largest "
         f"relative difference of a standard deviation. Largest of all: {_percent(worst)} % and "
         f"{_percent(spread)} %. Flights on which a status or a count of restarts was ever another: "
         f"{other:.0f} of {len(single)}, in single and in double. `in double, most`: the largest "

@@ -163,8 +163,8 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         "",
         "## Consistency",
         "",
-        "Flights in which the model holds exactly, with yaw at 1 rad/s: the mean over "
-        f"{checks[0]['runs']} flights of 2 s, and the 95 % band of a consistent filter "
+        "Flights in which the model holds exactly, with yaw at 1 rad/s. The table has the mean "
+        f"over {checks[0]['runs']} flights of 2 s, and the 95 % band of a consistent filter "
         "(degrees of freedom in brackets).",
         "",
         *table,

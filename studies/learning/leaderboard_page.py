@@ -196,7 +196,7 @@ def _verdict(rows: Sequence[Row], lines: Sequence[Line]) -> str:
         if informed and one is not None:
             text += (
                 f" A tracker that knows the family of motions reaches {informed[0].rmse_m:.3f} m, "
-                f"{_said(informed[0].against['tracker'])} against the one that does not. {best.name} "
+                f"{_said(informed[0].against['tracker'])} against the one that does not. The policy {best.name} "
                 f"was trained on motions of that family, and is {_said(one)} against it."
             )
         sentences.append(text)
@@ -232,9 +232,9 @@ def _target(rows: Sequence[Row]) -> str:
         for row in kinds[name]
     )
     return (
-        f"* **Target of learning: {'reached' if holds(name) else 'missed'}.** Asked was a kind of policy each of whose seeds has a mean RMSE "
-        f"at or below that of the best tracker that does not know the motions, on base and on fast, and which loses nothing. {name} comes "
-        f"closest: {told}."
+        f"* **Target of learning: {'reached' if holds(name) else 'missed'}.** Asked was a kind of policy that loses nothing. Each of its "
+        f"seeds was to have a mean RMSE at or below that of the best tracker that does not know the motions, on base and on fast. "
+        f"Closest comes {name}: {told}."
     )
 
 
@@ -364,8 +364,8 @@ def _limit(results: Sequence[Result], rows: Sequence[Row], plan: Mapping[str, An
 
 What could the best controller reach that sees the estimated wrench and not the fan? `limit` is a particle filter with the model by
 which episodes are made: motions with their ranges, jet, gusts, disturbance, noise of the pose and the filter's own lag. The lower bound
-is how uncertain even it is of where the fan will be {half_response():.2f} s later, after which the flight loop has carried out half of a command:
-the root mean square over an episode of the posterior's standard deviation, mean over the episodes, in m. It leaves out that
+is how uncertain even it is of where the fan will be {half_response():.2f} s later, after which the flight loop has carried out half of a command.
+It is the root mean square over an episode of the posterior's standard deviation, mean over the episodes, in m. It leaves out that
 gusts move the vehicle, too; the gap from there to the oracle is what the wrench does not tell, and no learning can find it there. What
 varied draws anew in each episode and undeclared effects are not in the model of `limit`: there it is a controller and no limit.
 
@@ -580,7 +580,7 @@ def _tuning() -> str:
             )
     return (
         "## Tuning\n\nWhat designed laws were given, to set beside the decisions of training: gains "
-        "searched on validation episodes (`windwrench tune`); a set of gains that is far behind "
+        "searched on validation episodes (`windwrench tune`). A set of gains that is far behind "
         "after ten episodes is given up. Before: the gains that the search began with.\n\n"
         + "\n".join(table)
     )

@@ -142,12 +142,10 @@ def _losses(result: Result) -> list[str]:
     if dear:
         out.append(
             f"* In {len(dear)} of {count} groups a burst more than doubles the filter's error "
-            "while it lasts, all where the filter is fast: "
-            + "; ".join(
-                f"{r['case']}, {r['flights']}: {_times(r['filter']['ratio'])}" for r in dear
-            )
-            + ". Without any pose the force of that time is not known better: see the gaps beside."
+            "while it lasts, all where the filter is fast. Without any pose the force of that time "
+            "is not known better: see the gaps beside. The groups:"
         )
+        out += [f"    * {r['case']}, {r['flights']}: {_times(r['filter']['ratio'])}" for r in dear]
     return out
 
 
@@ -191,8 +189,9 @@ def write_page(result: Result, data: Path, picture: Path, page: Path) -> None:
         "## Bad poses",
         "",
         f"The error of the force over that of the clean log: {100 * SHARE:g} % of the poses, or "
-        f"all poses of a burst every {EVERY:g} s, lie {100 * FAR:g} cm off; of a burst, while it "
-        "lasts. Ratio of pooled errors, its 95 % interval (flights drawn anew, 2,000 times), and "
+        f"all poses of a burst every {EVERY:g} s, lie {100 * FAR:g} cm off. For a "
+        "burst, the error is that while it lasts. Ratio of pooled errors, its 95 % interval "
+        "(flights drawn anew, 2,000 times), and "
         "the largest of one flight. The gaps have no pose at all for as long: no gate can do "
         "better. The kit's vehicles fly in five times the usual disturbance, calmly and fast.",
         "",

@@ -69,8 +69,8 @@ def _comparisons(result: Result) -> list[str]:
         "",
         f"* **Missed**: on {len(small)} of {len(changed)} changed flights *nothing* is likelier "
         f"than any place{_named(small)}. A light weight changes the trim by one to three times the "
-        "usual scatter of an unchanged vehicle from flight to flight (a battery is never put in "
-        "twice at the same place).",
+        "usual scatter of an unchanged vehicle from flight to flight. A battery is never put in "
+        "twice at the same place.",
         f"* The likeliest of all answers is right: "
         f"{share(sum(row['right'] for row in changed), len(changed))}.",
         f"* The likeliest place, if something changed, is right: "
@@ -104,7 +104,7 @@ def _comparisons(result: Result) -> list[str]:
         "from statics and not from the comparison's own model.",
         "",
         f"* Sure of a wrong place: {share(drawn['sure_of_a_wrong_place'], drawn['sure'])} of what "
-        f"was sure; sure of nothing where a little had changed: "
+        f"was sure. Sure of nothing where a little had changed: "
         f"{share(drawn['sure_of_nothing_and_wrong'], drawn['sure'])}.",
         f"* Of the changed ones the likeliest answer is right: "
         f"{share(drawn['changed_right'], drawn['changed'])}; of the unchanged ones: "
