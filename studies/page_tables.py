@@ -8,7 +8,13 @@ from scipy.stats import binomtest
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_text
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+
+def marks(name: str) -> tuple[str, str]:
+    """Return the comments between which a page holds what has this name."""
+    return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+
+
+BEGIN, END = marks("tables")
 
 
 def share(count: int, whole: int) -> str:
@@ -24,16 +30,22 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
 
 
-def put_between(text: str, page: Path | None) -> None:
-    """Put a text between the marks ``BEGIN`` and ``END`` of a page; without a page, do nothing.
+def put_between(text: str, page: Path | None, name: str = "tables") -> None:
+    """Put a text between a page's marks; without a page, do nothing.
+
+    Args:
+        text: Markdown.
+        page: its file.
+        name: of the marks; a page of two studies has a pair for each.
 
     Raises:
         InputError: the page is not there or lacks the marks.
     """
     if page is None:
         return
+    begin, end = marks(name)
     old = page.read_text(encoding="utf-8") if page.exists() else ""
-    if old.count(BEGIN) != 1 or old.count(END) != 1:
-        raise InputError(f"{page}: expected a page with one line {BEGIN} and one {END}")
-    before, rest = old.split(BEGIN)
-    write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}", page)
+    if old.count(begin) != 1 or old.count(end) != 1:
+        raise InputError(f"{page}: expected a page with one line {begin} and one {end}")
+    before, rest = old.split(begin)
+    write_text(f"{before}{begin}\n\n{text}\n\n{end}{rest.split(end)[1]}", page)

@@ -7,6 +7,7 @@ squares of the specific force along body z.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +24,8 @@ WARM_UP = 1.0  # s before the window, by which the filter forgets where it began
 BLOCK = 5.0  # s: errors further apart are taken as independent
 POWERS = 3  # of the command in thrust: u^0, u^1, u^2
 START = (0.06, 0.01)  # s, lag and offset
-MODELS = {
-    (on, beside): f"lag on {on}, {'a time offset' if beside else 'no time offset'}"
-    for on in ("commands", "thrust")
-    for beside in (False, True)
-}
+MODELS = tuple((on, beside) for on in ("commands", "thrust") for beside in (False, True))
+DIGITS = 6  # of what is kept: 1 us, less than the search resolves
 
 
 def lagged(x: Array, lag: float, period: float) -> Array:
@@ -95,24 +93,25 @@ def fitted(command: Array, force: Array, period: float, on: str, beside: bool) -
     return [told(best), width, np.sqrt(left(best, everything))]
 
 
-def rows(command: Array, force: Array, period: float) -> list[list[str]]:
-    """Return a line of the table for each model; arguments as of ``fitted``."""
+def outcomes(command: Array, force: Array, period: float) -> list[dict[str, Any]]:
+    """Return what each model makes of a flight, as JSON holds it; arguments as of ``fitted``."""
     out = []
-    for (on, beside), name in MODELS.items():
+    for on, beside in MODELS:
         (lag, offset), (lag_width, offset_width), left = fitted(command, force, period, on, beside)
-        out.append(
-            [
-                name,
-                f"{1e3 * lag:.0f} ± {1e3 * lag_width:.0f} ms",
-                f"{1e3 * offset:.1f} ± {1e3 * offset_width:.1f} ms" if beside else "none",
-                f"{left:.3f} m/s2",
-            ]
-        )
+        figures = {
+            "lag_s": lag,
+            "lag_half_width_s": lag_width,
+            "offset_s": offset,
+            "offset_half_width_s": offset_width,
+            "residual_rms_mps2": left,
+        }
+        rounded = {key: round(float(value), DIGITS) for key, value in figures.items()}
+        out.append({"on": on, "offset_fitted": beside, **rounded})
     return out
 
 
-def of_log(path: Path, begin: float, end: float) -> list[list[str]]:
-    """Return the table's lines of a part of a log, in s after its start.
+def of_log(path: Path, begin: float, end: float) -> list[dict[str, Any]]:
+    """Return the outcomes on a part of a log, in s after its start.
 
     Raises:
         InputError: the log cannot be read, or lacks motor commands or an accelerometer.
@@ -124,4 +123,4 @@ def of_log(path: Path, begin: float, end: float) -> list[list[str]]:
     if log.command is None or log.accelerometer is None:
         raise InputError(f"{path}: expected motor commands and an accelerometer")
     command = np.stack([np.interp(even, time, one) for one in log.command.T], axis=1)
-    return rows(command, np.interp(even, time, log.accelerometer[:, 2]), period)
+    return outcomes(command, np.interp(even, time, log.accelerometer[:, 2]), period)

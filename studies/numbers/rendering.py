@@ -35,14 +35,15 @@ def _written(name: str, write: Callable[[Any, Path, Path], Any], data: str) -> s
         return page.read_text(encoding="utf-8")
 
 
-def _between_marks(name: str, tables: str) -> str:
-    """Return a page with its tables made anew."""
+def _between_marks(name: str, tables: str, **others: str) -> str:
+    """Return a page with its tables made anew, and ``others`` by the names of their marks."""
     from windwrench.studies.page_tables import put_between
 
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / f"{name}.md"
         page.write_bytes((DOCS / f"{name}.md").read_bytes())
-        put_between(tables, page)
+        for marks, text in {"tables": tables, **others}.items():
+            put_between(text, page, marks)
         return page.read_text(encoding="utf-8")
 
 
@@ -161,8 +162,13 @@ def _clients() -> str:
 
 def _identify() -> str:
     from windwrench.studies.identified_vehicles.page import tables
+    from windwrench.studies.motor_lag import page as motor_lag
 
-    return _between_marks("identify", tables(kept("identify/identified_vehicles.json.gz")))
+    return _between_marks(
+        "identify",
+        tables(kept("identify/identified_vehicles.json.gz")),
+        **{motor_lag.MARKS: motor_lag.tables(kept("identify/motor_lag.json"))},
+    )
 
 
 # made by results whose sentences have other words by now: their numbers are compared
