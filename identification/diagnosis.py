@@ -23,7 +23,6 @@ from .findings import (
     Disturbance,
     Errors,
     NamedEffect,
-    Probabilities,
     Signature,
     Structure,
     Trace,
@@ -74,8 +73,9 @@ from .logs.screening import LEAST_SECONDS, screen_log
 from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
+from .posterior.deviations import with_both_estimates
 from .posterior.pooling import Signs, pooled
-from .posterior.ranking import rank
+from .posterior.ranking import Ranking, rank
 from .prediction import nis_without_wrench_state, rollout_error
 from .wrench_series import pose_notes
 
@@ -127,8 +127,9 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each name is, is worked out as well, beside all else
-            and without changing it. It takes about as long again.
+        probabilities: whether how probable each name is, is worked out as well. Names stay the
+            same; standard deviations of coefficients then know of the second estimate that it has
+            of each. It takes about as long again.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -218,6 +219,9 @@ def diagnose(
     if thrust_is_assumed(every, vehicle):
         effects = tuple(_with_assumed_thrust(effect, vehicle) for effect in effects)
         notes += assumed_thrust_doubts(fit.effects)
+    ranking = _ranking(flights, search, report) if probabilities else None
+    if ranking:
+        effects = with_both_estimates(effects, ranking.sets)
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )
@@ -281,8 +285,12 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
         doubts=doubted_by,
-        probabilities=_probabilities(flights, search, effects, remainder, beyond, report)
-        if probabilities
+        probabilities=pooled(
+            effects,
+            [(x.effects, x.probability) for x in ranking.sets],
+            Signs(remainder, beyond, ranking.structure, ranking.varying),
+        )
+        if ranking
         else None,
     )
 
@@ -326,16 +334,9 @@ def _name_doubts(
     return {check: sentences for check, words in found.items() if (sentences := tuple(words))}
 
 
-def _probabilities(
-    flights: Flights,
-    search: Search,
-    effects: Sequence[NamedEffect],
-    remainder: str,
-    beyond: float,
-    report: Callable[[str], None],
-) -> Probabilities | None:
-    """Return how probable each name is; None where the logs hold no poses and rotor speeds as they
-    were measured, or where the vehicle declares effects, of which none is then tried.
+def _ranking(flights: Flights, search: Search, report: Callable[[str], None]) -> Ranking | None:
+    """Return the posterior of sets of effects; None where the logs hold no poses and rotor speeds
+    as they were measured, or where the vehicle declares effects, of which none is then tried.
     """
     if flights.commanded or flights.inertial or flights.filtered or flights.vehicle.effects:
         return None
@@ -343,9 +344,7 @@ def _probabilities(
     if max(periods) > DIAGNOSIS.most_period_ratio * min(periods):
         return None
     report("asking how probable each effect is")
-    found = rank(flights, search.library, report=report)
-    sets = [(x.effects, x.probability) for x in found.sets]
-    return pooled(effects, sets, Signs(remainder, beyond, found.structure, found.varying))
+    return rank(flights, search.library, report=report)
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

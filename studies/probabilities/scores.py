@@ -15,8 +15,10 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from windwrench.identification.findings import Alternative, Probabilities
+from windwrench.identification.posterior.deviations import of_two_estimates
 from windwrench.identification.posterior.pooling import POOLING
 from windwrench.studies.page_tables import share, table
+from windwrench.studies.probabilities.doubts import table_of_doubts
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
     fit,
@@ -182,9 +184,9 @@ def _area(flights: Sequence[Scored]) -> str:
     return f"{area:.3f} ({len(strange)} against {len(known)})"
 
 
-def _coverage(flights: Sequence[Scored]) -> list[float]:
+def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
     """Return errors of coefficients in stated standard deviations, of right names whose truth is
-    known.
+    known; ``both``: of the two estimates, else of the search alone.
     """
     out = []
     for x in flights:
@@ -192,7 +194,11 @@ def _coverage(flights: Sequence[Scored]) -> list[float]:
             for name, value in x.flight["truth"].get(e["name"], {}).items():
                 std = e["std"].get(name) or 0.0
                 if std > 0.0 and not acts_unknown(x.flight):
-                    out.append(abs(e["coefficients"][name] - value) / std)
+                    own = e["coefficients"][name]
+                    other = x.flight["fitted"].get(e["name"], {}).get(name, [own])[0]
+                    if both:
+                        std = of_two_estimates(std, own, other)
+                    out.append(abs(own - value) / std)
     return out
 
 
@@ -251,11 +257,11 @@ def _counts(flights: Sequence[Scored]) -> str:
         ["outsiders and left-out effects, yet a name of 0.5 and more", above(strange, 0.5)],
         ["... of 0.95 and more", above(strange, 0.95)],
     ]
-    errors = _coverage(flights)
-    if errors:
-        for level, most in ((68, 0.9945), (95, 1.96)):
+    for both, words in ((True, ""), (False, ", by the search alone")):
+        errors = _coverage(flights, both)
+        for level, most in ((68, 0.9945), (95, 1.96)) if errors else ():
             count = share(sum(e < most for e in errors), len(errors))
-            rows.append([f"coverage of {level} % intervals of coefficients", count])
+            rows.append([f"coverage of {level} % intervals of coefficients{words}", count])
     search, ranking = np.median([x.flight["cpu_s"] for x in flights], axis=0)
     rows.append(
         ["CPU time of search and of posterior, median", f"{search:.1f} and {ranking:.1f} s"]
@@ -294,4 +300,6 @@ def tables(records: Sequence[Mapping[str, Any]]) -> str:
         if some:
             parts += [f"**{title}**", _counts(some)]
             parts += [table(["probability", "mean", "right"], reliability(some))]
+    parts += ["**Checks that make names tentative**"]
+    parts += [table_of_doubts([r["result"] for r in records])]
     return "\n\n".join([*parts, "**Weights of the pool**", _weights(records)])

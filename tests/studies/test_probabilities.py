@@ -13,6 +13,7 @@ import pytest
 from windwrench.identification.findings import Probabilities
 from windwrench.identification.posterior.pooling import POOLING
 from windwrench.studies.probabilities.__main__ import RESULTS, plan
+from windwrench.studies.probabilities.doubts import table_of_doubts
 from windwrench.studies.probabilities.fitting import fit, frequencies, is_right
 from windwrench.studies.probabilities.scores import (
     Scored,
@@ -39,6 +40,8 @@ def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", 
         "varying": 0.0,
         "gusts": [],
         "weight": [4.56, 0.126],
+        "signs": [],
+        "doubts": {},
     }
 
 
@@ -70,6 +73,20 @@ def test_what_is_right():
     assert not is_right(flight(["mass"], ["inertia"]), "mass")
     assert not is_right(flight(["mass"], ["inertia"], left_out=["inertia"]), "mass")
     assert not is_right(flight(["mass"], [], outsider="tether"), "mass")
+
+
+def test_a_check_is_worth_the_flights_that_it_alone_doubts():
+    wrong, right = flight(["wind?"], ["mass"]), flight(["mass?"], ["mass"])
+    wrong["doubts"] = {"pair": 1}
+    right["signs"] = [["a candidate regressor", "thrust with time", 0.1]]
+    both = flight(["wind?"], ["mass"])
+    both["doubts"], both["signs"] = {"pair": 2}, right["signs"]
+    rows = [x.split(" | ") for x in table_of_doubts([wrong, right, both]).splitlines()[2:]]
+    assert [x.strip("| ") for x in rows[0]] == ["pair", "2", "1", "0", "0"]
+    assert [x.strip("| ") for x in rows[1]] == [
+        "structure: a candidate regressor",
+        *("1", "0", "1", "1"),
+    ]
 
 
 def test_weights_follow_who_was_right():
