@@ -288,7 +288,7 @@ def diagnose(
         probabilities=pooled(
             effects,
             [(x.effects, x.probability) for x in ranking.sets],
-            Signs(remainder, beyond, ranking.structure, ranking.varying),
+            Signs(beyond, ranking.structure),
         )
         if ranking
         else None,

@@ -188,38 +188,6 @@ def evidence_of_one_more(
     return log_sum(factors.ravel().tolist()) - math.log(factors.size)
 
 
-def evidence_of_change(
-    blocks: Array, chosen: Index, size: Array, shapes: Sequence[Array], sizes: Sequence[float]
-) -> float:
-    """Return the logarithm of the Bayes factor of one sum of columns whose multiple changes from
-    block to block, no one knows which, against none.
-
-    The multiples are independent, of mean one: a random coefficient (T. S. Breusch and A. R. Pagan,
-    Econometrica 47 (1979), 1287-1294), here with its variance integrated out.
-
-    Args:
-        blocks: (blocks, c + 1, c + 1) products of columns and residual, in prior standard
-            deviations.
-        chosen: columns of the model.
-        size: (len(chosen),) standard deviations of their prior.
-        shapes: (c,) each, the sums.
-        sizes: relative standard deviations that a multiple may have.
-    """
-    if not shapes:
-        return 0.0
-    total = blocks.sum(axis=0)
-    inner = total[np.ix_(chosen, chosen)] * size[:, None] * size + np.eye(len(chosen))
-    mode = np.zeros(blocks.shape[1] - 1)
-    np.add.at(mode, chosen, size * np.linalg.solve(inner, total[chosen, -1] * size))
-    left = blocks[:, :-1, -1] - blocks[:, :-1, :-1] @ mode
-    every = np.stack(shapes)
-    scores = left @ every.T  # (blocks, shapes)
-    known = np.einsum("sc,bcd,sd->bs", every, blocks[:, :-1, :-1], every)
-    square = np.square(np.asarray(sizes))[:, None, None]
-    factors = 0.5 * square * scores**2 / (1.0 + square * known) - 0.5 * np.log1p(square * known)
-    return log_sum(factors.sum(axis=1).ravel().tolist()) - math.log(len(shapes) * len(sizes))
-
-
 def log_sum(values: Sequence[float]) -> float:
     """Return the logarithm of a sum of exponentials."""
     most = max(values, default=-math.inf)

@@ -33,21 +33,18 @@ class PoolingSettings:
 
     # below the likeliest set: no likelihood is so right that its tails further out count
     most_worse: float = 10.0
-    evidence: float = 0.47  # a nat of the posterior, between sets
-    sure: float = 2.69  # an effect that the search names
-    tentative: float = -0.14  # one that it names with a doubt
-    other: float = -3.34  # one that it does not name
-    # log odds that something unknown acts: where the residual is at its noise and all names are
-    # sure, and what each sign adds
-    unknown: float = -2.8
-    structured: float = 2.03  # the residual depends on motion, load, place or time
-    random: float = 0.0  # it is larger than its noise
-    doubted: float = 1.58  # a name is tentative
-    disturbance: float = 1.0  # a nat of ``Signs.disturbance``
-    structure: float = 0.08  # a nat of ``Ranking.structure``
-    varying: float = 0.0  # a nat of ``Ranking.varying``
+    evidence: float = 0.36  # a nat of the posterior, between sets
+    sure: float = 3.61  # an effect that the search names
+    tentative: float = 1.39  # one that it names with a doubt
+    other: float = -4.47  # one that it does not name
+    # log odds that something unknown acts: where the flight is calm and all names are sure, and
+    # what each sign adds
+    unknown: float = -2.45
+    doubted: float = 2.45  # a name is tentative
+    disturbance: float = 1.87  # a nat of ``Signs.disturbance``
+    structure: float = 0.07  # a nat of ``Signs.structure``
     disturbance_range: tuple[float, float] = (-1.0, 4.0)  # nats
-    nats_range: tuple[float, float] = (-2.0, 15.0)  # of the other two
+    structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
     least: float = 0.001  # probability of an alternative that is reported
 
 
@@ -114,31 +111,24 @@ def features(named: Sequence[Named], found: Explanations) -> Array:
 
 @dataclass(frozen=True)
 class Signs:
-    """What speaks for something unknown.
+    """What speaks for something unknown, beside the search's doubts.
 
     Attributes:
-        remainder: none, random or structured, by the search.
         disturbance: logarithm of the largest disturbance over what counts for none.
         structure: of the posterior, ``Ranking.structure``.
-        varying: of the posterior, ``Ranking.varying``.
     """
 
-    remainder: str
     disturbance: float
     structure: float
-    varying: float
 
     def numbers(self, named: Sequence[Named]) -> Array:
-        """Return them as numbers (7,) beside the names of the search; the first is one."""
+        """Return them as numbers (4,) with the doubts of the search; the first is one."""
         return np.array(
             [
                 1.0,
-                self.remainder == "structured",
-                self.remainder == "random",
                 any(e.tentative for e in named),
                 np.clip(self.disturbance, *POOLING.disturbance_range),
-                np.clip(self.structure, *POOLING.nats_range),
-                np.clip(self.varying, *POOLING.nats_range),
+                np.clip(self.structure, *POOLING.structure_range),
             ],
             dtype=np.float64,
         )
@@ -163,9 +153,7 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    odds = signs.numbers(named) @ np.array(
-        [w.unknown, w.structured, w.random, w.doubted, w.disturbance, w.structure, w.varying]
-    )
+    odds = signs.numbers(named) @ np.array([w.unknown, w.doubted, w.disturbance, w.structure])
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown
     names = {e.name: 0.0 for e in named}

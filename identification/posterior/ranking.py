@@ -34,7 +34,6 @@ from .evidence import (
     Index,
     Marginal,
     SetEvidence,
-    evidence_of_change,
     evidence_of_one_more,
     log_sum,
     marginal,
@@ -62,8 +61,6 @@ class RankingSettings:
     # times such a start, between which its column stands for it
     near_start: tuple[float, float] = (0.5, 1.5)
     most_effects: int = 4
-    # relative standard deviations by which an effect's strength may change from block to block
-    changes: tuple[float, ...] = (0.03, 0.1, 0.3, 1.0)
     kept_sets: int = 8  # of each size, to which a further effect is added
     kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
     rounds: int = 4  # of fitting the noise beside the best set
@@ -94,16 +91,12 @@ class Ranking:
         sets: the likeliest first.
         structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
             effect outside the library may follow, beside the likeliest set.
-        varying: logarithm of the Bayes factor of an effect of that set whose strength changes from
-            block to block, against the same strength throughout. An effect that imitates another
-            one does, where the flight changes.
         tempering: power of the likelihood, 1 where its scatter is what it should be.
     """
 
     probability: Mapping[str, float]
     sets: tuple[Ranked, ...]
     structure: float
-    varying: float
     tempering: float
 
 
@@ -438,26 +431,6 @@ class _Posterior:
             DISCREPANCY.sizes,
         )
 
-    def varying(self) -> float:
-        """Return the logarithm of the Bayes factor of an effect of the likeliest set whose strength
-        changes from block to block, against none that does.
-        """
-        best = self.known[max(self.scores, key=self.scores.__getitem__)]
-        base = self.bases[best.base]
-        own = [base.columns[c] for v in best.variants for c in v[1]]
-        asked = [i for (e, _), i in base.columns.items() if e]
-        chosen = np.array([*base.plain, *asked, *own], dtype=np.intp)
-        little = RANKING.negligible * base.typical[asked]
-        size = np.concatenate([np.ones(len(base.plain)), little, np.ones(len(own))])
-        shapes, row = [], 0
-        for _, columns in best.variants:
-            shape = np.zeros(len(base.size))
-            at = [base.columns[c] for c in columns]
-            shape[at] = best.evidence.mode[row : row + len(at)]
-            shapes.append(shape)
-            row += len(at)
-        return evidence_of_change(self.power * base.blocks, chosen, size, shapes, RANKING.changes)
-
     def best_setting(self, most: int = RANKING.most_effects) -> Setting:
         """Return the coefficients of the likeliest set of at most so many effects."""
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
@@ -516,4 +489,4 @@ class _Posterior:
                 break
             setting, std = self._setting(key)
             sets.append(Ranked(tuple(sorted(key)), p[key], setting, std))
-        return Ranking(probability, tuple(sets), self.structure(), self.varying(), self.power)
+        return Ranking(probability, tuple(sets), self.structure(), self.power)

@@ -26,7 +26,7 @@ _DECIMALS = 2  # of a weight
 # what is known of the weights before the flights: mean and standard deviation
 _BEFORE = ((0.5, 2.0, 0.0, -1.0), 1.0)
 _SIGN_STD = 1.8
-_NATS_STD = 0.2  # a nat
+_STRUCTURE_STD = 0.2  # a nat
 _LEAST = 1e-4  # no probability counts as less
 
 
@@ -68,12 +68,7 @@ def is_right(flight: dict[str, Any], name: str) -> bool:
 def signs_of(flight: dict[str, Any]) -> Signs:
     """Return what speaks for something unknown on a recorded flight."""
     gusts = [Disturbance("", rms, time) for rms, time in flight["gusts"]]
-    return Signs(
-        flight["remainder"],
-        beyond_calm(gusts, *flight["weight"]),
-        flight["structure"],
-        flight["varying"],
-    )
+    return Signs(beyond_calm(gusts, *flight["weight"]), flight["structure"])
 
 
 def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
@@ -116,7 +111,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     ).x
     x = np.array([signs_of(f).numbers(names_of(f)) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
-    scale = np.array([1e3, *(4 * [_SIGN_STD]), *(2 * [_NATS_STD])])
+    scale = np.array([1e3, _SIGN_STD, _SIGN_STD, _STRUCTURE_STD])
 
     def loss_of_signs(w: Array) -> float:
         odds = x @ w
@@ -124,7 +119,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    by_signs = minimize(loss_of_signs, np.zeros(7)).x
+    by_signs = minimize(loss_of_signs, np.zeros(4)).x
     a, b = by_sets.round(_DECIMALS).tolist(), by_signs.round(_DECIMALS).tolist()
     return replace(
         POOLING,
@@ -133,12 +128,9 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         tentative=a[2],
         other=a[3],
         unknown=b[0],
-        structured=b[1],
-        random=b[2],
-        doubted=b[3],
-        disturbance=b[4],
-        structure=b[5],
-        varying=b[6],
+        doubted=b[1],
+        disturbance=b[2],
+        structure=b[3],
     )
 
 

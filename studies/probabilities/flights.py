@@ -89,7 +89,6 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
         "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
         "fitted": _fitted(found, [e.name for e in search.effects]),
         "structure": round(found.structure, 3),
-        "varying": round(found.varying, 3),
         "tempering": round(found.tempering, 4),
         "cpu_s": [round(middle - begun, 2), round(ended - middle, 2)],
     }

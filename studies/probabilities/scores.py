@@ -277,12 +277,9 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "tentative",
         "other",
         "unknown",
-        "structured",
-        "random",
         "doubted",
         "disturbance",
         "structure",
-        "varying",
     )
     rows = [[f"`{x}`", f"{getattr(w, x):.2f}", f"{getattr(POOLING, x):.2f}"] for x in names]
     return table(["weight, nats", "fitted to all these flights", "in use"], rows)

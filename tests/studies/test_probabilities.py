@@ -37,7 +37,6 @@ def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", 
         "remainder": remainder,
         "sets": sets or [[[e.strip("?") for e in named], 1.0]],
         "structure": structure,
-        "varying": 0.0,
         "gusts": [],
         "weight": [4.56, 0.126],
         "signs": [],
@@ -96,7 +95,7 @@ def test_weights_follow_who_was_right():
     ]
     found = fit([*agree, *strange])
     assert found.sure > 2.0
-    assert found.unknown < -1.0 < 1.0 < found.structured
+    assert found.unknown < -1.0 < 1.0 < found.doubted
     assert frequencies([*agree, *strange]) == {False: 21 / 22, True: 1 / 22}
 
 

@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 from windwrench.identification.posterior.evidence import (
     Marginal,
-    evidence_of_change,
     evidence_of_one_more,
     log_sum,
     marginal,
@@ -102,20 +101,3 @@ def test_one_more_column_is_worth_the_mean_of_its_bayes_factors():
 def test_log_sums():
     assert log_sum([0.0, 0.0]) == pytest.approx(math.log(2.0))
     assert log_sum([]) == -math.inf
-
-
-@pytest.mark.parametrize(("scatter", "least", "most"), [(0.0, -4.0, 0.0), (0.3, 10.0, np.inf)])
-def test_an_effect_whose_strength_changes_is_told_from_one_that_is_constant(scatter, least, most):
-    rng = np.random.default_rng(5)
-    x = rng.standard_normal((20, 200, 2))
-    multiple = 1.0 + scatter * rng.standard_normal((20, 1))
-    y = 2.0 * multiple * x[..., 0] + rng.standard_normal((20, 200))
-    both = np.concatenate([x, y[..., None]], axis=2)
-    blocks = np.einsum("bni,bnj->bij", both, both)
-    shape = np.array([2.0, 0.0])
-    found = evidence_of_change(blocks, np.arange(2), np.ones(2), [shape], (0.03, 0.1, 0.3, 1.0))
-    assert least < found < most
-
-
-def test_no_effect_has_no_strength_that_changes():
-    assert evidence_of_change(np.eye(3)[None], np.arange(2), np.ones(2), [], (0.1,)) == 0.0

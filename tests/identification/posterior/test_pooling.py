@@ -16,8 +16,7 @@ class Name:
 
 
 BOTH = [(("mass",), 0.9), (("mass", "inertia"), 0.1)]
-CALM = Signs("none", -1.0, -1.0, -1.0)
-LOUD = Signs("structured", 3.0, 15.0, 5.0)
+CALM, LOUD = Signs(-1.0, -1.0), Signs(3.0, 15.0)
 
 
 def test_what_both_say_is_likelier_than_what_one_says():
@@ -65,9 +64,9 @@ def test_signs_make_something_unknown_likelier():
 
 
 def test_signs_have_their_ranges():
-    low, high = POOLING.nats_range
-    beyond = Signs("random", -np.inf, 99.0, -99.0).numbers([Name("mass")])
-    np.testing.assert_allclose(beyond, [1, 0, 1, 0, POOLING.disturbance_range[0], high, low])
+    beyond = Signs(-np.inf, 99.0).numbers([Name("mass")])
+    least, most = POOLING.disturbance_range[0], POOLING.structure_range[1]
+    np.testing.assert_allclose(beyond, [1, 0, least, most])
 
 
 def test_nothing_found_is_an_explanation_too():
