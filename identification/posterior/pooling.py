@@ -33,10 +33,10 @@ class PoolingSettings:
 
     # below the likeliest set: no likelihood is so right that its tails further out count
     most_worse: float = 10.0
-    evidence: float = 0.36  # a nat of the posterior, between sets
-    sure: float = 3.61  # an effect that the search names
-    tentative: float = 1.39  # one that it names with a doubt
-    other: float = -4.47  # one that it does not name
+    evidence: float = 0.35  # a nat of the posterior, between sets
+    sure: float = 3.56  # an effect that the search names
+    tentative: float = 1.48  # one that it names with a doubt
+    other: float = -4.43  # one that it does not name
     # log odds that something unknown acts: where the flight is calm and all names are sure, and
     # what each sign adds
     unknown: float = -2.45

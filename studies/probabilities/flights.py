@@ -28,7 +28,7 @@ from windwrench.studies.trials.trials import EQUIVALENTS
 
 KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
 _ATTEMPTS = 4  # at a flight that crashes
-_MOST_SETS = 40  # of the posterior, that are kept
+_MOST_SETS = 20  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
 _STRONGEST_GUSTS = 3.0  # times the background's
 _MASSES = (0.1, 2.0)  # kg, between which a vehicle of half the flights lies
