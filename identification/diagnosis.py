@@ -127,9 +127,9 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each name is, is worked out as well. Names stay the
-            same; standard deviations of coefficients then know of the second estimate that it has
-            of each. It takes about as long again.
+        probabilities: whether how probable each name is, is worked out as well. Names and
+            coefficients stay the same. The standard deviation of a coefficient then includes how
+            far the posterior's estimate of it is from the search's. It takes about as long again.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -221,7 +221,7 @@ def diagnose(
         notes += assumed_thrust_doubts(fit.effects)
     ranking = _ranking(flights, search, report) if probabilities else None
     if ranking:
-        effects = with_both_estimates(effects, ranking.sets)
+        effects = with_both_estimates(effects, ranking)
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
     )

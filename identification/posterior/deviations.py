@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..findings import NamedEffect
-from .ranking import Ranked
+from .ranking import Ranking
 
 
 def of_two_estimates(std: float, value: float, other: float) -> float:
@@ -22,18 +22,18 @@ def of_two_estimates(std: float, value: float, other: float) -> float:
 
 
 def with_both_estimates(
-    effects: Sequence[NamedEffect], sets: Sequence[Ranked]
+    effects: Sequence[NamedEffect], ranking: Ranking
 ) -> tuple[NamedEffect, ...]:
     """Return named effects with the standard deviations that both estimates of each coefficient
     allow; an effect that is in no set stays as it is.
 
     Args:
         effects: of the search.
-        sets: of the posterior, the likeliest first.
+        ranking: the posterior.
     """
     out = []
     for effect in effects:
-        likeliest = next((s for s in sets if effect.name in s.effects), None)
+        likeliest = ranking.likeliest_with(effect.name)
         other = likeliest.coefficients[effect.name] if likeliest else {}
         std = {
             name: of_two_estimates(value, effect.coefficients[name], other[name])

@@ -99,6 +99,10 @@ class Ranking:
     structure: float
     tempering: float
 
+    def likeliest_with(self, effect: str) -> Ranked | None:
+        """Return the likeliest set that has an effect; None where no set has it."""
+        return next((s for s in self.sets if effect in s.effects), None)
+
 
 @dataclass(frozen=True, eq=False)
 class _Base:

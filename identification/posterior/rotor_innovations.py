@@ -37,7 +37,7 @@ DRIVEN = (2, 3, 4, 5)
 
 def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> list[Array]:
     """Return the rotors' innovations (n, 4) of each piece, as accelerations: along body z (m/s2)
-    and about the body's axes (rad/s2).
+    and about the body's axes (rad/s2). The first samples, of which too little is past, have none.
 
     Args:
         pieces: as they were measured, and as the filter sees them.
@@ -46,16 +46,16 @@ def rotor_innovations(pieces: list[tuple[Poses, Track]], inertias: Array) -> lis
     sides = []
     for poses, track in pieces:
         now = _accelerations(poses, track, inertias)
-        sides.append((known_before(poses, track, now), now[FEEDBACK.lags :]))
+        sides.append((_known_before(track, now), now[FEEDBACK.lags :]))
     out = []
-    for (_, y), predicted in zip(sides, fitted(sides), strict=True):
-        found = np.zeros((len(y) + FEEDBACK.lags, 4))
+    for (poses, _), (_, y), predicted in zip(pieces, sides, _predicted(sides), strict=True):
+        found = np.zeros((len(poses.t), 4))
         found[FEEDBACK.lags :] = y - predicted
         out.append(found)
     return out
 
 
-def fitted(sides: list[tuple[Array, Array]]) -> list[Array]:
+def _predicted(sides: list[tuple[Array, Array]]) -> list[Array]:
     """Return the least-squares predictions of each piece, of regressors (n, c) and what they
     predict (n, 4).
     """
@@ -79,13 +79,14 @@ def _accelerations(poses: Poses, track: Track, inertias: Array) -> Array:
     return np.asarray(np.square(poses.rotor_speeds) @ wrench / inertias)
 
 
-def known_before(poses: Poses, track: Track, rotors: Array) -> Array:
+def _known_before(track: Track, rotors: Array) -> Array:
     """Return what is known before a sample's rotors (n - lags, c): their past, ``rotors`` (n, 4),
-    and the filter's state.
+    and the filter's state. Nothing is known in a piece that is shorter than the lags.
     """
     lags = FEEDBACK.lags
-    known = [rotors[lags - i - 1 : len(rotors) - i - 1] for i in range(lags)]
-    before = slice(lags - 1, len(rotors) - 1)
+    count = max(len(rotors) - lags, 0)
+    known = [rotors[i : i + count] for i in reversed(range(lags))]
+    before = slice(lags - 1, lags - 1 + count)
     body = np.einsum("nij,ni->nj", track.rotation[before], track.velocity[before])
     known += [
         track.rotation[before][:, 2, :2],

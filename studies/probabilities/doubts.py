@@ -20,7 +20,7 @@ _SIGNS = (
     ("rotor thrust beyond", "structure: thrust bends"),
     ("bends at one point", "structure: thrust bends"),
     ("position and heading together", "structure: drag by place"),
-    ("", "structure: a candidate regressor"),
+    ("a candidate regressor", "structure: a candidate regressor"),
 )
 
 

@@ -82,9 +82,6 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
         "doubts": {check: len(words) for check, words in search.doubts.items()},
         "signs": [[s.test, s.where, float(f"{s.gain:.3g}")] for s in search.structure],
         "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
-        "floor": [float(f"{x:.3g}") for x in (search.floor_force_rms, search.floor_torque_rms)],
-        "after": [float(f"{x:.3g}") for x in (search.after.force_rms, search.after.torque_rms)],
-        "pushed": len(search.pushes),
         "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],
         "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
         "fitted": _fitted(found, [e.name for e in search.effects]),
@@ -95,15 +92,12 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
 
 
 def _fitted(found: Ranking, effects: Sequence[str]) -> dict[str, Any]:
-    """Return coefficients and deviations of effects in the likeliest set that has each."""
+    """Return coefficients of effects in the likeliest set that has each."""
     out = {}
     for e in effects:
-        best = next((s for s in found.sets if e in s.effects), None)
+        best = found.likeliest_with(e)
         if best is not None:
-            out[e] = {
-                k: [float(f"{x:.6g}"), float(f"{best.std[e].get(k, 0.0):.6g}")]
-                for k, x in best.coefficients[e].items()
-            }
+            out[e] = {k: float(f"{x:.6g}") for k, x in best.coefficients[e].items()}
     return out
 
 

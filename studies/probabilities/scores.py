@@ -195,7 +195,7 @@ def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
                 std = e["std"].get(name) or 0.0
                 if std > 0.0 and not acts_unknown(x.flight):
                     own = e["coefficients"][name]
-                    other = x.flight["fitted"].get(e["name"], {}).get(name, [own])[0]
+                    other = x.flight["fitted"].get(e["name"], {}).get(name, own)
                     if both:
                         std = of_two_estimates(std, own, other)
                     out.append(abs(own - value) / std)

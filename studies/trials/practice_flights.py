@@ -170,7 +170,9 @@ def fly_practice(
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
     """
-    for what, value in (("turbulence", turbulence), ("sensor", sensor), ("seen", seen)):
+    if not 0.0 < seen <= 1.0:
+        raise InputError(f"fly_practice: seen must be a number above 0 and at most 1, got {seen}")
+    for what, value in (("turbulence", turbulence), ("sensor", sensor)):
         if not 0.0 <= value < np.inf:
             raise InputError(
                 f"fly_practice: {what} must be a finite number of at least 0, got {value}"

@@ -389,3 +389,9 @@ def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
     # it holds its place better in the same gusts
     away = [log.position[200:].std(axis=0).max() for log in logs]
     assert away[1] < away[0]
+
+
+@pytest.mark.parametrize("seen", [0.0, 1.5])
+def test_a_loop_sees_some_of_the_log_s_noise_and_no_more(seen):
+    with pytest.raises(InputError, match="seen must be"):
+        fly_practice(load_vehicle("ardrone2"), seconds=4.0, seen=seen)

@@ -5,7 +5,7 @@ import pytest
 
 from windwrench.identification.findings import NamedEffect
 from windwrench.identification.posterior.deviations import of_two_estimates, with_both_estimates
-from windwrench.identification.posterior.ranking import Ranked
+from windwrench.identification.posterior.ranking import Ranked, Ranking
 
 
 def test_intervals_hold_where_both_estimates_are_wrong_alike():
@@ -27,7 +27,8 @@ def test_an_effect_that_no_set_has_stays_as_it_is():
         Ranked(("wind",), 0.9, {"wind": {"vx": 1.0}}, {"wind": {"vx": 0.1}}),
         Ranked(("mass",), 0.1, {"mass": {"dm": 0.054}}, {"mass": {"dm": 0.002}}),
     ]
-    assert with_both_estimates([effect], sets[:1]) == (effect,)
-    (found,) = with_both_estimates([effect], sets)
+    without, ranking = (Ranking({}, tuple(some), 0.0, 1.0) for some in (sets[:1], sets))
+    assert with_both_estimates([effect], without) == (effect,)
+    (found,) = with_both_estimates([effect], ranking)
     assert found.std["dm"] == pytest.approx(np.hypot(0.001, 0.004 / np.sqrt(2.0)))
     assert found.coefficients == effect.coefficients
