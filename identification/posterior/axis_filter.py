@@ -28,6 +28,14 @@ class AxisSettings:
     # s, correlation times: gusts last 0.1 to 2 s; what lasts longer is no disturbance
     times: tuple[float, float] = (0.03, 3.0)
     ridge: float = 1e-9  # relative, of gains that do the same
+    # logarithms of variances and of the correlation time, by which the search's first points differ
+    # where nothing is known, and where a noise of the same flight is
+    first_step: float = 2.0
+    next_step: float = 0.7
+    # the same, and log-likelihood, by which the search's points differ at its end. A white noise
+    # that is far below the rest has no likeliest value
+    last_step: float = 0.3
+    least_gain: float = 0.2
 
 
 AXIS = AxisSettings()
@@ -141,6 +149,7 @@ def likeliest_noise(
     disturbance: float,
     jumps: Sequence[Array],
     jump_state: NDArray[np.intp],
+    time: float | None = None,
 ) -> tuple[AxisNoise, Array]:
     """Return the noise of one axis at maximum likelihood, and the gains (c,) of the jumps beside
     it.
@@ -156,6 +165,8 @@ def likeliest_noise(
         jumps: (n, c) of each piece, what a unit of each gain adds to the state before the pose of
             sample k is read. What else is known of a disturbance leaves less of it to the pose.
         jump_state: (c,) the state: 0 the pose, 1 its rate, 2 the disturbance.
+        time: s, correlation time of the disturbance at which the search begins, where the noise is
+            roughly known; default: it is not.
     """
     skip = round(AXIS.settling_time / period)
     count = max(sum(len(x) - skip for x in measured), 1)
@@ -179,29 +190,32 @@ def likeliest_noise(
     begun = np.array(
         [
             2.0 * math.log(disturbance / pose),
-            math.log(AXIS.first_time),
+            math.log(time or AXIS.first_time),
             2.0 * math.log(max(white, 1e-3 * disturbance) / pose),
         ]
     )
     low, high = begun - 16.0, begun + 16.0
     low[1], high[1] = np.log(AXIS.times)
+    begun = np.clip(begun, low, high)
     best = minimize(
         loss,
         begun,
         method="Nelder-Mead",
         options={
-            "initial_simplex": begun + np.vstack([np.zeros(3), 2.0 * np.eye(3)]),
-            "xatol": 0.05,
-            "fatol": 0.5,
+            "initial_simplex": begun
+            + (AXIS.next_step if time else AXIS.first_step)
+            * np.vstack([np.zeros(3), np.diag(np.where(begun >= high, -1.0, 1.0))]),
+            "xatol": AXIS.last_step,
+            "fatol": AXIS.least_gain,
             "maxfev": 160,
         },
     )
-    strength, time, shaken = np.exp(np.clip(best.x, low, high)).tolist()
-    left, gains = sums(strength, time, shaken)
+    strength, lasting, shaken = np.exp(np.clip(best.x, low, high)).tolist()
+    left, gains = sums(strength, lasting, shaken)
     innovation = math.sqrt(left / count)
-    noise = innovation / math.sqrt(steady(strength, time, shaken, period, gain))
+    noise = innovation / math.sqrt(steady(strength, lasting, shaken, period, gain))
     found = steady_noise(
-        noise, noise * math.sqrt(strength), time, noise * math.sqrt(shaken), period
+        noise, noise * math.sqrt(strength), lasting, noise * math.sqrt(shaken), period
     )
     return found, gains
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import log_ndtr
+
+from ...runtime.compiled import compiled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -74,58 +75,109 @@ def set_evidence(m: Marginal, index: Sequence[int], low: Array, high: Array) -> 
         index: the set's columns.
         low: (c,) bounds of all columns, at most zero.
         high: (c,) at least zero.
+
+    Raises:
+        numpy.linalg.LinAlgError: columns of the set that no prior tells apart.
     """
     at = np.asarray(index, dtype=np.intp)
-    if not len(at):
-        return SetEvidence(m.constant, np.zeros(0), np.zeros(0))
-    normal = m.normal[np.ix_(at, at)] + np.eye(len(at))
-    right, lo, hi = m.right[at], low[at], high[at]
-    mode, held = _bounded(normal, right, lo, hi)
+    mode, std = np.empty(len(at)), np.empty(len(at))
+    value = _evidence(m.normal, m.right, at, low, high, mode, std)
+    return SetEvidence(m.constant + value, mode, std)
+
+
+@compiled
+def _evidence(
+    every: Array, slopes: Array, at: np.ndarray, low: Array, high: Array, mode: Array, std: Array
+) -> float:
+    """Write mode and standard deviations of the columns ``at`` (n,); return the logarithm of their
+    evidence.
+    """
+    n = len(at)
+    if n == 0:
+        return 0.0
+    normal, right, lo, hi = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        for j in range(n):
+            normal[i, j] = every[at[i], at[j]]
+        normal[i, i] += 1.0
+        right[i], lo[i], hi[i] = slopes[at[i]], low[at[i]], high[at[i]]
     factor = np.linalg.cholesky(normal)
-    value = float(right @ mode - 0.5 * mode @ normal @ mode)
-    value -= float(np.log(np.diagonal(factor)).sum())
-    if held.any():
-        slope = np.abs(right - normal @ mode)
-        # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
-        z = slope[held] / np.sqrt(np.diagonal(normal)[held])
-        value += float(np.sum(0.5 * z * z + log_ndtr(-z)))
-    value -= float(np.sum(np.log(_share(lo, hi))))
     inverse = np.linalg.inv(normal)
-    return SetEvidence(m.constant + value, mode, np.sqrt(np.diagonal(inverse)))
+    held = np.zeros(n, dtype=np.bool_)
+    mode[:] = np.dot(inverse, right)
+    _bound(normal, right, lo, hi, mode, held)
+    value = 0.0
+    for i in range(n):
+        slope = right[i]
+        for j in range(n):
+            slope -= normal[i, j] * mode[j]
+        value += 0.5 * mode[i] * (right[i] + slope) - math.log(factor[i, i])
+        if held[i]:
+            # int_0^inf exp(-s t - h t^2 / 2) dt over the whole normal integral of curvature h
+            value += _log_tail(abs(slope) / math.sqrt(normal[i, i]))
+        value -= math.log(max(_normal(hi[i]) - _normal(lo[i]), 1e-12))
+        std[i] = math.sqrt(inverse[i, i])
+    return value
 
 
-def _share(low: Array, high: Array) -> Array:
-    """Return how much of a standard normal density lies between bounds."""
-    return np.asarray(np.maximum(np.exp(log_ndtr(high)) - np.exp(log_ndtr(low)), 1e-12))
+@compiled
+def _normal(x: float) -> float:
+    """Return how much of a standard normal density lies below ``x``."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
 
 
-def _bounded(
-    normal: Array, right: Array, low: Array, high: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the mode within all bounds at once, and which coefficients are held at one."""
-    held = np.zeros(len(right), dtype=np.bool_)
-    mode: Array = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-    if np.all((mode >= low) & (mode <= high)):
-        return mode, held
-    for _ in range(3 * len(right)):
-        beyond = np.where(held, 0.0, np.maximum(low - mode, mode - high))
-        worst = int(np.argmax(beyond * np.sqrt(np.diagonal(normal))))
-        if beyond[worst] > 1e-12:
+@compiled
+def _log_tail(z: float) -> float:
+    """Return ``z**2 / 2`` plus the logarithm of how much of a standard normal density lies beyond
+    ``z``, at least zero.
+    """
+    if z < 10.0:
+        return 0.5 * z * z + math.log(0.5 * math.erfc(z / math.sqrt(2.0)))
+    w = 1.0 / (z * z)  # M. Abramowitz and I. Stegun, Handbook (1964), 26.2.12
+    return -math.log(z * math.sqrt(2.0 * math.pi)) + math.log1p(-w * (1.0 - w * (3.0 - 15.0 * w)))
+
+
+@compiled
+def _bound(
+    normal: Array, right: Array, low: Array, high: Array, mode: Array, held: NDArray[np.bool_]
+) -> None:
+    """Move the mode within all bounds at once; write which coefficients are held at one."""
+    n = len(right)
+    for _ in range(3 * n):
+        worst, most = 0, 0.0
+        for i in range(n):
+            beyond = max(low[i] - mode[i], mode[i] - high[i])
+            if not held[i] and beyond > 1e-12 and beyond * math.sqrt(normal[i, i]) > most:
+                worst, most = i, beyond * math.sqrt(normal[i, i])
+        if most > 0.0:
             held[worst] = True
             mode[worst] = low[worst] if mode[worst] < low[worst] else high[worst]
         else:
-            pull = right - normal @ mode
-            inwards = np.where(mode >= high, -pull, pull)
-            inwards[~held] = 0.0
-            back = int(np.argmax(inwards))
-            if inwards[back] <= 1e-9:
+            back, most = 0, 1e-9
+            for i in range(n):
+                if held[i]:
+                    pull = right[i]
+                    for j in range(n):
+                        pull -= normal[i, j] * mode[j]
+                    inwards = -pull if mode[i] >= high[i] else pull
+                    if inwards > most:
+                        back, most = i, inwards
+            if most <= 1e-9:
                 break
             held[back] = False
-        free = ~held
-        if free.any():
-            rest = right[free] - normal[np.ix_(free, held)] @ mode[held]
-            mode[free] = np.linalg.solve(normal[np.ix_(free, free)], rest)
-    return np.clip(mode, low, high), held
+        free = np.flatnonzero(~held)
+        inner, rest = np.empty((len(free), len(free))), np.empty(len(free))
+        for a, i in enumerate(free):
+            rest[a] = right[i]
+            for j in range(n):
+                if held[j]:
+                    rest[a] -= normal[i, j] * mode[j]
+            for b, j in enumerate(free):
+                inner[a, b] = normal[i, j]
+        if len(free):
+            mode[free] = np.linalg.solve(inner, rest)
+    for i in range(n):
+        mode[i] = min(max(mode[i], low[i]), high[i])
 
 
 def tempering(blocks: Array, chosen: Index) -> float:

@@ -92,11 +92,15 @@ class Likelihood:
     Args:
         flights: of the vehicle.
         setting: the coefficients about which all is linear.
+        near: the likelihood of the same flights near another setting, whose noise is where the
+            search for this one's begins; default: it begins with what any flight may have.
     """
 
     axes: tuple[int, ...] = (0, 1, 2, 3, 4, 5)  # whose innovations count
 
-    def __init__(self, flights: Flights, setting: Setting) -> None:
+    def __init__(
+        self, flights: Flights, setting: Setting, near: "Likelihood | None" = None
+    ) -> None:
         self.flights, self.setting = flights, setting
         self.vehicle = flights.amended({k: v for k, v in setting.items() if k})
         self.pieces = [
@@ -108,11 +112,17 @@ class Likelihood:
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
-        self.noise = self._first_noise()
-        self.tracks = [run(piece, self.vehicle, self.noise) for piece in self.pieces]
-        for _ in range(LIKELIHOOD.noise_rounds):
-            self.noise, known = self._likeliest()
-            self.tracks = self._run(self.noise, known)
+        lengths = [len(piece.t) for piece in self.pieces]
+        if near is None or [len(piece.t) for piece in near.pieces] != lengths:
+            near = None
+            self.noise = self._first_noise()
+            known = [np.zeros((n, 6, 3)) for n in lengths]
+        else:
+            self.noise, known = near.noise, near.known
+        self.tracks = self._run(self.noise, known)
+        for i in range(1 if near else LIKELIHOOD.noise_rounds):
+            self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
+            self.tracks = self._run(self.noise, self.known)
         self.signals = [
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
@@ -152,11 +162,11 @@ class Likelihood:
         return np.asarray(np.maximum(out, 1e-9))
 
     def _likeliest(
-        self, explained: Sequence[Array] | None = None
+        self, explained: Sequence[Array] | None = None, begun: bool = True
     ) -> tuple[tuple[AxisNoise, ...], list[Array]]:
         """Return the likeliest noise of each axis, and what the rotors' innovations add to the
         states of each piece (n, 6, 3); ``explained`` (n, 2, 6) is what is known to move the pose,
-        and to accelerate, beside the model.
+        and to accelerate, beside the model. ``begun``: whether this noise is roughly known.
         """
         angles = []
         for piece in self.pieces:
@@ -195,6 +205,7 @@ class Likelihood:
                 now.disturbance,
                 own,
                 jump_state[say],
+                now.time if begun else None,
             )
             out.append(found)
             for x, jump in zip(known, own, strict=True):

@@ -124,12 +124,11 @@ class _Base:
 def rank(
     flights: Flights,
     library: Sequence[str],
-    likelihood: Callable[[Flights, Setting], Likelihood] = Likelihood,
     report: Callable[[str], None] = lambda text: None,
 ) -> Ranking:
     """Return the posterior over sets of effects of a library, of those that flights can show."""
     library = [e for e in library if e not in flights.not_identifiable]
-    near = likelihood(flights, {})
+    near = Likelihood(flights, {})
     starts = _starts(flights, library, {})
     sums = near.sums(_wanted(library, {}, starts), starts, unknown=False)
     loud = _in_prior_units(flights, sums, {}, starts)
@@ -149,7 +148,7 @@ def rank(
         last = setting
         tried.add(frozenset(setting))
         report(f"trying {', '.join(setting)}")
-        near = likelihood(flights, setting)
+        near = Likelihood(flights, setting, near)
         starts = _starts(flights, library, setting)
         sums = near.sums(_wanted(library, setting, starts), starts, unknown=False)
         now = _in_prior_units(flights, sums, setting, starts)
