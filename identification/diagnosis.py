@@ -23,6 +23,7 @@ from .findings import (
     Disturbance,
     Errors,
     NamedEffect,
+    Ranking,
     Signature,
     Structure,
     Trace,
@@ -44,8 +45,7 @@ from .inference.equivalence import (
     unlisted_equivalent_doubts,
 )
 from .inference.imu_limits import hidden_by_bias, hidden_causes, with_errors_of_fusion
-from .inference.innovations import Innovations, contradicted_by_innovations
-from .inference.joint_equivalence import pair_doubts
+from .inference.innovations import Innovations
 from .inference.likelihood_refit import (
     DelayKind,
     delay_alternatives,
@@ -66,7 +66,7 @@ from .inference.regression import (
 from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.sensor_bias import biases
-from .inference.stepwise_search import find_effects
+from .inference.stepwise_search import find_effects, with_proposal
 from .inference.transient_disturbances import transient_disturbances
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log
@@ -75,7 +75,7 @@ from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .posterior.deviations import with_both_estimates
 from .posterior.pooling import Signs, pooled
-from .posterior.ranking import Ranking, rank
+from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
 from .wrench_series import pose_notes
 
@@ -102,6 +102,7 @@ class DiagnosisSettings:
 
 
 DIAGNOSIS = DiagnosisSettings()
+SMALL = "small beside the residual"
 FILTERED_NAMES = (
     "the pose was filtered before the log was written. Whether the named effects act on the "
     "vehicle, or follow from feedback-induced correlation, shows only in the sensors' "
@@ -127,9 +128,10 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each name is, is worked out as well. Names and
-            coefficients stay the same. The standard deviation of a coefficient then includes how
-            far the posterior's estimate of it is from the search's. It takes about as long again.
+        probabilities: whether how probable each name is, is worked out as well. The likeliest set
+            of the posterior is then named if it explains the residual better than what the search
+            has found, and the standard deviation of a coefficient includes how far the posterior's
+            estimate of it is from the search's. It takes about as long again.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -153,6 +155,9 @@ def diagnose(
     notes += [f"{log.name}: {note}" for log in every for note in pose_notes(log, vehicle)]
     search = Search(flights, [n for n in names() if n not in without], report)
     fit, first = find_effects(search)
+    ranking = _ranking(flights, search, fit, report) if probabilities else None
+    if ranking and ranking.sets:
+        fit = with_proposal(search, fit, ranking.sets[0].coefficients)
     rotor_delay = delay_kind(search, fit)
     if rotor_delay == "lag":
         fit = with_lag(search, fit)
@@ -219,7 +224,6 @@ def diagnose(
     if thrust_is_assumed(every, vehicle):
         effects = tuple(_with_assumed_thrust(effect, vehicle) for effect in effects)
         notes += assumed_thrust_doubts(fit.effects)
-    ranking = _ranking(flights, search, report) if probabilities else None
     if ranking:
         effects = with_both_estimates(effects, ranking)
     sure = remainder == "none" and not any(
@@ -232,7 +236,7 @@ def diagnose(
     )
     notes += name_doubts
     if large and (small := [e.name for e in effects if _is_small(e.evidence["energy_explained"])]):
-        doubted_by["small beside the residual"] = tuple(small)
+        doubted_by[SMALL] = tuple(small)
     report("predicting the flights")
     amended = flights.amended({k: v for k, v in fit.setting.items() if k})
     segments = _segments(flights)
@@ -285,10 +289,11 @@ def diagnose(
         and (flights.filtered or any(map(pose_was_filtered, every))),
         needs_pose=tuple(sorted(flights.needs_pose | hidden)),
         doubts=doubted_by,
+        ranking=ranking,
         probabilities=pooled(
             effects,
             [(x.effects, x.probability) for x in ranking.sets],
-            Signs(beyond, ranking.structure),
+            Signs(contradicting(signs, doubted_by), beyond, ranking.structure),
         )
         if ranking
         else None,
@@ -313,6 +318,13 @@ def beyond_calm(disturbances: Sequence[Disturbance], weight: float, arm: float) 
     return float(np.log(np.max(slow / _calm(weight, arm)))) if slow else -np.inf
 
 
+def contradicting(signs: Sequence[Structure], doubts: Iterable[str]) -> int:
+    """Return how many checks contradict what was found: tests that show structure, and checks of
+    names. That a name is small beside the residual contradicts nothing.
+    """
+    return len({sign.kind for sign in signs}) + len(set(doubts) - {SMALL})
+
+
 def _name_doubts(
     search: Search, fit: FittedEffects, rotor_delay: DelayKind | None
 ) -> dict[str, tuple[str, ...]]:
@@ -321,7 +333,6 @@ def _name_doubts(
     found: dict[str, Iterable[str]] = {
         "composite": composite_doubts(flights, fit),
         "unlisted equivalent": unlisted_equivalent_doubts(search, fit),
-        "pair": pair_doubts(search, fit),
         "hidden cause": hidden_causes(search, fit),
     }
     if not flights.commanded:
@@ -329,12 +340,13 @@ def _name_doubts(
     if flights.filtered and fit.effects:
         found["filtered pose"] = [FILTERED_NAMES]
     elif not flights.commanded:
-        found["innovations"] = contradicted_by_innovations(flights, fit.setting)
         found["delay"] = delay_doubts(search, fit, rotor_delay)
     return {check: sentences for check, words in found.items() if (sentences := tuple(words))}
 
 
-def _ranking(flights: Flights, search: Search, report: Callable[[str], None]) -> Ranking | None:
+def _ranking(
+    flights: Flights, search: Search, fit: FittedEffects, report: Callable[[str], None]
+) -> Ranking | None:
     """Return the posterior of sets of effects; None where the logs hold no poses and rotor speeds
     as they were measured, or where the vehicle declares effects, of which none is then tried.
     """
@@ -344,7 +356,8 @@ def _ranking(flights: Flights, search: Search, report: Callable[[str], None]) ->
     if max(periods) > DIAGNOSIS.most_period_ratio * min(periods):
         return None
     report("asking how probable each effect is")
-    return rank(flights, search.library, report=report)
+    found = {effect: fit.setting[effect] for effect in fit.effects}
+    return rank(flights, search.library, found, report)
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

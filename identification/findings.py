@@ -17,6 +17,9 @@ from ..dynamics.vehicle import Vehicle
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+# tests for structure in the residual: a candidate regressor explains some of it, a coefficient
+# changes with a variable, or innovations confirm an effect that the residual hardly shows
+STRUCTURE_TESTS = ("candidate regressor", "varying coefficient", "innovations")
 CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 
@@ -143,11 +146,13 @@ class Structure:
         test: what was tried, in words.
         where: channel and regressor, in words.
         gain: share of the residual's deviance that it explains on left-out blocks.
+        kind: of the test, one of ``STRUCTURE_TESTS``.
     """
 
     test: str
     where: str
     gain: float
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -216,6 +221,45 @@ class Probabilities:
     unknown: float
 
 
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects, by the posterior alone.
+
+    Attributes:
+        effects: names, in order of the alphabet.
+        probability: that these act and no others, if nothing acts but effects of the library.
+        coefficients: of each effect, at the mode, in the units of the library.
+        std: their standard deviations, where they have one.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    coefficients: Mapping[str, Mapping[str, float]]
+    std: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The posterior of a flight, given that nothing acts but effects of the library.
+
+    Attributes:
+        probability: of each effect of the library, that it acts.
+        sets: the likeliest first.
+        structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
+            effect outside the library may follow, beside the likeliest set.
+        tempering: power of the likelihood, 1 where its scatter is what it should be.
+    """
+
+    probability: Mapping[str, float]
+    sets: tuple[RankedSet, ...]
+    structure: float
+    tempering: float
+
+    def likeliest_with(self, effect: str) -> RankedSet | None:
+        """Return the likeliest set that has an effect; None where no set has it."""
+        return next((s for s in self.sets if effect in s.effects), None)
+
+
 Gusts, Push = Disturbance, TransientDisturbance  # their older names
 
 
@@ -258,8 +302,10 @@ class Diagnosis:
             beside the IMU.
         doubts: why names are tentative, by the check that says so: sentences, which are notes as
             well, or names. Beside these, ``structure`` is a doubt of all names.
-        probabilities: of what was found; none where they were not asked for, or where rotors or
-            pose were not measured as they were.
+        ranking: the posterior of sets of effects; none where it was not asked for, or where rotors
+            or pose were not measured as they were.
+        probabilities: of what was found, by search and posterior together; none where there is no
+            posterior.
     """
 
     verdict: str
@@ -288,6 +334,7 @@ class Diagnosis:
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
     needs_pose: tuple[str, ...] = ()
     doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    ranking: Ranking | None = None
     probabilities: Probabilities | None = None
 
     def __repr__(self) -> str:

@@ -44,8 +44,6 @@ class RegressorSettings:
     most_noise_share: float = 0.05
     # share of rounding noise in a rotor torque: shares of 0.045 look like an effect
     most_rounding_share: float = 0.02
-    places_per_axis: int = 5  # along either horizontal axis
-    least_presence: float = 0.01  # mean of a place's bump, below which the vehicle was hardly there
     # Hz, of a load on a cable of 0.1 to 1.5 m; flight loops answer faster
     load_frequencies_hz: Array = field(default_factory=lambda: np.geomspace(0.4, 1.5, 11))
     # Hz, of a part on a soft mount; the residual ends at 5
@@ -174,60 +172,6 @@ def general_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str
                 column = np.zeros((len(x), 6))
                 column[:, :3] = rotation[:, :, channel] * x[:, None]
                 yield f"force along body {'xyz'[channel]}", name, column
-
-
-def place_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of what acts near one place of the room alone, with the channel and
-    the place in words.
-    """
-    at = np.concatenate([p.signals.position[p.rows, :2] for p in flights.pieces(setting)])
-    if at.std(axis=0).min() <= REGRESSORS.least_variation["position"]:
-        return
-    low, high = np.quantile(at, [0.02, 0.98], axis=0)
-    apart = (high - low) / (REGRESSORS.places_per_axis - 1)
-    for i, j in np.ndindex(REGRESSORS.places_per_axis, REGRESSORS.places_per_axis):
-        place = low + apart * [i, j]
-        bump = np.prod(np.maximum(0.0, 1.0 - np.abs(at - place) / apart), axis=1)
-        if bump.mean() < REGRESSORS.least_presence:
-            continue
-        for channel in range(6):
-            column = np.zeros((len(at), 6))
-            column[:, channel] = bump
-            yield (
-                CHANNELS[channel],
-                f"the place near x = {place[0]:.1f} m, y = {place[1]:.1f} m",
-                column,
-            )
-
-
-def drag_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield columns (rows, 6) of a linear drag that changes with a variable and has a mean of zero,
-    with the variable in words.
-    """
-    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
-    if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
-        return
-    for name, x in standardised(explanatory_variables(flights, setting)).items():
-        yield "a drag", name, np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)])
-
-
-def drag_by_place(flights: Flights, setting: Setting) -> list[Array]:
-    """Return columns (rows, 6) of a linear drag, and of drags that change with position, with
-    heading and with both at once.
-    """
-    velocity = np.concatenate([p.signals.velocity[p.rows] for p in flights.pieces(setting)])
-    if velocity.std(axis=0).max() <= REGRESSORS.least_variation["velocity"]:
-        return []
-    known = standardised(explanatory_variables(flights, setting))
-    places = [x for name, x in known.items() if "position" in name]
-    headings = [x for name, x in known.items() if "heading" in name]
-    shapes = [
-        np.ones(len(velocity)),
-        *places,
-        *headings,
-        *(x * y for x in places for y in headings),
-    ]
-    return [np.column_stack([-velocity * x[:, None], np.zeros_like(velocity)]) for x in shapes]
 
 
 def resonant_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:

@@ -15,10 +15,7 @@ from ...dynamics.effects import Family, Role, get, of_family, playing
 from .gram_matrix import GRAM, gram
 from .regression import (
     CENTRAL,
-    REGRESSION,
-    ROTOR_TIME_OFFSET,
     Flights,
-    coefficient,
     unit_of_change,
 )
 from .search import SEARCH, FittedEffects, Search, coefficient_count
@@ -46,18 +43,11 @@ class EquivalenceSettings:
     # share of what is left without the effect, which is the limit for commanded flights at most
     commanded_most_share_without: float = 0.4
     largest_size: float = 1.2 * GRAM.prior_std  # typical sizes
-    share_of_bound: float = 0.98  # of a bound, from which a coefficient has reached it
     most_reliable_effects: int = 2  # at once; aerodynamic ones count as one
     # share of what an inertia explains, which one that goes with the mass may leave of it
     most_share_apart: float = 0.1
-    # standard deviations between rotor efficiencies that are the same
-    most_std_apart: float = 3.0
-    least_efficiency: float = 0.01  # relative, below which a rotor is as good as declared
     least_std: float = 1e-9  # relative; standard deviations are no smaller
-    # share of a thrust scale which a mass may fail to cancel
-    most_share_uncancelled: float = 0.1
     least_hanging_ratio: float = 5.0  # a centre of mass along z over across it: a load that hangs
-    least_voltage_correlation: float = 0.95  # of voltage and time, where the voltage falls evenly
 
 
 EQUIVALENCE = EquivalenceSettings()
@@ -219,11 +209,6 @@ def _changes(flights: Flights, fit: FittedEffects, role: Role) -> float:
     )
 
 
-def _said(*roles: Role) -> str:
-    """Return the effects of the library that play some roles, as they are said in a sentence."""
-    return " or a ".join(playing(*roles)) or "another effect"
-
-
 def _relative(flights: Flights, fit: FittedEffects) -> tuple[Array, Array]:
     """Return the relative changes of inertia (three), mass and thrust in a fit, and their standard
     deviations.
@@ -248,29 +233,12 @@ def _weighted(values: Array, std: Array) -> float:
     return float(np.average(values, weights=None if np.any(std == 0.0) else std**-2.0))
 
 
-def _three_alike(fit: FittedEffects, effect: str) -> bool:
-    """Return whether an effect changes the thrust of just three rotors alike, and by more than
-    nothing.
-    """
-    rotors = [c.name for c in get(effect).coefficients[:4]]
-    off = np.array([fit.setting[effect].get(name, 0.0) for name in rotors])
-    std = max(fit.std.get((effect, name), 0.0) for name in rotors)
-    middle = float(np.median(off))
-    same = np.abs(off - middle) < max(
-        EQUIVALENCE.most_std_apart * std, EQUIVALENCE.most_share_apart * abs(middle)
-    )
-    return np.count_nonzero(same) == len(rotors) - 1 and abs(middle) > max(
-        EQUIVALENCE.most_std_apart * std, EQUIVALENCE.least_efficiency
-    )
-
-
 def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
     """Return, as sentences, which single effect may be the cause of several named ones that are
     together its exact equivalent.
 
-    Mass is a scale of thrust with inertia, a scale of thrust is mass with inertia, and inertia is
-    mass with a scale of thrust (their coefficients coincide then); a battery that falls evenly is a
-    thrust that is off and fades.
+    Mass is a scale of thrust with inertia, and a scale of thrust is mass with inertia: their
+    coefficients coincide then. And the more effects are needed, the rather they are parts of one.
     """
     found = []
     names = set(fit.effects)
@@ -284,24 +252,6 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             f"{len(names)} effects were needed: together they may stand for one effect outside the "
             "library"
         )
-    offset = fit.setting.get(ROTOR_TIME_OFFSET[0], {}).get(ROTOR_TIME_OFFSET[1], 0.0)
-    if names and offset < EQUIVALENCE.share_of_bound * REGRESSION.rotor_time_offset_range[0]:
-        found.append(
-            f"the fitted rotor speeds act at least {-1000.0 * offset:.1f} ms earlier than they are "
-            "logged: an effect outside the library may be the cause"
-        )
-    found += [
-        f"{effect} reaches the largest plausible value of {name} "
-        f"({coefficient((effect, name)).meaning}): it may stand for another effect"
-        for effect in fit.effects
-        for name, value in fit.setting[effect].items()
-        if value > EQUIVALENCE.share_of_bound * coefficient((effect, name)).plausible
-    ]
-    if any(_three_alike(fit, effect) for effect in named(Role.ROTOR_THRUSTS)):
-        found.append(
-            f"three rotors have the same efficiency: a {_said(Role.MASS, Role.THRUST)}, and one "
-            "weak rotor, may be the cause"
-        )
     if named(Role.INERTIA) and named(Role.MASS, *THRUSTS):
         values, std = _relative(flights, fit)
         off = (values - _weighted(values, std)) / np.maximum(std, EQUIVALENCE.least_std)
@@ -311,28 +261,5 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             found.append(
                 "the relative changes of inertia and of thrust or mass coincide: a single other "
                 "effect may be the cause"
-            )
-    if named(Role.MASS) and named(Role.THRUST):
-        weight, thrust = (1.0 + _changes(flights, fit, x) for x in (Role.MASS, Role.THRUST))
-        if abs(thrust / weight - 1.0) < EQUIVALENCE.most_share_uncancelled * abs(thrust - 1.0):
-            found.append(
-                f"{' and '.join(named(Role.MASS, Role.THRUST))} cancel, but for the moments: "
-                f"{_said(Role.INERTIA)} may be the cause"
-            )
-    if named(Role.THRUST_OVER_TIME) and named(Role.MASS, *THRUSTS, Role.STEADY_FORCE):
-        drop = [
-            (p.signals.t, p.signals.voltage)
-            for p in flights.pieces({})
-            if p.signals.voltage is not None
-        ]
-        even = all(
-            abs(float(np.corrcoef(t, v)[0, 1])) > EQUIVALENCE.least_voltage_correlation
-            for t, v in drop
-            if v.std() > 0
-        )
-        if drop and even:
-            found.append(
-                "the battery's voltage falls evenly: a thrust that is off and fades may be "
-                f"{_said(Role.THRUST_OVER_VOLTAGE)}"
             )
     return found

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ...dynamics.effects import get
 from ...runtime.errors import InputError
 from .gram_matrix import Gram, gram
-from .joint_equivalence import used_coefficients
 from .regression import (
     CENTRAL,
     START_PREFIX,
@@ -38,6 +37,7 @@ class ImuLimitsSettings:
     draws: int = 8  # a standard deviation of them is then known to a quarter
     # typical sizes, up to which an effect that such a log does not show may be there all the same
     hidden_size: float = 2.0
+    least_in_std: float = 3.0  # standard deviations from zero, from which a coefficient is used
 
 
 IMU_LIMITS = ImuLimitsSettings()
@@ -76,6 +76,17 @@ def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
     return frozenset(e for e, c in whole.items() if shows(c, []) and not shows(c, biases))
 
 
+def _used_coefficients(fit: FittedEffects, effect: str) -> list[str]:
+    """Return which of an effect's coefficients differ from zero beyond their uncertainty."""
+    return [
+        name
+        for name, value in fit.setting[effect].items()
+        if name != CENTRAL
+        and abs(value) > IMU_LIMITS.least_in_std * fit.std.get((effect, name), 0.0)
+        and value != 0.0
+    ]
+
+
 def hidden_causes(search: Search, fit: FittedEffects) -> list[str]:
     """Return, as sentences, which named effects an effect that these logs do not show may stand
     behind: at twice its typical size or less it would be taken for the named one, as large as that.
@@ -102,7 +113,7 @@ def hidden_causes(search: Search, fit: FittedEffects) -> list[str]:
         induced = np.linalg.lstsq(total[np.ix_(at, at)], total[at, -1], rcond=None)[0]
         taken_for = dict(zip(wanted, IMU_LIMITS.hidden_size * np.abs(induced), strict=True))
         for effect in fit.effects:
-            used = used_coefficients(fit, effect)
+            used = _used_coefficients(fit, effect)
             if used and all(
                 taken_for.get((effect, name), 0.0) >= abs(fit.setting[effect][name])
                 for name in used

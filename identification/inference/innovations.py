@@ -55,10 +55,6 @@ class InnovationSettings:
     least_confirmed_share: float = 0.65
     # log-likelihood ratio (twice the gain of the log-likelihood); chance alone gives one an axis
     least_log_likelihood_ratio: float = 20.0
-    # of the confirmed share and one, and the same in its standard deviations, from which an effect
-    # contradicts the innovations; 200 true effects had up to 0.05
-    most_share_error: float = 0.1
-    most_share_error_in_std: float = 2.0
     settling_time: float = 1.0  # s, from the start of a piece to the first innovation that counts
     grid_margin: float = 1.0  # in the logarithm, around the best point of a grid
     derivative_step: float = 0.1  # typical sizes, over which derivatives are taken
@@ -398,35 +394,6 @@ def confirms_addition(
     """
     offsets = {ROTOR_TIME_OFFSET[0]: after.get(ROTOR_TIME_OFFSET[0], {})}
     return Innovations(flights, {**before, **offsets}).confirm({**after, **offsets}, least)
-
-
-def contradicted_by_innovations(flights: Flights, setting: Setting) -> list[str]:
-    """Return, as sentences, which effects of a fitted setting the innovations contradict.
-
-    An effect is the same below 5 Hz from both sides in time as it is from the past alone at all
-    frequencies; one that stands for another effect seldom is. (Two estimates that must agree: J. A.
-    Hausman, Econometrica 46 (1978), 1251-1271.)
-    """
-    out = []
-    for effect in setting:
-        if (
-            not effect or get(effect).kind == "sensing"
-        ):  # it changes the measurement and not the motion: biased by its own noise
-            continue
-        share, ratio = Innovations(
-            flights, {k: v for k, v in setting.items() if k != effect}
-        ).confirmed_share(setting)
-        if abs(share - 1.0) > max(
-            INNOVATIONS.most_share_error,
-            INNOVATIONS.most_share_error_in_std
-            * abs(share)
-            / np.sqrt(max(ratio, INNOVATIONS.least_sum)),
-        ):
-            out.append(
-                f"{effect}: the innovations confirm {share:.0%} of it: another effect may be the "
-                "cause"
-            )
-    return out
 
 
 def _unexplained(products: Array) -> float:

@@ -8,32 +8,25 @@ Each column is tried alone, on blocks that are left out in turn.
 """
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...dynamics.effects import Family, Role, get, of_family, playing
-from ..findings import CHANNELS, Structure
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..findings import STRUCTURE_TESTS, Structure
 from .candidate_regressors import (
-    drag_by_place,
-    drag_regressors,
     explanatory_variables,
     general_regressors,
-    place_regressors,
     resonant_regressors,
     standardised,
 )
 from .gram_matrix import Gram
 from .innovations import Innovations, confirms_addition
 from .regression import (
-    CENTRAL,
     REGRESSION,
     Column,
     Flights,
-    Setting,
     moves_time,
 )
 from .search import SEARCH, FittedEffects, Search
@@ -64,9 +57,6 @@ class StructureSettings:
     # part of a flight, but strongly
     large_reduction_ratio: float = 3.0
     least_spread_of_large: float = 1.0
-    # of columns that are tried together, as a share of their mean square sum; from 0.03 to 0.3
-    # little changes
-    ridge: float = 0.1
     # factor on the least reduction where rotor speeds hardly leave their rounding steps
     rounded_rotor_factor: float = 4.0
     batch: int = 24  # columns at a time
@@ -74,23 +64,6 @@ class StructureSettings:
     # to block; true effects have at most 3 of the first
     least_scatter_significance: float = 5.0
     least_scatter: float = 0.1
-    # deviance of one question, whether a drag grows with another power of speed: 93 true drags had
-    # up to 5
-    least_reduction_of_power: float = 7.0
-    # the same where the exponent is off by so much or more; on two flights on a circle, at one
-    # speed, a third of a friction had 6.4 and 8.1
-    large_exponent_error: float = 0.5
-    least_reduction_of_large_exponent: float = 4.0
-    least_speed: float = 0.05  # m/s, below which speed is noise
-    thrust_bends: tuple[float, ...] = (0.9, 1.0, 1.1, 1.2, 1.3)  # times the thrust of hover
-    # deviance of one question, whether thrust bends: 36 true curved thrusts had up to 4, rotors
-    # that stall 29 to 680; where no curvature is named, 93 flights without a bend had up to 17 that
-    # innovations confirmed, a rotor that stalls 56
-    least_reduction_of_bend: float = 12.0
-    least_reduction_of_stall: float = 25.0
-    # of the deviance that a rigid effect explains, which its slow motion alone must explain: beyond
-    # the least reduction true ones had up to 0.007 (one 0.3), loose cameras 0.04 to 2.3
-    least_share_of_loose_mount: float = 0.02
     # deviance of an effect in the residual, and in the innovations, that is too much for no name
     least_residual_hint: float = 10.0
     least_innovation_hint: float = 50.0
@@ -99,6 +72,7 @@ class StructureSettings:
 
 
 STRUCTURE = StructureSettings()
+REGRESSOR, VARYING, INNOVATIONS = STRUCTURE_TESTS
 
 
 def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure], bool]:
@@ -116,18 +90,14 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
     residual = flights.residual(fit.setting)
     base = flights.columns(fit.setting, regression.columns, 0.1)
     every = search.deviance_of(flights.residual(fit.without(*fit.effects).setting) - residual)
-    words: list[tuple[str, str]] = []
+    words: list[tuple[str, str, str]] = []  # test, where, and kind of test
     columns: list[Array] = []
     named: list[float] = []  # deviance of the effects whose model error a column may be
-    asked = (
-        [general_regressors]
-        if flights.commanded
-        else [general_regressors, place_regressors, drag_regressors, resonant_regressors]
-    )
+    asked = [general_regressors, *([] if flights.commanded else [resonant_regressors])]
     for channel_words, drive, column in itertools.chain.from_iterable(
         ask(flights, fit.setting) for ask in asked
     ):
-        words.append(("a candidate regressor", f"{channel_words} with {drive}"))
+        words.append(("a candidate regressor", f"{channel_words} with {drive}", REGRESSOR))
         columns.append(column)
         named.append(every)
     known = standardised(explanatory_variables(flights, fit.setting))
@@ -137,15 +107,9 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
     }
     for effect, share in shares.items():
         for name, x in known.items():
-            words.append((f"{effect}'s coefficient is not constant", f"it changes with {name}"))
+            test = f"{effect}'s coefficient is not constant"
+            words.append((test, f"it changes with {name}", VARYING))
             columns.append(share * x[:, None])
-        rotorwise = any(
-            c.name == CENTRAL for c in get(effect).coefficients
-        )  # its moment is free in any case
-        for channel in range(3 if rotorwise else 6):
-            words.append((f"{effect}'s channels do not agree", f"{CHANNELS[channel]} differs"))
-            columns.append(np.zeros_like(share))
-            columns[-1][:, channel] = share[:, channel]
         named += [search.deviance_of(share)] * (len(columns) - len(named))
     rough = 1.0 if flights.rotor_speeds_vary else STRUCTURE.rounded_rotor_factor
     least_of_all = max(
@@ -163,21 +127,11 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
                 if gain < STRUCTURE.large_reduction_ratio * least[i]
                 else STRUCTURE.least_spread_of_large
             ):
-                found.append((Structure(*words[i], float(gain) / error), column))
-    if not flights.commanded and (group := drag_by_place(flights, fit.setting)):
-        together, column = _joint_regression(search, regression, group)
-        if together > rough * max(least_of_all, STRUCTURE.least_share_of_named * every):
-            where = "a drag with position and heading together"
-            found.append((Structure("a candidate regressor", where, together / error), column))
+                found.append((Structure(*words[i][:2], float(gain) / error, words[i][2]), column))
     found.sort(key=lambda x: -x[0].gain)
     if flights.commanded:
         return [sign for sign, _ in found[: STRUCTURE.most_signs]], bool(found)
-    block_signs = [
-        *varying_coefficients(search, shares, regression),
-        *drag_exponents(search, shares, regression, base),
-        *bending_thrust(search, fit, regression, base),
-        *loose_mounts(search, shares, regression, base),
-    ]
+    block_signs = list(varying_coefficients(search, shares, regression))
     if not found:
         # a filtered pose has no innovations
         signs = block_signs or ([] if flights.filtered else list(innovation_hints(search, fit)))
@@ -227,147 +181,7 @@ def varying_coefficients(
                 f"{effect}'s coefficient is not constant",
                 words,
                 float(np.sum(slope**2 / np.maximum(size, 1e-30)) / max(whole, 1e-30)),
-            )
-
-
-def drag_exponents(
-    search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
-) -> Iterator[Structure]:
-    """Yield a sign for each named drag whose force grows with another power of speed.
-
-    Args:
-        search: that found the effects.
-        shares: what each explains (rows, 6).
-        regression: on the columns of the fit.
-        base: these columns (rows, 6) each.
-
-    It is asked in all rows together: a flight at one speed has another one only as it begins.
-    """
-    flights = search.flights
-    whole = regression.blocks[:, -1, -1].sum()
-    drags = of_family(Family.DRAG)
-    for effect in filter(drags.__contains__, shares):
-        speed = np.concatenate(
-            [np.linalg.norm(p.signals.velocity[p.rows], axis=1) for p in flights.pieces({})]
-        )
-        # weighted towards slow flight, and towards fast flight
-        asked = (
-            _single_regression(search, regression, base, shares[effect] * x[:, None])
-            for x in (np.log(speed.clip(STRUCTURE.least_speed)), speed)
-        )
-        (exponent, slow), (_, quick) = asked
-        gain = max(slow, quick)
-        if gain > STRUCTURE.least_reduction_of_power or (
-            slow > STRUCTURE.least_reduction_of_large_exponent
-            and abs(exponent) > STRUCTURE.large_exponent_error
-        ):
-            yield Structure(
-                f"{effect}'s coefficient is not constant",
-                "its force grows with another power of speed",
-                gain / max(float(whole), 1e-30),
-            )
-
-
-def bending_thrust(
-    search: Search, fit: FittedEffects, regression: Gram, base: Mapping[Column, Array]
-) -> Iterator[Structure]:
-    """Yield a sign where rotors deliver less, or more, beyond some thrust.
-
-    Args:
-        search: that found the effects.
-        fit: the effects.
-        regression: on the columns of the fit.
-        base: these columns (rows, 6) each.
-
-    A rotor that stalls beyond some thrust does so in a few moments of a flight, which are too few
-    blocks, and a curved thrust explains most of it: it is asked in all rows together. Where a
-    curve of the thrust is named it is also asked whether thrust bends at hover alone; innovations
-    need not confirm that.
-    """
-    flights = search.flights
-    curved = bool(playing(Role.THRUST_CURVE, among=fit.effects))
-    if not flights.rotor_speeds_vary:
-        return
-    asked = [
-        (
-            f"rotor thrust beyond {share:.1f} times the thrust of hover",
-            _thrust_beyond(flights, fit.setting, share, 0.0),
-        )
-        for share in STRUCTURE.thrust_bends
-    ]
-    if curved:
-        asked.append(
-            (
-                "thrust that bends at one point",
-                _thrust_beyond(flights, fit.setting, 1.0, -1.0),
-            )
-        )
-    gains = [_single_regression(search, regression, base, column)[1] for _, column in asked]
-    best = int(np.argmax(gains))
-    where, column = asked[best]
-    stalls = gains[best] > STRUCTURE.least_reduction_of_stall and Innovations(
-        flights, fit.setting
-    ).confirm_column(_best_multiple(search, regression, base, column))
-    if stalls or (curved and gains[best] > STRUCTURE.least_reduction_of_bend):
-        yield Structure(
-            "a candidate regressor",
-            where,
-            gains[best] / max(float(regression.blocks[:, -1, -1].sum()), 1e-30),
-        )
-
-
-def _thrust_beyond(flights: Flights, setting: Setting, share: float, below: float) -> Array:
-    """Return what rotors deliver (rows, 6) beyond a multiple of their share of the weight, and
-    ``below`` times what they deliver below it.
-    """
-    vehicle, parts = flights.amended(setting), []
-    for piece in flights.pieces(setting):
-        off = vehicle.k * piece.signals.rotor_speeds**2 - share * flights.vehicle.weight / 4.0
-        thrust = np.where(off > 0.0, off, below * off)
-        wrench = vehicle.rotor_wrench(np.sqrt(thrust / vehicle.k))
-        force = piece.signals.rotation[:, :, 2] * wrench[:, :1]
-        parts.append(
-            low_pass(
-                np.concatenate([force, wrench[:, 1:]], axis=1),
-                CUTOFFS.residual_hz,
-                piece.signals.period,
-            )[piece.rows]
-        )
-    return np.concatenate(parts)
-
-
-def loose_mounts(
-    search: Search, shares: Mapping[str, Array], regression: Gram, base: Mapping[Column, Array]
-) -> Iterator[Structure]:
-    """Yield a sign for each named mass, inertia or offset that differs between slow and fast
-    motion.
-
-    Args:
-        search: that found the effects.
-        shares: what each explains (rows, 6).
-        regression: on the columns of the fit.
-        base: these columns (rows, 6) each.
-
-    A part on a soft mount follows slow motion as if it were bolted on, and fast motion hardly:
-    below its resonance it adds to mass and inertia.
-    """
-    flights = search.flights
-    whole = float(regression.blocks[:, -1, -1].sum())
-    least = STRUCTURE.least_deviance_reduction * max(1.0, whole / regression.design[..., 0].size)
-    rigid = of_family(Family.RIGID_BODY)
-    for effect in filter(rigid.__contains__, shares):
-        pieces = np.split(shares[effect], np.flatnonzero(flights.start)[1:])
-        slow = np.concatenate(
-            [low_pass(piece, CUTOFFS.slow_motion_hz, flights.period) for piece in pieces]
-        )
-        more, gain = _single_regression(search, regression, base, slow)
-        if more > 0.0 and gain > max(
-            least, STRUCTURE.least_share_of_loose_mount * search.deviance_of(shares[effect])
-        ):
-            yield Structure(
-                f"{effect}'s coefficient is not constant",
-                f"it changes below {CUTOFFS.slow_motion_hz:.0f} Hz",
-                gain / max(whole, 1e-30),
+                VARYING,
             )
 
 
@@ -397,6 +211,7 @@ def innovation_hints(search: Search, fit: FittedEffects) -> Iterator[Structure]:
                     "the innovations confirm what the residual hardly shows",
                     gain.effect,
                     gain.share,
+                    INNOVATIONS,
                 )
 
 
@@ -422,17 +237,6 @@ def _best_multiple(search: Search, g: Gram, base: Mapping[Column, Array], column
     return np.asarray(alone * np.sum(x * g.design[..., -1]) / np.sum(x * x))
 
 
-def _single_regression(
-    search: Search, g: Gram, base: Mapping[Column, Array], column: Array
-) -> tuple[float, float]:
-    """Return the best multiple of a column (rows, 6) beside the columns ``base`` of a fit, and the
-    deviance that it explains.
-    """
-    x = search.whiten(_orthogonal_part(search, g, base, column))[search.flights.fit_rows]
-    slope, size = float(np.sum(x * g.design[..., -1])), max(float(np.sum(x * x)), 1e-30)
-    return slope / size, slope**2 / size
-
-
 def _orthogonal_part(search: Search, g: Gram, base: Mapping[Column, Array], column: Array) -> Array:
     """Return the part of a column (rows, 6) that is orthogonal to the columns ``base`` of a fit."""
     k = len(g.columns)
@@ -443,37 +247,6 @@ def _orthogonal_part(search: Search, g: Gram, base: Mapping[Column, Array], colu
     return column - sum(
         (w * base[c] for c, w in zip(g.columns, weights, strict=True)), np.zeros_like(column)
     )
-
-
-def _joint_regression(search: Search, g: Gram, columns: Sequence[Array]) -> tuple[float, Array]:
-    """Return the deviance that columns (rows, 6) explain together on left-out blocks, and their
-    best sum (rows, 6).
-
-    A ridge keeps each small: many columns fitted to noise would cost more than an effect is worth.
-    """
-    x = search.whiten(np.stack(columns, axis=2))[search.flights.fit_rows]
-    k, n = len(g.columns), len(g.columns) + len(columns)
-    design = np.concatenate([g.design[..., :k], x, g.design[..., -1:]], axis=2)
-    parts = (part.reshape(-1, n + 1) for part in np.split(design, g.begins[1:]))
-    blocks = np.array([part.T @ part for part in parts])
-    total = blocks.sum(axis=0)
-    ridge = np.concatenate(
-        [
-            g.precision,
-            np.full(len(columns), STRUCTURE.ridge * np.trace(total[k:n, k:n]) / len(columns)),
-        ]
-    )
-
-    def error(size: int) -> float:
-        rest = total - blocks
-        weights = np.linalg.solve(
-            rest[:, :size, :size] + np.diag(ridge[:size]), rest[:, :size, -1:]
-        )[..., 0]
-        square = np.einsum("bi,bij,bj->", weights, blocks[:, :size, :size], weights)
-        return float(total[-1, -1] - 2.0 * np.sum(weights * blocks[:, :size, -1]) + square)
-
-    weights = np.linalg.solve(total[:n, :n] + np.diag(ridge), total[:n, -1])[k:]
-    return error(k) - error(n), np.tensordot(np.stack(columns, axis=2), weights, axes=(2, 0))
 
 
 def _gains(search: Search, g: Gram, columns: Array) -> tuple[Array, Array]:

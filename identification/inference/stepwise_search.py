@@ -6,7 +6,7 @@ rows.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +94,23 @@ def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
         # wrong one may be large beside the right one
         asked.append(set(needed.effects))
     return _confirmed_effects(search, needed), first
+
+
+def with_proposal(
+    search: Search, fit: FittedEffects, proposed: Mapping[str, Mapping[str, float]]
+) -> FittedEffects:
+    """Return a fit, or that of the effects that another search proposes, with its coefficients, if
+    they explain the residual better.
+    """
+    if set(proposed) == set(fit.effects) or not set(proposed) <= set(search.library):
+        return fit
+    other = fit.without(*fit.effects)
+    other.setting |= {k: dict(v) for k, v in proposed.items()}
+    error, cost = search.error(fit), SEARCH.deviance_per_coefficient
+    saved = sum(map(coefficient_count, fit.effects)) - sum(map(coefficient_count, proposed))
+    swap = Swap(tuple(proposed), other, error + cost * saved - STEPWISE.swap_reduction)
+    better = _first_better(search, [swap], fit, fit.effects)
+    return _confirmed_effects(search, _prune(search, better[0])) if better else fit
 
 
 def _confirmed_effects(search: Search, fit: FittedEffects) -> FittedEffects:

@@ -10,8 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..findings import NamedEffect
-from .ranking import Ranking
+from ..findings import NamedEffect, Ranking
 
 
 def of_two_estimates(std: float, value: float, other: float) -> float:
@@ -19,6 +18,13 @@ def of_two_estimates(std: float, value: float, other: float) -> float:
     ``std`` the deviation by its own noise.
     """
     return math.hypot(std, (value - other) / math.sqrt(2.0))
+
+
+def without_other_estimate(std: float, value: float, other: float) -> float:
+    """Return the deviation by its own noise of an estimate whose deviation ``of_two_estimates``
+    gave.
+    """
+    return math.sqrt(max(std**2 - 0.5 * (value - other) ** 2, 0.0))
 
 
 def with_both_estimates(

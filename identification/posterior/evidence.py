@@ -167,13 +167,14 @@ def _bound(
             held[back] = False
         free = np.flatnonzero(~held)
         inner, rest = np.empty((len(free), len(free))), np.empty(len(free))
-        for a, i in enumerate(free):
+        for a in range(len(free)):
+            i = free[a]
             rest[a] = right[i]
             for j in range(n):
                 if held[j]:
                     rest[a] -= normal[i, j] * mode[j]
-            for b, j in enumerate(free):
-                inner[a, b] = normal[i, j]
+            for b in range(len(free)):
+                inner[a, b] = normal[i, free[b]]
         if len(free):
             mode[free] = np.linalg.solve(inner, rest)
     for i in range(n):

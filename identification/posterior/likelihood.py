@@ -112,14 +112,15 @@ class Likelihood:
         self.period = self.pieces[0].period
         inertia = flights.vehicle.inertia
         self.inertias = np.array([flights.vehicle.mass] * 3 + np.diagonal(inertia).tolist())
+        self.known: list[Array]  # (n, 6, 3) of each piece, what rotors' innovations say of it
         lengths = [len(piece.t) for piece in self.pieces]
         if near is None or [len(piece.t) for piece in near.pieces] != lengths:
             near = None
             self.noise = self._first_noise()
-            known = [np.zeros((n, 6, 3)) for n in lengths]
+            self.known = [np.zeros((n, 6, 3)) for n in lengths]
         else:
-            self.noise, known = near.noise, near.known
-        self.tracks = self._run(self.noise, known)
+            self.noise, self.known = near.noise, near.known
+        self.tracks = self._run(self.noise, self.known)
         for i in range(1 if near else LIKELIHOOD.noise_rounds):
             self.noise, self.known = self._likeliest(begun=near is not None or i > 0)
             self.tracks = self._run(self.noise, self.known)
@@ -127,6 +128,9 @@ class Likelihood:
             _signals(piece, track) for piece, track in zip(self.pieces, self.tracks, strict=True)
         ]
         self._base = [self._acceleration(s, self.vehicle) for s in self.signals]
+        # what a unit of each column adds to the accelerations, or to the measured pose; a column
+        # that was asked for once is kept
+        self._columns: tuple[dict[Column, list[Array]], dict[Column, list[Array]]] = {}, {}
 
     def _run(self, noise: tuple[AxisNoise, ...], known: Sequence[Array]) -> list[Track]:
         return [
@@ -317,19 +321,17 @@ class Likelihood:
         """Return the sums of products of these columns, of what any flight may have beside them,
         and of the innovations.
 
+        All columns that were asked for before are in them as well.
+
         Args:
             wanted: coefficients of effects.
             starts: columns of whole effects, with the coefficients of each.
             unknown: whether the discrepancy's columns are wanted.
         """
-        acting: dict[Column, list[Array]] = {}
-        moved: dict[Column, list[Array]] = {}
-        later = self._later_rotors()
-        acting[ROTOR_TIME_OFFSET] = later
-        acting["", BETWEEN] = self._bent_rotors()
-        for name, column in self._model_errors().items():
-            acting["", f"{MODEL_ERROR} {name}"] = column
-        if unknown:
+        acting, moved = self._columns
+        if not acting:
+            self._add_what_any_flight_may_have()
+        if unknown and not any(name.startswith(UNKNOWN) for _, name in acting):
             found = discrepancy_columns(
                 self.tracks,
                 [p.t for p in self.pieces],
@@ -340,24 +342,32 @@ class Likelihood:
             for (group, name), column in found.items():
                 acting["", f"{UNKNOWN}{group}: {name}"] = column
         for c, start in starts.items():
-            acting[c] = self._start(c[0], start)
+            if c not in acting:
+                acting[c] = self._start(c[0], start)
         for c in wanted:
-            if c[1].startswith(START_PREFIX):
+            if c in acting or c in moved or c[1].startswith(START_PREFIX):
                 continue
             if is_delay(c[0]):
-                acting[c] = later
+                acting[c] = acting[ROTOR_TIME_OFFSET]
             elif get(c[0]).kind == "sensing" and not is_delay(c[0]):
                 moved[c] = self._moved(c)
             elif (slope := self._slope(c)) is not None:
                 acting[c] = slope
+        return self._products(acting, moved)
+
+    def _add_what_any_flight_may_have(self) -> None:
+        """Add the columns of time offsets, of rotors between samples and of the model's error."""
+        acting, moved = self._columns
+        acting[ROTOR_TIME_OFFSET] = self._later_rotors()
+        acting["", BETWEEN] = self._bent_rotors()
+        for name, column in self._model_errors().items():
+            acting["", f"{MODEL_ERROR} {name}"] = column
         moved[ATTITUDE_TIME_OFFSET] = []
         for track in self.tracks:
             # the rate before the sample is read: after it, it knows that sample's noise
             rate = track.angular_velocity + self.period * track.acceleration[:, 3:]
             rate = np.vstack([track.angular_velocity[:1], rate[:-1]])
             moved[ATTITUDE_TIME_OFFSET].append(np.column_stack([np.zeros_like(rate), -rate]))
-        self._columns = acting, moved
-        return self._products(acting, moved)
 
     def quieter(self, coefficients: Mapping[Column, float]) -> Sums:
         """Return the sums of the same columns with the noise that is likeliest beside them all, at

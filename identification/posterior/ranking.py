@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...dynamics.effects import get
 from ...dynamics.effects.declaration import Role
+from ..findings import RankedSet, Ranking
 from ..inference.gram_matrix import GRAM
 from ..inference.regression import (
     ATTITUDE_TIME_OFFSET,
@@ -60,7 +61,7 @@ class RankingSettings:
     time_starts: tuple[float, ...] = (0.3, 0.6, 1.2)
     # times such a start, between which its column stands for it
     near_start: tuple[float, float] = (0.5, 1.5)
-    most_effects: int = 4
+    most_effects: int = 5
     kept_sets: int = 8  # of each size, to which a further effect is added
     kept_asked: int = 24  # sets, the best, that are asked for beside the noise of no effect too
     rounds: int = 4  # of fitting the noise beside the best set
@@ -70,38 +71,6 @@ class RankingSettings:
 RANKING = RankingSettings()
 # one way in which an effect may act: all coefficients, or one of those starting points
 Variant = tuple[str, tuple[Column, ...]]
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """A set of effects and its probability, with coefficients at the mode and their deviations."""
-
-    effects: tuple[str, ...]
-    probability: float
-    coefficients: Mapping[str, Mapping[str, float]]
-    std: Mapping[str, Mapping[str, float]]
-
-
-@dataclass(frozen=True)
-class Ranking:
-    """The posterior of a flight, given that nothing acts but effects of the library.
-
-    Attributes:
-        probability: of each effect of the library, that it acts.
-        sets: the likeliest first.
-        structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
-            effect outside the library may follow, beside the likeliest set.
-        tempering: power of the likelihood, 1 where its scatter is what it should be.
-    """
-
-    probability: Mapping[str, float]
-    sets: tuple[Ranked, ...]
-    structure: float
-    tempering: float
-
-    def likeliest_with(self, effect: str) -> Ranked | None:
-        """Return the likeliest set that has an effect; None where no set has it."""
-        return next((s for s in self.sets if effect in s.effects), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +93,18 @@ class _Base:
 def rank(
     flights: Flights,
     library: Sequence[str],
+    proposed: Setting | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Ranking:
-    """Return the posterior over sets of effects of a library, of those that flights can show."""
+    """Return the posterior over sets of effects of a library, of those that flights can show.
+
+    Args:
+        flights: whose poses are explained.
+        library: names of effects that may act.
+        proposed: effects with coefficients that another search has found: its columns are asked
+            beside those of the sets that the posterior comes upon by itself.
+        report: called with a line of progress.
+    """
     library = [e for e in library if e not in flights.not_identifiable]
     near = Likelihood(flights, {})
     starts = _starts(flights, library, {})
@@ -134,32 +112,56 @@ def rank(
     loud = _in_prior_units(flights, sums, {}, starts)
     explained = _whole_library(loud)
     now = _in_prior_units(flights, near.quieter(explained), {}, starts)
-    found = _Posterior(flights, library, (loud, now))
-    tried = {frozenset[str]()}
+    tried: dict[frozenset[str], Setting] = {frozenset(): {}}
+    beside: _Beside | None = None
+    others: tuple[_Base, ...] = ()
+    if proposed and proposed.keys() <= set(library):
+        tried[frozenset(proposed)] = proposed
+        beside = _Beside(flights, library, proposed, near)
+        others = (beside.base(),)
+    found = _Posterior(flights, library, (loud, *others, now))
     # the best effect first, alone: another set's columns are those of the model that has it
     setting = found.best_setting(1)
-    last: Setting = {}
+    last: _Beside | None = None
     for _ in range(RANKING.rounds):
         # the columns of the same set change with its coefficients, where these have moved far
-        if frozenset(setting) in tried and not found.has_moved(last, setting):
+        if not found.is_elsewhere(setting, tried):
             setting = found.best_setting()
-            if frozenset(setting) in tried:
+            if not found.is_elsewhere(setting, tried):
                 break
-        last = setting
-        tried.add(frozenset(setting))
+        tried[frozenset(setting)] = setting
+        if beside and beside.setting.keys() == setting.keys():
+            beside, others = None, ()
         report(f"trying {', '.join(setting)}")
-        near = Likelihood(flights, setting, near)
-        starts = _starts(flights, library, setting)
-        sums = near.sums(_wanted(library, setting, starts), starts, unknown=False)
-        now = _in_prior_units(flights, sums, setting, starts)
-        found = _Posterior(flights, library, (loud, now))
+        last = _Beside(flights, library, setting, last.likelihood if last else near)
+        found = _Posterior(flights, library, (loud, *others, last.base()))
         setting = found.best_setting()
-    # once more, with the dictionary's columns, that are dear
-    sums = near.sums(_wanted(library, last, starts), starts)
-    if not last:
-        sums = near.quieter(explained)
-    now = _in_prior_units(flights, sums, last, starts)
-    return _Posterior(flights, library, (loud, now), found.tempering()).ranking()
+    # once more, with the dictionary's columns, that are dear, beside the likeliest set
+    if beside and found.best_base() == 1:
+        others, last = ((last.base(),) if last else (now,)), beside
+    if last:
+        now = last.base(unknown=True)
+    else:
+        near.sums(_wanted(library, {}, starts), starts)
+        now = _in_prior_units(flights, near.quieter(explained), {}, starts)
+    return _Posterior(flights, library, (loud, *others, now), found.tempering()).ranking()
+
+
+class _Beside:
+    """The likelihood beside a set of effects, and the starts of all others there."""
+
+    def __init__(
+        self, flights: Flights, library: Sequence[str], setting: Setting, near: Likelihood
+    ) -> None:
+        self.flights, self.library, self.setting = flights, library, setting
+        self.likelihood = Likelihood(flights, setting, near)
+        self.starts = _starts(flights, library, setting)
+
+    def base(self, unknown: bool = False) -> _Base:
+        """Return its sums; ``unknown``: with the dictionary's columns."""
+        wanted = _wanted(self.library, self.setting, self.starts)
+        sums = self.likelihood.sums(wanted, self.starts, unknown)
+        return _in_prior_units(self.flights, sums, self.setting, self.starts)
 
 
 def _wanted(
@@ -370,7 +372,7 @@ class _Posterior:
             if not self._possible(base, some, evidence):
                 return -math.inf
             key = frozenset(e for e, _ in some)
-            if number == 0 and self.bases[-1].effects and key >= self.bases[-1].effects:
+            if number == 0 and any(x.effects and key >= x.effects for x in self.bases[1:]):
                 return -math.inf  # its columns are those of the other base
             total = value + self._log_prior(len(some))
             if total > self.scores.get(key, -math.inf):
@@ -414,6 +416,10 @@ class _Posterior:
                 return False
         return True
 
+    def best_base(self) -> int:
+        """Return the number of the base in which the likeliest set is."""
+        return self.known[max(self.scores, key=self.scores.__getitem__)].base
+
     def structure(self) -> float:
         """Return the logarithm of the Bayes factor of one more column beside the likeliest set."""
         base = self.bases[-1]
@@ -439,12 +445,13 @@ class _Posterior:
         key = max((k for k in self.scores if len(k) <= most), key=self.scores.__getitem__)
         return self._setting(key)[0]
 
-    def has_moved(self, old: Setting, new: Setting) -> bool:
-        """Return whether a set's coefficients are more than a standard deviation from those of the
-        model that its columns are of.
+    def is_elsewhere(self, new: Setting, tried: Mapping[frozenset[str], Setting]) -> bool:
+        """Return whether a set was not tried yet, or with coefficients that are more than a
+        standard deviation away.
         """
-        if not new or set(old) != set(new):
-            return False
+        if frozenset(new) not in tried:
+            return True
+        old = tried[frozenset(new)]
         std = self._setting(frozenset(new))[1]
         return any(
             abs(value - old[effect].get(name, 0.0)) > std[effect].get(name, math.inf)
@@ -491,5 +498,5 @@ class _Posterior:
             if p[key] < RANKING.least_probability:
                 break
             setting, std = self._setting(key)
-            sets.append(Ranked(tuple(sorted(key)), p[key], setting, std))
+            sets.append(RankedSet(tuple(sorted(key)), p[key], setting, std))
         return Ranking(probability, tuple(sets), self.structure(), self.power)

@@ -7,30 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from windwrench.studies.page_tables import table
-from windwrench.studies.probabilities.fitting import is_right
-
-# a sign of structure by the words in which it is said: its test, or where it is
-_SIGNS = (
-    ("block to the next", "structure: a coefficient differs from block to block"),
-    ("another power of speed", "structure: a drag grows with another power of speed"),
-    ("it changes below", "structure: a mass or an offset differs in slow motion"),
-    ("channels do not agree", "structure: channels do not agree on a coefficient"),
-    ("is not constant", "structure: a coefficient changes with a variable"),
-    ("innovations confirm", "structure: innovations confirm what the residual hardly shows"),
-    ("rotor thrust beyond", "structure: thrust bends"),
-    ("bends at one point", "structure: thrust bends"),
-    ("position and heading together", "structure: drag by place"),
-    ("a candidate regressor", "structure: a candidate regressor"),
-)
-
-
-def checks_of(flight: Mapping[str, Any]) -> set[str]:
-    """Return the checks that doubt the names of a recorded flight."""
-    signs = {
-        next(name for words, name in _SIGNS if words in f"{test} {where}")
-        for test, where, _ in flight["signs"]
-    }
-    return signs | set(flight["doubts"])
+from windwrench.studies.probabilities.fitting import checks_of, is_right
 
 
 def table_of_doubts(flights: Sequence[Mapping[str, Any]]) -> str:

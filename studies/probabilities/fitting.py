@@ -1,6 +1,6 @@
 """The weights of the pool, fitted to flights of which the truth is known."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from windwrench.identification.diagnosis import beyond_calm
+from windwrench.identification.diagnosis import SMALL, beyond_calm
 from windwrench.identification.findings import Disturbance, Probabilities
 from windwrench.identification.posterior.pooling import (
     POOLING,
@@ -65,10 +65,16 @@ def is_right(flight: dict[str, Any], name: str) -> bool:
     return not acts_unknown(flight) and bool(stands_for(flight, name) & set(flight["truth"]))
 
 
+def checks_of(flight: Mapping[str, Any]) -> set[str]:
+    """Return the checks that doubt the names of a recorded flight."""
+    return {f"structure: {kind}" for kind, *_ in flight["signs"]} | set(flight["doubts"])
+
+
 def signs_of(flight: dict[str, Any]) -> Signs:
     """Return what speaks for something unknown on a recorded flight."""
     gusts = [Disturbance("", rms, time) for rms, time in flight["gusts"]]
-    return Signs(beyond_calm(gusts, *flight["weight"]), flight["structure"])
+    contradicting = len(checks_of(flight) - {SMALL})
+    return Signs(contradicting, beyond_calm(gusts, *flight["weight"]), flight["structure"])
 
 
 def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
@@ -128,7 +134,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         tentative=a[2],
         other=a[3],
         unknown=b[0],
-        doubted=b[1],
+        doubts=b[1],
         disturbance=b[2],
         structure=b[3],
     )

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import mannwhitneyu
 
 from windwrench.identification.findings import Alternative, Probabilities
-from windwrench.identification.posterior.deviations import of_two_estimates
+from windwrench.identification.posterior.deviations import without_other_estimate
 from windwrench.identification.posterior.pooling import POOLING
 from windwrench.studies.page_tables import share, table
 from windwrench.studies.probabilities.doubts import table_of_doubts
@@ -196,8 +196,8 @@ def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
                 if std > 0.0 and not acts_unknown(x.flight):
                     own = e["coefficients"][name]
                     other = x.flight["fitted"].get(e["name"], {}).get(name, own)
-                    if both:
-                        std = of_two_estimates(std, own, other)
+                    if not both:
+                        std = without_other_estimate(std, own, other)
                     out.append(abs(own - value) / std)
     return out
 
@@ -262,9 +262,9 @@ def _counts(flights: Sequence[Scored]) -> str:
         for level, most in ((68, 0.9945), (95, 1.96)) if errors else ():
             count = share(sum(e < most for e in errors), len(errors))
             rows.append([f"coverage of {level} % intervals of coefficients{words}", count])
-    search, ranking = np.median([x.flight["cpu_s"] for x in flights], axis=0)
+    low, middle, high = np.quantile([x.flight["cpu_s"] for x in flights], [0.05, 0.5, 0.95])
     rows.append(
-        ["CPU time of search and of posterior, median", f"{search:.1f} and {ranking:.1f} s"]
+        ["CPU time, median (5 to 95 % of flights)", f"{middle:.1f} s ({low:.1f} to {high:.1f})"]
     )
     return table(["", "value (95 % interval)"], rows)
 
@@ -277,7 +277,7 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "tentative",
         "other",
         "unknown",
-        "doubted",
+        "doubts",
         "disturbance",
         "structure",
     )

@@ -17,25 +17,6 @@ FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
 MASS = FLIGHTS.vehicle.mass
 
 
-@pytest.mark.parametrize(
-    ("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)]
-)
-def test_mass_and_thrust_that_cancel_may_be_an_inertia(thrust, cancels):
-    fit = FittedEffects({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
-    assert bool(composite_doubts(FLIGHTS, fit)) == cancels
-
-
-@pytest.mark.parametrize(
-    ("shift", "doubtful"), [(-0.006, True), (-0.005, False), (0.0, False), (0.006, False)]
-)
-def test_turn_rates_cannot_act_before_they_are_logged(shift, doubtful):
-    fit = FittedEffects(
-        {"": {"rotor_time_offset": shift}, "rate_damping": {"dx": 0.005, "dy": 0.005, "dz": 0.005}}
-    )
-    assert bool(composite_doubts(FLIGHTS, fit)) == doubtful
-    assert not composite_doubts(FLIGHTS, FittedEffects({"": {"rotor_time_offset": shift}}))
-
-
 def test_what_coincides_within_its_noise_may_be_one_effect():
     fit = FittedEffects(
         {"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}}
@@ -78,23 +59,6 @@ def test_more_than_two_effects_may_stand_for_one():
     assert not composite_doubts(
         FLIGHTS, FittedEffects({name: three[name] for name in ("mass", "com_offset")})
     )
-
-
-@pytest.mark.parametrize(
-    ("off", "doubtful"),
-    [
-        ((-0.066, -0.067, -0.066, -0.14), True),
-        ((0.0, 0.001, 0.0, -0.14), False),
-        ((-0.066, -0.067, -0.066, -0.067), False),
-        ((-0.066, -0.02, 0.03, -0.14), False),
-    ],
-)
-def test_three_rotors_that_are_alike_may_be_a_mass_and_one_rotor(off, doubtful):
-    rotors = {f"e{i + 1}": value for i, value in enumerate(off)}
-    fit = FittedEffects(
-        {"rotor_efficiency": rotors}, {("rotor_efficiency", name): 5e-4 for name in rotors}
-    )
-    assert bool(composite_doubts(FLIGHTS, fit)) == doubtful
 
 
 @pytest.mark.parametrize("trajectory", ["hover", "vertical"])
