@@ -24,8 +24,6 @@ class Cutoffs:
     pose_hz: float = 15.0
     # of the residual and of every column that is regressed on it
     residual_hz: float = 5.0
-    # of what is bolted on and moves slowly; below the residual's cut-off
-    slow_motion_hz: float = 3.0
     # of the residual, where transient disturbances are searched for: they last as long, and sensor
     # noise is weakest below these
     transient_hz: tuple[float, float] = (1.5, 3.0)

@@ -22,7 +22,7 @@ from .words import headline
 
 # MAJOR.MINOR of ``report.json``, which ``report.schema.json`` beside this file describes: a new key
 # is a new minor version, a key that goes or changes its meaning a new major one
-SCHEMA_VERSION = "1.1"
+SCHEMA_VERSION = "1.2"
 
 
 def write_report(

@@ -7,10 +7,9 @@ from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.disturbance_filter import innovations
-from windwrench.identification.inference.innovations import Innovations, contradicted_by_innovations
+from windwrench.identification.inference.innovations import Innovations
 from windwrench.identification.inference.regression import Flights, typical_size
 from windwrench.identification.inference.search import SEARCH, FittedEffects, Search
-from windwrench.identification.inference.stepwise_search import find_effects
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")
@@ -119,14 +118,3 @@ def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
     assert not innovations.confirm_column(-column)
     assert not innovations.confirm_column(3.0 * column)
     assert not Innovations(flights, truth).confirm_column(column)
-
-
-@pytest.mark.parametrize(
-    ("library", "doubtful"), [("flapping_moment", False), ("rate_damping", True)]
-)
-def test_what_stands_for_another_law_is_at_odds_with_the_innovations(library, doubtful):
-    flapping = EffectSetting("flapping_moment", {"kflap": 3e-6})
-    flights = Flights([fly_practice(VEHICLE, (flapping,), "excite", 40.0, seed=4)], VEHICLE)
-    fit, _ = find_effects(Search(flights, [library]))
-    assert fit.effects == [library]
-    assert bool(contradicted_by_innovations(flights, fit.setting)) == doubtful

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from windwrench.identification.findings import NamedEffect
-from windwrench.identification.posterior.deviations import of_two_estimates, with_both_estimates
-from windwrench.identification.posterior.ranking import Ranked, Ranking
+from windwrench.identification.findings import NamedEffect, RankedSet, Ranking
+from windwrench.identification.posterior.deviations import (
+    of_two_estimates,
+    with_both_estimates,
+    without_other_estimate,
+)
 
 
 def test_intervals_hold_where_both_estimates_are_wrong_alike():
@@ -21,11 +24,17 @@ def test_intervals_hold_where_both_estimates_are_wrong_alike():
     assert np.mean(np.abs(own) < np.multiply(1.96, std)) > 0.8
 
 
+def test_the_deviation_of_one_estimate_alone_comes_back():
+    both = of_two_estimates(0.02, 1.0, 1.05)
+    assert without_other_estimate(both, 1.0, 1.05) == pytest.approx(0.02)
+    assert without_other_estimate(0.01, 1.0, 1.05) == 0.0
+
+
 def test_an_effect_that_no_set_has_stays_as_it_is():
     effect = NamedEffect("mass", {"dm": 0.05}, {"dm": 0.001}, {"dm": "kg"}, False, (), {})
     sets = [
-        Ranked(("wind",), 0.9, {"wind": {"vx": 1.0}}, {"wind": {"vx": 0.1}}),
-        Ranked(("mass",), 0.1, {"mass": {"dm": 0.054}}, {"mass": {"dm": 0.002}}),
+        RankedSet(("wind",), 0.9, {"wind": {"vx": 1.0}}, {"wind": {"vx": 0.1}}),
+        RankedSet(("mass",), 0.1, {"mass": {"dm": 0.054}}, {"mass": {"dm": 0.002}}),
     ]
     without, ranking = (Ranking({}, tuple(some), 0.0, 1.0) for some in (sets[:1], sets))
     assert with_both_estimates([effect], without) == (effect,)

@@ -42,6 +42,17 @@ def test_a_law_that_the_library_lacks_shows_as_structure(vehicle):
     assert rank(flown(vehicle, drag), ("mass", "inertia")).structure > 10.0
 
 
+def test_what_another_search_proposes_is_asked_too(vehicle):
+    truth = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": {"kdx": 1.2e-4, "kdy": 1.2e-4}}
+    flights = flown(vehicle, *(EffectSetting(k, v) for k, v in truth.items()))
+    near = {k: {x: 0.9 * y for x, y in v.items()} for k, v in truth.items()}
+    best = rank(flights, ("wind", *LIBRARY), near).sets[0]
+    assert best.effects == ("rotor_drag", "wind")
+    assert best.coefficients["wind"]["wx"] == pytest.approx(2.0, rel=0.1)
+    # what lies outside the library is no proposal
+    assert rank(flights, ("mass",), truth).sets == rank(flights, ("mass",)).sets
+
+
 def test_the_noise_is_that_of_the_flight(vehicle):
     noise = Likelihood(flown(vehicle), {}).noise
     for axis in noise[:3]:
