@@ -47,6 +47,8 @@ class EquivalenceSettings:
     # share of what an inertia explains, which one that goes with the mass may leave of it
     most_share_apart: float = 0.1
     least_std: float = 1e-9  # relative; standard deviations are no smaller
+    # share of a thrust scale which a mass may fail to cancel
+    most_share_uncancelled: float = 0.1
     least_hanging_ratio: float = 5.0  # a centre of mass along z over across it: a load that hangs
 
 
@@ -237,8 +239,9 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
     """Return, as sentences, which single effect may be the cause of several named ones that are
     together its exact equivalent.
 
-    Mass is a scale of thrust with inertia, and a scale of thrust is mass with inertia: their
-    coefficients coincide then. And the more effects are needed, the rather they are parts of one.
+    Thrust is known by what it moves: only its ratios to mass and to inertia show. So of mass,
+    inertia and a scale of thrust any two can be the third: where both change alike, or where mass
+    and thrust cancel. And the more effects are needed, the rather they are parts of one.
     """
     found = []
     names = set(fit.effects)
@@ -261,5 +264,12 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
             found.append(
                 "the relative changes of inertia and of thrust or mass coincide: a single other "
                 "effect may be the cause"
+            )
+    if named(Role.MASS) and named(Role.THRUST):
+        weight, thrust = (1.0 + _changes(flights, fit, x) for x in (Role.MASS, Role.THRUST))
+        if abs(thrust / weight - 1.0) < EQUIVALENCE.most_share_uncancelled * abs(thrust - 1.0):
+            found.append(
+                f"{' and '.join(named(Role.MASS, Role.THRUST))} cancel, but for the moments: a "
+                "change of the inertia may be the cause"
             )
     return found

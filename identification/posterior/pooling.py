@@ -38,10 +38,11 @@ class PoolingSettings:
     tentative: float = 1.48  # one that it names with a doubt
     other: float = -4.43  # one that it does not name
     # log odds that something unknown acts where no sign speaks, and what each sign adds
-    unknown: float = -3.83
-    doubts: float = 3.5  # a nat of one plus the number of checks that doubt what was found
-    disturbance: float = 4.12  # a nat of ``Signs.disturbance``, where nothing is named
-    structure: float = 0.15  # a nat of ``Signs.structure``
+    unknown: float = -3.87
+    tests: float = 3.84  # a nat of one plus ``Signs.tests``
+    doubts: float = 6.85  # a nat of one plus ``Signs.doubts``
+    disturbance: float = 3.96  # a nat of ``Signs.disturbance``, where nothing is named
+    structure: float = 0.07  # a nat of ``Signs.structure``
     disturbance_range: tuple[float, float] = (-1.0, 4.0)  # nats
     structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
     least: float = 0.001  # probability of an alternative that is reported
@@ -113,22 +114,25 @@ class Signs:
     """What speaks for something unknown.
 
     Attributes:
-        doubts: how many checks of the search contradict what it found. One may be chance; an
-            effect that stands for another one fails several.
+        tests: how many kinds of tests show structure in the residual. One may be chance; where the
+            library lacks the effect, several speak.
+        doubts: how many checks of names say that another effect may be the cause.
         disturbance: logarithm of the largest disturbance over what counts for none. It counts
             where nothing is named: a name that stands for an unknown cause takes its disturbance.
         structure: of the posterior, ``Ranking.structure``.
     """
 
+    tests: int
     doubts: int
     disturbance: float
     structure: float
 
     def numbers(self, named: Sequence[Named]) -> Array:
-        """Return them as numbers (4,); the first is one."""
+        """Return them as numbers (5,); the first is one."""
         return np.array(
             [
                 1.0,
+                np.log1p(self.tests),
                 np.log1p(self.doubts),
                 0.0 if named else np.clip(self.disturbance, *POOLING.disturbance_range),
                 np.clip(self.structure, *POOLING.structure_range),
@@ -156,7 +160,8 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    odds = signs.numbers(named) @ np.array([w.unknown, w.doubts, w.disturbance, w.structure])
+    by_sign = np.array([w.unknown, w.tests, w.doubts, w.disturbance, w.structure])
+    odds = signs.numbers(named) @ by_sign
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown
     names = {e.name: 0.0 for e in named}

@@ -253,7 +253,7 @@ def doubt_sentences(diagnosis: Diagnosis) -> list[str]:
     if unsure:
         told.append(
             f"{in_words(unsure)} {'is' if len(unsure) == 1 else 'are'} tentative: the true cause "
-            "may be an effect that the library lacks."
+            "may be another effect, in the library or not."
         )
     return told
 

@@ -73,8 +73,9 @@ def checks_of(flight: Mapping[str, Any]) -> set[str]:
 def signs_of(flight: dict[str, Any]) -> Signs:
     """Return what speaks for something unknown on a recorded flight."""
     gusts = [Disturbance("", rms, time) for rms, time in flight["gusts"]]
-    contradicting = len(checks_of(flight) - {SMALL})
-    return Signs(contradicting, beyond_calm(gusts, *flight["weight"]), flight["structure"])
+    tests, doubts = {kind for kind, *_ in flight["signs"]}, set(flight["doubts"]) - {SMALL}
+    beyond = beyond_calm(gusts, *flight["weight"])
+    return Signs(len(tests), len(doubts), beyond, flight["structure"])
 
 
 def pool(flight: dict[str, Any], weights: PoolingSettings = POOLING) -> Probabilities:
@@ -117,7 +118,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     ).x
     x = np.array([signs_of(f).numbers(names_of(f)) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
-    scale = np.array([1e3, _SIGN_STD, _SIGN_STD, _STRUCTURE_STD])
+    scale = np.array([1e3, _SIGN_STD, _SIGN_STD, _SIGN_STD, _STRUCTURE_STD])
 
     def loss_of_signs(w: Array) -> float:
         odds = x @ w
@@ -125,7 +126,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    by_signs = minimize(loss_of_signs, np.zeros(4)).x
+    by_signs = minimize(loss_of_signs, np.zeros(5)).x
     a, b = by_sets.round(_DECIMALS).tolist(), by_signs.round(_DECIMALS).tolist()
     return replace(
         POOLING,
@@ -134,9 +135,10 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         tentative=a[2],
         other=a[3],
         unknown=b[0],
-        doubts=b[1],
-        disturbance=b[2],
-        structure=b[3],
+        tests=b[1],
+        doubts=b[2],
+        disturbance=b[3],
+        structure=b[4],
     )
 
 

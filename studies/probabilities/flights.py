@@ -17,7 +17,7 @@ import numpy as np
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
-from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.diagnosis import IMPROBABLE, diagnose
 from windwrench.identification.findings import Ranking
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
@@ -70,7 +70,8 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
         "named": [
             {
                 "name": e.name,
-                "tentative": e.tentative,
+                # by the search: its doubts are known before any probability
+                "tentative": e.tentative and IMPROBABLE not in search.doubts,
                 "indistinguishable_from": list(e.indistinguishable_from),
                 "coefficients": {k: float(f"{v:.6g}") for k, v in e.coefficients.items()},
                 "std": {k: float(f"{v:.6g}") for k, v in e.std.items()},
@@ -78,7 +79,7 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
             for e in search.effects
         ],
         "remainder": search.remainder,
-        "doubts": {check: len(words) for check, words in search.doubts.items()},
+        "doubts": {c: len(words) for c, words in search.doubts.items() if c != IMPROBABLE},
         "signs": [[s.kind, s.test, s.where, float(f"{s.gain:.3g}")] for s in search.structure],
         "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
         "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],

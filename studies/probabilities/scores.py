@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import mannwhitneyu
 
+from windwrench.identification.diagnosis import DIAGNOSIS
 from windwrench.identification.findings import Alternative, Probabilities
 from windwrench.identification.posterior.deviations import without_other_estimate
 from windwrench.identification.posterior.pooling import POOLING
@@ -235,6 +236,12 @@ def _counts(flights: Sequence[Scored]) -> str:
     nothing = [x for x in known if not x.flight["truth"]]
     strange = [x for x in flights if acts_unknown(x.flight)]
     sure = [(e, x) for x in flights for e in x.flight["named"] if not e["tentative"]]
+    stated = [
+        (e, x)
+        for e, x in sure
+        if min(x.found.names[n["name"]] for n in x.flight["named"])
+        >= DIAGNOSIS.least_sure_probability
+    ]
 
     def above(some: Sequence[Scored], least: float) -> str:
         return share(sum(any(p >= least for p in x.found.names.values()) for x in some), len(some))
@@ -242,7 +249,11 @@ def _counts(flights: Sequence[Scored]) -> str:
     rows = [
         ["flights", str(len(flights))],
         [
-            "names of the search that are sure, and right",
+            "names that are sure, and right",
+            share(sum(is_right(x.flight, e["name"]) for e, x in stated), len(stated)),
+        ],
+        [
+            "... by the checks of the search alone",
             share(sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)),
         ],
         [
@@ -277,6 +288,7 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "tentative",
         "other",
         "unknown",
+        "tests",
         "doubts",
         "disturbance",
         "structure",

@@ -14,7 +14,7 @@ from windwrench.identification.findings import Probabilities
 from windwrench.identification.posterior.pooling import POOLING
 from windwrench.studies.probabilities.__main__ import RESULTS, plan
 from windwrench.studies.probabilities.doubts import table_of_doubts
-from windwrench.studies.probabilities.fitting import fit, frequencies, is_right
+from windwrench.studies.probabilities.fitting import fit, frequencies, is_right, signs_of
 from windwrench.studies.probabilities.scores import (
     Scored,
     error_of_perfect_calibration,
@@ -77,13 +77,13 @@ def test_what_is_right():
 def test_a_check_is_worth_the_flights_that_it_alone_doubts():
     wrong, right = flight(["wind?"], ["mass"]), flight(["mass?"], ["mass"])
     wrong["doubts"] = {"pair": 1}
-    right["signs"] = [["a candidate regressor", "thrust with time", 0.1]]
+    right["signs"] = [["candidate regressor", "a candidate regressor", "thrust with time", 0.1]]
     both = flight(["wind?"], ["mass"])
     both["doubts"], both["signs"] = {"pair": 2}, right["signs"]
     rows = [x.split(" | ") for x in table_of_doubts([wrong, right, both]).splitlines()[2:]]
     assert [x.strip("| ") for x in rows[0]] == ["pair", "2", "1", "0", "0"]
     assert [x.strip("| ") for x in rows[1]] == [
-        "structure: a candidate regressor",
+        "structure: candidate regressor",
         *("1", "0", "1", "1"),
     ]
 
@@ -93,9 +93,12 @@ def test_weights_follow_who_was_right():
     strange = [
         flight(["wind?"], [], "tether", remainder="structured", structure=12.0) for _ in range(20)
     ]
+    for x in strange:
+        x["doubts"] = {"composite": 1, "small beside the residual": 1}
     found = fit([*agree, *strange])
     assert found.sure > 2.0
-    assert found.unknown < -1.0 < 1.0 < found.doubted
+    assert found.unknown < -1.0 < 1.0 < found.doubts
+    assert signs_of(strange[0]).doubts == 1
     assert frequencies([*agree, *strange]) == {False: 21 / 22, True: 1 / 22}
 
 

@@ -17,6 +17,14 @@ FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
 MASS = FLIGHTS.vehicle.mass
 
 
+@pytest.mark.parametrize(
+    ("thrust", "cancels"), [(0.1, True), (0.104, True), (0.06, False), (-0.1, False)]
+)
+def test_mass_and_thrust_that_cancel_may_be_an_inertia(thrust, cancels):
+    fit = FittedEffects({"mass": {"dm": 0.1 * MASS}, "thrust_scale": {"s": thrust}})
+    assert bool(composite_doubts(FLIGHTS, fit)) == cancels
+
+
 def test_what_coincides_within_its_noise_may_be_one_effect():
     fit = FittedEffects(
         {"thrust_scale": {"s": -0.033}, "inertia": {"jx": -0.071, "jy": -0.068, "jz": -0.034}}
