@@ -174,8 +174,8 @@ def test_many_doubts_take_two_sentences():
     )
     assert sureness_sentences(replace(made, effects=doubtful))[:2] == [
         "For rotor_drag and mass, another effect explains these logs equally well.",
-        "rotor_drag and mass are tentative: the true cause may be an effect that the library "
-        "lacks.",
+        "rotor_drag and mass are tentative: the true cause may be another effect, in the library "
+        "or not.",
     ]
 
 
