@@ -270,18 +270,15 @@ class Flights:
         self.not_identifiable: frozenset[
             str
         ]  # effects whose columns are sensor noise to a large part
-        self.column_noise: dict[Column, Array]  # (rows, 6) a sample of it in each column
         self.rotor_noise: (
             Array  # (4,) its share of the variance of what the rotors deliver: thrust and torque
         )
         self.angular_velocity_noise: Array  # (3,) its share of the variance of angular velocities
-        self.sensor_noise, self.not_identifiable, self.column_noise, self.rotor_noise = (
-            self._repeat_sensor_noise()
-        )
+        self.sensor_noise, self.not_identifiable, self.rotor_noise = self._repeat_sensor_noise()
 
-    def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], dict[Column, Array], Array]:
-        """Return samples of the sensor noise: of the residual, of the columns and of the rotors,
-        and the effects that are not identifiable.
+    def _repeat_sensor_noise(self) -> tuple[Array, frozenset[str], Array]:
+        """Return a sample of the residual's sensor noise, the effects that are not identifiable,
+        and the share of noise in the rotors.
 
         The noise is added to the logs once more, and the change is what noise makes. An effect
         whose column is noise to a large part is not identifiable; fitted all the same, it would
@@ -305,19 +302,14 @@ class Flights:
             for c in get(e).coefficients
             if c.name != CENTRAL
         ]
-        smooth = own + [
-            (e, MOMENT_PREFIX + n)
-            for e, n in own
-            if any(c.name == CENTRAL for c in get(e).coefficients)
-        ]
-        quiet, loud = self.columns({}, smooth), noisy.columns({}, smooth)
+        quiet, loud = self.columns({}, own), noisy.columns({}, own)
         shares = self._noise_shares(quiet, loud, own, weight)
         if self.inertial:
             # a column also depends on what the IMU knows badly
             quietly = {e for e, share in shares.items() if share > _most_noise_share(e)}
             noisy._pieces, noisy._needs, noisy._offset_signals, noisy._residuals = {}, {}, {}, {}
             noisy._columns, noisy._drift = {}, np.random.default_rng(1)
-            loud = {c: self._in_own_axes(x, noisy) for c, x in noisy.columns({}, smooth).items()}
+            loud = {c: self._in_own_axes(x, noisy) for c, x in noisy.columns({}, own).items()}
             shares = self._noise_shares(quiet, loud, own, weight)
             self.without_trace = frozenset(e for e, share in shares.items() if not share < np.inf)
         not_identifiable = {e for e, share in shares.items() if share > _most_noise_share(e)}
@@ -341,7 +333,7 @@ class Flights:
         self.angular_velocity_noise = np.var(noise, axis=0) / np.maximum(
             np.var(rates, axis=0), 1e-30
         )
-        return floor, frozenset(not_identifiable), {c: loud[c] - quiet[c] for c in smooth}, rounded
+        return floor, frozenset(not_identifiable), rounded
 
     def with_drift(self, rng: np.random.Generator) -> "Flights":
         """Return the same flights with other errors of what an IMU does not know, as large as its

@@ -62,8 +62,6 @@ class SearchSettings:
     least_iteration_reduction: float = 1.0
     # times what the last iteration gained: what all further iterations together may still gain
     most_further_gain: float = 3.0
-    # share of sensor noise in what a column adds or explains; true effects have up to 0.02
-    most_noise_share: float = 0.3
     # share of an effect's deviance that the other named effects must leave unexplained. In hover a
     # thrust and a steady force leave 0.00001 of each other; on 78 flights on which two effects were
     # found each left at least 0.019 of the other, on one slow flight 0.0007
@@ -393,49 +391,15 @@ class Search:
     def not_identifiable(
         self, g: Gram, total: Array, wanted: Sequence[Column], change: Array, effect: str
     ) -> bool:
-        """Return whether an effect is not identifiable beside the other columns.
-
-        It is not if the others explain nearly all of it, if what it adds is sensor noise to a large
-        part, or if what it explains is such noise: less thrust, for one, makes less of the
-        attitude's noise.
+        """Return whether an effect is not identifiable beside the other named ones, because these
+        explain nearly all of it.
         """
         own = [c for c in wanted if c[0] == effect]
         shape = change[[wanted.index(c) for c in own]]
-        deviance = unexplained_deviance(g, total, own, shape, [c for c in wanted if c[0] != effect])
         others = [c for c in wanted if c[0] not in (effect, "")]
-        if others and unexplained_deviance(
+        return bool(others) and unexplained_deviance(
             g, total, own, shape, others
-        ) < SEARCH.least_independent_share * unexplained_deviance(g, total, own, shape, []):
-            return True
-        return bool(
-            max(self._noise(dict(zip(own, shape, strict=True))))
-            > SEARCH.most_noise_share * deviance
-        )
-
-    def noise_explained(self, fit: FittedEffects) -> float:
-        """Return by how much a fit lowers the deviance only because it makes the sensor noise
-        smaller.
-        """
-        columns = (c for effect in fit.effects for c in self.columns_of(effect, True))
-        own, with_floor = self._noise({c: fit.setting[c[0]].get(c[1], 0.0) for c in columns})
-        return 2.0 * with_floor - own
-
-    def _noise(self, shape: Mapping[Column, float]) -> tuple[float, float]:
-        """Return the deviance of the sensor noise in a sum of columns, as far as it is known, and
-        its product with the noise floor.
-        """
-        known = {c: value for c, value in shape.items() if c in self.flights.column_noise}
-        if not known:
-            return 0.0, 0.0
-        noise = np.tensordot(
-            np.stack([self.flights.column_noise[c] for c in known], axis=2),
-            [*known.values()],
-            axes=(2, 0),
-        )
-        noise, floor = (
-            self.whiten(x)[self.flights.fit_rows] for x in (noise, self.flights.sensor_noise)
-        )
-        return float(np.sum(noise * noise)), float(np.sum(noise * floor))
+        ) < SEARCH.least_independent_share * unexplained_deviance(g, total, own, shape, [])
 
     def error_without(self, fit: FittedEffects, effect: str) -> float:
         """Return the deviance on left-out blocks when one effect is removed and the others are

@@ -266,14 +266,12 @@ def _first_better(
 ) -> tuple[FittedEffects, float] | None:
     """Return the first swap for a group of a fit's effects that stays below its limit when
     refitted, and its error.
-
-    A gain from less sensor noise does not count.
     """
-    quiet = search.noise_explained(old)
     for swap in swaps:
         fit = search.refit(swap.fit, swap.limit)
-        limit = swap.limit - max(search.noise_explained(fit) - quiet, 0.0)
-        better = search.deviance(fit.setting) < limit and (error := search.error(fit)) < limit
+        better = (
+            search.deviance(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit
+        )
         if better and (
             len(swap.effects) == 1 or all(_is_confirmed(search, fit, e) for e in swap.effects)
         ):
