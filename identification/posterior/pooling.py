@@ -33,15 +33,16 @@ class PoolingSettings:
 
     # below the likeliest set: no likelihood is so right that its tails further out count
     most_worse: float = 10.0
-    evidence: float = 0.35  # a nat of the posterior, between sets
-    sure: float = 3.56  # an effect that the search names
-    tentative: float = 1.48  # one that it names with a doubt
-    other: float = -4.43  # one that it does not name
+    evidence: float = 0.41  # a nat of the posterior, between sets
+    sure: float = 1.91  # an effect that the search names
+    tentative: float = -0.02  # one that it names with a doubt
+    other: float = -5.22  # one that it does not name
     # log odds that something unknown acts where no sign speaks, and what each sign adds
-    unknown: float = -3.87
-    tests: float = 3.84  # a nat of one plus ``Signs.tests``
-    doubts: float = 6.85  # a nat of one plus ``Signs.doubts``
-    disturbance: float = 3.96  # a nat of ``Signs.disturbance``, where nothing is named
+    unknown: float = -4.75
+    tests: float = 3.94  # the first of ``Signs.tests``
+    further: float = 1.08  # each further one
+    doubts: float = 6.65  # any of ``Signs.doubts``
+    disturbance: float = 5.09  # a nat of ``Signs.disturbance``, where nothing is named
     structure: float = 0.07  # a nat of ``Signs.structure``
     disturbance_range: tuple[float, float] = (-1.0, 4.0)  # nats
     structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
@@ -128,12 +129,13 @@ class Signs:
     structure: float
 
     def numbers(self, named: Sequence[Named]) -> Array:
-        """Return them as numbers (5,); the first is one."""
+        """Return them as numbers (6,); the first is one."""
         return np.array(
             [
                 1.0,
-                np.log1p(self.tests),
-                np.log1p(self.doubts),
+                self.tests > 0,
+                max(self.tests - 1, 0),
+                self.doubts > 0,
                 0.0 if named else np.clip(self.disturbance, *POOLING.disturbance_range),
                 np.clip(self.structure, *POOLING.structure_range),
             ],
@@ -160,7 +162,7 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    by_sign = np.array([w.unknown, w.tests, w.doubts, w.disturbance, w.structure])
+    by_sign = np.array([w.unknown, w.tests, w.further, w.doubts, w.disturbance, w.structure])
     odds = signs.numbers(named) @ by_sign
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown

@@ -47,12 +47,12 @@ def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> li
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.probabilities")
-    parser.add_argument("--own", type=int, default=185, help="flights of this project's plant")
-    parser.add_argument("--other", type=int, default=185, help="flights of the other simulator")
+    parser.add_argument("--own", type=int, default=350, help="flights of this project's plant")
+    parser.add_argument("--other", type=int, default=350, help="flights of the other simulator")
     parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
-    parser.add_argument("--first", type=int, default=610_000, help="number of the first own flight")
+    parser.add_argument("--first", type=int, default=800_000, help="number of the first own flight")
     parser.add_argument(
-        "--catalogue", type=int, default=900, help="first of the other's catalogues"
+        "--catalogue", type=int, default=3000, help="first of the other's catalogues"
     )
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("results/probabilities"))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _DECIMALS = 2  # of a weight
 # what is known of the weights before the flights: mean and standard deviation
 _BEFORE = ((0.5, 2.0, 0.0, -1.0), 1.0)
-_SIGN_STD = 1.8
+_SIGN_STD = 3.0
 _STRUCTURE_STD = 0.2  # a nat
 _LEAST = 1e-4  # no probability counts as less
 
@@ -118,7 +118,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     ).x
     x = np.array([signs_of(f).numbers(names_of(f)) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
-    scale = np.array([1e3, _SIGN_STD, _SIGN_STD, _SIGN_STD, _STRUCTURE_STD])
+    scale = np.array([1e3, *[_SIGN_STD] * 4, _STRUCTURE_STD])
 
     def loss_of_signs(w: Array) -> float:
         odds = x @ w
@@ -126,7 +126,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    by_signs = minimize(loss_of_signs, np.zeros(5)).x
+    by_signs = minimize(loss_of_signs, np.zeros(6)).x
     a, b = by_sets.round(_DECIMALS).tolist(), by_signs.round(_DECIMALS).tolist()
     return replace(
         POOLING,
@@ -136,9 +136,10 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         other=a[3],
         unknown=b[0],
         tests=b[1],
-        doubts=b[2],
-        disturbance=b[3],
-        structure=b[4],
+        further=b[2],
+        doubts=b[3],
+        disturbance=b[4],
+        structure=b[5],
     )
 
 

@@ -21,7 +21,7 @@ from windwrench.studies.trials.rotorpy_flights import (
 
 _PATHS = ("excite", "fast")
 _SPEEDS = (0.5, 3.0)  # m/s, of the wind
-_SURE = 0.9
+_SURE = 0.95
 
 
 def recorded(path: str, seed: int) -> dict[str, Any]:

@@ -289,6 +289,7 @@ def _weights(records: Sequence[Mapping[str, Any]]) -> str:
         "other",
         "unknown",
         "tests",
+        "further",
         "doubts",
         "disturbance",
         "structure",
@@ -301,6 +302,9 @@ def tables(records: Sequence[Mapping[str, Any]]) -> str:
     """Return the scores of recorded flights as Markdown tables."""
     every = scored(records)
     parts = ["**Three ways to a probability, all flights**", _comparison(every)]
+    both = zip(every[WAYS[0]], every[WAYS[1]], strict=True)
+    gained = _mean_and_interval([a.log_score() - b.log_score() for a, b in both])
+    parts += [f"Log score that pooling gains over the search alone, a flight: {gained}."]
     best = every[WAYS[0]]
     parts += ["**Pooled: names by their probability, all flights**"]
     parts += [table(["probability", "mean", "right"], reliability(best))]
