@@ -241,7 +241,7 @@ def diagnose(
         if low and not any(effect.tentative for effect in effects):
             effects = tuple(replace(effect, tentative=True) for effect in effects)
             words = " and ".join(f"{name} ({p:.0%})" for name, p in low.items())
-            doubted_by[IMPROBABLE] = (f"less probable than {least:.0%}: {words}",)
+            doubted_by[IMPROBABLE] = (f"less probable than {least:.0%}, so tentative: {words}",)
             notes += doubted_by[IMPROBABLE]
     sure = remainder == "none" and not any(
         effect.tentative or effect.indistinguishable_from for effect in effects
