@@ -14,7 +14,10 @@ from math import erf, sqrt
 from typing import Any
 
 import numpy as np
+from scipy.stats import mannwhitneyu
 
+from windwrench.identification.diagnosis import DIAGNOSIS
+from windwrench.studies.page_tables import share as counted
 from windwrench.studies.trials.trials import EQUIVALENTS
 from windwrench.studies.trials.unseen_outsiders import UNSEEN
 
@@ -71,6 +74,8 @@ class Judgement:
     rollout_ratio: float  # one-second prediction error after over before
     rollout_of_truth: float  # that of the true model over before, on the same blocks
     gusts: float  # in force, found over flown; NaN in still air
+    probable: tuple[bool, ...]  # whether each name of a probability that makes it sure is true
+    unknown: float  # probability that something acts which no effect of the library is
     gave_away: str  # strongest sign of structure
     problem: str  # the error's text where it failed
     seconds: float  # that the diagnosis took
@@ -145,6 +150,12 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
         gusts=_ratio(float(np.mean(found["gusts"][:3])), flown.get("gusts"))
         if found.get("gusts")
         else np.nan,
+        probable=tuple(
+            bool(_stands_for(e) & set(truth))
+            for e in effects
+            if (e.get("probability") or 0.0) >= DIAGNOSIS.least_sure_probability
+        ),
+        unknown=_number(found.get("unknown")),
         gave_away=f"{structure[0]['test']}: {structure[0]['where']}" if structure else "",
         problem=found.get("error", ""),
         seconds=found["seconds"],
@@ -357,7 +368,16 @@ def rules(judged: Iterable[Judgement]) -> list[Rule]:
                 len(some),
             )
         )
-    return [*out, *_rotorpy(of("rotorpy")), _gusts([j for j in full if j.right])]
+    foreign = outside + [
+        j for size in ("typical", "small") for j in left_out(every, size) if j.without
+    ]
+    inside = [j for j in full if j.group not in ("outsider", "held back")]
+    return [
+        *out,
+        *_rotorpy(of("rotorpy")),
+        *_probabilities(inside, foreign),
+        _gusts([j for j in full if j.right]),
+    ]
 
 
 def doubts(j: Judgement) -> bool:
@@ -422,8 +442,13 @@ def _share(
 ) -> Rule:
     count = sum(map(good, some))
     return _rule(
-        subject, count / max(len(some), 1), bar, len(some), f"({count} of {len(some)})", at_most
+        subject, count / max(len(some), 1), bar, len(some), f"({_counted(count, some)})", at_most
     )
+
+
+def _counted(count: int, some: Sequence[Judgement]) -> str:
+    """Return a count and its 95 % interval."""
+    return counted(count, len(some)).replace(" (", ", ").rstrip(")")
 
 
 def _by_kind(subject: str, some: Sequence[Judgement], bar: float) -> Rule:
@@ -492,6 +517,48 @@ def _floor(subject: str, some: Sequence[Judgement]) -> Rule:
         bool(worst <= FLOOR_BAR) if some else None,
         len(some),
     )
+
+
+def _probabilities(inside: Sequence[Judgement], foreign: Sequence[Judgement]) -> list[Rule]:
+    """Return what the stated probabilities are worth.
+
+    Args:
+        inside: diagnoses whose cause, if there is one, is in their library.
+        foreign: those whose cause is not.
+    """
+    least = f"{DIAGNOSIS.least_sure_probability:.0%}"
+    names = [true for j in inside for true in j.probable]
+    known, unknown = (
+        [j.unknown for j in some if np.isfinite(j.unknown)] for some in (inside, foreign)
+    )
+    area = "not flown"
+    if known and unknown:
+        wins = mannwhitneyu(unknown, known).statistic / (len(known) * len(unknown))
+        area = f"{wins:.3f} ({len(unknown)} against {len(known)})"
+    false = sum(len(j.probable) > 0 for j in foreign)
+    return [
+        Rule(
+            f"8. names with a probability of {least} and more, the cause in the library: true",
+            "-",
+            counted(sum(names), len(names)),
+            None,
+            len(inside),
+        ),
+        Rule(
+            f"8. the cause not in the library: no name has a probability of {least} and more",
+            "-",
+            counted(len(foreign) - false, len(foreign)),
+            None,
+            len(foreign),
+        ),
+        Rule(
+            "8. the cause in the library, or not: area under the curve of `unknown`",
+            "-",
+            area,
+            None,
+            len(known) + len(unknown),
+        ),
+    ]
 
 
 def _gusts(some: Sequence[Judgement]) -> Rule:

@@ -238,7 +238,7 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     for without in trial.libraries:
         begun = time.perf_counter()
         try:
-            diagnosis = diagnose([log], vehicle, without=without)
+            diagnosis = diagnose([log], vehicle, without=without, probabilities=True)
             found = _findings(diagnosis)
             if not without and not flown["outsider"]:
                 truth = _rollout_of_truth(
@@ -327,6 +327,7 @@ def _fly(trial: Trial, seed: int) -> tuple[FlightLog, Vehicle, dict[str, Any]]:
 
 def _findings(found: Diagnosis) -> dict[str, Any]:
     """Return what a score needs of a diagnosis, as JSON."""
+    stated = found.probabilities
     summary = {
         "verdict": found.verdict,
         "remainder": found.remainder,
@@ -338,9 +339,11 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
                 "tentative": e.tentative,
                 "indistinguishable_from": e.indistinguishable_from,
                 "evidence": e.evidence,
+                "probability": stated.names[e.name] if stated else None,
             }
             for e in found.effects
         ],
+        "unknown": stated.unknown if stated else None,
         "before": asdict(found.before),
         "after": asdict(found.after),
         "floor": {"force_rms": found.floor_force_rms, "torque_rms": found.floor_torque_rms},
