@@ -34,9 +34,6 @@ class CommandedSettings:
     # landing last beyond: where no height shows them
     carrying_share: float = 0.7
     take_off: float = 1.0
-    # factor on what an effect explains that is not the usual cause of its trace: a force beside an
-    # error of measurement, a mass beside the scale of thrust, which is known to be unknown
-    second_choice_factor: float = 0.8
     # typical size and range of a flight's deviation from the others: relative, and rad
     thrust_scale_size: tuple[float, float] = (0.02, 0.5)
     tilt_size: tuple[float, float] = (0.01, 0.2)

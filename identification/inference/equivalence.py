@@ -26,22 +26,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EquivalenceSettings:
-    """From which deviance on, flights tell two explanations apart.
-
-    ``commanded`` marks flights whose rotor speeds are worked out from commands.
-    """
+    """From which deviance on, flights tell two explanations apart."""
 
     least_deviance: float = 30.0  # between two explanations; a little over five std deviations
-    least_share: float = 0.001  # of the effect's own deviance: effect models are true to that
-    commanded_least_share: float = 0.005  # the same where thrust is a guess
-    # share of the effect's deviance that another one must explain, linearised, to be worth a refit
-    least_linear_share: float = 0.1
-    commanded_least_linear_share: float = 0.3
-    # times the limit, which the linear fit of another one may leave of it to be worth a refit
-    most_linear_deviance_ratio: float = 40.0
-    commanded_most_linear_deviance_ratio: float = 6.0
-    # share of what is left without the effect, which is the limit for commanded flights at most
-    commanded_most_share_without: float = 0.4
     largest_size: float = 1.2 * GRAM.prior_std  # typical sizes
     most_reliable_effects: int = 2  # at once; aerodynamic ones count as one
     # share of what an inertia explains, which one that goes with the mass may leave of it
@@ -65,7 +52,7 @@ def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     """Return the effects of the library that would explain what ``effect`` explains, given all
     others of the fit.
     """
-    flights = search.flights
+    flights, rules = search.flights, search.flights.rules
     if search.is_fixed(effect):
         return same_delays(effect, search.library)
     less = fit.without(effect)
@@ -74,31 +61,18 @@ def equivalents(search: Search, fit: FittedEffects, effect: str) -> list[str]:
     part = flights.residual(less.setting) - whole
     g = gram(flights, less.setting, search.whiten, regression.columns, part)
     limit = limit_of(search, part)
-    if flights.commanded:  # they tell less: the other one must explain most of it
-        alone = search.refit(less)
-        limit = min(
-            limit,
-            EQUIVALENCE.commanded_most_share_without
-            * search.deviance_of(flights.residual(alone.setting) - whole),
-        )
+    if np.isfinite(rules.most_share_without):  # the other one must explain most of it
+        left = flights.residual(search.refit(less).setting) - whole
+        limit = min(limit, rules.most_share_without * search.deviance_of(left))
     # by the triangle inequality they are no farther apart
     enough = (np.sqrt(search.deviance_of(whole)) + np.sqrt(limit)) ** 2
     out = []
     for other in search.gains(less, regression, g):
-        near, hopeful = (
-            (
-                EQUIVALENCE.commanded_most_linear_deviance_ratio,
-                EQUIVALENCE.commanded_least_linear_share,
-            )
-            if flights.commanded
-            else (EQUIVALENCE.most_linear_deviance_ratio, EQUIVALENCE.least_linear_share)
-        )
-        if other.share < hopeful:
-            continue
         if (
             other.effect == effect
+            or other.share < rules.least_linear_share
             or other.size > EQUIVALENCE.largest_size
-            or other.deviance_left > near * limit
+            or other.deviance_left > rules.most_linear_deviance_ratio * limit
         ):
             continue
         # a nonlinear effect is refitted to the flights
@@ -199,8 +173,7 @@ def limit_of(search: Search, part: Array) -> float:
     """Return the deviance from which on two explanations of ``part`` (rows, 6) are told apart."""
     return max(
         EQUIVALENCE.least_deviance,
-        (EQUIVALENCE.commanded_least_share if search.flights.commanded else EQUIVALENCE.least_share)
-        * search.deviance_of(part),
+        search.flights.rules.least_share_apart * search.deviance_of(part),
     )
 
 

@@ -24,7 +24,7 @@ from .regression import (
     is_nonlinear,
     typical_size,
 )
-from .search import SEARCH, FittedEffects, Search, unexplained_deviance
+from .search import FittedEffects, Search, unexplained_deviance
 from .sensor_bias import is_bias
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def hidden_by_bias(search: Search, fit: FittedEffects) -> frozenset[str]:
 
     def shows(column: Column, beside: list[Column]) -> bool:
         left = unexplained_deviance(g, total, [column], np.ones(1), beside)
-        return left >= SEARCH.least_deviance_reduction
+        return left >= search.flights.rules.least_deviance_reduction
 
     return frozenset(e for e, c in whole.items() if shows(c, []) and not shows(c, biases))
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...dynamics.effects import Role, get, playing
 from .innovations import Innovations
 from .regression import REGRESSION, ROTOR_TIME_OFFSET, Column, coefficient, is_delay, moves_time
-from .search import SEARCH, FittedEffects, Search, with_changes
+from .search import FittedEffects, Search, with_changes
 
 
 @dataclass(frozen=True)
@@ -244,5 +244,5 @@ def _residual_agrees(search: Search, fit: FittedEffects, other: FittedEffects) -
     return (
         search.deviance(fit.setting)
         < REFIT.most_deviance_ratio * search.deviance(other.setting)
-        + SEARCH.least_deviance_reduction
+        + search.flights.rules.least_deviance_reduction
     )

@@ -39,6 +39,7 @@ from .commanded_rotors import (
     in_flight,
     in_flight_by_thrust,
 )
+from .selection_rules import COMMANDED_ROTORS, FILTERED_POSE, MEASURED
 from .sensor_bias import BIAS, bias, bias_columns, is_bias
 
 Array = NDArray[np.float64]
@@ -218,6 +219,17 @@ class Flights:
         self.filtered = not (self.commanded or self.inertial) and any(
             pose_was_filtered(log) for log in self.logs
         )
+        # which of a log's signals may be apart in time
+        self.time_offsets: tuple[Column, ...] = (
+            *(() if self.commanded else (ROTOR_TIME_OFFSET,)),
+            *(() if self.inertial else (ATTITUDE_TIME_OFFSET,)),
+            *(() if self.commanded or self.inertial else (VELOCITY_TIME_OFFSET,)),
+        )
+        # whether innovations say what acts: they need poses as measured, or an IMU, and rotors
+        self.has_innovations = not (self.commanded or self.filtered)
+        self.rules = (
+            COMMANDED_ROTORS if self.commanded else FILTERED_POSE if self.filtered else MEASURED
+        )
         self.logs = tuple(excerpt(self.logs))
         self.deviating_flights = (
             len(logs) if self.commanded else 0
@@ -226,6 +238,9 @@ class Flights:
         if self.inertial:
             self.deviations += tuple(bias_columns(len(logs)))
         self._drift: np.random.Generator | None = None  # of a copy whose fusion errs otherwise
+        self._fused: dict[
+            int, tuple[FlightLog, list[InertialSignals]]
+        ] = {}  # by the log's identity
         self._pieces: dict[tuple[object, ...], list[Piece]] = {}
         self._needs: dict[int, tuple[Piece, Array]] = {}
         self._offset_signals: dict[tuple[float, ...], tuple[Piece, Signals]] = {}
@@ -501,7 +516,10 @@ class Flights:
         return pieces
 
     def _inertial_signals(self, log: FlightLog) -> list[InertialSignals]:
-        found = inertial_signals(log, self.vehicle.gravity)
+        # no effect of the library changes what an IMU measured: each log is fused once
+        if id(log) not in self._fused:
+            self._fused[id(log)] = log, inertial_signals(log, self.vehicle.gravity)
+        found = self._fused[id(log)][1]
         if self._drift is None:
             return found
         return [with_drift(s, self._drift, self.vehicle.gravity) for s in found]

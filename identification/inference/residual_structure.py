@@ -3,8 +3,9 @@ another effect.
 
 A library that lacks the true effect explains it by a similar one, down to the noise floor. Small
 signs show it: candidate regressors still explain part of the residual; the coefficient of the named
-effect changes with speed, height, load, time or frequency; or its force differs between channels.
-Each column is tried alone, on blocks that are left out in turn.
+effect changes with speed, height, load or time, or from block to block; or the innovations confirm
+an effect of which the residual shows too little. Each column is tried alone, on blocks that are
+left out in turn.
 """
 
 import itertools
@@ -48,13 +49,8 @@ class StructureSettings:
     # of the deviance that the named effects explain: effect models, and the plant in which they
     # act, are true to one per cent
     least_share_of_named: float = 1e-4
-    # reduction over the root of the blocks' summed squares: an effect acts again and again, a
-    # transient disturbance once; the second is for commanded flights, where innovations confirm
-    # nothing
-    least_spread: float = 1.5
-    commanded_least_spread: float = 2.0
-    # times the least reduction, from which the least spread is smaller: an effect that acts in one
-    # part of a flight, but strongly
+    # times the least reduction, from which the least spread over blocks is smaller: an effect that
+    # acts in one part of a flight, but strongly
     large_reduction_ratio: float = 3.0
     least_spread_of_large: float = 1.0
     # factor on the least reduction where rotor speeds hardly leave their rounding steps
@@ -116,14 +112,13 @@ def find_structure(search: Search, fit: FittedEffects) -> tuple[list[Structure],
         STRUCTURE.least_deviance_reduction * unit, STRUCTURE.least_share_of_residual * error
     )
     least = rough * np.maximum(least_of_all, STRUCTURE.least_share_of_named * np.array(named))
-    steady = STRUCTURE.commanded_least_spread if flights.commanded else STRUCTURE.least_spread
     found = []
     for at in range(0, len(columns), STRUCTURE.batch):
         batch = columns[at : at + STRUCTURE.batch]
         gains, spreads = _gains(search, regression, np.stack(batch, axis=2))
         for i, (column, gain, spread) in enumerate(zip(batch, gains, spreads, strict=True), at):
             if gain > least[i] and spread >= (
-                steady
+                flights.rules.least_spread
                 if gain < STRUCTURE.large_reduction_ratio * least[i]
                 else STRUCTURE.least_spread_of_large
             ):

@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 from ...dynamics.effects import Need, Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from .commanded_rotors import COMMANDED, similar_effects
+from .commanded_rotors import similar_effects
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
-    ATTITUDE_TIME_OFFSET,
     CENTRAL,
     MOMENT_PREFIX,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
-    VELOCITY_TIME_OFFSET,
     Column,
     Flights,
     Setting,
@@ -40,23 +38,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """What an effect must explain to be named, and when the Gauss-Newton fit stops.
+    """What an effect must be to be named, and when the Gauss-Newton fit stops.
 
     A deviance is the sum of squares of a whitened residual: twice the negative log-likelihood, up
     to a constant.
     """
 
-    # deviance on left-out blocks that an effect must explain; a spurious effect explains about 10
-    least_deviance_reduction: float = 40.0
     # typical sizes; a smaller effect is not worth a name
     least_size: float = 0.1
     # deviance by which an effect with one more coefficient must be better
     deviance_per_coefficient: float = 8.0
-    # Hz, of flights known from commands: the band that weighs effects when they are selected, and
-    # the one that weighs their coefficients: noise in commands makes a lag too long if fast changes
-    # weigh much
-    selection_band_hz: tuple[float, float] = (1.0, 2.0)
-    estimation_band_hz: tuple[float, float] = (0.2, 0.5)
     most_iterations: int = 6  # of Gauss-Newton
     # deviance; an iteration that lowers it by less is idle, and two idle ones in a row are the last
     least_iteration_reduction: float = 1.0
@@ -169,18 +160,9 @@ class Search:
         """Return the columns of a model: of its effects, of effects that are tried, and the time
         offsets that any log may have.
         """
-        rotor_offset = (
-            []
-            if self.flights.commanded or any(map(is_delay, (*effects, *tried)))
-            else [ROTOR_TIME_OFFSET]
-        )
-        velocity_offset = (
-            [] if self.flights.commanded or self.flights.inertial else [VELOCITY_TIME_OFFSET]
-        )
+        late = any(map(is_delay, (*effects, *tried)))
         return [
-            *rotor_offset,
-            *([] if self.flights.inertial else [ATTITUDE_TIME_OFFSET]),
-            *velocity_offset,
+            *(c for c in self.flights.time_offsets if not (late and c == ROTOR_TIME_OFFSET)),
             *self.flights.deviations,
             *(c for e in effects for c in self.columns_of(e, True)),
             *(c for e in tried for c in self.columns_of(e, False)),
@@ -222,9 +204,7 @@ class Search:
         """Return the whitened sums of a regression."""
         return gram(self.flights, fit.setting, self.whiten, regression.columns, regression.residual)
 
-    def _whitener(
-        self, noise: Array, band: tuple[float, float] = SEARCH.selection_band_hz
-    ) -> Whitener:
+    def _whitener(self, noise: Array, band: tuple[float, float] | None) -> Whitener:
         flights = self.flights
         return Whitener(
             noise,
@@ -232,7 +212,7 @@ class Search:
             flights.start,
             flights.fit_rows,
             flights.period,
-            band if flights.commanded or flights.filtered else None,
+            band,
         )
 
     def set_noise(self, fit: FittedEffects, regression: "Regression") -> None:
@@ -242,14 +222,14 @@ class Search:
         noise = regression.residual
         columns = {c: x for c, x in regression.columns.items() if not c[1].startswith(START_PREFIX)}
         for _ in range(3):
-            self.whiten = self._whitener(noise)
+            self.whiten = self._whitener(noise, self.flights.rules.selection_band_hz)
             g = gram(self.flights, fit.setting, self.whiten, columns, regression.residual)
             change = g.solve(g.blocks.sum(axis=0), np.arange(len(g.columns)))
             noise = regression.residual - np.tensordot(
                 np.stack(list(columns.values()), axis=2), change, axes=(2, 0)
             )
         self.noise = noise
-        self.whiten = self._whitener(noise)
+        self.whiten = self._whitener(noise, self.flights.rules.selection_band_hz)
 
     # Fitting
 
@@ -273,7 +253,7 @@ class Search:
 
         A fit that is not going to reach a deviance of ``enough`` is given up early.
         """
-        if not self.flights.commanded:
+        if self.has_one_weighting:
             return self._refit(fit, enough)
         finding = self.whiten
         self.weight_for_estimation()
@@ -281,11 +261,16 @@ class Search:
         self.whiten = finding
         return out
 
+    @property
+    def has_one_weighting(self) -> bool:
+        """Whether coefficients are estimated with the weights by which effects are selected."""
+        return self.flights.rules.estimation_band_hz is None
+
     def weight_for_estimation(self) -> None:
-        """Weight the frequencies of commanded flights for the estimation of coefficients, not for
-        the selection of effects.
+        """Weight the frequencies for the estimation of coefficients, not for the selection of
+        effects.
         """
-        self.whiten = self._whitener(self.noise, SEARCH.estimation_band_hz)
+        self.whiten = self._whitener(self.noise, self.flights.rules.estimation_band_hz)
 
     def _refit(self, fit: FittedEffects, enough: float = np.inf) -> FittedEffects:
         setting = {k: dict(v) for k, v in fit.setting.items()}
@@ -367,11 +352,7 @@ class Search:
             key=lambda x: (
                 SEARCH.deviance_per_coefficient * coefficient_count(x.effect)
                 - x.deviance_reduction
-                * (
-                    COMMANDED.second_choice_factor
-                    if self.flights.commanded and not get(x.effect).usual
-                    else 1.0
-                )
+                * (1.0 if get(x.effect).usual else self.flights.rules.second_choice_factor)
             ),
         )
 
@@ -421,14 +402,10 @@ class Search:
         """
         g = self.gram_at(fit)
         error = g.error(np.arange(len(g.columns)))
-        # a fit to commanded flights is weighted otherwise than judged: it need not be at the
-        # minimum
-        return (
-            error
-            if self.flights.commanded
-            or self.deviance(fit.setting) < 1.05 * error + SEARCH.least_deviance_reduction
-            else np.inf
-        )
+        # a fit that is weighted otherwise than judged need not be at the minimum
+        least = self.flights.rules.least_deviance_reduction
+        converged = self.deviance(fit.setting) < 1.05 * error + least
+        return error if converged or not self.has_one_weighting else np.inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,33 +30,17 @@ from .search import (
 
 @dataclass(frozen=True)
 class StepwiseSettings:
-    """How many effects may be named, and by how much a move of the search must pay.
+    """What a move of the search must pay, beside the ``SelectionSettings`` of the flights.
 
-    Deviances are on left-out blocks. ``commanded`` marks flights whose rotor speeds are worked out
-    from commands.
+    Deviances are on left-out blocks.
     """
 
-    # share of the deviance that is left unexplained, which an effect must explain as well as
-    # ``SEARCH.least_deviance_reduction``
-    least_share_of_deviance: float = 0.01
     # times the least reduction; an effect that explains so much may have half the least size
     large_reduction_ratio: float = 4.0
     # typical sizes, the least size of an effect that scales a measurement: it is wrong by the share
     # of noise in what is measured
     least_size_of_scale: float = 0.25
     swap_reduction: float = 12.0  # deviance by which one effect in place of another must be better
-    most_effects: int = 4
-    # the same for commanded flights; effects that cannot be there explain up to 25, and a share of
-    # 0.01, of real flights
-    commanded_least_deviance_reduction: float = 25.0
-    commanded_least_share_of_deviance: float = 0.018
-    # share that an effect with nonlinear coefficients must explain of a commanded flight
-    commanded_least_share_of_nonlinear: float = 0.15
-    # typical sizes; a larger effect takes up what the thrust curve of a commanded flight lacks
-    commanded_largest_size: float = 6.0
-    # thrust scale, battery sag, delay and tilt come on top of what other flights have
-    commanded_most_effects: int = 8
-    rounds: int = 2  # of adding and pruning; what changes further stands for an unlisted effect
     most_moves: int = 3  # of one pruning; a move takes seconds where four effects stand for one
     most_replacements: int = 2  # single effects tried in place of others, the best first
     most_candidates: int = 8  # tried for one place, the best first, if innovations reject them
@@ -76,19 +60,15 @@ def find_effects(search: Search) -> tuple[FittedEffects, list[Gain]]:
     needed = FittedEffects(search.delay.setting(search.rotor_delay) if search.delay else {})
     first: list[Gain] = []
     asked: list[set[str]] = []
-    for _ in range(STEPWISE.rounds):
+    for _ in range(search.flights.rules.rounds):
         fit, gains = _forward(search, needed)
         first = first or gains
         if asked and fit.effects == needed.effects:
             break
         search.report("asking whether every effect is needed")
         # with the noise as estimated by now
-        needed = _prune(search, fit if search.flights.commanded else search.refit(fit))
-        if (
-            search.flights.commanded
-            or needed.effects == fit.effects
-            or set(needed.effects) in asked
-        ):
+        needed = _prune(search, search.refit(fit) if search.has_one_weighting else fit)
+        if needed.effects == fit.effects or set(needed.effects) in asked:
             break
         # one effect in place of two leaves room for more, and an effect that was small beside a
         # wrong one may be large beside the right one
@@ -115,7 +95,7 @@ def with_proposal(
 
 def _confirmed_effects(search: Search, fit: FittedEffects) -> FittedEffects:
     """Return a fit without the effects that the innovations do not confirm beside the others."""
-    if search.flights.commanded:
+    if not search.flights.has_innovations:
         return fit
     for effect in fit.effects:
         if not _is_confirmed(search, fit, effect):
@@ -132,10 +112,7 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
     """Return ``fit`` with the effects that are worth adding one after the other, and what each
     explained at first.
     """
-    commanded, most = (
-        search.flights.commanded,
-        STEPWISE.commanded_most_effects if search.flights.commanded else STEPWISE.most_effects,
-    )
+    flights, most = search.flights, search.flights.rules.most_effects
     first: list[Gain] = []
     for count in range(len([e for e in fit.effects if not search.is_fixed(e)]), most + 1):
         regression = search.linearise(fit)
@@ -146,22 +123,18 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
         gains = search.gains(fit, regression, g)
         first = first or gains
         least = _least(search, g.error(g.index(search.model_columns(fit.effects))))
-        better = [
-            x
-            for x in gains
-            if _is_worth_naming(x, least) and (not commanded or _plausible(search, x, count))
-        ]
+        better = [x for x in gains if _is_worth_naming(x, least) and _plausible(search, x, count)]
         if not better or count == most:
             break
         for gain in better[: STEPWISE.most_candidates]:
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
-            if commanded:
-                # where rotors are measured, innovations contradict what cannot be
-                taken = is_possible(more, search.flights.vehicle)
-            else:
-                taken = confirms_addition(search.flights, fit.setting, more.setting)
-            if taken:
+            # innovations contradict what cannot be
+            if (
+                confirms_addition(flights, fit.setting, more.setting)
+                if flights.has_innovations
+                else is_possible(more, flights.vehicle)
+            ):
                 break
         else:
             break
@@ -170,13 +143,12 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
 
 
 def _plausible(search: Search, gain: Gain, count: int) -> bool:
-    """Return whether an effect is plausible as the ``count``-th one of a flight whose thrust is a
-    guess.
-    """
-    if cancels_thrust_scale(gain.fit.setting, search.flights.vehicle.weight):
+    """Return whether an effect is plausible as the ``count``-th one."""
+    flights = search.flights
+    if flights.commanded and cancels_thrust_scale(gain.fit.setting, flights.vehicle.weight):
         return False
-    return (gain.size < STEPWISE.commanded_largest_size or count == 0) and (
-        not is_nonlinear(gain.effect) or gain.share > STEPWISE.commanded_least_share_of_nonlinear
+    return (gain.size < flights.rules.largest_size or count == 0) and (
+        not is_nonlinear(gain.effect) or gain.share > flights.rules.least_share_of_nonlinear
     )
 
 
@@ -191,7 +163,7 @@ def _prune(search: Search, fit: FittedEffects) -> FittedEffects:
         if better is None:
             break
         fit, error = better
-    if search.flights.commanded:
+    if not search.has_one_weighting:
         fit = search.refit(fit)
         search.weight_for_estimation()
     return fit
@@ -341,12 +313,8 @@ def _least(search: Search, error: float) -> float:
     """Return the deviance that an effect must explain of flights with such an unexplained
     deviance.
     """
-    gain, share = (
-        (STEPWISE.commanded_least_deviance_reduction, STEPWISE.commanded_least_share_of_deviance)
-        if search.flights.commanded
-        else (SEARCH.least_deviance_reduction, STEPWISE.least_share_of_deviance)
-    )
-    return max(gain, share * error)
+    rules = search.flights.rules
+    return max(rules.least_deviance_reduction, rules.least_share_of_deviance * error)
 
 
 def _least_size(effect: str) -> float:
