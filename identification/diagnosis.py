@@ -74,7 +74,7 @@ from .motion.inertial_signals import pose_rate
 from .motion.noise_spectrum import filtering_notes, pose_was_filtered
 from .motion.smoothing import CUTOFFS
 from .posterior.deviations import with_both_estimates
-from .posterior.pooling import Signs, pooled
+from .posterior.pooling import POOLING, SEARCH_ALONE, PoolingSettings, Signs, pooled
 from .posterior.ranking import rank
 from .prediction import nis_without_wrench_state, rollout_error
 from .wrench_series import pose_notes
@@ -131,10 +131,13 @@ def diagnose(
             which the fit never sees.
         without: effects that are taken out of the library.
         report: called with a line of progress.
-        probabilities: whether how probable each name is, is worked out as well. The likeliest set
-            of the posterior is then named if it explains the residual better than what the search
-            has found, and the standard deviation of a coefficient includes how far the posterior's
-            estimate of it is from the search's. It takes about as long again.
+        probabilities: whether how probable each name is, is worked out as well; not where rotor
+            speeds come from commands. Where pose and rotor speeds were measured, and the vehicle
+            declares no effect, it has a posterior: its likeliest set is then named if it explains
+            the residual better than what the search has found, and the standard deviation of a
+            coefficient includes how far the posterior's estimate of it is from the search's. That
+            takes about as long again. Elsewhere a probability is how often such findings of the
+            search are right.
 
     Raises:
         InputError: a log that is not what it claims to be, or an unknown effect.
@@ -198,7 +201,7 @@ def diagnose(
     )
     disturbances = (
         ()
-        if flights.commanded or flights.filtered
+        if not flights.has_innovations
         else tuple(
             Disturbance(channel, *found)
             for channel, found in zip(
@@ -207,14 +210,12 @@ def diagnose(
         )
     )
     transients = (
-        ()
-        if flights.commanded or flights.filtered
-        else tuple(transient_disturbances(flights, fit.setting))
+        () if not flights.has_innovations else tuple(transient_disturbances(flights, fit.setting))
     )
     beyond = beyond_calm(disturbances, vehicle.weight, vehicle.arm_l)
     disturbed = bool(transients) or beyond > 0.0
     remainder = "structured" if signs else "random" if noisy or unconfirmed or disturbed else "none"
-    large = noisy if flights.commanded or flights.filtered else disturbed
+    large = disturbed if flights.has_innovations else noisy
     effects = tuple(
         _named(search, fit, effect, classes[effect], bool(signs or name_doubts), large)
         for effect in fit.effects
@@ -227,15 +228,18 @@ def diagnose(
     if thrust_is_assumed(every, vehicle):
         effects = tuple(_with_assumed_thrust(effect, vehicle) for effect in effects)
         notes += assumed_thrust_doubts(fit.effects)
-    stated = None
+    stated, weights = None, _pooling(flights, ranking) if probabilities else None
     if ranking:
         effects = with_both_estimates(effects, ranking)
+    if weights:
         tests = len({sign.kind for sign in signs})
         stated = pooled(
             effects,
-            [(x.effects, x.probability) for x in ranking.sets],
-            Signs(tests, len(doubted_by), beyond, ranking.structure),
+            [(x.effects, x.probability) for x in ranking.sets] if ranking else [],
+            Signs(tests, len(doubted_by), beyond, ranking.structure if ranking else 0.0),
+            weights,
         )
+    if ranking and stated:
         least = DIAGNOSIS.least_sure_probability
         low = {e.name: p for e in effects if (p := stated.names[e.name]) < least}
         if low and not any(effect.tentative for effect in effects):
@@ -362,6 +366,17 @@ def _ranking(
     report("asking how probable each effect is")
     found = {effect: fit.setting[effect] for effect in fit.effects}
     return rank(flights, search.library, found, report)
+
+
+def _pooling(flights: Flights, ranking: Ranking | None) -> PoolingSettings | None:
+    """Return how findings of such logs become probabilities; None of commanded rotors: there is no
+    flight of theirs whose truth is known.
+    """
+    if flights.commanded:
+        return None
+    if ranking:
+        return POOLING
+    return SEARCH_ALONE["imu" if flights.inertial else "filtered" if flights.filtered else "pose"]
 
 
 def _inertial_notes(flights: Flights, effects: Sequence[str]) -> list[str]:

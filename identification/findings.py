@@ -304,8 +304,9 @@ class Diagnosis:
             well, or names. Beside these, ``structure`` is a doubt of all names.
         ranking: the posterior of sets of effects; none where it was not asked for, or where rotors
             or pose were not measured as they were.
-        probabilities: of what was found, by search and posterior together; none where there is no
-            posterior.
+        probabilities: of what was found, by search and posterior together, or by the search alone
+            where there is no posterior; none where they were not asked for, or where rotor speeds
+            are worked out from commands.
     """
 
     verdict: str

@@ -14,7 +14,7 @@ that it does not name. Beside them stands the explanation that something acts wh
 library is; then no name counts as right, because what is named imitates it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,6 +50,14 @@ class PoolingSettings:
 
 
 POOLING = PoolingSettings()
+# Where there is no posterior, by what the motion is read from: a pose of a vehicle that declares
+# effects, an IMU, or a pose that was filtered before it was logged. An explanation is then what the
+# search names, or a part of it
+SEARCH_ALONE: Mapping[str, PoolingSettings] = {
+    "pose": PoolingSettings(),
+    "imu": PoolingSettings(),
+    "filtered": PoolingSettings(),
+}
 
 
 class Named(Protocol):

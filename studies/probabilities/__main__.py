@@ -7,23 +7,10 @@ from pathlib import Path
 
 from windwrench.runtime.page_files import write_text
 from windwrench.studies.page_tables import put_between
-from windwrench.studies.probabilities.flights import recorded
+from windwrench.studies.probabilities.flights import OF_TEN, recorded
 from windwrench.studies.probabilities.scores import tables
 from windwrench.studies.resumed_tasks import Task, run_tasks
 
-# of ten flights of the project's own simulator
-_OF_TEN = (
-    "single",
-    "third",
-    "pair",
-    "nothing",
-    "left out",
-    "outsider",
-    "single",
-    "nothing",
-    "single",
-    "left out",
-)
 RESULTS = Path("docs/probabilities/results.json.gz")
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
@@ -35,7 +22,7 @@ def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> li
     # in turn, so that a run that is stopped has both
     for i in range(max(own, other)):
         if i < own:
-            out.append(("own", _OF_TEN[i % len(_OF_TEN)], first + i))
+            out.append(("own", OF_TEN[i % len(OF_TEN)], first + i))
         if i >= other:
             continue
         place = i * _STRIDE % _CATALOGUE + _CATALOGUE * (catalogue + i // _CATALOGUE)

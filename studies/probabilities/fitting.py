@@ -45,8 +45,9 @@ def names_of(flight: dict[str, Any]) -> list[Name]:
 
 
 def acts_unknown(flight: dict[str, Any]) -> bool:
-    """Return whether something acts which no effect of the library is."""
-    return bool(flight["outsider"] or set(flight["left_out"]) & set(flight["truth"]))
+    """Return whether something acts which no effect of the library is that such a log can show."""
+    lost = {*flight["left_out"], *flight.get("hidden", ())}
+    return bool(flight["outsider"] or lost & set(flight["truth"]))
 
 
 def stands_for(flight: dict[str, Any], name: str) -> set[str]:
@@ -92,6 +93,11 @@ def _right_sets(flight: dict[str, Any], keys: Sequence[frozenset[str]]) -> NDArr
             for key in keys
         ]
     )
+
+
+def without_posterior(flight: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a recorded flight as if it had no posterior."""
+    return {**flight, "sets": [], "structure": 0.0}
 
 
 def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:

@@ -19,13 +19,31 @@ from windwrench.dynamics.effects import names
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.identification.diagnosis import IMPROBABLE, diagnose
 from windwrench.identification.findings import Ranking
+from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
+from windwrench.studies.filtered_logs.filters import FILTERS
+from windwrench.studies.imu_logs.sensors import LOGS
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.practice_flights import of_mass, practise, shown_in
 from windwrench.studies.trials.trials import EQUIVALENTS
 
+# how a flight is logged: as measured, by its IMU, or behind one of the filters in turn
+WAYS_TO_LOG = ("pose", *LOGS, "filtered")
 KINDS = ("single", "third", "pair", "nothing", "outsider", "left out")
+# of ten flights of the project's own simulator
+OF_TEN = (
+    "single",
+    "third",
+    "pair",
+    "nothing",
+    "left out",
+    "outsider",
+    "single",
+    "nothing",
+    "single",
+    "left out",
+)
 _ATTEMPTS = 4  # at a flight that crashes
 _MOST_SETS = 10  # of the posterior, that are kept
 _GUST_TIMES = (0.1, 2.0)  # s, between which a gust's duration is drawn
@@ -42,24 +60,35 @@ _KNOWN = {
 }
 
 
-def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
-    """Return what the search and the posterior say of one flight, and its truth, as JSON.
+def recorded(simulator: str, kind: str, number: int, way: str = "pose") -> dict[str, Any]:
+    """Return what the search and the posterior say of one flight, and its truth, as JSON; only why
+    it was refused, where it was.
 
     Args:
         simulator: "own", or the file of the other one.
         kind: one of ``KINDS``; of the other simulator "catalogue" or "left out".
         number: the seed of a flight, or its place in the other simulator's catalogues, one seed
             after the other.
+        way: one of ``WAYS_TO_LOG``; the other simulator has no IMU.
     """
     log, vehicle, truth, outsider, flown = (
-        _own(kind, number) if simulator == "own" else _other(Path(simulator), number)
+        _own(kind, number, way in LOGS) if simulator == "own" else _other(Path(simulator), number)
     )
+    if way in LOGS:
+        log = LOGS[way](log, number)
+    elif way == "filtered":
+        name = list(FILTERS)[1:][number % (len(FILTERS) - 1)]
+        log, flown = FILTERS[name](log, vehicle), f"{flown}, {name}"
     left_out: list[str] = []
     if kind == "left out":
         left_out = [e for t in truth for e in (t, *EQUIVALENTS.get(t, ()))]
     begun = time.process_time()
-    search = diagnose([log], vehicle, without=left_out, probabilities=True)
+    try:
+        search = diagnose([log], vehicle, without=left_out, probabilities=True)
+    except InputError as error:
+        return {"refused": str(error)}
     ended = time.process_time()
+    lost = {*search.needs_pose, *(lost_behind_a_filter() if way == "filtered" else ())}
     # a log that looks filtered has no posterior
     found = search.ranking or Ranking({}, (), 0.0, 1.0)
     return {
@@ -67,6 +96,7 @@ def recorded(simulator: str, kind: str, number: int) -> dict[str, Any]:
         "truth": truth,
         "outsider": outsider,
         "left_out": left_out,
+        "hidden": sorted(lost & set(truth)),
         "named": [
             {
                 "name": e.name,
@@ -105,7 +135,7 @@ def _fitted(found: Ranking, effects: Sequence[str]) -> dict[str, Any]:
     return out
 
 
-def _own(kind: str, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
+def _own(kind: str, number: int, imu: bool) -> tuple[FlightLog, Vehicle, dict[str, Any], str, str]:
     rng = np.random.default_rng((number, len(kind)))
     vehicle = load_vehicle("ardrone2")
     if rng.random() < 0.5:
@@ -128,8 +158,9 @@ def _own(kind: str, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any], st
                 10 * number + attempt,
                 60.0,
                 turbulence,
-                gust_time=gust_time,
-                seen=seen,
+                imu,
+                gust_time,
+                seen,
             )
         except InputError:
             continue
@@ -191,4 +222,4 @@ def _other(path: Path, number: int) -> tuple[FlightLog, Vehicle, dict[str, Any],
     return log, vehicle, truth, outsider, kind
 
 
-__all__ = ["KINDS", "recorded"]
+__all__ = ["KINDS", "OF_TEN", "WAYS_TO_LOG", "recorded"]

@@ -76,19 +76,31 @@ class Scored:
         return total
 
 
+def _halves(records: Sequence[Mapping[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Return the flights of even and of odd numbers."""
+    return [[r["result"] for r in records if r["task"][2] % 2 == odd] for odd in (0, 1)]
+
+
+def cross_fitted(records: Sequence[Mapping[str, Any]]) -> list[Scored]:
+    """Return the flights with pooled probabilities, none by weights that know it."""
+    weights = [fit(half) for half in reversed(_halves(records))]
+    return [
+        Scored(r["task"][0] == "own", r["result"], pool(r["result"], weights[r["task"][2] % 2]))
+        for r in records
+    ]
+
+
 def scored(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Scored]]:
     """Return the flights with the probabilities of each way, none by weights that know it.
 
     Args:
         records: ``{"task": [simulator, kind, number], "result": ...}`` each.
     """
-    halves = [[r["result"] for r in records if r["task"][2] % 2 == odd] for odd in (0, 1)]
-    weights = [fit(halves[1]), fit(halves[0])]
-    shares = [frequencies(halves[1]), frequencies(halves[0])]
+    shares = [frequencies(half) for half in reversed(_halves(records))]
     out: dict[str, list[Scored]] = {way: [] for way in WAYS}
+    out[WAYS[0]] = cross_fitted(records)
     for record in records:
         own, flight, odd = record["task"][0] == "own", record["result"], record["task"][2] % 2
-        out[WAYS[0]].append(Scored(own, flight, pool(flight, weights[odd])))
         out[WAYS[1]].append(Scored(own, flight, _by_frequency(flight, shares[odd])))
         out[WAYS[2]].append(Scored(own, flight, _by_posterior(flight)))
     return out
@@ -119,7 +131,8 @@ def expected_calibration_error(claims: Sequence[Claim]) -> float:
     return total / max(len(claims), 1)
 
 
-def _of(flights: Sequence[Scored]) -> list[Claim]:
+def claims_of(flights: Sequence[Scored]) -> list[Claim]:
+    """Return the claims of all flights."""
     return [claim for flight in flights for claim in flight.claims()]
 
 
@@ -166,7 +179,7 @@ def _mean_and_interval(values: Sequence[float]) -> str:
 def reliability(flights: Sequence[Scored]) -> list[list[str]]:
     """Return rows of the reliability diagram: probability, its mean, and how often it is right."""
     rows = []
-    claims = _of(flights)
+    claims = claims_of(flights)
     for low, high in itertools.pairwise((0.0, *EDGES)):
         inside = [x for x in claims if low <= x[0] < high]
         if inside:
@@ -176,13 +189,14 @@ def reliability(flights: Sequence[Scored]) -> list[list[str]]:
     return rows
 
 
-def _area(flights: Sequence[Scored]) -> str:
+def area(flights: Sequence[Scored]) -> str:
+    """Return the area under the curve of ``unknown``, with the counts of flights."""
     strange = [x.found.unknown for x in flights if acts_unknown(x.flight)]
     known = [x.found.unknown for x in flights if not acts_unknown(x.flight)]
     if not strange or not known:
         return "–"
-    area = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
-    return f"{area:.3f} ({len(strange)} against {len(known)})"
+    wins = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
+    return f"{wins:.3f} ({len(strange)} against {len(known)})"
 
 
 def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
@@ -206,7 +220,7 @@ def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
 def _comparison(every: Mapping[str, Sequence[Scored]]) -> str:
     rows = []
     for way, flights in every.items():
-        claims = _of(flights)
+        claims = claims_of(flights)
         low, high = calibration_interval(flights)
         rows.append(
             [
@@ -214,7 +228,7 @@ def _comparison(every: Mapping[str, Sequence[Scored]]) -> str:
                 f"{expected_calibration_error(claims):.3f} ({low:.3f} to {high:.3f})",
                 f"{error_of_perfect_calibration(claims):.3f}",
                 _mean_and_interval([x.log_score() for x in flights]),
-                _area(flights),
+                area(flights),
                 str(len(claims)),
             ]
         )

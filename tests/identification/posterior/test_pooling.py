@@ -5,7 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from windwrench.identification.posterior.pooling import POOLING, Signs, explanations, pooled
+from windwrench.identification.posterior.pooling import (
+    POOLING,
+    SEARCH_ALONE,
+    Signs,
+    explanations,
+    pooled,
+)
 
 
 @dataclass(frozen=True)
@@ -88,3 +94,15 @@ def test_nothing_found_is_an_explanation_too():
     assert found.alternatives[0].effects == ()
     assert found.names == {}
     assert found.unknown + found.alternatives[0].probability == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", SEARCH_ALONE)
+def test_without_a_posterior_what_is_named_and_its_parts_explain(kind):
+    names = [Name("mass"), Name("wind", tentative=True)]
+    found = pooled(names, [], CALM, replace(SEARCH_ALONE[kind], least=0.0))
+    parts = {x.effects for x in found.alternatives}
+    assert parts == {(), ("mass",), ("wind",), ("mass", "wind")}
+    assert sum(x.probability for x in found.alternatives) + found.unknown == pytest.approx(1.0)
+    assert found.names["mass"] > found.names["wind"]
+    doubted = pooled(names, [], LOUD, SEARCH_ALONE[kind])
+    assert doubted.unknown > found.unknown
