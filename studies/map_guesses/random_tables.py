@@ -3,7 +3,7 @@
 The writing shares no code with the reading: what it writes comes from the map's words alone.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -262,14 +262,3 @@ def save(written: Written, path: Path) -> Path:
     """Write a table's text to a file."""
     path.write_text(written.text, encoding="utf-8")
     return path
-
-
-def with_rates(log: FlightLog, rng: np.random.Generator) -> FlightLog:
-    """Return the flight with a pose in every second row alone, as a table of several rates has
-    it.
-    """
-    lost = np.zeros(len(log.t), bool)
-    lost[int(rng.integers(2)) :: 2] = True
-    position, quaternion = log.position.copy(), log.quaternion.copy()
-    position[lost] = quaternion[lost] = np.nan
-    return replace(log, position=position, quaternion=quaternion, valid=~lost)

@@ -6,7 +6,7 @@ from another), and a disturbance outside the library. All are flown in MuJoCo an
 """
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from windwrench.dynamics.effects import get, names
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.envs.plant import TICK, is_a_body
-from windwrench.envs.recording import TRAJECTORIES, background, draw_trajectory, record_flight
+from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.identification.inference.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
@@ -376,33 +376,6 @@ def practise(
         replace(log, name=name),
         vehicle,
     )
-
-
-def practice_set(
-    vehicle: Vehicle,
-    kinds: tuple[str, ...] = KINDS,
-    sizes: tuple[str, ...] = tuple(SIZES),
-    seed: int = 0,
-    seconds: float = 60.0,
-    pairs: int = 12,
-) -> Iterator[Practice]:
-    """Yield practice flights, each flown when it is asked for.
-
-    Nothing on every trajectory; every effect and every disturbance at every size; ``pairs`` pairs
-    of effects drawn at random; every effect that a hover shows, hovering.
-    """
-    for kind in kinds:
-        if kind not in KINDS:
-            raise unknown_name("kind", kind, KINDS)
-    if "nothing" in kinds:
-        for i, trajectory in enumerate(TRAJECTORIES):
-            yield practise(vehicle, "nothing", (), sizes[0], trajectory, seed + i, seconds)
-    for kind, every in (("effect", names()), ("outsider", tuple(OUTSIDERS)), ("hover", _HOVERING)):
-        for i, name in enumerate(every if kind in kinds else ()):
-            for j, size in enumerate(sizes if kind != "hover" else sizes[:1]):
-                yield practise(vehicle, kind, (name,), size, None, seed + 10 * i + j, seconds)
-    for i in range(pairs if "pair" in kinds else 0):
-        yield practise(vehicle, "pair", (), sizes[i % len(sizes)], None, seed + 1000 + i, seconds)
 
 
 def _in_the_open(effects: tuple[str, ...]) -> tuple[str, ...]:
