@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Need, Role, get, names, needing, playing
@@ -39,7 +40,7 @@ from .commanded_rotors import (
     in_flight,
     in_flight_by_thrust,
 )
-from .selection_rules import COMMANDED_ROTORS, FILTERED_POSE, MEASURED
+from .selection_rules import COMMANDED_ROTORS, FILTERED_POSE, MEASURED, SelectionSettings
 from .sensor_bias import BIAS, bias, bias_columns, is_bias
 
 Array = NDArray[np.float64]
@@ -74,6 +75,9 @@ class RegressionSettings:
     filtered_rotor_time_offset_range: tuple[float, float] = (-0.1, 0.1)
     # s, typical size of a time offset, and of the rotors' where the pose was filtered
     time_offset_size: float = 0.0025
+    # s2, typical size and range of the spread in time: 5 ms, and at most 40
+    rotor_spread_size: float = 2.5e-5
+    rotor_spread_range: tuple[float, float] = (0.0, 1.6e-3)
     filtered_rotor_time_offset_size: float = 0.02
 
 
@@ -96,6 +100,10 @@ START_PREFIX = "start "
 ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
 ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
 VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
+# variance (s2) of the time over which rotor speeds are averaged, to both sides: an IMU hardly has
+# noise, so that of the rotor speeds, and their rounding, show; and it has a low-pass of its own.
+# Without it a lag is found that averages them, with an offset that brings them forward again
+ROTOR_SPREAD = ("", "rotor_spread")
 TIME_OFFSETS = (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
 
 
@@ -143,6 +151,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """
     if column in TIME_OFFSETS:
         return REGRESSION.time_offset_size
+    if column == ROTOR_SPREAD:
+        return REGRESSION.rotor_spread_size
     if is_bias(column):
         return BIAS.step
     if not column[0] and (size := deviation_size(column[1])) is not None:
@@ -168,6 +178,8 @@ def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
     """
     if filtered and column == ROTOR_TIME_OFFSET:
         return REGRESSION.filtered_rotor_time_offset_range
+    if column == ROTOR_SPREAD:
+        return REGRESSION.rotor_spread_range
     if is_bias(column):
         return -BIAS.largest, BIAS.largest
     size = deviation_size(column[1])
@@ -222,12 +234,13 @@ class Flights:
         # which of a log's signals may be apart in time
         self.time_offsets: tuple[Column, ...] = (
             *(() if self.commanded else (ROTOR_TIME_OFFSET,)),
+            *((ROTOR_SPREAD,) if self.inertial and not self.commanded else ()),
             *(() if self.inertial else (ATTITUDE_TIME_OFFSET,)),
             *(() if self.commanded or self.inertial else (VELOCITY_TIME_OFFSET,)),
         )
         # whether innovations say what acts: they need poses as measured, or an IMU, and rotors
         self.has_innovations = not (self.commanded or self.filtered)
-        self.rules = (
+        self.rules: SelectionSettings = (
             COMMANDED_ROTORS if self.commanded else FILTERED_POSE if self.filtered else MEASURED
         )
         self.logs = tuple(excerpt(self.logs))
@@ -617,6 +630,7 @@ class Flights:
             offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
             offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
             offsets.get(VELOCITY_TIME_OFFSET[1], 0.0),
+            offsets.get(ROTOR_SPREAD[1], 0.0),
             scale,
         )
         if key not in self._offset_signals:
@@ -748,6 +762,10 @@ def _with_time_offsets(
         at = np.clip(np.arange(n) - rotor_offset / signals.period, 0, n - 1)
         speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
         signals = replace(signals, rotor_speeds=speeds)
+    if (spread := offsets.get(ROTOR_SPREAD[1], 0.0)) != 0.0:
+        over = np.sqrt(spread) / signals.period
+        smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
+        signals = replace(signals, rotor_speeds=smooth)
     if (velocity_offset := offsets.get(VELOCITY_TIME_OFFSET[1], 0.0)) != 0.0:
         signals = replace(
             signals, velocity=signals.velocity - velocity_offset * signals.acceleration

@@ -7,20 +7,18 @@ that cannot be there. So an effect must explain more of what is left, and anothe
 effect; but a thrust scale, a sag of the battery, a delay and a tilt are there as a rule.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 
 @dataclass(frozen=True)
 class SelectionSettings:
-    """The rules of one kind of flights. Deviances are on left-out blocks."""
+    """Where rotors and pose were measured. Deviances are on left-out blocks."""
 
-    # deviance that an effect must explain; a spurious effect explains about 10 where rotors are
-    # measured. Effects that cannot be there explain up to 25 of real flights known from commands
+    # deviance that an effect must explain; a spurious effect explains about 10
     least_deviance_reduction: float = 40.0
-    # share of the deviance that is left unexplained, which an effect must explain as well; of real
-    # flights known from commands, effects that cannot be there explain 0.01
+    # share of the deviance that is left unexplained, which an effect must explain as well
     least_share_of_deviance: float = 0.01
     least_share_of_nonlinear: float = 0.0  # the same, of an effect with nonlinear coefficients
     # typical sizes of any effect but the first; a larger one takes up what a thrust curve lacks
@@ -31,8 +29,7 @@ class SelectionSettings:
     most_effects: int = 4
     rounds: int = 2  # of adding and pruning; what changes further stands for an unlisted effect
     # Hz: the band that weighs effects when they are selected, and the one that weighs their
-    # coefficients; default: all that the residual holds. Noise in commands makes a lag too long if
-    # fast changes weigh much
+    # coefficients; none: all that the residual holds
     selection_band_hz: tuple[float, float] | None = None
     estimation_band_hz: tuple[float, float] | None = None
     # of an effect's own deviance, by which two explanations must differ: effect models are true to
@@ -45,25 +42,39 @@ class SelectionSettings:
     # share of what is left without the effect, which is the limit at most
     most_share_without: float = np.inf
     # gain of a candidate regressor over the root of the blocks' summed squares: an effect acts
-    # again and again, a transient disturbance once; more where innovations confirm nothing
+    # again and again, a transient disturbance once
     least_spread: float = 1.5
 
 
+@dataclass(frozen=True)
+class FilteredSelectionSettings(SelectionSettings):
+    """Where the pose was filtered before it was logged; what it says of fast motion is lost."""
+
+    selection_band_hz: tuple[float, float] | None = (1.0, 2.0)  # well below any filter
+
+
+@dataclass(frozen=True)
+class CommandedSelectionSettings(SelectionSettings):
+    """Where rotor speeds are worked out from commands."""
+
+    least_deviance_reduction: float = 25.0  # what cannot be there explains up to that
+    least_share_of_deviance: float = 0.018  # the same explains 0.01
+    least_share_of_nonlinear: float = 0.15  # such effects imitate what the thrust curve lacks
+    largest_size: float = 6.0
+    second_choice_factor: float = 0.8
+    most_effects: int = 8  # thrust, battery, delay and tilt come on top of what other flights have
+    rounds: int = 1
+    # noise in commands makes a lag too long if fast changes weigh much
+    selection_band_hz: tuple[float, float] | None = (1.0, 2.0)
+    estimation_band_hz: tuple[float, float] | None = (0.2, 0.5)
+    # they tell less: another effect must explain most of one to stand for it
+    least_share_apart: float = 0.005
+    least_linear_share: float = 0.3
+    most_linear_deviance_ratio: float = 6.0
+    most_share_without: float = 0.4
+    least_spread: float = 2.0  # innovations confirm nothing
+
+
 MEASURED = SelectionSettings()
-FILTERED_POSE = replace(MEASURED, selection_band_hz=(1.0, 2.0))
-COMMANDED_ROTORS = SelectionSettings(
-    least_deviance_reduction=25.0,
-    least_share_of_deviance=0.018,
-    least_share_of_nonlinear=0.15,
-    largest_size=6.0,
-    second_choice_factor=0.8,
-    most_effects=8,
-    rounds=1,
-    selection_band_hz=(1.0, 2.0),
-    estimation_band_hz=(0.2, 0.5),
-    least_share_apart=0.005,
-    least_linear_share=0.3,
-    most_linear_deviance_ratio=6.0,
-    most_share_without=0.4,
-    least_spread=2.0,
-)
+FILTERED_POSE = FilteredSelectionSettings()
+COMMANDED_ROTORS = CommandedSelectionSettings()
