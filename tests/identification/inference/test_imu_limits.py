@@ -1,5 +1,7 @@
 """What an accelerometer's bias hides, and what the errors of a fusion add to deviations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -15,6 +17,7 @@ from windwrench.identification.inference.imu_limits import (
 )
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.selection_rules import MEASURED
 
 VEHICLE = load_vehicle("ardrone2")
 FORCE = {"fx": 0.2, "fy": 0.2}
@@ -67,3 +70,21 @@ def test_a_name_is_doubted_where_a_cause_that_does_not_show_would_look_like_it()
     assert any("rotor_interaction" in text for text in hidden_causes(search, fit))
     heavy = FittedEffects({"mass": {"dm": 0.3}}, fit.std)
     assert not any("rotor_interaction" in text for text in hidden_causes(search, heavy))
+
+
+def test_noise_of_rotor_speeds_is_averaged_and_is_no_lag():
+    """An IMU is so quiet that what rotor speeds are wrong by shows in it. A lag averages them as
+    well; it must be left no gain by it.
+    """
+    log = pose_removed(imu_flight(VEHICLE, trajectory="fast", seconds=30.0))
+    noise = np.random.default_rng(0).normal(0.0, 3.0, log.rotor_speeds.shape)
+    spreads, gained = [], []
+    for flown in (log, replace(log, rotor_speeds=log.rotor_speeds + noise)):
+        nothing = FittedEffects({})
+        search = search_on(flown, ["motor_lag"], nothing)
+        fit = search.refit(nothing)
+        spreads.append(fit.setting[""]["rotor_spread"])
+        lag = search.refit(FittedEffects({**fit.setting, "motor_lag": {"tau": 0.01}}))
+        gained.append(search.deviance(fit.setting) - search.deviance(lag.setting))
+    assert spreads[0] < 0.3 * spreads[1]
+    assert max(gained) < MEASURED.least_deviance_reduction
