@@ -328,10 +328,11 @@ def probability_sentences(diagnosis: Diagnosis) -> list[str]:
         f"{percent(x.probability)}."
         for x in found.alternatives[:5]
     ]
+    hidden = "" if diagnosis.ranking else ", or none that these logs can show"
     return [
         *names,
         *sets,
-        f"Something acts that no effect of the library is: {percent(found.unknown)}.",
+        f"Something acts that no effect of the library is{hidden}: {percent(found.unknown)}.",
         "A probability is how often such a finding was right on simulated flights of which the "
         "truth is known, some of them with a cause outside the library.",
     ]

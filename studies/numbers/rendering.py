@@ -76,9 +76,12 @@ def _imu() -> str:
 
 
 def _probabilities() -> str:
+    from windwrench.studies.probabilities import other_logs
     from windwrench.studies.probabilities.scores import tables
 
-    return _between_marks("probabilities", tables(kept("probabilities/results.json.gz")))
+    poses = kept("probabilities/results.json.gz")
+    others = other_logs.tables(kept("probabilities/other-logs.json.gz"), poses)
+    return _between_marks("probabilities", tables(poses), **{other_logs.PAGE_PART: others})
 
 
 def _log_estimates() -> str:

@@ -44,10 +44,14 @@ def names_of(flight: dict[str, Any]) -> list[Name]:
     return [Name(e["name"], e["tentative"], e["indistinguishable_from"]) for e in flight["named"]]
 
 
-def acts_unknown(flight: dict[str, Any]) -> bool:
+def acts_unknown(flight: Mapping[str, Any]) -> bool:
     """Return whether something acts which no effect of the library is that such a log can show."""
-    lost = {*flight["left_out"], *flight.get("hidden", ())}
-    return bool(flight["outsider"] or lost & set(flight["truth"]))
+    return bool(flight["outsider"]) or _to_be_named(flight) != set(flight["truth"])
+
+
+def _to_be_named(flight: Mapping[str, Any]) -> set[str]:
+    """Return the effects that act, are in the library, and show in such a log."""
+    return set(flight["truth"]) - {*flight["left_out"], *flight.get("hidden", ())}
 
 
 def stands_for(flight: dict[str, Any], name: str) -> set[str]:
@@ -62,8 +66,8 @@ def stands_for(flight: dict[str, Any], name: str) -> set[str]:
 
 
 def is_right(flight: dict[str, Any], name: str) -> bool:
-    """Return whether a name is right: its effect acts, and nothing unknown does."""
-    return not acts_unknown(flight) and bool(stands_for(flight, name) & set(flight["truth"]))
+    """Return whether a name is right: its effect acts, and was there to be named."""
+    return bool(stands_for(flight, name) & _to_be_named(flight))
 
 
 def checks_of(flight: Mapping[str, Any]) -> set[str]:
