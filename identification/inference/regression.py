@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Need, Role, get, names, needing, playing
@@ -78,6 +79,9 @@ class RegressionSettings:
     # s2, typical size and range of the spread in time: 5 ms, and at most 40
     rotor_spread_size: float = 2.5e-5
     rotor_spread_range: tuple[float, float] = (0.0, 1.6e-3)
+    # s, typical size and range of a lag's asymmetry: rotors are driven up, and drag slows them down
+    lag_asymmetry_size: float = 0.005
+    lag_asymmetry_range: tuple[float, float] = (-0.02, 0.02)
     filtered_rotor_time_offset_size: float = 0.02
 
 
@@ -104,6 +108,9 @@ VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
 # noise, so that of the rotor speeds, and their rounding, show; and it has a low-pass of its own.
 # Without it a lag is found that averages them, with an offset that brings them forward again
 ROTOR_SPREAD = ("", "rotor_spread")
+# s by which rotors behind a lag speed up sooner, and slow down later, than the lag says. Without it
+# their mean thrust, which is larger by as much, is a mass that is smaller
+LAG_ASYMMETRY = ("", "lag_asymmetry")
 TIME_OFFSETS = (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
 
 
@@ -153,6 +160,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
         return REGRESSION.time_offset_size
     if column == ROTOR_SPREAD:
         return REGRESSION.rotor_spread_size
+    if column == LAG_ASYMMETRY:
+        return REGRESSION.lag_asymmetry_size
     if is_bias(column):
         return BIAS.step
     if not column[0] and (size := deviation_size(column[1])) is not None:
@@ -180,6 +189,8 @@ def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
         return REGRESSION.filtered_rotor_time_offset_range
     if column == ROTOR_SPREAD:
         return REGRESSION.rotor_spread_range
+    if column == LAG_ASYMMETRY:
+        return REGRESSION.lag_asymmetry_range
     if is_bias(column):
         return -BIAS.largest, BIAS.largest
     size = deviation_size(column[1])
@@ -599,6 +610,7 @@ class Flights:
                 for kind in (THRUST_SCALE, TILT_X, TILT_Y)
             )
             s = self._with_time_offsets(piece, offsets, scale)
+            s = with_uneven_lag(s, vehicle, offsets.get(LAG_ASYMMETRY[1], 0.0))
             model, _ = acting_wrench(s, vehicle, self.vehicle)
             model[:, :2] += self.vehicle.weight * np.array(tilt)
             if self.inertial and (off := bias(setting, piece.log)).any():
@@ -743,6 +755,26 @@ def _rows(signals: Signals) -> Index:
     step = max(1, round(1.0 / (REGRESSION.row_rate_hz * signals.period)))
     edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)
+
+
+def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
+    """Return the signals with rotors that speed up sooner, by ``asymmetry`` s, and slow down later
+    than a vehicle's lag says; as they are where it has none.
+
+    To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
+    |dW/dt|`` with the lag ``tau``, where W follows u.
+    """
+    lags = [
+        e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
+        for e in vehicle.effects
+        if get(e.name).role == Role.LAG
+    ]
+    if asymmetry == 0.0 or not any(lags):
+        return signals
+    u, kept = signals.rotor_speeds, np.exp(-signals.period / max(lags))
+    followed, _ = lfilter([1.0 - kept], [1.0, -kept], u, axis=0, zi=kept * u[:1])
+    rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
+    return replace(signals, rotor_speeds=u + asymmetry * rate)
 
 
 def _with_time_offsets(

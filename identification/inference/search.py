@@ -17,6 +17,7 @@ from .commanded_rotors import similar_effects
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
     CENTRAL,
+    LAG_ASYMMETRY,
     MOMENT_PREFIX,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
@@ -163,6 +164,7 @@ class Search:
         late = any(map(is_delay, (*effects, *tried)))
         return [
             *(c for c in self.flights.time_offsets if not (late and c == ROTOR_TIME_OFFSET)),
+            *([LAG_ASYMMETRY] if playing(Role.LAG, among=effects) else []),
             *self.flights.deviations,
             *(c for e in effects for c in self.columns_of(e, True)),
             *(c for e in tried for c in self.columns_of(e, False)),
@@ -275,8 +277,9 @@ class Search:
     def _refit(self, fit: FittedEffects, enough: float = np.inf) -> FittedEffects:
         setting = {k: dict(v) for k, v in fit.setting.items()}
         wanted = self.model_columns(fit.effects)
-        if ROTOR_TIME_OFFSET not in wanted:
-            setting.get(ROTOR_TIME_OFFSET[0], {}).pop(ROTOR_TIME_OFFSET[1], None)
+        for free in (ROTOR_TIME_OFFSET, LAG_ASYMMETRY):
+            if free not in wanted:
+                setting.get(free[0], {}).pop(free[1], None)
         out = FittedEffects(setting)
         if not wanted:
             return out

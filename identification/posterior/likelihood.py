@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ...dynamics.effects import get
+from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..inference.regression import (
     ATTITUDE_TIME_OFFSET,
     CENTRAL,
+    LAG_ASYMMETRY,
+    REGRESSION,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
@@ -27,6 +29,7 @@ from ..inference.regression import (
     coefficient,
     is_delay,
     typical_size,
+    with_uneven_lag,
 )
 from ..logs.flight_log import FlightLog
 from ..motion.residual import acting_wrench
@@ -275,6 +278,15 @@ class Likelihood:
             out.append((self._acceleration(shifted, self.vehicle) - base) / delta)
         return out
 
+    def _uneven_lag(self) -> list[Array]:
+        """Return what a second of the lag's asymmetry adds, by the derivative."""
+        delta = LIKELIHOOD.step * REGRESSION.lag_asymmetry_size
+        return [
+            (self._acceleration(with_uneven_lag(s, self.vehicle, delta), self.vehicle) - base)
+            / delta
+            for s, base in zip(self.signals, self._base, strict=True)
+        ]
+
     def _bent_rotors(self) -> list[Array]:
         """Return what rotor speeds add that move between samples by their second difference beside
         the straight line.
@@ -360,6 +372,8 @@ class Likelihood:
         acting, moved = self._columns
         acting[ROTOR_TIME_OFFSET] = self._later_rotors()
         acting["", BETWEEN] = self._bent_rotors()
+        if playing(Role.LAG, among=[e for e in self.setting if e]):
+            acting[LAG_ASYMMETRY] = self._uneven_lag()
         for name, column in self._model_errors().items():
             acting["", f"{MODEL_ERROR} {name}"] = column
         moved[ATTITUDE_TIME_OFFSET] = []

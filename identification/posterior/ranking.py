@@ -19,6 +19,7 @@ from ..inference.gram_matrix import GRAM
 from ..inference.regression import (
     ATTITUDE_TIME_OFFSET,
     CENTRAL,
+    LAG_ASYMMETRY,
     REGRESSION,
     ROTOR_TIME_OFFSET,
     START_PREFIX,
@@ -228,6 +229,8 @@ def _prior_size(column: Column, flights: Flights) -> float:
     effect, name = column
     if column in (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET):
         return REGRESSION.time_offset_size
+    if column == LAG_ASYMMETRY:
+        return REGRESSION.lag_asymmetry_size
     if not effect:
         if name == BETWEEN:
             return LIKELIHOOD.between_samples

@@ -1,0 +1,72 @@
+"""Rotors that speed up sooner than they slow down: no mass is missing for that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs.recording import record_flight
+from windwrench.identification.inference.regression import Flights, with_uneven_lag
+from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.motion.signals import log_signals
+from windwrench.identification.motion.smoothing import low_pass
+
+VEHICLE = load_vehicle("ardrone2")
+TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
+EFFECTS = {"motor_lag": {"tau": TAU}, "mass": {"dm": 0.0}}
+
+
+def followed(commands, period, up, down):
+    """Rotor speeds behind a lag of two time constants, integrated in steps far below them."""
+    out, now = np.empty_like(commands), commands[0].copy()
+    for k, wanted in enumerate(commands):
+        for _ in range(20):
+            tau = np.where(wanted > now, up, down)
+            now = now + period / 20 * (wanted - now) / tau
+        out[k] = now
+    return out
+
+
+def flown(commanded):
+    """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
+    c = record_flight(VEHICLE, (), "excite", 20.0, 3)
+    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
+    speeds = low_pass(log.rotor_speeds, 12.0, log.period)
+    rate = np.gradient(speeds, log.period, axis=0)
+    tau = np.where(rate > 0.0, TAU - APART, TAU + APART)
+    return replace(log, rotor_speeds=speeds + tau * rate if commanded else speeds)
+
+
+def test_the_first_order_is_most_of_it():
+    (signals,) = log_signals(flown(commanded=True))
+    lag = VEHICLE.with_effects(EffectSetting("motor_lag", {"tau": TAU}))
+    commands, period = signals.rotor_speeds, signals.period
+    even = followed(commands, period, TAU, TAU)
+    uneven = followed(commands, period, TAU - APART, TAU + APART)
+    near = followed(with_uneven_lag(signals, lag, APART).rotor_speeds, period, TAU, TAU)
+    inner = slice(100, -100)
+    left, whole = (np.sqrt(np.mean((x - uneven)[inner] ** 2)) for x in (near, even))
+    assert left < 0.25 * whole
+    assert with_uneven_lag(signals, VEHICLE, APART) is signals  # without a lag there is none
+
+
+def fitted(log, *effects):
+    search = Search(Flights([log], VEHICLE), ["motor_lag", "mass"])
+    begun = FittedEffects({effect: dict(EFFECTS[effect]) for effect in effects})
+    search.set_noise(begun, search.linearise(begun))
+    return search, search.refit(begun)
+
+
+def test_a_lag_that_is_uneven_leaves_no_mass():
+    """The mass is that of a fit to the rotor speeds themselves, which are smoothed here."""
+    _, known = fitted(flown(commanded=False), "mass")
+    search, fit = fitted(flown(commanded=True), "mass", "motor_lag")
+    assert fit.setting[""]["lag_asymmetry"] == pytest.approx(APART, abs=0.003)
+    assert fit.setting["motor_lag"]["tau"] == pytest.approx(TAU, abs=0.003)
+    off = fit.setting["mass"]["dm"] - known.setting["mass"]["dm"]
+    assert abs(off) < 0.001 * VEHICLE.mass
+    # a lag that goes takes its asymmetry with it
+    assert "lag_asymmetry" not in search.refit(fit.without("motor_lag")).setting.get("", {})
