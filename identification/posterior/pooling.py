@@ -38,11 +38,13 @@ class PoolingSettings:
     tentative: float = -0.02  # one that it names with a doubt
     other: float = -5.22  # one that it does not name
     # log odds that something unknown acts where no sign speaks, and what each sign adds
-    unknown: float = -4.75
-    tests: float = 3.94  # the first of ``Signs.tests``
-    further: float = 1.08  # each further one
-    doubts: float = 6.65  # any of ``Signs.doubts``
-    disturbance: float = 5.09  # a nat of ``Signs.disturbance``, where nothing is named
+    unknown: float = -6.4
+    tests: float = 2.71  # the first of ``Signs.tests``
+    further: float = 1.06  # each further one
+    doubts: float = 5.49  # any of ``Signs.doubts``
+    nothing: float = 2.95  # nothing is named
+    disturbance: float = 4.15  # and then a nat of ``Signs.disturbance``
+    unsure: float = 2.94  # a name is tentative
     structure: float = 0.07  # a nat of ``Signs.structure``
     disturbance_range: tuple[float, float] = (-1.0, 4.0)  # nats
     structure_range: tuple[float, float] = (-2.0, 15.0)  # nats
@@ -50,13 +52,63 @@ class PoolingSettings:
 
 
 POOLING = PoolingSettings()
+# the weights of ``Signs.numbers``, in their order
+SIGNS = (
+    "unknown",
+    "tests",
+    "further",
+    "doubts",
+    "nothing",
+    "disturbance",
+    "unsure",
+    "structure",
+)
 # Where there is no posterior, by what the motion is read from: a pose of a vehicle that declares
 # effects, an IMU, or a pose that was filtered before it was logged. An explanation is then what the
 # search names, or a part of it
 SEARCH_ALONE: Mapping[str, PoolingSettings] = {
-    "pose": PoolingSettings(),
-    "imu": PoolingSettings(),
-    "filtered": PoolingSettings(),
+    "pose": PoolingSettings(
+        evidence=0.0,
+        sure=4.33,
+        tentative=0.86,
+        other=0.0,
+        unknown=-6.41,
+        tests=2.86,
+        further=1.26,
+        doubts=5.3,
+        nothing=2.97,
+        disturbance=4.14,
+        unsure=3.14,
+        structure=0.0,
+    ),
+    "imu": PoolingSettings(
+        evidence=0.0,
+        sure=3.21,
+        tentative=1.39,
+        other=0.0,
+        unknown=-1.86,
+        tests=1.37,
+        further=3.72,
+        doubts=1.63,
+        nothing=1.33,
+        disturbance=1.38,
+        unsure=0.12,
+        structure=0.0,
+    ),
+    "filtered": PoolingSettings(
+        evidence=0.0,
+        sure=2.0,
+        tentative=1.13,
+        other=0.0,
+        unknown=-1.45,
+        tests=2.01,
+        further=1.65,
+        doubts=-0.31,
+        nothing=0.31,
+        disturbance=-0.31,
+        unsure=-0.31,
+        structure=0.0,
+    ),
 }
 
 
@@ -137,14 +189,16 @@ class Signs:
     structure: float
 
     def numbers(self, named: Sequence[Named]) -> Array:
-        """Return them as numbers (6,); the first is one."""
+        """Return them as numbers (8,); the first is one."""
         return np.array(
             [
                 1.0,
                 self.tests > 0,
                 max(self.tests - 1, 0),
                 self.doubts > 0,
+                not named,
                 0.0 if named else np.clip(self.disturbance, *POOLING.disturbance_range),
+                any(e.tentative for e in named),
                 np.clip(self.structure, *POOLING.structure_range),
             ],
             dtype=np.float64,
@@ -170,7 +224,7 @@ def pooled(
     score = features(named, found) @ np.array([w.evidence, w.sure, w.tentative, w.other])
     share = np.exp(score - score.max())
     share /= share.sum()
-    by_sign = np.array([w.unknown, w.tests, w.further, w.doubts, w.disturbance, w.structure])
+    by_sign = np.array([getattr(w, sign) for sign in SIGNS])
     odds = signs.numbers(named) @ by_sign
     unknown = float(1.0 / (1.0 + np.exp(-odds)))
     share *= 1.0 - unknown

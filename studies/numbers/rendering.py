@@ -77,11 +77,15 @@ def _imu() -> str:
 
 def _probabilities() -> str:
     from windwrench.studies.probabilities import other_logs
-    from windwrench.studies.probabilities.scores import tables
+    from windwrench.studies.probabilities.__main__ import LATER_PART
+    from windwrench.studies.probabilities.scores import tables, tables_of_later_flights
 
     poses = kept("probabilities/results.json.gz")
-    others = other_logs.tables(kept("probabilities/other-logs.json.gz"), poses)
-    return _between_marks("probabilities", tables(poses), **{other_logs.PAGE_PART: others})
+    parts = {
+        LATER_PART: tables_of_later_flights(kept("probabilities/later.json.gz")),
+        other_logs.PAGE_PART: other_logs.tables(kept("probabilities/other-logs.json.gz"), poses),
+    }
+    return _between_marks("probabilities", tables(poses), **parts)
 
 
 def _log_estimates() -> str:

@@ -8,10 +8,11 @@ from pathlib import Path
 from windwrench.runtime.page_files import write_text
 from windwrench.studies.page_tables import put_between
 from windwrench.studies.probabilities.flights import OF_TEN, recorded
-from windwrench.studies.probabilities.scores import tables
+from windwrench.studies.probabilities.scores import tables, tables_of_later_flights
 from windwrench.studies.resumed_tasks import Task, run_tasks
 
 RESULTS = Path("docs/probabilities/results.json.gz")
+LATER, LATER_PART = Path("docs/probabilities/later.json.gz"), "later flights"
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
 
@@ -34,18 +35,29 @@ def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> li
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.probabilities")
-    parser.add_argument("--own", type=int, default=350, help="flights of this project's plant")
-    parser.add_argument("--other", type=int, default=350, help="flights of the other simulator")
-    parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
-    parser.add_argument("--first", type=int, default=800_000, help="number of the first own flight")
     parser.add_argument(
-        "--catalogue", type=int, default=3000, help="first of the other's catalogues"
+        "--later",
+        action="store_true",
+        help="flights that the weights in use were not fitted to: 200 of either, of other numbers",
     )
+    parser.add_argument("--own", type=int, help="flights of this project's plant")
+    parser.add_argument("--other", type=int, help="flights of the other simulator")
+    parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
+    parser.add_argument("--first", type=int, help="number of the first own flight")
+    parser.add_argument("--catalogue", type=int, help="first of the other's catalogues")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("results/probabilities"))
-    parser.add_argument("--results", type=Path, default=RESULTS, help="what is kept for the page")
+    parser.add_argument("--results", type=Path, help="what is kept for the page")
     parser.add_argument("--page", type=Path, default=None, help="page whose tables are made anew")
     parser.add_argument("--done", action="store_true", help="score only what has been kept")
+    later = parser.parse_known_args()[0].later
+    parser.set_defaults(
+        own=200 if later else 350,
+        other=200 if later else 350,
+        first=850_000 if later else 800_000,
+        catalogue=5000 if later else 3000,
+        results=LATER if later else RESULTS,
+    )
     given = parser.parse_args()
     if not given.done:
         wanted = plan(given.own, given.other, given.first, given.catalogue, given.simulator)
@@ -56,6 +68,7 @@ if __name__ == "__main__":
         ]
         lines = ",\n".join(json.dumps(x) for x in kept)
         write_text(f"[\n{lines}\n]\n", given.results)
-    text = tables(json.loads(gzip.decompress(given.results.read_bytes())))
-    put_between(text, given.page)
+    records = json.loads(gzip.decompress(given.results.read_bytes()))
+    text = tables_of_later_flights(records) if later else tables(records)
+    put_between(text, given.page, LATER_PART if later else "tables")
     print(text)

@@ -12,6 +12,7 @@ from windwrench.identification.diagnosis import SMALL, beyond_calm
 from windwrench.identification.findings import Disturbance, Probabilities
 from windwrench.identification.posterior.pooling import (
     POOLING,
+    SIGNS,
     PoolingSettings,
     Signs,
     explanations,
@@ -128,7 +129,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
     ).x
     x = np.array([signs_of(f).numbers(names_of(f)) for f in flights])
     y = np.array([acts_unknown(f) for f in flights])
-    scale = np.array([1e3, *[_SIGN_STD] * 4, _STRUCTURE_STD])
+    scale = np.array([1e3, *[_SIGN_STD] * (len(SIGNS) - 2), _STRUCTURE_STD])
 
     def loss_of_signs(w: Array) -> float:
         odds = x @ w
@@ -136,7 +137,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
             np.sum(np.logaddexp(0.0, odds) - y * odds) + 0.5 * np.sum(np.square(w / scale))
         )
 
-    by_signs = minimize(loss_of_signs, np.zeros(6)).x
+    by_signs = minimize(loss_of_signs, np.zeros(len(SIGNS))).x
     a, b = by_sets.round(_DECIMALS).tolist(), by_signs.round(_DECIMALS).tolist()
     return replace(
         POOLING,
@@ -144,12 +145,7 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         sure=a[1],
         tentative=a[2],
         other=a[3],
-        unknown=b[0],
-        tests=b[1],
-        further=b[2],
-        doubts=b[3],
-        disturbance=b[4],
-        structure=b[5],
+        **dict(zip(SIGNS, b, strict=True)),
     )
 
 

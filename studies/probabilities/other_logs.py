@@ -6,10 +6,11 @@ import argparse
 import gzip
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from windwrench.identification.posterior.pooling import SEARCH_ALONE
+from windwrench.identification.posterior.pooling import SEARCH_ALONE, SIGNS, PoolingSettings
 from windwrench.runtime.page_files import write_text
 from windwrench.studies.page_tables import put_between, share, table
 from windwrench.studies.probabilities.fitting import acts_unknown, fit, is_right, without_posterior
@@ -22,6 +23,7 @@ from windwrench.studies.probabilities.scores import (
     cross_fitted,
     error_of_perfect_calibration,
     expected_calibration_error,
+    mean_and_interval,
     reliability,
 )
 from windwrench.studies.resumed_tasks import Task, run_tasks
@@ -29,7 +31,7 @@ from windwrench.studies.resumed_tasks import Task, run_tasks
 RESULTS = Path("docs/probabilities/other-logs.json.gz")
 POSES = Path("docs/probabilities/results.json.gz")
 PAGE_PART = "other logs"
-_WEIGHTS = ("sure", "tentative", "unknown", "tests", "further", "doubts", "disturbance")
+_WEIGHTS = ("sure", "tentative", *SIGNS[:-1])
 _TITLES = {"pose": "a pose, without its posterior", "imu": "an IMU", "filtered": "a filtered pose"}
 
 
@@ -73,8 +75,36 @@ def _row(title: str, some: Sequence[Scored]) -> list[str]:
         right(unsure),
         f"{expected_calibration_error(claims):.3f} ({low:.3f} to {high:.3f})",
         f"{error_of_perfect_calibration(claims):.3f}",
+        mean_and_interval([x.log_score() for x in some]),
         area(some),
     ]
+
+
+def _of_kind(
+    kind: str, records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return the records of a key of ``SEARCH_ALONE``, without a posterior."""
+    mine = (
+        [{**r, "task": [*r["task"], "pose"]} for r in poses]
+        if kind == "pose"
+        else [r for r in records if kind_of(r["task"][3]) == kind]
+    )
+    return [
+        {**r, "result": without_posterior(r["result"])}
+        for r in mine
+        if "refused" not in r["result"]
+    ]
+
+
+def fitted_weights(
+    records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
+) -> dict[str, PoolingSettings]:
+    """Return what ``SEARCH_ALONE`` should be by these flights; arguments as of ``tables``."""
+    unused = {"evidence": 0.0, "other": 0.0, "structure": 0.0}
+    return {
+        kind: replace(fit([r["result"] for r in _of_kind(kind, records, poses)]), **unused)
+        for kind in SEARCH_ALONE
+    }
 
 
 def tables(records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]) -> str:
@@ -87,16 +117,7 @@ def tables(records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, An
     """
     rows, weights, parts = [], [], []
     for kind, in_use in SEARCH_ALONE.items():
-        mine = (
-            [{**r, "task": [*r["task"], "pose"]} for r in poses]
-            if kind == "pose"
-            else [r for r in records if kind_of(r["task"][3]) == kind]
-        )
-        mine = [
-            {**r, "result": without_posterior(r["result"])}
-            for r in mine
-            if "refused" not in r["result"]
-        ]
+        mine = _of_kind(kind, records, poses)
         found = cross_fitted(mine)
         ways = dict.fromkeys(r["task"][3] for r in mine)
         for way in ways:
@@ -105,14 +126,18 @@ def tables(records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, An
         if kind != "pose":
             parts += [f"**{_TITLES[kind].capitalize()}: names by their probability**"]
             parts += [table(["probability", "mean", "right"], reliability(found))]
-        fitted = fit([r["result"] for r in mine])
+        fitted = fitted_weights(records, poses)[kind]
         weights.append(
             [_TITLES[kind]]
             + [f"{getattr(fitted, x):.2f} ({getattr(in_use, x):.2f})" for x in _WEIGHTS]
         )
     head = ["read from", "flights, something unknown acts", "sure names right"]
     head += ["tentative names right", "expected calibration error (95 %)"]
-    head += ["of a perfect forecaster", "area under the curve of `unknown`"]
+    head += [
+        "of a perfect forecaster",
+        "log score a flight (95 %)",
+        "area under the curve of `unknown`",
+    ]
     refused = sum("refused" in r["result"] for r in records)
     parts = [table(head, rows), f"Refused: {share(refused, len(records))}.", *parts]
     parts += ["**Weights, fitted to all these flights (and in use), nats**"]

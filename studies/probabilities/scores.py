@@ -1,8 +1,8 @@
 """What the probabilities of recorded flights are worth: calibration, log score, and the coverage of
 coefficients' intervals.
 
-Flights of even numbers are scored with weights that were fitted to those of odd numbers, and the
-other way round: no flight is scored with weights that know it.
+Flights are halved by their numbers, ten by ten, so that either half has all kinds. Each is scored
+with weights that were fitted to the other: no flight is scored with weights that know it.
 """
 
 import itertools
@@ -17,7 +17,7 @@ from scipy.stats import mannwhitneyu
 from windwrench.identification.diagnosis import DIAGNOSIS
 from windwrench.identification.findings import Alternative, Probabilities
 from windwrench.identification.posterior.deviations import without_other_estimate
-from windwrench.identification.posterior.pooling import POOLING
+from windwrench.identification.posterior.pooling import POOLING, SIGNS
 from windwrench.studies.page_tables import share, table
 from windwrench.studies.probabilities.doubts import table_of_doubts
 from windwrench.studies.probabilities.fitting import (
@@ -76,16 +76,21 @@ class Scored:
         return total
 
 
+def half_of(record: Mapping[str, Any]) -> int:
+    """Return in which half a record is: ten numbers in a row have all kinds of flights."""
+    return int(record["task"][2]) // 10 % 2
+
+
 def _halves(records: Sequence[Mapping[str, Any]]) -> list[list[dict[str, Any]]]:
-    """Return the flights of even and of odd numbers."""
-    return [[r["result"] for r in records if r["task"][2] % 2 == odd] for odd in (0, 1)]
+    """Return the flights of either half."""
+    return [[r["result"] for r in records if half_of(r) == half] for half in (0, 1)]
 
 
 def cross_fitted(records: Sequence[Mapping[str, Any]]) -> list[Scored]:
     """Return the flights with pooled probabilities, none by weights that know it."""
     weights = [fit(half) for half in reversed(_halves(records))]
     return [
-        Scored(r["task"][0] == "own", r["result"], pool(r["result"], weights[r["task"][2] % 2]))
+        Scored(r["task"][0] == "own", r["result"], pool(r["result"], weights[half_of(r)]))
         for r in records
     ]
 
@@ -100,8 +105,8 @@ def scored(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Scored]]:
     out: dict[str, list[Scored]] = {way: [] for way in WAYS}
     out[WAYS[0]] = cross_fitted(records)
     for record in records:
-        own, flight, odd = record["task"][0] == "own", record["result"], record["task"][2] % 2
-        out[WAYS[1]].append(Scored(own, flight, _by_frequency(flight, shares[odd])))
+        own, flight = record["task"][0] == "own", record["result"]
+        out[WAYS[1]].append(Scored(own, flight, _by_frequency(flight, shares[half_of(record)])))
         out[WAYS[2]].append(Scored(own, flight, _by_posterior(flight)))
     return out
 
@@ -168,7 +173,8 @@ def error_of_perfect_calibration(claims: Sequence[Claim]) -> float:
     )
 
 
-def _mean_and_interval(values: Sequence[float]) -> str:
+def mean_and_interval(values: Sequence[float]) -> str:
+    """Return a mean and its 95 % interval, over values drawn anew."""
     x = np.array(values)
     rng = np.random.default_rng(2)
     drawn = x[rng.integers(len(x), size=(_RESAMPLED, len(x)))].mean(axis=1)
@@ -227,7 +233,7 @@ def _comparison(every: Mapping[str, Sequence[Scored]]) -> str:
                 way,
                 f"{expected_calibration_error(claims):.3f} ({low:.3f} to {high:.3f})",
                 f"{error_of_perfect_calibration(claims):.3f}",
-                _mean_and_interval([x.log_score() for x in flights]),
+                mean_and_interval([x.log_score() for x in flights]),
                 area(flights),
                 str(len(claims)),
             ]
@@ -296,20 +302,17 @@ def _counts(flights: Sequence[Scored]) -> str:
 
 def _weights(records: Sequence[Mapping[str, Any]]) -> str:
     w = fit([r["result"] for r in records])
-    names = (
-        "evidence",
-        "sure",
-        "tentative",
-        "other",
-        "unknown",
-        "tests",
-        "further",
-        "doubts",
-        "disturbance",
-        "structure",
-    )
+    names = ("evidence", "sure", "tentative", "other", *SIGNS)
     rows = [[f"`{x}`", f"{getattr(w, x):.2f}", f"{getattr(POOLING, x):.2f}"] for x in names]
     return table(["weight, nats", "fitted to all these flights", "in use"], rows)
+
+
+def tables_of_later_flights(records: Sequence[Mapping[str, Any]]) -> str:
+    """Return the scores of flights that were flown after the weights in use were fitted."""
+    flights = [Scored(r["task"][0] == "own", r["result"], pool(r["result"])) for r in records]
+    parts = [_comparison({"weights in use": flights}), _counts(flights)]
+    parts += [table(["probability", "mean", "right"], reliability(flights))]
+    return "\n\n".join(parts)
 
 
 def tables(records: Sequence[Mapping[str, Any]]) -> str:
@@ -317,7 +320,7 @@ def tables(records: Sequence[Mapping[str, Any]]) -> str:
     every = scored(records)
     parts = ["**Three ways to a probability, all flights**", _comparison(every)]
     both = zip(every[WAYS[0]], every[WAYS[1]], strict=True)
-    gained = _mean_and_interval([a.log_score() - b.log_score() for a, b in both])
+    gained = mean_and_interval([a.log_score() - b.log_score() for a, b in both])
     parts += [f"Log score that pooling gains over the search alone, a flight: {gained}."]
     best = every[WAYS[0]]
     parts += ["**Pooled: names by their probability, all flights**"]

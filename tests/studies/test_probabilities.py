@@ -11,15 +11,25 @@ import numpy as np
 import pytest
 
 from windwrench.identification.findings import Probabilities
-from windwrench.identification.posterior.pooling import POOLING
+from windwrench.identification.posterior.pooling import POOLING, SEARCH_ALONE
+from windwrench.studies.probabilities import other_logs
 from windwrench.studies.probabilities.__main__ import RESULTS, plan
 from windwrench.studies.probabilities.doubts import table_of_doubts
-from windwrench.studies.probabilities.fitting import fit, frequencies, is_right, signs_of
+from windwrench.studies.probabilities.fitting import (
+    acts_unknown,
+    fit,
+    frequencies,
+    is_right,
+    signs_of,
+)
+from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
 from windwrench.studies.probabilities.scores import (
     Scored,
     error_of_perfect_calibration,
     expected_calibration_error,
+    half_of,
     scored,
+    tables_of_later_flights,
 )
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,12 +68,12 @@ def test_the_weights_in_use_are_those_of_the_kept_flights(records):
 def test_each_half_is_scored_by_the_other(records):
     changed = [json.loads(json.dumps(r)) for r in records]
     for r in changed:
-        if r["task"][2] % 2:
+        if half_of(r):
             r["result"]["truth"] = {}
     old, new = scored(records)["pooled"], scored(changed)["pooled"]
     for r, a, b in zip(records, old, new, strict=True):
         same = a.found.unknown == b.found.unknown
-        assert same == bool(r["task"][2] % 2)  # odd flights know even ones, that did not change
+        assert same == bool(half_of(r))  # it knows the other half, which did not change
 
 
 def test_what_is_right():
@@ -114,6 +124,40 @@ def test_a_log_score_counts_what_nobody_named():
     named = Scored(True, flight(["mass"], ["mass"]), Probabilities({"mass": 0.9}, (), 0.1))
     assert missed.log_score() == pytest.approx(np.log(1e-3))
     assert named.log_score() == pytest.approx(np.log(0.9))
+
+
+def test_either_half_has_all_kinds():
+    tasks = [{"task": task} for task in plan(40, 40, 800_000, 3000, "other.py")]
+    for half in (0, 1):
+        assert {t["task"][1] for t in tasks if half_of(t) == half} >= {*KINDS, "catalogue"}
+
+
+def test_the_weights_without_a_posterior_are_those_of_the_kept_flights(records):
+    found = other_logs.fitted_weights(other_logs.kept(ROOT / other_logs.RESULTS), records)
+    for kind, weights in found.items():
+        for name, value in asdict(SEARCH_ALONE[kind]).items():
+            assert getattr(weights, name) == pytest.approx(value, abs=0.02), (kind, name)
+
+
+def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
+    tasks = other_logs.plan(20, 0, 1000, "other.py")
+    assert len(set(tasks)) == len(tasks) == 60
+    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
+    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
+    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)
+
+
+def test_what_a_log_does_not_show_is_unknown_to_it():
+    pair = {**flight(["mass", "wind"], ["mass", "wind"]), "hidden": ["wind"]}
+    assert acts_unknown(pair)
+    assert is_right(pair, "mass")
+    assert not is_right(pair, "wind")
+
+
+def test_later_flights_are_scored_with_the_weights_in_use(records):
+    text = tables_of_later_flights(records[:40])
+    assert "| weights in use |" in text
+    assert "| flights | 40 |" in text
 
 
 def test_a_run_has_flights_of_both_and_none_twice():

@@ -8,6 +8,7 @@ import pytest
 from windwrench.identification.posterior.pooling import (
     POOLING,
     SEARCH_ALONE,
+    SIGNS,
     Signs,
     explanations,
     pooled,
@@ -72,21 +73,32 @@ def test_signs_make_something_unknown_likelier():
 def test_signs_have_their_ranges():
     beyond = Signs(1, 2, -np.inf, 99.0).numbers([])
     least, most = POOLING.disturbance_range[0], POOLING.structure_range[1]
-    np.testing.assert_allclose(beyond, [1, 1, 0, 1, least, most])
+    np.testing.assert_allclose(beyond, [1, 1, 0, 1, 1, least, 0, most])
 
 
 def test_a_disturbance_counts_where_nothing_is_named():
     """A name that stands for an unknown cause leaves little of it."""
     loud = Signs(0, 0, 3.0, -1.0)
-    assert loud.numbers([Name("mass")])[4] == 0.0
+    assert loud.numbers([Name("mass")])[SIGNS.index("disturbance")] == 0.0
     assert pooled([], [((), 1.0)], loud).unknown > 0.99
 
 
 def test_a_check_that_doubts_makes_something_unknown_likelier():
     signs = [(0, 0), (1, 0), (2, 0), (0, 1)]
-    found = [pooled([Name("mass")], BOTH, Signs(*n, -1.0, -1.0)).unknown for n in signs]
+    found = [
+        pooled([Name("mass", tentative=any(n))], BOTH, Signs(*n, -1.0, -1.0)).unknown for n in signs
+    ]
     assert found == sorted(found)
-    assert found[0] < 0.05 < 0.2 < found[1] < 0.5 < found[2]
+    assert found[0] < 0.05 < 0.2 < found[1] < 0.5 < found[3]
+
+
+def test_a_tentative_name_is_a_sign_and_so_is_none():
+    """What the weights of other signs are beside them: a sure name leaves little to doubt."""
+    sure, unsure, none = ([Name("mass")], [Name("mass", tentative=True)], [])
+    u = [pooled(named, BOTH, CALM).unknown for named in (sure, unsure, none)]
+    assert u[0] < 0.5 * u[1]
+    assert CALM.numbers(none)[SIGNS.index("nothing")] == 1.0
+    assert CALM.numbers(unsure)[SIGNS.index("unsure")] == 1.0
 
 
 def test_nothing_found_is_an_explanation_too():
