@@ -124,7 +124,8 @@ def tables(records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, An
             some = [x for x, r in zip(found, mine, strict=True) if r["task"][3] == way]
             rows.append(_row(way if len(ways) > 1 else _TITLES[kind], some))
         if kind != "pose":
-            parts += [f"**{_TITLES[kind].capitalize()}: names by their probability**"]
+            title = f"{_TITLES[kind][0].upper()}{_TITLES[kind][1:]}"
+            parts += [f"**{title}: names by their probability**"]
             parts += [table(["probability", "mean", "right"], reliability(found))]
         fitted = fitted_weights(records, poses)[kind]
         weights.append(
