@@ -1,0 +1,104 @@
+"""Fits of effects to flights, and what each other effect would explain."""
+
+import numpy as np
+import pytest
+
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs.recording import background, record_flight
+from windwrench.identification.inference.regression import (
+    ATTITUDE_TIME_OFFSET,
+    ROTOR_TIME_OFFSET,
+    Flights,
+)
+from windwrench.identification.inference.search import (
+    FittedEffects,
+    Search,
+    is_possible,
+    with_changes,
+)
+from windwrench.identification.logs.flight_log import FlightLog
+
+VEHICLE = load_vehicle("ardrone2")
+DRAG = {"kdx": 1.2e-4, "kdy": 1.2e-4}
+LIBRARY = ["rotor_drag", "body_drag", "mass", "com_offset", "constant_force", "latency"]
+
+
+def flown(trajectory="excite", seconds=20.0, **effects):
+    settings = tuple(EffectSetting(name, values) for name, values in effects.items())
+    c = record_flight(VEHICLE, settings, trajectory, seconds, 1, background(VEHICLE, 1.0))
+    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
+
+
+@pytest.fixture(scope="module")
+def search():
+    found = Search(Flights([flown(rotor_drag=DRAG)], VEHICLE), LIBRARY)
+    nothing = FittedEffects({})
+    found.set_noise(nothing, found.linearise(nothing))
+    return found
+
+
+def gains_at(search, fit):
+    regression = search.linearise(fit)
+    return search.gains(fit, regression, search.gram(fit, regression))
+
+
+def test_what_acts_explains_most_and_nothing_is_left_beside_it(search):
+    first = gains_at(search, FittedEffects({}))
+    assert first[0].effect == "rotor_drag"
+    assert first[0].deviance_reduction > 100.0
+    fit = search.refit(first[0].fit)
+    for name, value in DRAG.items():
+        assert fit.setting["rotor_drag"][name] == pytest.approx(value, rel=0.05)
+        assert 0.0 < fit.std["rotor_drag", name] < 0.05 * value
+    beside = gains_at(search, fit)
+    assert "rotor_drag" not in {x.effect for x in beside}
+    assert max(x.deviance_reduction for x in beside) < 40.0
+
+
+def test_a_fit_lowers_the_deviance_and_stays_in_range(search):
+    begun = FittedEffects({"rotor_drag": {"kdx": 0.0, "kdy": 0.0, "central": 0.0}})
+    fit = search.refit(begun)
+    assert search.deviance(fit.setting) < search.deviance(begun.setting)
+    assert 0.0 <= fit.setting["rotor_drag"]["central"] <= 1.0
+    assert search.error(fit) < search.error_without(fit, "rotor_drag") - 100.0
+
+
+def test_a_delay_takes_the_place_of_the_rotors_time_offset(search):
+    assert ROTOR_TIME_OFFSET in search.model_columns(["rotor_drag"])
+    late = search.model_columns(["rotor_drag"], ["latency"])
+    assert ROTOR_TIME_OFFSET not in late
+    assert ATTITUDE_TIME_OFFSET in late
+
+
+def test_a_fit_knows_its_effects_and_can_lose_one():
+    fit = FittedEffects(
+        {"": {"rotor_time_offset": 0.001}, "mass": {"dm": 0.1}, "wind": {"wx": 1.0}}
+    )
+    assert fit.effects == ["mass", "wind"]
+    assert fit.without("mass").effects == ["wind"]
+    assert fit.effects == ["mass", "wind"]
+
+
+def test_changes_are_kept_in_range(search):
+    fit = FittedEffects({"motor_lag": {"tau": 0.01}})
+    far = with_changes(search.flights, fit, [("motor_lag", "tau")], np.array([-1.0]))
+    assert far.setting["motor_lag"]["tau"] == 0.0
+    assert fit.setting["motor_lag"]["tau"] == 0.01
+    late = with_changes(search.flights, fit, [ROTOR_TIME_OFFSET], np.array([1.0]))
+    assert late.setting[""]["rotor_time_offset"] == pytest.approx(0.006)
+
+
+@pytest.mark.parametrize(("damping", "there"), [(0.5, True), (50.0, False)])
+def test_no_air_damps_a_load_so_much(damping, there):
+    load = {"m": 0.03, "l": 0.5, "damping": damping}
+    assert is_possible(FittedEffects({"slung_payload": load}), VEHICLE) is there
+
+
+def test_in_a_hover_a_force_and_a_thrust_are_not_told_apart():
+    log = flown("hover", constant_force={"fx": 0.0, "fy": 0.0, "fz": 0.1})
+    hover = Search(Flights([log], VEHICLE), ["constant_force", "thrust_scale"])
+    nothing = FittedEffects({})
+    hover.set_noise(nothing, hover.linearise(nothing))
+    fit = hover.refit(FittedEffects({"constant_force": {"fx": 0.0, "fy": 0.0, "fz": 0.1}}))
+    assert "thrust_scale" not in {x.effect for x in gains_at(hover, fit)}
