@@ -56,7 +56,6 @@ from .inference.likelihood_refit import (
 )
 from .inference.regression import (
     CENTRAL,
-    ROTOR_TIME_OFFSET,
     Flights,
     coefficient,
     lost_behind_a_filter,
@@ -67,6 +66,9 @@ from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.sensor_bias import biases
 from .inference.stepwise_search import find_effects, with_proposal
+from .inference.time_offsets import (
+    ROTOR_TIME_OFFSET,
+)
 from .inference.transient_disturbances import transient_disturbances
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log

@@ -14,8 +14,6 @@ from ...dynamics.effects import Role, get
 from .regression import (
     CENTRAL,
     MOMENT_PREFIX,
-    REGRESSION,
-    ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
     Flights,
@@ -26,6 +24,9 @@ from .regression import (
     unit_of_change,
 )
 from .sensor_bias import BIAS, flight_and_axis, is_bias
+from .time_offsets import (
+    timing_of,
+)
 from .whitening import Whitener
 
 Array = NDArray[np.float64]
@@ -170,8 +171,8 @@ def priors_and_ranges(
     """
     size = np.array(
         [
-            REGRESSION.filtered_rotor_time_offset_size
-            if flights.filtered and c == ROTOR_TIME_OFFSET
+            timing.size
+            if (timing := timing_of(c, flights.filtered))
             else typical_size(c, flights.vehicle)
             for c in columns
         ]

@@ -33,7 +33,6 @@ from .disturbance_filter import (
 )
 from .gram_matrix import Gram, priors_and_ranges
 from .regression import (
-    ROTOR_TIME_OFFSET,
     Column,
     Flights,
     Piece,
@@ -41,6 +40,9 @@ from .regression import (
     coefficient,
     is_delay,
     typical_size,
+)
+from .time_offsets import (
+    ROTOR_TIME_OFFSET,
 )
 
 Array = NDArray[np.float64]

@@ -17,8 +17,9 @@ import numpy as np
 
 from ...dynamics.effects import Role, get, playing
 from .innovations import Innovations
-from .regression import REGRESSION, ROTOR_TIME_OFFSET, Column, coefficient, is_delay, moves_time
+from .regression import Column, coefficient, is_delay, moves_time
 from .search import FittedEffects, Search, with_changes
+from .time_offsets import ROTOR_TIME_OFFSET, TIMING
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def refitted_by_likelihood(search: Search, fit: FittedEffects) -> FittedEffects:
     found = _maximum_likelihood(
         search,
         _with_rotor_time_offset(fit),
-        REFIT.largest_delay if late else REGRESSION.rotor_time_offset_range[1],
+        REFIT.largest_delay if late else TIMING.rotor_time_offset_range[1],
         REFIT.iterations,
     )
     for effect, name in late:

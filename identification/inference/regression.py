@@ -12,9 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import lfilter
-from scipy.spatial.transform import Rotation
 
 from ...dynamics.effects import Need, Role, get, names, needing, playing
 from ...dynamics.effects.base import Coefficient
@@ -43,6 +40,16 @@ from .commanded_rotors import (
 )
 from .selection_rules import COMMANDED_ROTORS, FILTERED_POSE, MEASURED, SelectionSettings
 from .sensor_bias import BIAS, bias, bias_columns, is_bias
+from .time_offsets import (
+    ATTITUDE_TIME_OFFSET,
+    LAG_ASYMMETRY,
+    ROTOR_SPREAD,
+    ROTOR_TIME_OFFSET,
+    VELOCITY_TIME_OFFSET,
+    timing_of,
+    with_time_offsets,
+    with_uneven_lag,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -70,19 +77,6 @@ class RegressionSettings:
     memory: int = 2**28  # bytes, of results kept: of pieces, and of columns
     kept_residuals: int = 16  # a fit asks several times for the residual at its setting
     bytes_per_sample: int = 400  # of a piece
-    rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
-    # s, the same where the pose was filtered before the log was written: a causal low-pass of 5 Hz
-    # is 45 ms late, an estimator some more
-    filtered_rotor_time_offset_range: tuple[float, float] = (-0.1, 0.1)
-    # s, typical size of a time offset, and of the rotors' where the pose was filtered
-    time_offset_size: float = 0.0025
-    # s2, typical size and range of the spread in time: 5 ms, and at most 40
-    rotor_spread_size: float = 2.5e-5
-    rotor_spread_range: tuple[float, float] = (0.0, 1.6e-3)
-    # s, typical size and range of a lag's asymmetry: rotors are driven up, and drag slows them down
-    lag_asymmetry_size: float = 0.005
-    lag_asymmetry_range: tuple[float, float] = (-0.02, 0.02)
-    filtered_rotor_time_offset_size: float = 0.02
 
 
 REGRESSION = RegressionSettings()
@@ -98,20 +92,6 @@ MOMENT_PREFIX = "moment of "
 CENTRAL = "central"  # the coefficient of effects that act rotor by rotor
 # a whole effect at coefficients of its own; the column is a multiple of it
 START_PREFIX = "start "
-# time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
-# attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
-# simulator that holds its forces over a step has one)
-ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
-ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
-VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
-# variance (s2) of the time over which rotor speeds are averaged, to both sides: an IMU hardly has
-# noise, so that of the rotor speeds, and their rounding, show; and it has a low-pass of its own.
-# Without it a lag is found that averages them, with an offset that brings them forward again
-ROTOR_SPREAD = ("", "rotor_spread")
-# s by which rotors behind a lag speed up sooner, and slow down later, than the lag says. Without it
-# their mean thrust, which is larger by as much, is a mass that is smaller
-LAG_ASYMMETRY = ("", "lag_asymmetry")
-TIME_OFFSETS = (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET)
 
 
 def is_delay(effect: str) -> bool:
@@ -156,12 +136,8 @@ def typical_size(column: Column, vehicle: Vehicle) -> float:
     """Return the typical size of a coefficient for a vehicle of this mass, interpolated between the
     library's two.
     """
-    if column in TIME_OFFSETS:
-        return REGRESSION.time_offset_size
-    if column == ROTOR_SPREAD:
-        return REGRESSION.rotor_spread_size
-    if column == LAG_ASYMMETRY:
-        return REGRESSION.lag_asymmetry_size
+    if (timing := timing_of(column)) is not None:
+        return timing.size
     if is_bias(column):
         return BIAS.step
     if not column[0] and (size := deviation_size(column[1])) is not None:
@@ -185,16 +161,13 @@ def range_of(column: Column, filtered: bool = False) -> tuple[float, float]:
     """Return the range of a time offset, or of a flight's deviation; ``filtered``: of flights whose
     pose was filtered.
     """
-    if filtered and column == ROTOR_TIME_OFFSET:
-        return REGRESSION.filtered_rotor_time_offset_range
-    if column == ROTOR_SPREAD:
-        return REGRESSION.rotor_spread_range
-    if column == LAG_ASYMMETRY:
-        return REGRESSION.lag_asymmetry_range
+    if (timing := timing_of(column, filtered)) is not None:
+        return timing.range
     if is_bias(column):
         return -BIAS.largest, BIAS.largest
     size = deviation_size(column[1])
-    return REGRESSION.rotor_time_offset_range if size is None else (-size[1], size[1])
+    assert size is not None
+    return -size[1], size[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -648,7 +621,7 @@ class Flights:
         if key not in self._offset_signals:
             if len(self._offset_signals) > 4 * len(self._first):
                 self._offset_signals.clear()
-            self._offset_signals[key] = piece, _with_time_offsets(piece.signals, offsets, scale)
+            self._offset_signals[key] = piece, with_time_offsets(piece.signals, offsets, scale)
         return self._offset_signals[key][1]
 
     def _kept(self, setting: Setting) -> dict[Column, Array]:
@@ -755,54 +728,3 @@ def _rows(signals: Signals) -> Index:
     step = max(1, round(1.0 / (REGRESSION.row_rate_hz * signals.period)))
     edge = round(REGRESSION.margin / signals.period)
     return np.arange(edge, len(signals.t) - edge, step)
-
-
-def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
-    """Return the signals with rotors that speed up sooner, by ``asymmetry`` s, and slow down later
-    than a vehicle's lag says; as they are where it has none.
-
-    To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
-    |dW/dt|`` with the lag ``tau``, where W follows u.
-    """
-    lags = [
-        e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
-        for e in vehicle.effects
-        if get(e.name).role == Role.LAG
-    ]
-    if asymmetry == 0.0 or not any(lags):
-        return signals
-    u, kept = signals.rotor_speeds, np.exp(-signals.period / max(lags))
-    followed, _ = lfilter([1.0 - kept], [1.0, -kept], u, axis=0, zi=kept * u[:1])
-    rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
-    return replace(signals, rotor_speeds=u + asymmetry * rate)
-
-
-def _with_time_offsets(
-    signals: Signals, offsets: Mapping[str, float], scale: float = 0.0
-) -> Signals:
-    """Return the signals with the time offsets of rotor speeds, velocity and attitude applied, and
-    with thrust multiplied by 1 + ``scale``.
-    """
-    if scale != 0.0:
-        signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
-    rotor_offset, attitude_offset = (
-        offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
-        offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
-    )
-    if rotor_offset != 0.0:
-        n = len(signals.t)
-        at = np.clip(np.arange(n) - rotor_offset / signals.period, 0, n - 1)
-        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
-        signals = replace(signals, rotor_speeds=speeds)
-    if (spread := offsets.get(ROTOR_SPREAD[1], 0.0)) != 0.0:
-        over = np.sqrt(spread) / signals.period
-        smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
-        signals = replace(signals, rotor_speeds=smooth)
-    if (velocity_offset := offsets.get(VELOCITY_TIME_OFFSET[1], 0.0)) != 0.0:
-        signals = replace(
-            signals, velocity=signals.velocity - velocity_offset * signals.acceleration
-        )
-    if attitude_offset != 0.0:
-        turn = Rotation.from_rotvec(-attitude_offset * signals.angular_velocity).as_matrix()
-        signals = replace(signals, rotation=signals.rotation @ turn)
-    return signals

@@ -17,9 +17,7 @@ from .commanded_rotors import similar_effects
 from .gram_matrix import Gram, columns_of, gram
 from .regression import (
     CENTRAL,
-    LAG_ASYMMETRY,
     MOMENT_PREFIX,
-    ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
     Flights,
@@ -31,6 +29,10 @@ from .regression import (
     typical_size,
 )
 from .starting_points import starting_points
+from .time_offsets import (
+    LAG_ASYMMETRY,
+    ROTOR_TIME_OFFSET,
+)
 from .turning_delay import rotor_delay, turning_delay
 from .whitening import Whitener
 

@@ -17,11 +17,7 @@ from ...dynamics.effects import Role, get, playing
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..inference.regression import (
-    ATTITUDE_TIME_OFFSET,
     CENTRAL,
-    LAG_ASYMMETRY,
-    REGRESSION,
-    ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
     Flights,
@@ -29,6 +25,12 @@ from ..inference.regression import (
     coefficient,
     is_delay,
     typical_size,
+)
+from ..inference.time_offsets import (
+    ATTITUDE_TIME_OFFSET,
+    LAG_ASYMMETRY,
+    ROTOR_TIME_OFFSET,
+    TIMING,
     with_uneven_lag,
 )
 from ..logs.flight_log import FlightLog
@@ -280,7 +282,7 @@ class Likelihood:
 
     def _uneven_lag(self) -> list[Array]:
         """Return what a second of the lag's asymmetry adds, by the derivative."""
-        delta = LIKELIHOOD.step * REGRESSION.lag_asymmetry_size
+        delta = LIKELIHOOD.step * TIMING.lag_asymmetry_size
         return [
             (self._acceleration(with_uneven_lag(s, self.vehicle, delta), self.vehicle) - base)
             / delta

@@ -17,11 +17,7 @@ from ...dynamics.effects.declaration import Role
 from ..findings import RankedSet, Ranking
 from ..inference.gram_matrix import GRAM
 from ..inference.regression import (
-    ATTITUDE_TIME_OFFSET,
     CENTRAL,
-    LAG_ASYMMETRY,
-    REGRESSION,
-    ROTOR_TIME_OFFSET,
     START_PREFIX,
     Column,
     Flights,
@@ -31,6 +27,9 @@ from ..inference.regression import (
     unit_of_change,
 )
 from ..inference.starting_points import starting_points
+from ..inference.time_offsets import (
+    timing_of,
+)
 from .discrepancy import DISCREPANCY
 from .evidence import (
     Index,
@@ -227,10 +226,8 @@ def _variants(
 
 def _prior_size(column: Column, flights: Flights) -> float:
     effect, name = column
-    if column in (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET):
-        return REGRESSION.time_offset_size
-    if column == LAG_ASYMMETRY:
-        return REGRESSION.lag_asymmetry_size
+    if (timing := timing_of(column)) is not None:
+        return timing.size
     if not effect:
         if name == BETWEEN:
             return LIKELIHOOD.between_samples

@@ -100,11 +100,10 @@ def fitted_weights(
     records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
 ) -> dict[str, PoolingSettings]:
     """Return what ``SEARCH_ALONE`` should be by these flights; arguments as of ``tables``."""
-    unused = {"evidence": 0.0, "other": 0.0, "structure": 0.0}
-    return {
-        kind: replace(fit([r["result"] for r in _of_kind(kind, records, poses)]), **unused)
-        for kind in SEARCH_ALONE
+    found = {
+        kind: fit([r["result"] for r in _of_kind(kind, records, poses)]) for kind in SEARCH_ALONE
     }
+    return {k: replace(x, evidence=0.0, other=0.0, structure=0.0) for k, x in found.items()}
 
 
 def tables(records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]) -> str:

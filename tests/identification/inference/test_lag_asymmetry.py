@@ -8,8 +8,13 @@ import pytest
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
-from windwrench.identification.inference.regression import Flights, with_uneven_lag
+from windwrench.identification.inference.regression import (
+    Flights,
+)
 from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.time_offsets import (
+    with_uneven_lag,
+)
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass

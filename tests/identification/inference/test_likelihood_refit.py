@@ -15,8 +15,13 @@ from windwrench.identification.inference.likelihood_refit import (
     refitted_by_likelihood,
     with_lag,
 )
-from windwrench.identification.inference.regression import ROTOR_TIME_OFFSET, Flights
+from windwrench.identification.inference.regression import (
+    Flights,
+)
 from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.time_offsets import (
+    ROTOR_TIME_OFFSET,
+)
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")

@@ -7,8 +7,6 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import background, record_flight
 from windwrench.identification.inference.regression import (
-    ATTITUDE_TIME_OFFSET,
-    ROTOR_TIME_OFFSET,
     Flights,
 )
 from windwrench.identification.inference.search import (
@@ -16,6 +14,10 @@ from windwrench.identification.inference.search import (
     Search,
     is_possible,
     with_changes,
+)
+from windwrench.identification.inference.time_offsets import (
+    ATTITUDE_TIME_OFFSET,
+    ROTOR_TIME_OFFSET,
 )
 from windwrench.identification.logs.flight_log import FlightLog
 

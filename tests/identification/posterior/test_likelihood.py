@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.identification.inference.regression import LAG_ASYMMETRY, Flights
+from windwrench.identification.inference.regression import (
+    Flights,
+)
+from windwrench.identification.inference.time_offsets import (
+    LAG_ASYMMETRY,
+)
 from windwrench.identification.posterior.likelihood import BETWEEN, GAIN, UNKNOWN, Likelihood
 from windwrench.studies.trials.practice_flights import fly_practice
 

@@ -1,0 +1,129 @@
+"""How the signals of a log may be apart in time, and rotor speeds less smooth or less even than
+what the rotors do: nuisances that are fitted beside effects.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from ...dynamics.effects import Role, get
+from ...dynamics.vehicle import Vehicle
+from ..motion.signals import Signals
+
+
+@dataclass(frozen=True)
+class TimingSettings:
+    """Typical sizes and ranges of what is apart."""
+
+    rotor_time_offset_range: tuple[float, float] = (-0.006, 0.006)  # s
+    # s, the same where the pose was filtered before the log was written: a causal low-pass of 5 Hz
+    # is 45 ms late, an estimator some more
+    filtered_rotor_time_offset_range: tuple[float, float] = (-0.1, 0.1)
+    # s, typical size of a time offset, and of the rotors' where the pose was filtered
+    time_offset_size: float = 0.0025
+    filtered_rotor_time_offset_size: float = 0.02
+    # s2, typical size and range of the spread in time: 5 ms, and at most 40
+    rotor_spread_size: float = 2.5e-5
+    rotor_spread_range: tuple[float, float] = (0.0, 1.6e-3)
+    # s, typical size and range of a lag's asymmetry: rotors are driven up, and drag slows them down
+    lag_asymmetry_size: float = 0.005
+    lag_asymmetry_range: tuple[float, float] = (-0.02, 0.02)
+
+
+TIMING = TimingSettings()
+# time offsets (s) of a log: by which the rotor speeds act later than they are logged, by which the
+# attitude is ahead of the position, and by which the velocity that acts is behind the position's (a
+# simulator that holds its forces over a step has one)
+ROTOR_TIME_OFFSET = ("", "rotor_time_offset")
+ATTITUDE_TIME_OFFSET = ("", "attitude_time_offset")
+VELOCITY_TIME_OFFSET = ("", "velocity_time_offset")
+# variance (s2) of the time over which rotor speeds are averaged, to both sides: an IMU hardly has
+# noise, so that of the rotor speeds, and their rounding, show; and it has a low-pass of its own.
+# Without it a lag is found that averages them, with an offset that brings them forward again
+ROTOR_SPREAD = ("", "rotor_spread")
+# s by which rotors behind a lag speed up sooner, and slow down later, than the lag says. Without it
+# their mean thrust, which is larger by as much, is a mass that is smaller
+LAG_ASYMMETRY = ("", "lag_asymmetry")
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Typical size and range of a nuisance, in its unit."""
+
+    size: float
+    range: tuple[float, float]
+
+
+def timing_of(column: tuple[str, str], filtered: bool = False) -> Timing | None:
+    """Return size and range of a nuisance of this module; None of any other column.
+
+    Args:
+        column: without an effect, and the nuisance's name.
+        filtered: whether the pose was filtered, and may be late.
+    """
+    if filtered and column == ROTOR_TIME_OFFSET:
+        return Timing(
+            TIMING.filtered_rotor_time_offset_size, TIMING.filtered_rotor_time_offset_range
+        )
+    if column in (ROTOR_TIME_OFFSET, ATTITUDE_TIME_OFFSET, VELOCITY_TIME_OFFSET):
+        return Timing(TIMING.time_offset_size, TIMING.rotor_time_offset_range)
+    if column == ROTOR_SPREAD:
+        return Timing(TIMING.rotor_spread_size, TIMING.rotor_spread_range)
+    if column == LAG_ASYMMETRY:
+        return Timing(TIMING.lag_asymmetry_size, TIMING.lag_asymmetry_range)
+    return None
+
+
+def with_uneven_lag(signals: Signals, vehicle: Vehicle, asymmetry: float) -> Signals:
+    """Return the signals with rotors that speed up sooner, by ``asymmetry`` s, and slow down later
+    than a vehicle's lag says; as they are where it has none.
+
+    To first order: behind a lag of ``tau -+ asymmetry``, rotor speeds follow ``u + asymmetry
+    |dW/dt|`` with the lag ``tau``, where W follows u.
+    """
+    lags = [
+        e.coefficients.get(get(e.name).coefficients[0].name, 0.0)
+        for e in vehicle.effects
+        if get(e.name).role == Role.LAG
+    ]
+    if asymmetry == 0.0 or not any(lags):
+        return signals
+    u, kept = signals.rotor_speeds, np.exp(-signals.period / max(lags))
+    followed, _ = lfilter([1.0 - kept], [1.0, -kept], u, axis=0, zi=kept * u[:1])
+    rate = np.abs(np.diff(followed, axis=0, prepend=followed[:1])) / signals.period
+    return replace(signals, rotor_speeds=u + asymmetry * rate)
+
+
+def with_time_offsets(
+    signals: Signals, offsets: Mapping[str, float], scale: float = 0.0
+) -> Signals:
+    """Return the signals with the time offsets of rotor speeds, velocity and attitude applied, and
+    with thrust multiplied by 1 + ``scale``.
+    """
+    if scale != 0.0:
+        signals = replace(signals, rotor_speeds=signals.rotor_speeds * np.sqrt(1.0 + scale))
+    rotor_offset, attitude_offset = (
+        offsets.get(ROTOR_TIME_OFFSET[1], 0.0),
+        offsets.get(ATTITUDE_TIME_OFFSET[1], 0.0),
+    )
+    if rotor_offset != 0.0:
+        n = len(signals.t)
+        at = np.clip(np.arange(n) - rotor_offset / signals.period, 0, n - 1)
+        speeds = np.column_stack([np.interp(at, np.arange(n), x) for x in signals.rotor_speeds.T])
+        signals = replace(signals, rotor_speeds=speeds)
+    if (spread := offsets.get(ROTOR_SPREAD[1], 0.0)) != 0.0:
+        over = np.sqrt(spread) / signals.period
+        smooth = gaussian_filter1d(signals.rotor_speeds, over, axis=0, mode="nearest")
+        signals = replace(signals, rotor_speeds=smooth)
+    if (velocity_offset := offsets.get(VELOCITY_TIME_OFFSET[1], 0.0)) != 0.0:
+        signals = replace(
+            signals, velocity=signals.velocity - velocity_offset * signals.acceleration
+        )
+    if attitude_offset != 0.0:
+        turn = Rotation.from_rotvec(-attitude_offset * signals.angular_velocity).as_matrix()
+        signals = replace(signals, rotation=signals.rotation @ turn)
+    return signals
