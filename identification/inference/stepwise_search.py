@@ -93,6 +93,17 @@ def with_proposal(
     return _confirmed_effects(search, _prune(search, better[0])) if better else fit
 
 
+def are_told_apart(search: Search, fit: FittedEffects) -> bool:
+    """Return whether no effect of a fit is explained by the others. In a hover mass and thrust are,
+    and rounding gives each a size of its own.
+    """
+    g = search.gram_at(fit)
+    total = g.blocks.sum(axis=0)
+    return not any(
+        search.not_identifiable(g, total, g.columns, g.value, effect) for effect in fit.effects
+    )
+
+
 def _confirmed_effects(search: Search, fit: FittedEffects) -> FittedEffects:
     """Return a fit without the effects that the innovations do not confirm beside the others."""
     if not search.flights.has_innovations:
@@ -130,7 +141,7 @@ def _forward(search: Search, fit: FittedEffects) -> tuple[FittedEffects, list[Ga
             search.report(f"trying {gain.effect}")
             more = search.refit(gain.fit)
             # innovations contradict what cannot be
-            if (
+            if are_told_apart(search, more) and (
                 confirms_addition(flights, fit.setting, more.setting)
                 if flights.has_innovations
                 else is_possible(more, flights.vehicle)
@@ -244,8 +255,10 @@ def _first_better(
         better = (
             search.deviance(fit.setting) < swap.limit and (error := search.error(fit)) < swap.limit
         )
-        if better and (
-            len(swap.effects) == 1 or all(_is_confirmed(search, fit, e) for e in swap.effects)
+        if (
+            better
+            and are_told_apart(search, fit)
+            and (len(swap.effects) == 1 or all(_is_confirmed(search, fit, e) for e in swap.effects))
         ):
             search.report(f"{' and '.join(swap.effects)} in place of {' and '.join(group)}")
             return fit, error

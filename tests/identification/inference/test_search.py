@@ -15,6 +15,7 @@ from windwrench.identification.inference.search import (
     is_possible,
     with_changes,
 )
+from windwrench.identification.inference.stepwise_search import are_told_apart
 from windwrench.identification.inference.time_offsets import (
     ATTITUDE_TIME_OFFSET,
     ROTOR_TIME_OFFSET,
@@ -104,3 +105,15 @@ def test_in_a_hover_a_force_and_a_thrust_are_not_told_apart():
     hover.set_noise(nothing, hover.linearise(nothing))
     fit = hover.refit(FittedEffects({"constant_force": {"fx": 0.0, "fy": 0.0, "fz": 0.1}}))
     assert "thrust_scale" not in {x.effect for x in gains_at(hover, fit)}
+
+
+def test_effects_of_a_fit_are_told_apart_or_it_is_none(search):
+    """A refit may run along what flights do not show: a hover's mass and thrust, to -80 %."""
+    both = FittedEffects({"rotor_drag": dict(DRAG), "mass": {"dm": 0.01}})
+    assert are_told_apart(search, search.refit(both))
+    hover = Search(Flights([flown("hover")], VEHICLE), ["mass", "thrust_scale"])
+    nothing = FittedEffects({})
+    hover.set_noise(nothing, hover.linearise(nothing))
+    far = FittedEffects({"mass": {"dm": -0.5 * VEHICLE.mass}, "thrust_scale": {"s": -0.5}})
+    assert not are_told_apart(hover, far)
+    assert are_told_apart(hover, far.without("mass"))
