@@ -18,6 +18,6 @@ if __name__ == "__main__":
     given = parser.parse_args()
     wanted = tasks(range(given.seeds), given.log or tuple(LOGS))
     outcomes = run(given.out, wanted, given.jobs)
-    save(outcomes, given.out / "imu_logs.json")
+    save(outcomes, given.out / "imu_logs.json.gz")
     put_between(tables(outcomes), given.page)
     print(tables(outcomes))

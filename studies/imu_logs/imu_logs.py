@@ -108,6 +108,6 @@ def run(folder: Path, wanted: Sequence[Task], jobs: int = 1) -> list[dict[str, A
 
 
 def save(outcomes: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Write the outcomes as JSON."""
+    """Write the outcomes as JSON; gzipped where ``path`` ends so."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_json(list(outcomes), path)

@@ -158,7 +158,7 @@ def _filtered_logs() -> str:
 def _imu_logs() -> str:
     from windwrench.studies.imu_logs.page import tables
 
-    return _between_marks("imu-logs", tables(kept("imu-logs/imu_logs.json")))
+    return _between_marks("imu-logs", tables(kept("imu-logs/imu_logs.json.gz")))
 
 
 def _clients() -> str:

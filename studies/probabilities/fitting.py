@@ -73,13 +73,13 @@ def is_right(flight: dict[str, Any], name: str) -> bool:
 
 def checks_of(flight: Mapping[str, Any]) -> set[str]:
     """Return the checks that doubt the names of a recorded flight."""
-    return {f"structure: {kind}" for kind, *_ in flight["signs"]} | set(flight["doubts"])
+    return {f"structure: {kind}" for kind in flight["signs"]} | set(flight["doubts"])
 
 
 def signs_of(flight: dict[str, Any]) -> Signs:
     """Return what speaks for something unknown on a recorded flight."""
     gusts = [Disturbance("", rms, time) for rms, time in flight["gusts"]]
-    tests, doubts = {kind for kind, *_ in flight["signs"]}, set(flight["doubts"]) - {SMALL}
+    tests, doubts = set(flight["signs"]), set(flight["doubts"]) - {SMALL}
     beyond = beyond_calm(gusts, *flight["weight"])
     return Signs(len(tests), len(doubts), beyond, flight["structure"])
 

@@ -103,18 +103,14 @@ def recorded(simulator: str, kind: str, number: int, way: str = "pose") -> dict[
                 # by the search: its doubts are known before any probability
                 "tentative": e.tentative and IMPROBABLE not in search.doubts,
                 "indistinguishable_from": list(e.indistinguishable_from),
-                "coefficients": {k: float(f"{v:.6g}") for k, v in e.coefficients.items()},
-                "std": {k: float(f"{v:.6g}") for k, v in e.std.items()},
+                "coefficients": {k: float(f"{v:.5g}") for k, v in e.coefficients.items()},
+                "std": {k: float(f"{v:.5g}") for k, v in e.std.items()},
             }
             for e in search.effects
         ],
         "remainder": search.remainder,
         "doubts": {c: len(words) for c, words in search.doubts.items() if c != IMPROBABLE},
-        # the strongest of each kind
-        "signs": [
-            [s.kind, s.test, s.where, float(f"{s.gain:.3g}")]
-            for s in {s.kind: s for s in reversed(search.structure)}.values()
-        ],
+        "signs": sorted({sign.kind for sign in search.structure}),
         "gusts": [[float(f"{g.rms:.3g}"), float(f"{g.time:.3g}")] for g in search.gusts],
         "weight": [round(vehicle.weight, 4), round(vehicle.arm_l, 5)],
         "sets": [[list(s.effects), float(f"{s.probability:.4g}")] for s in found.sets[:_MOST_SETS]],
@@ -131,7 +127,7 @@ def _fitted(found: Ranking, effects: Sequence[str]) -> dict[str, Any]:
     for e in effects:
         best = found.likeliest_with(e)
         if best is not None:
-            out[e] = {k: float(f"{x:.6g}") for k, x in best.coefficients[e].items()}
+            out[e] = {k: float(f"{x:.5g}") for k, x in best.coefficients[e].items()}
     return out
 
 

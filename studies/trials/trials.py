@@ -338,7 +338,6 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
                 "std": e.std,
                 "tentative": e.tentative,
                 "indistinguishable_from": e.indistinguishable_from,
-                "evidence": e.evidence,
                 "probability": stated.names[e.name] if stated else None,
             }
             for e in found.effects
@@ -349,7 +348,6 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
         "floor": {"force_rms": found.floor_force_rms, "torque_rms": found.floor_torque_rms},
         "structure": [asdict(sign) for sign in found.structure[:3]],
         "gusts": [gusts.rms for gusts in found.gusts],
-        "notes": found.notes,
     }
     return dict(_plain(summary))
 

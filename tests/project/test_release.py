@@ -73,9 +73,9 @@ def test_the_papers_figures_are_those_of_the_pages():
         assert f"({low:.3f} to {high:.3f})" in text
     trials = (ROOT / "docs/diagnosis-trials.md").read_text(encoding="utf-8")
     for count in re.findall(r"\d+ of \d+", text):
-        if count != "2 of 264":  # 2 left of two times 132
-            assert count in trials, count
-    assert "161 of 171 coefficients" in trials
+        assert count in trials, count
+    assert "112 of 118 coefficients" in trials
+    assert trials.count("(46 of 46 kinds) | 92 |") == 2  # 184 diagnoses
 
 
 @pytest.fixture(scope="module")

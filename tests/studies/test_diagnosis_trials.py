@@ -47,7 +47,6 @@ def name(effect, tentative=False, like=(), probability=None, **coefficients):
         "std": {k: 0.01 * abs(v) for k, v in coefficients.items()},
         "tentative": tentative,
         "indistinguishable_from": list(like),
-        "evidence": {},
     }
 
 
@@ -70,7 +69,6 @@ def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more
         },
         "floor": {"force_rms": 0.02, "torque_rms": 1e-3},
         "structure": [],
-        "notes": [],
         "seconds": 1.0,
         **more,
     }

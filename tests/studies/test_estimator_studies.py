@@ -73,7 +73,7 @@ def test_a_picture_shows_every_row(draw, name, panels):
     ("study", "name", "data"),
     [
         (filtered_logs_page, "filtered-logs", "filtered_logs.json.gz"),
-        (imu_logs_page, "imu-logs", "imu_logs.json"),
+        (imu_logs_page, "imu-logs", "imu_logs.json.gz"),
         (identified_page, "identify", "identified_vehicles.json.gz"),
     ],
 )

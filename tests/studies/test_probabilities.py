@@ -87,7 +87,7 @@ def test_what_is_right():
 def test_a_check_is_worth_the_flights_that_it_alone_doubts():
     wrong, right = flight(["wind?"], ["mass"]), flight(["mass?"], ["mass"])
     wrong["doubts"] = {"pair": 1}
-    right["signs"] = [["candidate regressor", "a candidate regressor", "thrust with time", 0.1]]
+    right["signs"] = ["candidate regressor"]
     both = flight(["wind?"], ["mass"])
     both["doubts"], both["signs"] = {"pair": 2}, right["signs"]
     rows = [x.split(" | ") for x in table_of_doubts([wrong, right, both]).splitlines()[2:]]
