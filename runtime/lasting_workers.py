@@ -86,7 +86,10 @@ class _Process:
         if self._process is None:
             return "its process died"
         self._process.join(_PATIENCE)
-        code = self._process.exitcode
+        latest = time.monotonic() + _PATIENCE
+        # the pool waits for it as well: whoever comes second knows the code a moment later
+        while (code := self._process.exitcode) is None and time.monotonic() < latest:
+            time.sleep(0.01)
         if code is None or code >= 0:
             return f"its process ended with code {code}"
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
