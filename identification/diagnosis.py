@@ -66,9 +66,7 @@ from .inference.residual_structure import find_structure
 from .inference.search import FittedEffects, Gain, Search
 from .inference.sensor_bias import biases
 from .inference.stepwise_search import find_effects, with_proposal
-from .inference.time_offsets import (
-    ROTOR_TIME_OFFSET,
-)
+from .inference.time_offsets import ROTOR_TIME_OFFSET
 from .inference.transient_disturbances import transient_disturbances
 from .logs.flight_log import FlightLog
 from .logs.screening import LEAST_SECONDS, screen_log

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from scipy.stats import binomtest
+from scipy.stats import binomtest, mannwhitneyu
 
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_text
@@ -23,6 +23,14 @@ def share(count: int, whole: int) -> str:
         return "–"
     low, high = binomtest(count, whole).proportion_ci(method="wilson")
     return f"{count} of {whole} ({100 * low:.0f}–{100 * high:.0f} %)"
+
+
+def area_under_curve(strange: Sequence[float], known: Sequence[float]) -> str:
+    """Return how often a number of ``strange`` is above one of ``known``, with both counts."""
+    if not strange or not known:
+        return "–"
+    area = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
+    return f"{area:.3f} ({len(strange)} against {len(known)})"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

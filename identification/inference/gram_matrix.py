@@ -24,9 +24,7 @@ from .regression import (
     unit_of_change,
 )
 from .sensor_bias import BIAS, flight_and_axis, is_bias
-from .time_offsets import (
-    timing_of,
-)
+from .time_offsets import timing_of
 from .whitening import Whitener
 
 Array = NDArray[np.float64]

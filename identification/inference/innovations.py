@@ -41,9 +41,7 @@ from .regression import (
     is_delay,
     typical_size,
 )
-from .time_offsets import (
-    ROTOR_TIME_OFFSET,
-)
+from .time_offsets import ROTOR_TIME_OFFSET
 
 Array = NDArray[np.float64]
 

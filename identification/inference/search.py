@@ -29,10 +29,7 @@ from .regression import (
     typical_size,
 )
 from .starting_points import starting_points
-from .time_offsets import (
-    LAG_ASYMMETRY,
-    ROTOR_TIME_OFFSET,
-)
+from .time_offsets import LAG_ASYMMETRY, ROTOR_TIME_OFFSET
 from .turning_delay import rotor_delay, turning_delay
 from .whitening import Whitener
 

@@ -27,9 +27,7 @@ from ..inference.regression import (
     unit_of_change,
 )
 from ..inference.starting_points import starting_points
-from ..inference.time_offsets import (
-    timing_of,
-)
+from ..inference.time_offsets import timing_of
 from .discrepancy import DISCREPANCY
 from .evidence import (
     Index,

@@ -153,10 +153,10 @@ def kept(path: Path) -> list[dict[str, Any]]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.probabilities.other_logs")
-    parser.add_argument("--flights", type=int, default=110, help="of each way to log")
+    parser.add_argument("--flights", type=int, default=100, help="of each way to log")
     parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
-    parser.add_argument("--first", type=int, default=900_000, help="number of the first own flight")
-    parser.add_argument("--catalogue", type=int, default=150_000, help="the other's first number")
+    parser.add_argument("--first", type=int, default=910_000, help="number of the first own flight")
+    parser.add_argument("--catalogue", type=int, default=170_000, help="the other's first number")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("results/other-logs"))
     parser.add_argument("--results", type=Path, default=RESULTS, help="what is kept for the page")

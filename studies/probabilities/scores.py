@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from windwrench.identification.diagnosis import DIAGNOSIS
 from windwrench.identification.findings import Alternative, Probabilities
 from windwrench.identification.posterior.deviations import without_other_estimate
 from windwrench.identification.posterior.pooling import POOLING, SIGNS
-from windwrench.studies.page_tables import share, table
+from windwrench.studies.page_tables import area_under_curve, share, table
 from windwrench.studies.probabilities.doubts import table_of_doubts
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
@@ -199,10 +198,7 @@ def area(flights: Sequence[Scored]) -> str:
     """Return the area under the curve of ``unknown``, with the counts of flights."""
     strange = [x.found.unknown for x in flights if acts_unknown(x.flight)]
     known = [x.found.unknown for x in flights if not acts_unknown(x.flight)]
-    if not strange or not known:
-        return "–"
-    wins = float(mannwhitneyu(strange, known).statistic) / (len(strange) * len(known))
-    return f"{wins:.3f} ({len(strange)} against {len(known)})"
+    return area_under_curve(strange, known)
 
 
 def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:

@@ -14,9 +14,9 @@ from math import erf, sqrt
 from typing import Any
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from windwrench.identification.diagnosis import DIAGNOSIS
+from windwrench.studies.page_tables import area_under_curve
 from windwrench.studies.page_tables import share as counted
 from windwrench.studies.trials.trials import EQUIVALENTS
 from windwrench.studies.trials.unseen_outsiders import UNSEEN
@@ -531,10 +531,6 @@ def _probabilities(inside: Sequence[Judgement], foreign: Sequence[Judgement]) ->
     known, unknown = (
         [j.unknown for j in some if np.isfinite(j.unknown)] for some in (inside, foreign)
     )
-    area = "not flown"
-    if known and unknown:
-        wins = mannwhitneyu(unknown, known).statistic / (len(known) * len(unknown))
-        area = f"{wins:.3f} ({len(unknown)} against {len(known)})"
     false = sum(len(j.probable) > 0 for j in foreign)
     return [
         Rule(
@@ -554,7 +550,7 @@ def _probabilities(inside: Sequence[Judgement], foreign: Sequence[Judgement]) ->
         Rule(
             "8. the cause in the library, or not: area under the curve of `unknown`",
             "-",
-            area,
+            area_under_curve(unknown, known) if known and unknown else "not flown",
             None,
             len(known) + len(unknown),
         ),
