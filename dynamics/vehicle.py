@@ -9,11 +9,14 @@ IROS 2016.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from ..runtime.errors import InputError
+from ..runtime.forms import STRICT, Number, Positive, expected, numbers
 
 Array = NDArray[np.float64]
 
@@ -23,6 +26,68 @@ _QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0
 # Turning sense about body +z; the reaction on the body is opposite, which gives tau_z = M1 - M2 +
 # M3 - M4.
 _SPIN = np.array([-1.0, 1.0, -1.0, 1.0])
+
+_MOST_POWERS = 6  # coefficients of a motor curve
+
+
+def _positive(value: Array) -> Array:
+    if np.any(value <= 0):
+        raise ValueError(f"must be four positive numbers, got {value.tolist()}")
+    return value
+
+
+def _sense(value: Array) -> Array:
+    if not np.all(np.isin(value, (-1.0, 1.0))):
+        raise ValueError(
+            f"must be four times 1 or -1 (turning sense about body +z), got {value.tolist()}"
+        )
+    return value
+
+
+def _full_thrust(value: tuple[float, ...]) -> tuple[float, ...]:
+    if not sum(value) > 0.0:
+        raise ValueError(
+            f"at the full command, the sum of its coefficients, is {sum(value):g} N; expected a "
+            "positive one"
+        )
+    return value
+
+
+def _rising(value: tuple[float, float]) -> tuple[float, float]:
+    if not value[0] < value[1]:
+        raise ValueError("falls")
+    return value
+
+
+def _matrix(value: object) -> object:
+    """Return the matrix of three principal values."""
+    short = isinstance(value, list) and len(value) == 3 and not isinstance(value[0], list)
+    try:
+        return np.diag(np.array(value, dtype=np.float64)) if short else value
+    except (TypeError, ValueError, OverflowError):
+        return value
+
+
+def _list_of_effects(value: object) -> object:
+    if not isinstance(value, list):
+        raise ValueError(f"must be a list of {{name, coefficients}}, got {value!r}")
+    return value
+
+
+def _definite(value: Array) -> Array:
+    symmetric = np.allclose(value, value.T, rtol=1e-9, atol=0.0)
+    if not symmetric or np.any(np.linalg.eigvalsh(value) <= 0):
+        raise ValueError(
+            "must be symmetric and positive definite (3 principal values or 3 x 3), got "
+            f"{value.tolist()}"
+        )
+    return value
+
+
+# Arrays of numbers as a vehicle file states them
+PerRotor = Annotated[Array, numbers(4), AfterValidator(_positive)]
+InertiaMatrix = Annotated[Array, numbers(3, 3), BeforeValidator(_matrix), AfterValidator(_definite)]
+NotNegative = Annotated[Number, Field(ge=0.0), expected("a number that is not negative")]
 
 
 @dataclass(frozen=True)
@@ -35,9 +100,11 @@ class Mocap:
         sigma_att_rad: rad, about each axis.
     """
 
-    rate_hz: float = 200.0
-    sigma_pos_m: float = 0.001
-    sigma_att_rad: float = 0.005
+    __pydantic_config__ = STRICT
+
+    rate_hz: Positive = 200.0
+    sigma_pos_m: Positive = 0.001
+    sigma_att_rad: Positive = 0.005
 
 
 @dataclass(frozen=True)
@@ -51,9 +118,23 @@ class MotorCurve:
         command: raw command (PWM counts, us, ...) at u = 0 and at u = 1.
     """
 
-    thrust: tuple[float, ...]
-    voltage_exponent: float = 0.0
-    command: tuple[float, float] = (0.0, 1.0)
+    __pydantic_config__ = STRICT
+
+    thrust: Annotated[
+        tuple[Number, ...],
+        Field(min_length=2, max_length=_MOST_POWERS),
+        expected(
+            f"2 to {_MOST_POWERS} numbers, the coefficients in N of u^0, u^1, ... with the command "
+            "u from 0 to 1"
+        ),
+        AfterValidator(_full_thrust),
+    ]
+    voltage_exponent: Number = 0.0
+    command: Annotated[
+        tuple[Number, Number],
+        AfterValidator(_rising),
+        expected("the raw command at u = 0 and a larger one at u = 1"),
+    ] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -66,8 +147,12 @@ class EffectSetting:
         coefficients: by their names, in the units that the effect states.
     """
 
-    name: str
-    coefficients: Mapping[str, float]
+    __pydantic_config__ = STRICT
+
+    name: Annotated[str, Field(coerce_numbers_to_str=True)]
+    coefficients: Annotated[
+        Mapping[str, Number], BeforeValidator(lambda given: {} if given is None else given)
+    ] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,26 +182,31 @@ class Vehicle:
         ceiling_z: m, world, height of the ceiling.
     """
 
-    name: str
-    mass: float
-    inertia: Array
-    arm_l: float
-    k: Array
-    p: Array
-    rotor_radius: float = 0.1
-    omega_lsb: float = 0.0
-    omega_max: float = math.inf
-    omega_source: str = "measured"
-    voltage_ref: float = 0.0
-    gravity: float = 9.81
-    spin: Array = field(default_factory=_SPIN.copy)
-    rotor_positions: Array | None = None
-    com: Array = field(default_factory=lambda: np.zeros(3))
+    __pydantic_config__ = STRICT
+
+    name: Annotated[str, Field(coerce_numbers_to_str=True)]
+    mass: Positive
+    inertia: InertiaMatrix
+    arm_l: Positive
+    k: PerRotor
+    p: PerRotor
+    rotor_radius: Positive = 0.1
+    omega_lsb: NotNegative = 0.0
+    omega_max: Positive = math.inf
+    omega_source: Literal["measured", "commanded"] = "measured"
+    voltage_ref: NotNegative = 0.0
+    gravity: Positive = 9.81
+    spin: Annotated[Array, numbers(4), AfterValidator(_sense)] = field(default_factory=_SPIN.copy)
+    rotor_positions: Annotated[Array, numbers(4, 3)] | None = None
+    com: Annotated[Array, numbers(3)] = field(default_factory=lambda: np.zeros(3))
     mocap: Mocap = Mocap()
-    effects: tuple[EffectSetting, ...] = ()
+    effects: Annotated[
+        tuple[EffectSetting, ...],
+        BeforeValidator(_list_of_effects),
+    ] = ()
     motor_curve: MotorCurve | None = None
-    floor_z: float = -math.inf
-    ceiling_z: float = math.inf
+    floor_z: Number = -math.inf
+    ceiling_z: Number = math.inf
 
     def __repr__(self) -> str:
         effects = ", ".join(effect.name for effect in self.effects) or "none"
