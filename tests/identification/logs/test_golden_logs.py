@@ -1,0 +1,33 @@
+"""Every measured file, and a small file of each form, gives the flight log that it gave before."""
+
+import numpy as np
+import pytest
+
+from tests.support.data_paths import DATA
+from tests.support.golden_logs import load_golden, recorded
+
+GOLDEN = load_golden()
+RELATIVE = 1e-9  # of an array's root mean square
+
+
+@pytest.mark.parametrize("case", GOLDEN)
+def test_a_file_gives_the_flight_log_that_was_recorded(case):
+    room, _, rest = case.rpartition(" ")[0].partition("/")
+    if room == "shared" and not (DATA / rest).exists():
+        pytest.skip(f"the measured file {rest} is not in {DATA} (WINDWRENCH_DATA names another)")
+    found, expected = recorded(case), GOLDEN[case]
+    assert found.get("error") == expected.get("error")
+    if "error" in expected:
+        return
+    assert set(found["notes"]) == set(expected["notes"])
+    assert (found["vehicle"], found["commanded"]) == (expected["vehicle"], expected["commanded"])
+    assert set(found["arrays"]) == set(expected["arrays"])
+    for name, summary in expected["arrays"].items():
+        here = found["arrays"][name]
+        for key in ("shape", "finite", "where"):
+            assert here[key] == summary[key], f"{name}: {key}"
+        if "numbers" in summary:
+            scale = abs(summary["numbers"][1])
+            np.testing.assert_allclose(
+                here["numbers"], summary["numbers"], RELATIVE, RELATIVE * scale, err_msg=name
+            )

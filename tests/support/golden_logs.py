@@ -1,0 +1,160 @@
+"""The flight logs that the kit makes of every measured file and of a small file of each form.
+
+``python -m tests.support.golden_logs`` writes ``tests/golden/logs.json`` anew. Do that only where a
+change of a log is meant, and say in the commit which of the two numbers is right, and why.
+"""
+
+import json
+import os
+import tempfile
+import warnings
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from tests.fuzz.forms import forms, lay_out
+from tests.support.data_paths import DATA, EXAMPLE, EXCERPTS
+from tests.support.paths import ROOT
+from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.identification import read_log
+from windwrench.runtime.errors import InputError
+
+GOLDEN = ROOT / "tests" / "golden" / "logs.json"
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".ulg", ".bin", ".bag", ".bbl")
+ARRAYS = (
+    *("t", "position", "quaternion", "rotor_speeds", "voltage", "force", "torque"),
+    *("accelerometer", "gyro", "command", "valid"),
+)
+VEHICLES = {  # by folder; a path is that of a file beside the logs
+    "crazypad": "crazyflie",
+    "crazyswarm2": "crazyflie",
+    "crazyswarm2_payload": "crazyflie",
+    "crazyflie_imu": "crazyflie",
+    "example": "crazyflie",
+    "nanobench": "crazyflie",
+    "idsia": "crazyflie",
+    "flights": "vehicle.yaml",
+    "racer": "vehicle.yaml",
+}
+MAPS = {"crazypad": "crazypad", "racer": "neurobem", "idsia": "written"}  # a second way to read
+# a map as a user writes one, of a table whose columns no reader knows
+WRITTEN = """
+time: {column: t, unit: s}
+position: {columns: [x_mocap, y_mocap, z_mocap], unit: m}
+attitude: {columns: [qx, qy, qz, qw], order: xyzw}
+rotors: {columns: [m1_erpm, m2_erpm, m3_erpm, m4_erpm], order: crazyflie, unit: eRPM, pole_pairs: 6}
+battery: {column: Vbat, unit: V}
+accelerometer: {columns: [ax, ay, az], unit: m/s2}
+gyro: {columns: [wx, wy, wz], unit: rad/s}
+"""
+FORM_READERS = {"ardupilot_bin", "betaflight", "crazyflie_sd"}
+FORM_MAPS = {"betaflight_csv": "betaflight", "crazyflie_csv": "cflib", "racer": "neurobem"}
+
+
+def cases():
+    """Return the names of all cases: ``ROOM/FOLDER/FILE`` and how it is read, behind a blank."""
+    found = []
+    for room, folder in (("shared", DATA), ("tests", EXCERPTS), ("shipped", EXAMPLE.parent)):
+        for path in sorted(folder.glob("*/*")):
+            is_log = path.name.lower().endswith(ENDINGS) or path.parent.name == "crazyflie_imu"
+            is_bag = path.is_dir() and path.name.startswith("ros2_")
+            if not (is_log or is_bag) or path.suffix in (".md", ".upstream"):
+                continue
+            if path.parent.name == "idsia" and "run1" not in path.name:
+                continue
+            name = f"{room}/{path.relative_to(folder)}"
+            found += [f"{name} alone", f"{name} vehicle"]
+            if path.parent.name in MAPS:
+                found.append(f"{name} map")
+    for name, form in forms().items():
+        if form.file.startswith(("log", "flight")) and name not in ("topic map", "names"):
+            found += [f"form/{name} alone", f"form/{name} vehicle"]
+            if name in FORM_MAPS:
+                found.append(f"form/{name} map")
+    return found
+
+
+def recorded(case):
+    """Return what reading a case gives: a log in numbers, or an error line."""
+    name, _, way = case.rpartition(" ")
+    room, _, rest = name.partition("/")
+    if room == "form":
+        form = forms()[rest]
+        with tempfile.TemporaryDirectory() as folder:
+            path = lay_out(form, form.good(), Path(folder) / "log")
+            vehicle = "crazyflie" if rest.startswith(("crazy", "nano")) else "ardrone2"
+            return _recorded(path, way, vehicle, FORM_MAPS.get(rest), Path(folder))
+    folder = {"shared": DATA, "tests": EXCERPTS, "shipped": EXAMPLE.parent}[room]
+    path = folder / rest
+    vehicle = VEHICLES.get(path.parent.name, "ardrone2")
+    if vehicle.endswith(".yaml"):
+        vehicle = path.parent / vehicle
+    return _recorded(path, way, vehicle, MAPS.get(path.parent.name), path.parent)
+
+
+def _map(name):
+    if name != "written":
+        return name
+    path = _written()
+    path.write_text(WRITTEN, encoding="utf-8")
+    return path
+
+
+def _written():
+    return Path(tempfile.gettempdir()) / f"windwrench-{os.getpid()}.yaml"
+
+
+def _without_paths(text, folder):
+    return text.replace(f"{folder}/", "").replace(str(_written()), "written.yaml")
+
+
+def _recorded(path, way, vehicle, map_name, folder):
+    flown = load_vehicle(vehicle) if way != "alone" else None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            log = read_log(path, vehicle=flown, map=_map(map_name) if way == "map" else None)
+    except InputError as error:
+        return {"error": _without_paths(str(error), folder)}
+    kept = {"vehicle": log.vehicle, "commanded": log.commanded, "arrays": {}}
+    kept["notes"] = sorted(_without_paths(note, folder) for note in log.notes)
+    arrays = {name: getattr(log, name) for name in ARRAYS}
+    arrays |= {f"extra {name}": values for name, values in log.extra.items()}
+    for name, values in arrays.items():
+        if values is not None:
+            kept["arrays"][name] = _summary(np.asarray(values, dtype=np.float64))
+    return kept
+
+
+def _summary(values):
+    """Return shape, where numbers are finite, mean, root mean square, and a weighted sum in which
+    each place counts for itself.
+    """
+    finite = np.isfinite(values)
+    rows = int(finite.sum())
+    summary = {"shape": list(values.shape), "finite": rows, "where": zlib.crc32(finite.tobytes())}
+    if rows:
+        flat = np.where(finite, values, 0.0).ravel()
+        weights = np.cos(1.0 + 0.7 * np.arange(flat.size) % 11.0)
+        rms = float(np.sqrt(np.sum(flat * flat) / rows))
+        numbers = (flat.sum() / rows, rms, flat @ weights / rows)
+        summary["numbers"] = [float(f"{x:.12g}") for x in numbers]
+    return summary
+
+
+def load_golden():
+    """Return what was recorded, by the cases' names."""
+    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))
+    return {case: kept[found] if isinstance(found, str) else found for case, found in kept.items()}
+
+
+if __name__ == "__main__":
+    kept = {}
+    for case in cases():
+        found = recorded(case)
+        alike = f"{case.rpartition(' ')[0]} alone"
+        kept[case] = alike if kept.get(alike) == found else found
+    lines = [f"{json.dumps(case)}: {json.dumps(found)}" for case, found in kept.items()]
+    GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    print(f"wrote {len(kept)} cases to {GOLDEN}")
