@@ -10,7 +10,6 @@ from typer.core import TyperGroup
 from . import __version__
 from .commands.checking import check, convert
 from .commands.comparing import benchmark, speed
-from .commands.datasets import minari
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
@@ -82,7 +81,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     demo,
     fly,
     benchmark,
-    minari,
     check,
     convert,
     estimate,
