@@ -3,14 +3,10 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo clients test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
+.PHONY: demo test test-all test-fast test-light test-lowest coverage coverage-all lint format types docs check clean
 
 demo: $(VENV)/.installed
 	$(BIN)/windwrench demo --out results/demo
-
-# other libraries of reinforcement learning, each in an environment of its own below .clients: some 6 GB and minutes
-clients: $(VENV)/.installed
-	$(BIN)/python -m studies.clients
 
 # processes that share the tests; 0: none beside the first
 WORKERS ?= auto

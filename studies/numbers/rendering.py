@@ -47,32 +47,10 @@ def _between_marks(name: str, tables: str, **others: str) -> str:
         return page.read_text(encoding="utf-8")
 
 
-def _export_c() -> str:
-    from windwrench.studies.export_c.page import write_page
-
-    return _written("export-c", write_page, "export-c/results.json")
-
-
-def _faults() -> str:
-    from windwrench.studies.faults.page import write_page
-
-    return _written("faults", write_page, "faults/results.json")
-
-
 def _real_faults() -> str:
     from windwrench.studies.real_faults.page import write_page
 
     return _written("real-faults", write_page, "real-faults/results.json")
-
-
-def _imu() -> str:
-    from windwrench.studies.inertial.page import write_page
-
-    return _written(
-        "imu",
-        lambda result, data, page: write_page(result, data, data.with_name("rise_time.png"), page),
-        "imu/results.json",
-    )
 
 
 def _probabilities() -> str:
@@ -86,16 +64,6 @@ def _probabilities() -> str:
         other_logs.PAGE_PART: other_logs.tables(kept("probabilities/other-logs.json.gz"), poses),
     }
     return _between_marks("probabilities", tables(poses), **parts)
-
-
-def _log_estimates() -> str:
-    from windwrench.studies.log_estimates.page import write_page
-
-    return _written(
-        "log-estimates",
-        lambda result, data, page: write_page(result, data, data.with_name("errors.png"), page),
-        "log-estimates/results.json",
-    )
 
 
 def _real_flights() -> str:
@@ -130,16 +98,6 @@ def _close_loop() -> str:
         return page.read_text(encoding="utf-8")
 
 
-def _fleets() -> str:
-    from windwrench.studies.fleet.page import write_page
-
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / "fleets.md"
-        page.write_bytes((DOCS / "fleets.md").read_bytes())
-        write_page(kept("fleets/study.json.gz"), DOCS / "fleets", page)
-        return page.read_text(encoding="utf-8")
-
-
 def _leaderboard() -> str:
     from windwrench.studies.learning.leaderboard_page import page_text
     from windwrench.studies.learning.study import Places, load_plan, read_results
@@ -149,57 +107,19 @@ def _leaderboard() -> str:
     return page_text(read_results(places), load_plan(), places, "leaderboard")
 
 
-def _filtered_logs() -> str:
-    from windwrench.studies.filtered_logs.page import tables
-
-    return _between_marks("filtered-logs", tables(kept("filtered-logs/filtered_logs.json.gz")))
-
-
-def _imu_logs() -> str:
-    from windwrench.studies.imu_logs.page import tables
-
-    return _between_marks("imu-logs", tables(kept("imu-logs/imu_logs.json.gz")))
-
-
-def _clients() -> str:
-    from windwrench.studies.clients.page import tables
-
-    return _between_marks("clients", tables(kept("clients/results.json")))
-
-
-def _identify() -> str:
-    from windwrench.studies.identified_vehicles.page import tables
-    from windwrench.studies.motor_lag import page as motor_lag
-
-    return _between_marks(
-        "identify",
-        tables(kept("identify/identified_vehicles.json.gz")),
-        **{motor_lag.MARKS: motor_lag.tables(kept("identify/motor_lag.json"))},
-    )
-
-
 # made by results whose sentences have other words by now: their numbers are compared
 NUMBERS_ALONE = ("diagnosis-trials",)
+_MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
 NUMBER = re.compile(r"(?<![\w.])[-+−]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?")
 PAGES: Mapping[str, Callable[[], str]] = {
     "diagnosis-trials": _trials,
     "leaderboard": _leaderboard,
     "close-loop": _close_loop,
-    "fleets": _fleets,
     "real-flights": _real_flights,
     "probabilities": _probabilities,
     "real-faults": _real_faults,
-    "imu-logs": _imu_logs,
-    "filtered-logs": _filtered_logs,
-    "identify": _identify,
-    "log-estimates": _log_estimates,
-    "imu": _imu,
-    "faults": _faults,
-    "export-c": _export_c,
-    "clients": _clients,
     "reproduction": partial(hand_written.reproduction, kept),
     "tasks": partial(hand_written.tasks, kept),
-    "tutorials/your-log": partial(hand_written.map_guesses, kept),
 }
 
 
@@ -230,3 +150,18 @@ def differing_lines(name: str) -> list[str]:
     page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
     found = difflib.unified_diff(lines(PAGES[name]()), lines(page), "results", "page", n=0)
     return [line for line in found if line[0] in "+-" and not line.startswith(("+++", "---"))]
+
+
+def missing_sources() -> list[str]:
+    """Return the modules that pages name and that do not exist, each with its page."""
+    pages = (
+        DOCS.parent / "README.md",
+        DOCS.parent / "CONTRIBUTING.md",
+        *sorted(DOCS.rglob("*.md")),
+    )
+    return [
+        f"{page.name} names {name}"
+        for page in pages
+        for name in sorted(set(_MODULE.findall(page.read_text(encoding="utf-8"))))
+        if not (DOCS.parent / name).exists() and not name.startswith(("my_", "live/ros2"))
+    ]

@@ -22,8 +22,7 @@ from windwrench.identification.findings import Ranking
 from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError
-from windwrench.studies.filtered_logs.filters import FILTERS
-from windwrench.studies.imu_logs.sensors import LOGS
+from windwrench.studies.trials.logged_poses import FILTERS, LOGS
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.practice_flights import of_mass, practise, shown_in
 from windwrench.studies.trials.trials import EQUIVALENTS

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.random_tables import Written, flight, random_table, save
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.errors import InputError
-from windwrench.studies.map_guesses.random_tables import Written, flight, random_table, save
 
 
 @pytest.fixture(scope="module")

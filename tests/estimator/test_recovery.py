@@ -7,9 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from windwrench.dynamics import InputError
-from windwrench.estimator import Recovery, UKFTuning, WrenchUKF, WrenchUKFBatch
-from windwrench.studies.faults.sequences import (
+from tests.support.fault_sequences import (
     FILTERS,
     GATES,
     HEIGHT,
@@ -21,8 +19,10 @@ from windwrench.studies.faults.sequences import (
     Flight,
     hover,
     outcome,
+    soak,
 )
-from windwrench.studies.faults.study import soak
+from windwrench.dynamics import InputError
+from windwrench.estimator import Recovery, UKFTuning, WrenchUKF, WrenchUKFBatch
 
 # one fault: what happens, for how many samples, how large (1 mm to 1 km), and a seed
 FAULTS = st.tuples(
@@ -317,7 +317,7 @@ def test_bad_settings_of_recovery_are_named():
 
 @pytest.mark.parametrize("kind", FILTERS)
 def test_a_short_soak(kind):
-    """A piece of the long flight of ``python -m studies.faults``; every step is checked."""
-    found = soak(kind, 10_000, 1, lambda share: None)
+    """A flight full of faults; every step is checked."""
+    found = soak(kind, 10_000, 1)
     assert found["steps"] >= 10_000
     assert found["right"] >= 0.8 * found["faults"]

@@ -12,7 +12,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import COMMANDED, thrust_is_assumed
 from windwrench.identification.inference.regression import lost_behind_a_filter
 from windwrench.identification.report.words import headline
-from windwrench.studies.filtered_logs.filters import FILTERS
+from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.practice_flights import fly_practice
 
 VEHICLE = load_vehicle("ardrone2")

@@ -9,16 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.paths import ROOT
-from windwrench.controllers.trained_policy import load_policy
-from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.effects import compile_effects, get, parse_setting
-from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
-from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
-from windwrench.live.export_c.effect_code import exportable_effects
-from windwrench.runtime.errors import InputError
-from windwrench.studies.export_c import firmware
-from windwrench.studies.export_c.compiled import (
+from tests.support.exported_c import firmware
+from tests.support.exported_c.compiled import (
     PARTS,
     STRICT,
     CompiledFilter,
@@ -28,7 +20,15 @@ from windwrench.studies.export_c.compiled import (
     run,
     write,
 )
-from windwrench.studies.export_c.flights import FLIGHTS, flight, vehicle_of
+from tests.support.exported_c.flights import FLIGHTS, flight, vehicle_of
+from tests.support.paths import ROOT
+from windwrench.controllers.trained_policy import load_policy
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.effects import compile_effects, get, parse_setting
+from windwrench.dynamics.effects.base import ROTORS_SIZE, SAMPLE_SIZE, STATE_SIZE
+from windwrench.live.export_c import ESTIMATORS, export_c, exportable_policy
+from windwrench.live.export_c.effect_code import exportable_effects
+from windwrench.runtime.errors import InputError
 
 LARGEST = 0.01  # of a standard deviation
 QUICK, SLOW = 2_000, 20_000  # steps of each of five flights

@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
+from tests.support.exported_c.compiled import CompiledFilter
 from tests.support.synthetic_wrench import TICKS, observations
 from windwrench.controllers import Tracker
 from windwrench.controllers.observation import FORCE_X, FORCE_Y, TORQUE_Z, VELOCITY_Y
@@ -12,7 +13,6 @@ from windwrench.dynamics import load_vehicle
 from windwrench.estimator import UKFTuning
 from windwrench.live.export_c import export_c, exportable_policy
 from windwrench.live.export_c.tracker import PARTICLES, briefing_of
-from windwrench.studies.export_c.compiled import CompiledFilter
 
 VEHICLE = load_vehicle("ardrone2")
 BRIEFING = briefing_of(VEHICLE, UKFTuning.for_vehicle(VEHICLE, 0.005, 0.45), 0.005)

@@ -5,12 +5,11 @@ results.
 import json
 
 import pytest
-import yaml
 
 from tests.support.paths import ROOT
 from windwrench.studies.numbers import quotes as quoting
 from windwrench.studies.numbers import rendering
-from windwrench.studies.numbers.staleness import in_a_checkout, missing_sources, remarks
+from windwrench.studies.numbers.rendering import missing_sources
 
 SLOW = {"leaderboard", "diagnosis-trials"}  # bootstraps thousands of episodes, judges 768 diagnoses
 QUOTES, NOT_RESULTS = quoting.read_quotes()
@@ -25,22 +24,15 @@ def test_a_page_holds_what_its_results_say(name):
 
 
 def test_a_number_that_is_changed_on_a_page_is_seen(tmp_path, monkeypatch):
-    text = (rendering.DOCS / "faults.md").read_text(encoding="utf-8")
-    row = next(line for line in text.splitlines() if line.startswith("| ") and "0" in line)
+    text = (rendering.DOCS / "real-flights.md").read_text(encoding="utf-8")
+    row = next(line for line in text.splitlines() if line.startswith("| B") and "0" in line)
     changed = row.replace("0", "1", 1)
-    (tmp_path / "faults").mkdir()
-    for name in ("faults.md", "faults/results.json"):
+    (tmp_path / "real-flights").mkdir()
+    for name in ("real-flights.md", "real-flights/real_flights.json"):
         (tmp_path / name).write_bytes((rendering.DOCS / name).read_bytes())
-    (tmp_path / "faults.md").write_text(text.replace(row, changed), encoding="utf-8")
+    (tmp_path / "real-flights.md").write_text(text.replace(row, changed, 1), encoding="utf-8")
     monkeypatch.setattr(rendering, "DOCS", tmp_path)
-    assert rendering.differing_lines("faults") == [f"-{row}", f"+{changed}"]
-
-
-def test_every_page_with_kept_results_is_made_again_from_them():
-    """But those of which prose quotes the figures, or whose page has another name."""
-    others = {"live", "map-guesses", "results"}
-    kept = {path.parent.name for path in (ROOT / "docs").glob("*/*.json*")}
-    assert kept - others <= set(rendering.PAGES)
+    assert rendering.differing_lines("real-flights") == [f"-{row}", f"+{changed}"]
 
 
 def test_figures_in_prose_are_those_of_their_results():
@@ -51,27 +43,6 @@ def test_figures_in_prose_are_those_of_their_results():
 @pytest.mark.parametrize("page", NOT_RESULTS)
 def test_every_number_in_prose_has_a_source(page):
     assert quoting.unknown_numbers(page, QUOTES, NOT_RESULTS[page]) == []
-
-
-def test_every_page_says_where_its_numbers_come_from():
-    listed = yaml.safe_load(quoting.FILE.read_text(encoding="utf-8"))
-    by_hand = listed["by hand"]
-    rendered = {f"docs/{name}.md" for name in rendering.PAGES}
-    known = [
-        *rendered,
-        *{quote.page for quote in QUOTES} - {"README.md"} - rendered,
-        *set(NOT_RESULTS) - {quote.page for quote in QUOTES} - {"README.md"},
-        *by_hand,
-        *listed["without results"],
-    ]
-    pages = {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")}
-    assert sorted(known) == sorted(page for page in pages if "/api/" not in page)
-    for page, source in by_hand.items():
-        made = source.replace("python -m ", "").replace("python ", "").split()[0]
-        there = made == "windwrench" or any(
-            (ROOT / name).exists() for name in (made, made.replace(".", "/"))
-        )
-        assert there, f"{page}: {source}"
 
 
 def test_an_exception_that_is_not_needed_goes():
@@ -104,11 +75,3 @@ def test_a_quote_of_a_row_that_is_not_there_is_refused(tmp_path):
 
 def test_modules_that_pages_name_are_there():
     assert missing_sources() == []
-
-
-def test_old_pages_are_listed_with_what_changed():
-    if not in_a_checkout():
-        pytest.skip("needs a checkout: its history says what changed")
-    for remark in remarks():
-        assert (ROOT / remark.page).exists()
-        assert remark.why

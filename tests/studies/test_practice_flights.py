@@ -13,6 +13,7 @@ from windwrench.envs.plant import TICK, is_a_body
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
+from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.outsiders import OUTSIDERS, Moment
 from windwrench.studies.trials.practice_flights import (
     KINDS,
@@ -395,3 +396,19 @@ def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
 def test_a_loop_sees_some_of_the_log_s_noise_and_no_more(seen):
     with pytest.raises(InputError, match="seen must be"):
         fly_practice(load_vehicle("ardrone2"), seconds=4.0, seen=seen)
+
+
+def test_filters_take_the_noise_at_high_frequencies_alone():
+    vehicle = load_vehicle("ardrone2")
+    log = fly_practice(vehicle, seconds=4.0, seed=1)
+    inner = slice(200, -200)
+
+    def rough(x):
+        return np.std(np.diff(x.position[inner], 3, axis=0))
+
+    for name, filtered in FILTERS.items():
+        behind = filtered(log, vehicle)
+        assert np.abs(behind.position - log.position)[inner].max() < 0.3, name
+        np.testing.assert_allclose(np.linalg.norm(behind.quaternion, axis=1), 1.0, atol=1e-6)
+        if name != "as measured":
+            assert rough(behind) < 0.7 * rough(log), name

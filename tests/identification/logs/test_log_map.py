@@ -9,6 +9,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.support.random_tables import flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.inference.commanded_rotors import thrust_is_assumed
@@ -18,7 +19,6 @@ from windwrench.identification.logs.mapped_log import read_mapped
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.rotor_orders import ORDERS, order_words, rotor_order
 from windwrench.runtime.errors import InputError
-from windwrench.studies.map_guesses.random_tables import flight, random_table, save
 
 GOOD = {
     "time": {"column": "t"},

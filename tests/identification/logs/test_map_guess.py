@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.support.random_tables import fields_of, flight, judge, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.column_names import Group, take_apart
 from windwrench.identification.logs.flight_log import FlightLog
@@ -13,8 +14,6 @@ from windwrench.identification.logs.layout_guess import open_any_table
 from windwrench.identification.logs.log_map import parse_map
 from windwrench.identification.logs.map_guess import Guess, guess_map, map_yaml, motor_unit
 from windwrench.runtime.errors import InputError
-from windwrench.studies.map_guesses.random_tables import flight, random_table, save
-from windwrench.studies.map_guesses.study import fields_of, judge
 
 
 @pytest.fixture(scope="module")

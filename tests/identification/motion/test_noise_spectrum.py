@@ -17,7 +17,7 @@ from windwrench.identification.motion.noise_spectrum import (
     noise_spectra,
     pose_was_filtered,
 )
-from windwrench.studies.filtered_logs.filters import FILTERS
+from windwrench.studies.trials.logged_poses import FILTERS
 
 VEHICLE = load_vehicle("ardrone2")
 

@@ -25,12 +25,11 @@ from windwrench.identification.logs.log_map import (
     Sensor,
     TimeColumn,
 )
+from windwrench.identification.logs.map_guess import Guess
 from windwrench.identification.logs.rotor_orders import ORDERS
 
 Array = NDArray[np.float64]
-
-TRAJECTORIES = ("excite", "gentle", "circle", "fast", "hover", "yaw")
-VEHICLES = ("ardrone2", "crazyflie", "hummingbird")
+Field = tuple[str, str]  # section and field of a map
 
 _TIMES = ("t", "time", "timestamp", "Time", "timestamp_{u}", "time ({u})", "Time [{u}]")
 _PLACES = ("{a}", "p{a}", "pos_{a}", "position.{a}", "mocap_{a}", "Position {A} [{u}]", "{a}_{u}")
@@ -262,3 +261,80 @@ def save(written: Written, path: Path) -> Path:
     """Write a table's text to a file."""
     path.write_text(written.text, encoding="utf-8")
     return path
+
+
+def fields_of(m: LogMap) -> dict[Field, Any]:
+    """Return what a map's fields mean, each once, however they are written."""
+    out: dict[Field, Any] = {
+        ("time", "column"): m.time.column,
+        ("time", "unit"): m.time.unit,
+    }
+    if m.position is not None:
+        out |= {
+            ("world", ""): m.world,
+            ("body", ""): m.body,
+            ("position", "columns"): m.position.columns,
+            ("position", "unit"): m.position.unit,
+        }
+    if (a := m.attitude) is not None:
+        out["attitude", "sense"] = a.sense
+        if a.euler:
+            out |= {
+                ("attitude", "columns"): a.columns,
+                ("attitude", "euler"): a.euler,
+                ("attitude", "unit"): a.unit,
+                ("attitude", "signs"): a.signs or (1, 1, 1),
+            }
+        else:
+            out["attitude", "order"] = tuple(a.columns[a.order.index(x)] for x in "wxyz")
+    for name in ("rotors", "commands"):
+        part = getattr(m, name)
+        if part is not None:
+            out |= {
+                (name, "columns"): tuple(sorted(part.columns)),
+                (name, "unit"): part.unit,
+                (name, "order"): tuple(part.columns[i - 1] for i in part.order),
+            }
+            if isinstance(part, Rotors):
+                out[name, "pole_pairs"] = part.pole_pairs
+            if isinstance(part, Commands):
+                out[name, "range"] = part.range
+    for name in ("accelerometer", "gyro"):
+        part = getattr(m, name)
+        if part is not None:
+            out |= {
+                (name, "columns"): part.columns,
+                (name, "unit"): part.unit,
+                (name, "body"): part.body or m.body,
+            }
+    if m.battery is not None:
+        out |= {
+            ("battery", "column"): m.battery.columns,
+            ("battery", "unit"): m.battery.unit,
+        }
+    return out
+
+
+def judge(guess: Guess, truth: LogMap) -> tuple[list[Field], list[Field]]:
+    """Return the fields that are wrong and marked as guesses (or whose columns are listed as not
+    used), and those that are wrong and marked as certain.
+    """
+    doubtful = {(r.section, r.field) for r in guess.doubts}
+    found, true = fields_of(guess.log_map), fields_of(truth)
+    flagged: list[Field] = []
+    silent: list[Field] = []
+    motors = {"rotors", "commands"}
+    for key in sorted(set(found) | set(true)):
+        if found.get(key) == true.get(key):
+            continue
+        section = key[0]
+        if key not in found:
+            # a channel that was not found is listed among the columns that are not used
+            other = next((s for s in motors if (s, "unit") in found), "")
+            unsure = section not in motors or (other, "unit") in doubtful
+            (flagged if unsure else silent).append(key)
+        elif key in doubtful or (section in motors and (section, "unit") in doubtful):
+            flagged.append(key)
+        else:
+            silent.append(key)
+    return flagged, silent

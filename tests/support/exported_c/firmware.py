@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.support.exported_c.compiled import missing, run, write
 from windwrench.live.export_c import Exported
 from windwrench.live.export_c.c_numbers import table
-from windwrench.studies.export_c.compiled import missing, run, write
 
 Array = NDArray[np.float64]
 _FOLDER = Path(__file__).parent / "board"

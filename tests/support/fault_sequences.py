@@ -28,6 +28,8 @@ FILTERS = {
     "observer": NonlinearObserver,
 }
 HEIGHT = 1.2  # m
+PERIOD = 0.005  # s, of the long flight
+LONGEST = 60.0  # s, of a fault in it
 FORCE = 0.1  # of the weight, upwards: what the rotors need not carry
 RISE = 1.0  # s, of the default tuning
 
@@ -169,3 +171,30 @@ def outcome(
     truth = np.array([0.0, 0.0, 0.0, 0.0, 0.0, FORCE * VEHICLES[vehicle].weight])
     deviation = np.sqrt(np.diag(estimate.covariance)[12:18])
     return estimate.status, float(np.max(np.abs(wrench - truth) / deviation))
+
+
+def soak(kind: str, steps: int, seed: int) -> dict[str, Any]:
+    """Fly ``steps`` steps of faults of up to a minute and good poses by turns, every step checked;
+    return how often the wrench was right to three of its deviations after each fault.
+    """
+    rng = np.random.default_rng(seed)
+    vehicle = VEHICLES["ardrone2"]
+    flight = Flight(kind, vehicle, PERIOD, 0.999)
+    flight.estimator.reset(flight.position, flight.quaternion)
+    truth = np.array([0.0, 0.0, 0.0, 0.0, 0.0, FORCE * vehicle.weight])
+    done = faults = right = 0
+    while done < steps:
+        samples = int(rng.uniform(0.0, LONGEST) / PERIOD) + 1
+        name = str(rng.choice(KINDS))
+        flight.suffer(name, samples, float(10.0 ** rng.uniform(-3, 3)), int(rng.integers(2**31)))
+        estimate = flight.recover(2.0 * RISE + 0.7)
+        done += samples + round((2.0 * RISE + 0.7) / PERIOD)
+        faults += 1
+        wrench = np.concatenate([estimate.torque, estimate.force])
+        deviation = np.sqrt(np.diag(estimate.covariance)[12:18])
+        right += bool(np.all(np.abs(wrench - truth) < 3.0 * deviation))
+    return {
+        "steps": done,
+        "faults": faults,
+        "right": right,
+    }

@@ -1,1 +1,0 @@
-"""Libraries of reinforcement learning on the fan-tracking task, each by itself."""

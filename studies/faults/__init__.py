@@ -1,1 +1,0 @@
-"""What faults of poses and rotor speeds do to the estimators."""

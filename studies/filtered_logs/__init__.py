@@ -1,1 +1,0 @@
-"""What a diagnosis makes of logs whose pose was filtered before it was written."""

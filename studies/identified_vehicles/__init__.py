@@ -1,1 +1,0 @@
-"""How right identified vehicles are: simulated ones whose truth is known."""

@@ -1,1 +1,0 @@
-"""What gyro and accelerometer are worth beside a slow pose, and whether the filter knows it."""

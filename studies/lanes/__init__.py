@@ -1,1 +1,0 @@
-"""Do environments in lanes have the statistics of those on MuJoCo?"""

@@ -1,1 +1,0 @@
-"""How good the wrench is that ``windwrench estimate`` finds in a log."""

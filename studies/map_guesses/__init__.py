@@ -1,1 +1,0 @@
-"""How often the map that is guessed for a table of unknown columns is right, flagged or wrong."""

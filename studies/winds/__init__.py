@@ -1,1 +1,0 @@
-"""The page of the winds: spectra against theory, and a picture of each wind."""
