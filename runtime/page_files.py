@@ -5,16 +5,32 @@ small picture a figure. The same content gives the same bytes.
 import gzip
 import io
 import json
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .whole_files import replaced
 
 if TYPE_CHECKING:
+    from jinja2 import Template
     from matplotlib.figure import Figure
 
 _DPI = 110
 _COLOURS = 128  # of a picture; lines and their soft edges need no more
+
+
+@cache
+def page_template(package: str, name: str) -> "Template":
+    """Return a package's template of an HTML page: every text is escaped, and a name that the page
+    was not given is an error.
+    """
+    from jinja2 import Environment, StrictUndefined  # most of the kit writes no page
+
+    source = resources.files(package).joinpath(name).read_text(encoding="utf-8")
+    return Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    ).from_string(source)
 
 
 def write_json(data: Any, path: Path, allow_nan: bool = False) -> None:

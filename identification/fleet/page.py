@@ -4,20 +4,16 @@ without it all of the page is there.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ... import __version__
+from ...runtime.page_files import page_template
 from ...runtime.whole_files import replaced
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
-
-if TYPE_CHECKING:
-    from jinja2 import Template
 
 _KINDS = {
     "input": "the log or its vehicle cannot be used",
@@ -44,7 +40,7 @@ def write_page(
     counts = fleet.individuals.values()
     diagnosed = sum(c["diagnosed"] for c in counts)
     refused = sum(c["refused"] for c in counts)
-    parts = _template().generate(
+    parts = page_template(__package__, "page.html.j2").generate(
         headline=headline(fleet),
         logs=diagnosed + refused,
         diagnosed=diagnosed,
@@ -64,16 +60,6 @@ def write_page(
     )
     with replaced(path) as partial, open(partial, "w", encoding="utf-8") as file:
         file.writelines(parts)
-
-
-@cache
-def _template() -> "Template":
-    from jinja2 import Environment, StrictUndefined
-
-    source = resources.files(__package__).joinpath("page.html.j2").read_text(encoding="utf-8")
-    return Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string(source)
 
 
 def changes(fleet: Fleet) -> list[Trend | Appearance]:

@@ -1,7 +1,7 @@
 """The page of a diagnosis's report: one HTML file that needs nothing else.
 
-Its plots are drawings (SVG), which a script of its own and a small library (``uplot/``) replace by
-plots with zoom and cursor where a browser runs scripts. Its policy allows no other script, and
+Its plots are still drawings (SVG). A script and a small library (``uplot/``) replace them by plots
+with zoom and cursor where a browser runs scripts. The page's policy allows no other script, and
 nothing from elsewhere.
 """
 
@@ -12,26 +12,18 @@ import math
 from collections.abc import Iterable
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ... import __version__
+from ...runtime.page_files import page_template
 from ..findings import Diagnosis, NamedEffect, Probabilities
 from .first_screen import next_step, sureness_sentences
-from .interactive import plot_data, scripted
-from .pictures import (
-    Picture,
-    draw_candidates,
-    draw_over_frequency,
-    draw_over_time,
-    draw_signatures,
-    shown_candidates,
-)
-from .tables import (
-    Table,
-    table_of_candidates,
-    tables_of_signatures,
-    tables_over_frequency,
-    tables_over_time,
+from .plot_numbers import (
+    candidate_bars,
+    plot_data,
+    plots_of_signatures,
+    plots_over_frequency,
+    plots_over_time,
 )
 from .words import (
     MISSING,
@@ -52,9 +44,6 @@ from .words import (
     with_std,
 )
 
-if TYPE_CHECKING:
-    from jinja2 import Template
-
 _TONES = {
     "explained": "good",
     "nothing to explain": "good",
@@ -67,17 +56,19 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """Return the page (HTML); ``command`` is what made it. Every text is escaped: names of files
     come from users.
     """
-    shown = shown_candidates(diagnosis)
-    data = plot_data(diagnosis)
+    time, frequency = plots_over_time(diagnosis), plots_over_frequency(diagnosis)
+    signatures, bars = plots_of_signatures(diagnosis), candidate_bars(diagnosis)
+    data = plot_data(diagnosis, time, frequency, signatures)
     library, script = _library(), _file("page.js")
-    return _template().render(
+    table = error_table(diagnosis)
+    return page_template(__package__, "page.html.j2").render(
         headline=headline(diagnosis),
         errors=error_sentences(diagnosis),
         remainder=remainder_sentence(diagnosis),
         sureness=sureness_sentences(diagnosis),
         next_step=next_step(diagnosis),
         policy=_policy((library, script) if data else ()),
-        data=scripted(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
+        data=_in_script(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
         library=library,
         library_style=_file("uplot/uPlot.min.css"),
         script=script,
@@ -90,21 +81,23 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         seconds=duration(diagnosis.seconds),
         cutoff=f"{diagnosis.cutoff_hz:.3g} Hz",
         effects=[_effect(effect, diagnosis.probabilities) for effect in diagnosis.effects],
-        table=error_table(diagnosis),
-        missing=any(MISSING in (row["before"], row["after"]) for row in error_table(diagnosis)),
+        table=table,
+        missing=any(MISSING in (row["before"], row["after"]) for row in table),
         held_out=_held_out(diagnosis),
         held_out_sum=_held_out_sum(diagnosis),
-        over_time=_plots(draw_over_time(diagnosis), tables_over_time(diagnosis)),
-        over_frequency=_plots(draw_over_frequency(diagnosis), tables_over_frequency(diagnosis)),
+        over_time=time,
+        over_frequency=frequency,
         pieces=[
             f"{trace.log}, {trace.t[0]:.1f} to {trace.t[-1]:.1f} s" for trace in diagnosis.traces
         ],
-        signatures=_plots(draw_signatures(diagnosis), tables_of_signatures(diagnosis.signatures)),
-        candidates=_candidates(draw_candidates(diagnosis), table_of_candidates(shown)),
+        signatures=signatures,
+        bars=bars,
         ranking=ranking_sentences(diagnosis),
         floor_is_bound=diagnosis.floor_is_bound,
         more_candidates=[
-            f"{c.name} {percent(c.gain)}" for c in diagnosis.candidates if c not in shown
+            f"{c.name} {percent(c.gain)}"
+            for c in diagnosis.candidates
+            if c.name not in {bar.name for bar in bars}
         ],
         structure=[
             {"where": s.where, "test": s.test, "gain": percent(s.gain)} for s in diagnosis.structure
@@ -118,12 +111,9 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     )
 
 
-def _plots(pictures: list[Picture], tables: list[Table]) -> list[dict[str, Any]]:
-    return [{"picture": p, "table": t} for p, t in zip(pictures, tables, strict=True)]
-
-
-def _candidates(picture: Picture | None, table: Table) -> dict[str, Any] | None:
-    return {"picture": picture, "table": table} if picture else None
+def _in_script(text: str) -> str:
+    """Return JSON as it may stand in a page's script element: no tag can begin in it."""
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 @cache
@@ -146,15 +136,6 @@ def _policy(scripts: Iterable[str]) -> str:
     )
     allowed = " ".join(hashes) or "'none'"
     return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"
-
-
-@cache
-def _template() -> "Template":
-    from jinja2 import Environment, StrictUndefined
-
-    return Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    ).from_string(_file("page.html.j2"))
 
 
 def evidence_words(key: str) -> str:

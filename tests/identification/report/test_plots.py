@@ -18,9 +18,14 @@ from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.identification.findings import CHANNELS, Probabilities
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.first_screen import next_step, sureness_sentences
-from windwrench.identification.report.interactive import plot_data, telling_samples
 from windwrench.identification.report.page import error_table, report_page
-from windwrench.identification.report.tables import tables_over_time
+from windwrench.identification.report.plot_numbers import (
+    plot_data,
+    plots_of_signatures,
+    plots_over_frequency,
+    plots_over_time,
+    telling_samples,
+)
 from windwrench.identification.report.words import rounded
 
 UPLOT = {
@@ -28,6 +33,11 @@ UPLOT = {
     "uPlot.min.css": "df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04",
     "LICENSE": "8f989229699b4fe2f1a0432d0e9edc338a8a911e250e2d1b01ecd770a5f5b1bd",
 }
+
+
+def packed(made):
+    plots = (plots_over_time(made), plots_over_frequency(made), plots_of_signatures(made))
+    return plot_data(made, *plots)
 
 
 def unpacked(series):
@@ -45,7 +55,7 @@ def times(channel, pieces):
 
 def test_a_flight_of_a_minute_is_carried_whole():
     trace = made_trace(effects=("rotor_drag", "wind"))
-    time = plot_data(made_diagnosis(trace))["time"]
+    time = packed(made_diagnosis(trace))["time"]
     assert time["effects"] == ["rotor_drag", "wind"]
     for i, channel in enumerate(time["channels"]):
         factor = {"N": 1.0, "Nm": 1.0, "mN": 1e3, "mNm": 1e3}[channel["unit"]]
@@ -64,7 +74,8 @@ def test_a_spike_of_any_channel_stays():
     before, after = trace.before.copy(), trace.after.copy()
     before[12_345, 0], before[100_001, 4], after[170_000, 2] = 7.0, -8.0, 9.0
     trace = replace(trace, before=before, after=after)
-    channels = plot_data(made_diagnosis(trace))["time"]["channels"]
+    plots = plots_over_time(made_diagnosis(trace))
+    channels = [plot.packed for plot in plots]
     assert unpacked(channels[0]["before"]).max() == pytest.approx(7.0, rel=1e-4)
     assert unpacked(channels[4]["before"]).min() * {"Nm": 1, "mNm": 1e-3}[
         channels[4]["unit"]
@@ -74,11 +85,17 @@ def test_a_spike_of_any_channel_stays():
     assert 12_345 in kept
     assert (kept[0], kept[-1]) == (0, len(trace.t) - 1)
     assert len(kept) <= 4 * 150 + 2
+    # in the still picture, the spike stands by half of the axis above the middle
+    still = plots[0].drawing
+    heights = [float(y) for y in re.findall(r" ([\d.]+)", still.lines[0][1])]
+    middle, half = (still.bottom + still.top) / 2, (still.bottom - still.top) / 2
+    largest = max(9.0, np.abs(before[:, :3]).max(), np.abs(after[:, :3]).max())
+    assert min(heights) == pytest.approx(middle - half * 7.0 / (1.08 * largest), abs=0.2)
 
 
 def test_the_rms_of_any_choice_of_effects_is_exact():
     trace = made_trace(effects=("rotor_drag", "wind", "mass"))
-    channel = plot_data(made_diagnosis(trace))["time"]["channels"][1]
+    channel = packed(made_diagnosis(trace))["time"]["channels"][1]
     for chosen in ((), ("wind",), ("rotor_drag", "mass"), ("rotor_drag", "wind", "mass")):
         weight = np.array([1.0, *(name in chosen for name in trace.parts)])
         rms = np.sqrt(weight @ np.array(channel["products"]) @ weight)
@@ -95,19 +112,20 @@ def test_a_page_of_a_minute_is_below_600_kb(effects, tmp_path):
 
 def test_pieces_of_several_logs_stand_side_by_side():
     traces = [made_trace(20.0, seed=i, log=f"log {i}") for i in range(3)]
-    time = plot_data(made_diagnosis(*traces))["time"]
+    time = packed(made_diagnosis(*traces))["time"]
     assert [p["log"] for p in time["pieces"]] == ["log 0", "log 1", "log 2"]
     x = times(time["channels"][0], time["pieces"])
     assert np.all(np.diff(x) > 0)
     assert x[-1] == pytest.approx(time["end"], abs=1e-3)
     assert len(time["held"]) == 2 * 3
-    (table, *_) = tables_over_time(made_diagnosis(*traces))
-    assert table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
+    (plot, *_) = plots_over_time(made_diagnosis(*traces))
+    assert [text for _, text in plot.drawing.marks] == ["1", "2", "3"]
+    assert plot.table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
 
 
 def test_the_table_behind_a_plot_has_its_numbers():
     trace = made_trace()
-    table = tables_over_time(made_diagnosis(trace))[0]
+    table = plots_over_time(made_diagnosis(trace))[0].table
     assert len(table.rows) == 16
     rows = np.array_split(np.arange(len(trace.t)), 16)[5]
     rms = [rounded(np.sqrt(np.mean(x[rows, 0] ** 2)), 2) for x in (trace.before, trace.after)]
@@ -185,19 +203,32 @@ def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
     for x in silent.values():
         x[:, 3:] = 0.0
     made = made_diagnosis(replace(trace, **silent))
-    drawn = plot_data(made)
+    drawn = packed(made)
     assert [channel["key"] for channel in drawn["time"]["channels"]] == [
         "time-Fx",
         "time-Fy",
         "time-Fz",
     ]
     assert [spectrum["key"] for spectrum in drawn["frequency"]] == ["frequency-force"]
-    assert len(tables_over_time(made)) == 3
     torque = error_table(made)[1]
     assert (torque["before"], torque["after"], torque["floor"]) == ("–", "–", "")
     page = report_page(made, "command")
     assert 'id="plot-time-Fz"' in page
     assert "plot-time-tau_x" not in page
+
+
+@pytest.mark.parametrize("decades", [0.3, 4.0])
+def test_an_axis_of_powers_of_ten_has_plain_numbers(decades):
+    trace = made_trace(80.0)
+    sine = np.tile(np.sin(2.0 * np.pi * trace.t)[:, None], (1, 6))
+    noise = 10.0**-decades * np.random.default_rng(0).standard_normal((len(trace.t), 6))
+    made = made_diagnosis(replace(trace, before=sine + noise, after=noise))
+    for plot in plots_over_frequency(made):
+        assert len(plot.drawing.x_ticks) >= 4
+        assert len(plot.drawing.y_ticks) >= 2
+        for place, text in plot.drawing.y_ticks:
+            assert plot.drawing.top <= place <= plot.drawing.bottom
+            assert re.fullmatch(r"[\d.]+(e−?\d+)?", text)
 
 
 ACT = """
@@ -275,5 +306,5 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
     # every stop of the keyboard has a name, and every plot a table
     assert done["unnamed"] == []
     assert done["plots"] == 6 + 2 + 2
-    assert done["tables"] == 6 + 2 + 2 + 1
+    assert done["tables"] == 6 + 2 + 2
     assert done["first"] < 900  # pixels: the answers fit a telephone's first screen
