@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 
 from . import __version__
 from .commands.checking import check, convert
-from .commands.comparing import benchmark, speed
+from .commands.comparing import benchmark
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
@@ -91,7 +91,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     record,
     replay,
     reproduce,
-    speed,
     effects,
     train,
     imitate,

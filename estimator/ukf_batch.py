@@ -147,7 +147,7 @@ class WrenchUKFBatch:
     call.
 
     Filters of one vehicle without declared effects cost less than half of what a single one does in
-    a compiled loop, others as much (``windwrench speed`` prints it).
+    a compiled loop, others as much (``python -m windwrench.speed`` prints it).
 
     Args:
         vehicles: the declared vehicle of all, or a sequence of ``count``.
