@@ -151,27 +151,3 @@ def test_model_runs_repeat_and_have_the_stated_noise():
     for bad in (np.ones(4), np.ones((0, 4)), np.full((3, 4), np.nan)):
         with pytest.raises(InputError, match="rotor_speeds"):
             simulate_model(VEHICLE, tuning, bad)
-
-
-def test_the_benchmark_solves_the_same_problem_as_its_peer(capsys):
-    pytest.importorskip(
-        "filterpy", reason="filterpy is not installed: pip install 'windwrench[peers]'"
-    )
-    from windwrench.speed import filter_step
-
-    filter_step.main(rounds=1, steps=20, peer_steps=20)
-    assert "filterpy" in capsys.readouterr().out
-    run = simulate_model(
-        VEHICLE,
-        UKFTuning(),
-        np.full((60, 4), VEHICLE.hover_rate),
-        seed=1,
-        **YAWED,
-        covariance=1e-6 * np.eye(18),
-    )
-    ours = WrenchUKF(VEHICLE, UKFTuning())
-    for by_component in (True, False):
-        peer = filter_step.PeerFilter(VEHICLE, UKFTuning(), 0.005, by_component)
-        force, torque = filter_step.agreement(run, ours, peer, 60)
-        assert force < 1e-6
-        assert torque < 1e-7
