@@ -85,12 +85,13 @@ class PeerFilter:
         attitude_error(turned, back, none[:3])
         v, a = x[9:12], rate[:3]
         moved = x[6:9] + dt * (v + 0.5 * dt * a)
-        return np.r_[none[:3], x[3:6] + dt * rate[3:], moved, v + dt * a, x[12:]]
+        return np.concatenate([none[:3], x[3:6] + dt * rate[3:], moved, v + dt * a, x[12:]])
 
     def step(self, rotor_speeds: Array, position: Array, quaternion: Array) -> Array:
         """Predict over one period and take in the pose; return the state (18,)."""
         after, rho, turn = np.empty(4), np.empty(3), np.empty(4)
-        turn_body(self.reference, *self.filter.x[3:6], self.period, after)
+        x, y, z = self.filter.x[3:6]
+        turn_body(self.reference, x, y, z, self.period, after)
         self.filter.predict(rotors=self.vehicle.rotor_wrench(rotor_speeds), back=after)
         attitude_error(quaternion, after, rho)
         self.filter.update(np.r_[rho, position])
