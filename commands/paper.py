@@ -13,7 +13,7 @@ from .terminal import Out, console, results_folder, say, share_bars
 @expensive
 def reproduce(
     figure: Annotated[
-        str, typer.Argument(help="Figure: fig3, fig4, fig5, fig6, fig7, extension or all.")
+        str, typer.Argument(help="Figure: fig3, fig4, fig5, fig6, fig7 or all.")
     ] = "all",
     out: Out = Path("results/reproduction"),
     seeds: Annotated[
@@ -34,7 +34,7 @@ def reproduce(
 
     Example: windwrench reproduce fig6 --out results/reproduction
     """
-    from ..paper import NAMES
+    from ..paper import KEPT, NAMES
     from ..paper.reproduce import chosen, is_done, numbers_of_seeds, write_page
     from ..paper.reproduce import reproduce as run
     from ..runtime.regular_files import read_json
@@ -56,7 +56,7 @@ def reproduce(
 
         fresh = run(names, folder, seeds, jobs, report)
     target = folder / "reproduction.md" if page is None else page
-    write_page(NAMES, folder, target)
+    write_page((*NAMES, *KEPT), folder, target)
     result: dict[str, Any] = {}
     for name in names:
         kept = read_json(folder / f"{name}.json", "a figure's results")

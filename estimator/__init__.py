@@ -7,7 +7,6 @@ from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
 from .fixed_lag import FixedLagSmoother
 from .late_poses import TimedFilter
-from .mass_ukf import WrenchMassUKF
 from .noise_fit import NoiseFit, NoiseFitSettings, fit_noise
 from .observer import NonlinearObserver, ObserverTuning
 from .recovery import Recovery
@@ -32,7 +31,6 @@ __all__ = [
     "WrenchEstimate",
     "WrenchEstimates",
     "WrenchEstimator",
-    "WrenchMassUKF",
     "WrenchUKF",
     "WrenchUKFBatch",
     "fit_noise",

@@ -53,12 +53,12 @@ class TimedFilter:
     Measurements with equal stamps count in the order in which they came.
 
     The cost: a late measurement replays what came after its stamp. The worst, 0.3 s late among
-    rotor speeds at 200 Hz and poses at 100 Hz, takes 0.5 ms with ``WrenchUKF`` and 2 ms with
-    ``WrenchMassUKF`` on one core; one that is 5 ms late takes 0.04 ms, and one of now 5 us.
+    rotor speeds at 200 Hz and poses at 100 Hz, takes 0.5 ms with ``WrenchUKF`` on one core. One
+    that is 5 ms late takes 0.04 ms, and one of now 5 us.
     Snapshots take 0.8 MB.
 
     Args:
-        ukf: a ``WrenchUKF``, ``WrenchEKF``, ``WrenchMassUKF`` or ``ConstantGainFilter``; this
+        ukf: a ``WrenchUKF``, ``WrenchEKF`` or ``ConstantGainFilter``; this
             object's from now on: only read from it.
         horizon: how far in the past a stamp may lie, s. Longer costs memory, and time where
             measurements are that late.

@@ -1,5 +1,4 @@
-"""Fig. 5: the wrench filter against a nonlinear observer, an EKF and a public filter, at low and at
-high noise.
+"""Fig. 5: the wrench filter against a nonlinear observer and an EKF, at low and at high noise.
 
 An external force and torque hit a hovering and a yawing vehicle at 7 s. All estimators take the
 same recorded samples. Three ways of tuning, each the same for filter and observer, so that a ratio
@@ -30,24 +29,18 @@ from .fig5_estimators import (
     ukf_runner,
 )
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
-from .fig5_peer import installed, run_peer
 from .fig5_picture import draw
 from .result import Comparison, Progress, Result
 
-TITLE = (
-    "Fig. 5: force and torque at two noise levels, against a nonlinear observer, an EKF and "
-    "a public filter"
-)
+TITLE = "Fig. 5: force and torque at two noise levels, against a nonlinear observer and an EKF"
 SEEDS = 20
 
-PEER = "drone-estimators"
 # what is compared with what: a label, the estimator and its rival
 PAIRS = (
     ("observer / UKF, both tuned at low noise", "observer low", "UKF low"),
     ("observer / UKF, both re-tuned to the noise", "observer anew", "UKF anew"),
     ("observer / UKF, both set to 1 s", "observer 1 s", "UKF 1 s"),
     ("EKF / UKF, both set to 1 s", "EKF 1 s", "UKF 1 s"),
-    ("drone-estimators / UKF, both set to 1 s", PEER, "UKF 1 s"),
     ("observer re-tuned / UKF set to 1 s", "observer anew", "UKF 1 s"),
     ("UKF re-tuned / UKF set to 1 s", "UKF anew", "UKF 1 s"),
 )
@@ -64,14 +57,13 @@ def run(seeds: int, progress: Progress) -> Result:
     return compare(seeds, progress)
 
 
-def compare(seeds: int, progress: Progress, evaluations: int = 120, peer: bool = True) -> Result:
+def compare(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     """Run every estimator over the same flights.
 
     Args:
         seeds: flights of each kind.
         progress: told the share of the work that is done.
         evaluations: of the cost for each tuning; 0 leaves "low" and "anew" at their starts.
-        peer: whether to run ``drone-estimators`` where it is installed, and to take times.
     """
     flights: dict[tuple[str, str, str], list[Flight]] = {}
     tunings: dict[tuple[str, str], tuple[UKFTuning, ObserverTuning]] = {}
@@ -94,14 +86,6 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120, peer: bool =
             scores[plant, flight, noise, name] = _rows(states, flown)
             if plant == "exact" and flight == "hover":
                 examples[noise, name] = states[0]
-    progress(0.65)
-    status, times = "not run", {}
-    if peer:
-        try:
-            times = _score_peer(flights, scores)
-            status = "installed" if installed() else "not installed"
-        except RuntimeError as error:
-            status = f"failed: {error}"
     progress(0.98)
     ratios = _ratios(scores)
     picture = draw(
@@ -112,15 +96,11 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120, peer: bool =
         seeds,
     )
     return Result(
-        figures=_figures(scores, ratios, tunings, seeds, status),
+        figures=_figures(scores, ratios, tunings, seeds),
         data=_columns(scores),
         picture=picture,
-        comparison=_comparison(scores, ratios, status),
-        remarks=_remarks(ratios, status, seeds),
-        timing=[
-            Comparison(f"time of a step of {name} from Python, one run (us)", "-", f"{value:.3g}")
-            for name, value in times.items()
-        ],
+        comparison=_comparison(scores, ratios),
+        remarks=_remarks(ratios, seeds),
     )
 
 
@@ -154,22 +134,6 @@ def _rows(states: Sequence[Array], flights: Sequence[Flight]) -> Array:
     return np.array([[row[name] for name in (*ERRORS, "nis")] for row in scored])
 
 
-def _score_peer(
-    flights: Mapping[tuple[str, str, str], Sequence[Flight]], scores: Scores
-) -> dict[str, float]:
-    """Add the peer's scores, if it is installed; return the times of a step in us."""
-    samples, keys = {}, {}
-    for noise in NOISES:
-        keys[noise] = [key for key in flights if key[2] == noise]
-        samples[noise] = np.stack([f.samples for key in keys[noise] for f in flights[key]])
-    states, times = run_peer(samples)
-    for noise, all_states in states.items():
-        parts = np.split(all_states, len(keys[noise]))
-        for (plant, flight, _), part in zip(keys[noise], parts, strict=True):
-            scores[plant, flight, noise, PEER] = _rows(list(part), flights[plant, flight, noise])
-    return times
-
-
 def ratio(rows: Array, rival: Array) -> tuple[float, float, float]:
     """Return the ratio of two mean errors (seeds,) of the same flights, and its 95 % interval by a
     paired bootstrap.
@@ -187,10 +151,9 @@ def _ratios(scores: Scores) -> Ratios:
     out: Ratios = {}
     for plant, flight, noise in dict.fromkeys(key[:3] for key in scores):
         for label, one, other in PAIRS:
-            if (plant, flight, noise, one) in scores:
-                a, b = scores[plant, flight, noise, one], scores[plant, flight, noise, other]
-                for i, error in enumerate(ERRORS):
-                    out[plant, flight, noise, label, error] = ratio(a[:, i], b[:, i])
+            a, b = scores[plant, flight, noise, one], scores[plant, flight, noise, other]
+            for i, error in enumerate(ERRORS):
+                out[plant, flight, noise, label, error] = ratio(a[:, i], b[:, i])
     return out
 
 
@@ -203,11 +166,9 @@ def _figures(
     ratios: Ratios,
     tunings: Mapping[tuple[str, str], tuple[UKFTuning, ObserverTuning]],
     seeds: int,
-    status: str,
 ) -> dict[str, Any]:
     return {
         "seeds": seeds,
-        "drone_estimators": status.split(":")[0],
         "rmse_ratio": [
             {
                 "plant": plant,
@@ -259,36 +220,32 @@ def _columns(scores: Scores) -> dict[str, Any]:
     return columns
 
 
-def _comparison(scores: Scores, ratios: Ratios, status: str) -> list[Comparison]:
+def _comparison(scores: Scores, ratios: Ratios) -> list[Comparison]:
     table = []
-    for label, one, _ in PAIRS:
+    for label, _, _ in PAIRS:
         for noise in NOISES:
             for flight in FLIGHTS:
                 paper = _PAPER.get(label, "-") if noise == "high" and flight == "hover" else "-"
                 quantity = f"RMSE ratio {label}: {noise} noise, {flight}, standard plant"
-                here = f"not compared ({status})"
-                if ("disturbed", flight, noise, one) in scores:
-                    some = [ratios["disturbed", flight, noise, label, error] for error in ERRORS]
-                    words = [f"{v:.2f} [{a:.2f}, {b:.2f}]" for v, a, b in some]
-                    here = (
-                        f"force {words[0]} transient, {words[1]} steady; torque {words[2]} "
-                        f"transient, "
-                        f"{words[3]} steady"
-                    )
+                some = [ratios["disturbed", flight, noise, label, error] for error in ERRORS]
+                words = [f"{v:.2f} [{a:.2f}, {b:.2f}]" for v, a, b in some]
+                here = (
+                    f"force {words[0]} transient, {words[1]} steady; torque {words[2]} transient, "
+                    f"{words[3]} steady"
+                )
                 table.append(Comparison(quantity, paper, here))
-    for name in ("UKF 1 s", "EKF 1 s", "UKF anew", PEER):
+    for name in ("UKF 1 s", "EKF 1 s", "UKF anew"):
         values = [
             f"{plant} plant, {noise} noise "
             f"{np.mean([scores[plant, f, noise, name][:, 4] for f in FLIGHTS]):.2f}"
             for plant in PLANTS
             for noise in NOISES
-            if (plant, "hover", noise, name) in scores
         ]
         table.append(
             Comparison(
                 f"mean NIS of {name} in steady state (a pose has 6 numbers)",
                 "-",
-                "; ".join(values) or f"not compared ({status})",
+                "; ".join(values),
             )
         )
     return table
@@ -306,11 +263,11 @@ def _span(
     return f"{min(values):.2f} to {max(values):.2f}" if values else "nothing"
 
 
-def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
+def _remarks(ratios: Ratios, seeds: int) -> list[str]:
     transient, steady = ("force_transient", "torque_transient"), ("force_steady", "torque_steady")
-    low, anew, second, ekf, public, mixed, gain = (label for label, _, _ in PAIRS)
+    low, anew, second, ekf, mixed, gain = (label for label, _, _ in PAIRS)
     close = max(v[0] for key, v in ratios.items() if key[3] == anew) < 1.3
-    remarks = [
+    return [
         f"RMSE ratios below 1 favour the one that is named first. Each is over {seeds} seeds, with "
         f"a paired bootstrap interval "
         "of 95 %. Truth is all of the external wrench, unmodelled disturbance included; transient: "
@@ -360,19 +317,3 @@ def _remarks(ratios: Ratios, status: str, seeds: int) -> list[str]:
         "flights were steered by the "
         "1 s filter, the same samples for all.",
     ]
-    if status == "installed":
-        remarks.append(
-            "drone-estimators 0.1 (force and torque states, quaternion as a plain vector, Euler "
-            "steps) with this vehicle's "
-            f"model and the same noises comes to "
-            f"{_span(ratios, public, 'low', (*transient, *steady))} at low and "
-            f"{_span(ratios, public, 'high', (*transient, *steady))} at high noise: as accurate. "
-            "Two things were adapted for it. The measured quaternion's sign is chosen to fit its "
-            "estimate, since its innovation is a plain difference. And crazyflow's model, which "
-            "fails with one command for many sigma points, is given one for each."
-        )
-    else:
-        remarks.append(
-            f"drone-estimators was not compared: {status}. It comes with the extra ``compare``."
-        )
-    return remarks

@@ -13,7 +13,7 @@ _TASKS = ("WindHover", "WindTrajectory", "FanTracking2D")
 
 def reproduction(kept: Kept) -> str:
     """Return the page of the paper's figures."""
-    from windwrench.paper import NAMES
+    from windwrench.paper import KEPT, NAMES
     from windwrench.paper.reproduce import write_page
 
     with tempfile.TemporaryDirectory() as above:
@@ -22,7 +22,7 @@ def reproduction(kept: Kept) -> str:
         for path in (DOCS / "reproduction").glob("*.json"):
             shutil.copy(path, folder)
         page = folder.with_suffix(".md")
-        write_page(NAMES, folder, page)
+        write_page((*NAMES, *KEPT), folder, page)
         return page.read_text(encoding="utf-8")
 
 

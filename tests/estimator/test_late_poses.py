@@ -11,7 +11,6 @@ from windwrench.estimator import (
     ConstantGainFilter,
     TimedFilter,
     WrenchEKF,
-    WrenchMassUKF,
     WrenchUKF,
 )
 
@@ -26,7 +25,7 @@ VEHICLES = {
     "crazyflie with drag": load_vehicle("crazyflie").with_effects(DRAG, LAG),
     "hummingbird, seen at a marker": load_vehicle("hummingbird").with_effects(MARKER, LAG),
 }
-FILTERS = (WrenchUKF, WrenchEKF, WrenchMassUKF, ConstantGainFilter)
+FILTERS = (WrenchUKF, WrenchEKF, ConstantGainFilter)
 
 
 def fly(vehicle, steps, seed):
@@ -123,9 +122,7 @@ STAMPS = st.lists(
 @given(drawn=STAMPS, kind=st.sampled_from(FILTERS), gate=st.sampled_from((None, 0.999)))
 def test_whatever_is_late_comes_out_as_if_it_had_not_been(name, drawn, kind, gate):
     vehicle, flight = VEHICLES[name], FLIGHTS[name]
-    # a pose that is off may take the mass below zero; that is not what is tried here
-    parts = [3 if part == 4 and kind is WrenchMassUKF else part for _, part, _ in drawn]
-    measurements = poses(flight, [t for t, _, _ in drawn], parts)
+    measurements = poses(flight, [t for t, _, _ in drawn], [part for _, part, _ in drawn])
     timed = TimedFilter(make(kind, vehicle, gate), horizon=0.6)
     stream(timed, flight, measurements, [delay for _, _, delay in drawn])
     assert timed.too_late == 0

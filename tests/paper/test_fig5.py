@@ -5,17 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from windwrench.estimator import UKFTuning
 from windwrench.paper import fig5
-from windwrench.paper.fig5_estimators import ukf_runner
-from windwrench.paper.fig5_flights import FLIGHTS, NOISES, PLANTS, TICK, fly, vehicle_at
-from windwrench.paper.fig5_peer import installed, run_peer
+from windwrench.paper.fig5_flights import FLIGHTS, NOISES, PLANTS, TICK, fly
 
 
 @pytest.fixture(scope="module")
 def result():
     shares = []
-    outcome = fig5.compare(2, shares.append, evaluations=5, peer=False)
+    outcome = fig5.compare(2, shares.append, evaluations=5)
     assert shares == sorted(shares)
     assert 0 < shares[0] <= shares[-1] <= 1
     return outcome
@@ -61,14 +58,6 @@ def test_every_figure_is_finite_and_all_columns_are_of_one_length(result):
     np.testing.assert_allclose(filters, 6.0, atol=0.5)
 
 
-def test_without_the_public_filter_its_rows_say_so(result):
-    rows = [
-        row for row in result.comparison if row.quantity.startswith("RMSE ratio drone-estimators")
-    ]
-    assert len(rows) == len(NOISES) * len(FLIGHTS)
-    assert all(row.here == "not compared (not run)" for row in rows)
-
-
 def test_the_wrench_sets_in_at_seven_seconds_and_the_same_seed_gives_the_same_flight():
     one, again = fly("yawing", "high", "exact", [3])[0], fly("yawing", "high", "exact", [3])[0]
     np.testing.assert_array_equal(one.samples, again.samples)
@@ -83,17 +72,3 @@ def test_the_wrench_sets_in_at_seven_seconds_and_the_same_seed_gives_the_same_fl
 def test_a_ratio_of_paired_errors_has_a_tight_interval_where_the_errors_go_together():
     hard = np.linspace(1.0, 5.0, 20)
     assert fig5.ratio(2.0 * hard, hard) == pytest.approx((2.0, 2.0, 2.0))
-
-
-@pytest.mark.skipif(
-    not installed(), reason="drone-estimators is not installed: pip install 'windwrench[compare]'"
-)
-def test_the_public_filter_agrees_with_ours_on_the_same_model():
-    flight = fly("yawing", "low", "exact", [0])[0]
-    samples = flight.samples[1200:1600]  # with the step in the middle
-    states, times = run_peer({"low": samples[None]}, timed=False)
-    vehicle = vehicle_at("low")
-    ours = ukf_runner(vehicle, UKFTuning.for_vehicle(vehicle, TICK))(samples)
-    assert times == {}
-    np.testing.assert_allclose(states["low"][0, 100:, 16:19], ours[100:, 16:19], atol=0.03)
-    np.testing.assert_allclose(states["low"][0, 100:, 13:16], ours[100:, 13:16], atol=0.003)

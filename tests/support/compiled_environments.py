@@ -5,7 +5,7 @@ import numpy as np
 
 import windwrench  # noqa: F401  registers the environments
 from windwrench.dynamics import load_vehicle
-from windwrench.estimator import NonlinearObserver, WrenchEKF, WrenchMassUKF, ukf_lanes
+from windwrench.estimator import NonlinearObserver, WrenchEKF, ukf_lanes
 
 
 def compile_environments():
@@ -17,7 +17,7 @@ def compile_environments():
     """
     ukf_lanes.step_address()
     pose = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    for kind in (NonlinearObserver, WrenchEKF, WrenchMassUKF):
+    for kind in (NonlinearObserver, WrenchEKF):
         estimator = kind(load_vehicle("ardrone2"))
         estimator.reset(*pose)
         estimator.step(np.full(4, 300.0), *pose)

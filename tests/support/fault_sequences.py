@@ -12,7 +12,6 @@ from windwrench.estimator import (
     NonlinearObserver,
     WrenchEKF,
     WrenchEstimate,
-    WrenchMassUKF,
     WrenchUKF,
 )
 
@@ -23,7 +22,6 @@ VEHICLES = {name: load_vehicle(name) for name in ("ardrone2", "crazyflie")}
 FILTERS = {
     "ukf": WrenchUKF,
     "ekf": WrenchEKF,
-    "mass": WrenchMassUKF,
     "constant gain": ConstantGainFilter,
     "observer": NonlinearObserver,
 }
