@@ -77,7 +77,7 @@ def test_nor_do_thousands_of_sequences(kind, vehicle, dt, gate, faults, turn):
 
 
 @pytest.mark.parametrize("gate", [None, 0.999])
-@pytest.mark.parametrize("kind", ["ukf", "ekf", "constant gain", "observer", "mass"])
+@pytest.mark.parametrize("kind", ["ukf", "ekf", "constant gain", "observer"])
 @pytest.mark.parametrize(
     "fault",
     [
@@ -105,7 +105,7 @@ def test_a_start_that_is_far_off_is_recovered_from(kind, turn, gate):
     live_through(kind, "crazyflie", 0.01, gate, [], turn)
 
 
-@pytest.mark.parametrize("kind", ["ukf", "ekf", "constant gain", "mass"])
+@pytest.mark.parametrize("kind", ["ukf", "ekf", "constant gain"])
 @pytest.mark.parametrize(
     "fault",
     [
