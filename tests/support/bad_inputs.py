@@ -27,7 +27,7 @@ MAP = {
 }
 
 
-def table(changes: Mapping[tuple[int, str], str] = {}, rows: int = 60, left_out: str = "") -> str:  # noqa: B006
+def table(changes: Mapping[tuple[int, str], str] = {}, rows: int = 60, left_out: str = "") -> str:
     """Return a hover at 100 Hz as CSV, with some cells changed and one column left out."""
     names = [name for name in COLUMNS if name != left_out]
     hover = dict.fromkeys(COLUMNS, "0") | {"pz": "1", "qw": "1"}
