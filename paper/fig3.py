@@ -23,7 +23,7 @@ from ..envs.plant import PlantSettings
 from ..envs.suspended_load import SuspendedLoad
 from ..runtime.errors import InputError
 from .hanging_mass import CALM, CENTRE_LOAD, FORCE, ROTOR_LOAD, TORQUE, hover
-from .result import Comparison, Progress, Result
+from .result import Comparison, Progress, Result, remarks
 
 TITLE = "Fig. 3: calibration with a known mass"
 SEEDS = 2
@@ -219,31 +219,17 @@ def _remarks(clusters: Sequence[Cluster], spread: dict[str, Array], added: Array
     off = np.array([cluster.mean for cluster in clusters]) - TARGETS
     plain, rest = np.abs(off).max(axis=0), np.abs(off - added).max(axis=0)
     alone = {
-        name: spread[f"{name} alone"]
+        name: 1e3 * spread[f"{name} alone"]
         for name in ("sensor noise", "8-bit rotor speeds", "actuator noise")
     }
-    told = "; ".join(
-        f"{name} alone {std[0] * 1e3:.1f} mN and {std[1] * 1e3:.2f} mNm"
-        for name, std in alone.items()
+    return remarks(
+        "fig3",
+        alone=alone,
+        most=[max(alone, key=lambda name, axis=axis: float(alone[name][axis])) for axis in (0, 1)],  # type: ignore[misc]
+        calm=1e3 * spread["without actuator noise"],
+        plain=1e3 * plain,
+        rest=1e3 * rest,
     )
-    most = [max(alone, key=lambda name, axis=axis: float(alone[name][axis])) for axis in (0, 1)]  # type: ignore[misc]
-    calm = spread["without actuator noise"]
-    return [
-        f"What limits the spread: {told}. The largest part is {most[0]} for the force and "
-        f"{most[1]} for the torque. "
-        "Actuator noise is a real wrench that nobody modelled (0.03 N, 0.01 Nm, 0.3 s): the filter "
-        "is right to follow "
-        f"it, so that part measures the vehicle rather than the filter. Without it "
-        f"{calm[0] * 1e3:.1f} mN and "
-        f"{calm[1] * 1e3:.2f} mNm are left. It does not average out over the flights either. The "
-        f"means are off their targets by up to {plain[0] * 1e3:.1f} mN and {plain[1] * 1e3:.2f} "
-        "mNm. Where the mean of the actuator noise that acted is added to the target, they are off "
-        f"by up to {rest[0] * 1e3:.1f} mN and {rest[1] * 1e3:.2f} mNm.",
-        "The pair of rotors is a choice: here the mass hangs under rotors 1 and 4 (front), 0.129 m "
-        "ahead of the centre, the "
-        "arm that the targets imply. The torque is the one about the vehicle's level left axis, "
-        "nose down positive.",
-    ]
 
 
 def _draw(estimates: Array, clusters: Sequence[Cluster], spread: dict[str, Array]) -> Figure:

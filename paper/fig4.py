@@ -21,7 +21,7 @@ from ..dynamics.vehicle_file import load_vehicle
 from ..envs.plant import PlantSettings
 from .fig4_picture import Step, draw
 from .hanging_mass import CALM, ROTOR_LOAD, THREAD, hover, with_noise
-from .result import Comparison, Progress, Result
+from .result import Comparison, Progress, Result, remarks
 
 TITLE = "Fig. 4: step response to a known mass"
 SEEDS = 6
@@ -264,56 +264,21 @@ def _remarks(rows: Sequence[dict[str, Any]]) -> list[str]:
         for row in rows
         if row["lateral_N"] + 2 * (row["lateral_error_N"] or 0.0) > _LATERAL_BOUND
     ]
-    listed = "; ".join(
-        f"{row['lateral_N']:.3f} (standard error {row['lateral_error_N'] or 0.0:.3f}) N tuned to "
-        f"{row['tuned_rise_s']:g} s at {_name(row)} "
-        f"{'with' if row['actuator_noise'] else 'without'} actuator noise"
-        for row in over
-    )
-    remarks = [
-        f"How the mass is hung on: at 7 s, all at once, at rest on a taut thread of {THREAD:g} m "
-        f"below the front rotors' axis. "
-        "The lateral force is the size of the level part of the estimate, in the mean of the "
-        "flights. From each flight that of the same noise without the mass is subtracted. Its "
-        f"transient is its largest value in the {_TRANSIENT:g} s after. Without that subtraction "
-        f"it reached {max(row['unpaired_lateral_N'] for row in rows):.3f} N, noise included.",
-        "Part of it is real. The mass tips the vehicle until the flight loop has trimmed, the "
-        "vehicle drifts from above the mass, and the thread pulls sideways by up to "
-        f"{max(row['true_lateral_N'] for row in rows):.2f} N in the mean of "
-        "the flights. The filter is right to show that, smoothed by its rise time. Beyond that "
-        "true pull the lateral estimate never had more than "
-        f"{max(row['made_up_lateral_N'] for row in rows):.3f} N. The flights use stiffer attitude "
-        f"and yaw loops than the "
-        "benchmark's. On a thread of 0.25 m, which oscillates with a "
-        "period of 1 s as the position loop does, the "
-        "pull reached 0.24 N and the "
-        "estimate tuned to 0.5 s at the higher noise about 0.1 N.",
-        "Lateral transients not clearly below "
-        f"{_LATERAL_BOUND:g} N (value plus two standard errors, every tuning): {listed or 'none'}. "
-        f"The largest is "
-        f"{lateral['lateral_N']:.3f} (standard error {lateral['lateral_error_N'] or 0.0:.3f}) N. "
-        f"Single flights are noisier: "
-        f"in one the lateral estimate reached {worst['worst_flight_lateral_N']:.2f} N (tuned to "
-        f"{worst['tuned_rise_s']:g} s, "
-        f"{_name(worst)}), where without the mass noise alone makes "
-        f"{worst['worst_flight_lateral_without_mass_N']:.2f} N.",
-    ]
-    pair = {
+    quiet = {
         (row["tuned_rise_s"], row["position_noise_m"]): row
         for row in rows
         if not row["actuator_noise"]
     }
-    clean, noisy = (pair.get((_RISE, noise[0])) for noise in NOISES)
-    if clean is not None and noisy is not None:
-        remarks.append(
-            "Choosing a tuning: with the unmodelled actuator noise of the standard plant (0.03 N, "
-            "0.01 Nm, 0.3 s) the spread "
-            "hardly depends on the motion capture and falls slowly with the rise time, because the "
-            "filter follows a real "
-            "wrench. Without actuator noise it falls about in inverse proportion to the rise time: "
-            f"{clean['force_std_N'] * 1e3:.1f} mN and {clean['torque_std_Nm'] * 1e3:.2f} mNm at 1 "
-            f"s, and ten times the sensor "
-            f"noise makes {noisy['force_std_N'] * 1e3:.1f} mN and "
-            f"{noisy['torque_std_Nm'] * 1e3:.2f} mNm of it."
-        )
-    return remarks
+    return remarks(
+        "fig4",
+        rows=rows,
+        name=_name,
+        worst=worst,
+        lateral=lateral,
+        over=over,
+        thread=THREAD,
+        transient=_TRANSIENT,
+        bound=_LATERAL_BOUND,
+        clean=quiet.get((_RISE, NOISES[0][0])),
+        noisy=quiet.get((_RISE, NOISES[1][0])),
+    )

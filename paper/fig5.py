@@ -30,7 +30,7 @@ from .fig5_estimators import (
 )
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
-from .result import Comparison, Progress, Result
+from .result import Comparison, Progress, Result, remarks
 
 TITLE = "Fig. 5: force and torque at two noise levels, against a nonlinear observer and an EKF"
 SEEDS = 20
@@ -251,69 +251,29 @@ def _comparison(scores: Scores, ratios: Ratios) -> list[Comparison]:
     return table
 
 
-def _span(
-    ratios: Ratios, label: str, noise: str, errors: Sequence[str], plant: str | None = None
-) -> str:
-    """Return the range of the ratios of a pair over plants and flights."""
-    values = [
-        v[0]
-        for (p, _, n, name, error), v in ratios.items()
-        if name == label and n == noise and error in errors and plant in (None, p)
-    ]
-    return f"{min(values):.2f} to {max(values):.2f}" if values else "nothing"
-
-
 def _remarks(ratios: Ratios, seeds: int) -> list[str]:
-    transient, steady = ("force_transient", "torque_transient"), ("force_steady", "torque_steady")
     low, anew, second, ekf, mixed, gain = (label for label, _, _ in PAIRS)
-    close = max(v[0] for key, v in ratios.items() if key[3] == anew) < 1.3
-    return [
-        f"RMSE ratios below 1 favour the one that is named first. Each is over {seeds} seeds, with "
-        f"a paired bootstrap interval "
-        "of 95 %. Truth is all of the external wrench, unmodelled disturbance included; transient: "
-        "7 to 9.5 s, steady: from "
-        "11 s. The standard plant has an unmodelled actuator disturbance (0.03 N, 0.01 Nm, over "
-        "0.3 s); the exact one has none. Both have motor lag (with the true rate logged) and 8-bit "
-        "rotor speeds.",
-        "The paper's comparison, an observer tuned for low noise and then given the high: the "
-        "steady-state error is "
-        f"{_span(ratios, low, 'high', steady, 'exact')} times that of the filter on the exact "
-        f"plant and "
-        f"{_span(ratios, low, 'high', steady, 'disturbed')} times on the standard one; the filter "
-        f"is only told of the new "
-        "measurement noise.",
-        f"Re-tuned to the noise, the observer {'comes close' if close else 'comes closer'}: at low "
-        f"noise "
-        f"{_span(ratios, anew, 'low', transient)} (transient) and "
-        f"{_span(ratios, anew, 'low', steady)} (steady) times the "
-        f"error of a filter that was tuned in the same way, at high noise "
-        f"{_span(ratios, anew, 'high', transient)} and "
-        f"{_span(ratios, anew, 'high', steady)}. Most of what separates them in the paper's "
-        f"comparison is tuning: the "
-        "filter's advantage is that one number, the measurement noise, carries it from one noise "
-        "level to the other.",
-        f"A re-tuned observer against the filter as the paper tunes it (1 s): "
-        f"{_span(ratios, mixed, 'low', transient)} "
-        f"(transient) and {_span(ratios, mixed, 'low', steady)} (steady) at low noise, "
-        f"{_span(ratios, mixed, 'high', transient)} and {_span(ratios, mixed, 'high', steady)} at "
-        f"high noise; the "
-        f"re-tuned filter against the same: {_span(ratios, gain, 'low', transient)}, "
-        f"{_span(ratios, gain, 'low', steady)}, "
-        f"{_span(ratios, gain, 'high', transient)} and {_span(ratios, gain, 'high', steady)}. "
-        "Both re-tuned ones rise faster and pay for it in steady state where nothing but the noise "
-        "moves. Both set to 1 s, "
-        f"the observer errs {_span(ratios, second, 'low', steady)} times as much in steady state "
-        f"at low noise and "
-        f"{_span(ratios, second, 'high', steady)} times at high noise.",
-        f"An EKF on the same model is as good: {_span(ratios, ekf, 'low', (*transient, *steady))} "
-        f"at low and "
-        f"{_span(ratios, ekf, 'high', (*transient, *steady))} at high noise. The unscented "
-        f"transform gains nothing here.",
-        "The optimiser (Nelder and Mead over logarithms) had flights of its own for each plant and "
-        "noise level and minimised "
-        "the sum of all four errors, force as a share of 0.52 N and torque of 0.067 Nm. So it "
-        "knows size and time scale of the steps, and both re-tuned estimators are better than "
-        "one can tune without that. The "
-        "flights were steered by the "
-        "1 s filter, the same samples for all.",
-    ]
+
+    def span(label: str, noise: str, errors: Sequence[str], plant: str | None = None) -> str:
+        """Return the range of the ratios of a pair over plants and flights."""
+        values = [
+            v[0]
+            for (p, _, n, name, error), v in ratios.items()
+            if name == label and n == noise and error in errors and plant in (None, p)
+        ]
+        return f"{min(values):.2f} to {max(values):.2f}"
+
+    return remarks(
+        "fig5",
+        seeds=seeds,
+        span=span,
+        low=low,
+        anew=anew,
+        second=second,
+        ekf=ekf,
+        mixed=mixed,
+        gain=gain,
+        transient=("force_transient", "torque_transient"),
+        steady=("force_steady", "torque_steady"),
+        close=max(v[0] for key, v in ratios.items() if key[3] == anew) < 1.3,
+    )

@@ -20,7 +20,7 @@ from ..envs.plant import NOISE, TICK
 from ..runtime.errors import InputError
 from .calm_jet import calm_jet, strongest_torque
 from .fig6_picture import draw_map
-from .result import Comparison, Progress, Result
+from .result import Comparison, Progress, Result, remarks
 
 TITLE = "The force and torque map of a fan's jet (Fig. 6)"
 SEEDS = 8
@@ -259,33 +259,17 @@ def run(seeds: int, progress: Progress) -> Result:
                 f"{figures['correlation_torque_z']:.4f}",
             ),
         ],
-        remarks=[
-            "Where the torque is largest is a choice, not a result: it follows from the fan's "
-            f"radius, which was chosen as {fan.radius:g} m to put it near the paper's 0.5 m. A fan "
-            f"of {', '.join(f'{r:g}' for r in peaks)} m has it at "
-            f"{', '.join(f'{offset:.2f}' for offset in peaks.values())} m off the axis of its mean "
-            "jet. What this figure tests is the map: whether the estimate shows the torque where "
-            "and as strong as it is.",
-            f"Each of {seeds} flights hovers {HOVER:g} s at {len(points)} points, at most 0.5 m "
-            f"apart, after {TRANSIT:g} s on "
-            f"the way and {SETTLE:g} s to settle; the vehicle faces the fan. The position loop's "
-            f"integral holds it against "
-            f"the jet to {figures['hover_offset_rms_m']:.3f} m.",
-            "The truth is the plant's whole external wrench. It has two parts: the jet with its "
-            "gusts on the tilting, drifting vehicle, and the unmodelled actuator disturbance (0.03 "
-            "N and 0.01 Nm over 0.3 s). The filter cannot tell the second from wind. "
-            f"Against the jet's part alone the correlation is "
-            f"{figures['correlation_force_x_with_jet_alone']:.3f} for f_x and "
-            f"{figures['correlation_torque_z_with_jet_alone']:.3f} for tau_z. That is the error of "
-            "the map as a map of the fan. Most of it is that disturbance, averaged over only 5 s.",
-            f"The jet counts as present where its mean force exceeds {JET_FORCE:g} N: "
-            f"{int(inside.sum())} of the "
-            f"{len(points)} points. Correlations are over the 5 s means of every point and flight; "
-            f"over the single samples, "
-            f"which the filter's rise time of 1 s smooths, they are "
-            f"{figures['correlation_force_x_200hz']:.3f} and "
-            f"{figures['correlation_torque_z_200hz']:.3f}.",
-        ],
+        remarks=remarks(
+            "fig6",
+            f=figures,
+            radius=fan.radius,
+            peaks=peaks,
+            hover=HOVER,
+            points=len(points),
+            transit=TRANSIT,
+            settle=SETTLE,
+            jet_force=JET_FORCE,
+        ),
     )
 
 

@@ -25,7 +25,7 @@ from ..evaluation.episodes import DECISIONS, Episode, fly_episode
 from ..runtime.errors import InputError
 from .calm_jet import strongest_torque
 from .fig7_picture import draw_tracking
-from .result import Comparison, Progress, Result
+from .result import Comparison, Progress, Result, remarks
 
 TITLE = "Staying in the jet of a moving fan by its torque (Fig. 7)"
 SEEDS = 10
@@ -389,69 +389,32 @@ def _share(row: Fastest) -> str:
 def _remarks(
     seeds: int, largest: float, at: float, fastest: list[Fastest], alone: dict[str, list[float]]
 ) -> list[str]:
-    step = (BRACKET[1] - BRACKET[0]) / 2**HALVINGS
-
-    def shares(name: str) -> str:
-        return "; ".join(
-            ", ".join(
-                f"{getattr(f, name) / f.bound:.0%}" for f in fastest if f.rise_time == rise_time
-            )
-            + f" (rise time {rise_time:g} s)"
+    return remarks(
+        "fig7",
+        seeds=seeds,
+        largest=largest,
+        at=at,
+        fastest=fastest,
+        alone={noise: (float(np.mean(found)), *interval(found)) for noise, found in alone.items()},
+        best=[
+            max((f for f in fastest if f.rise_time == rise_time), key=lambda f: f.held)
             for rise_time in RISE_TIMES
-        )
-
-    held = "; ".join(
-        ", ".join(_share(f) for f in fastest if f.rise_time == rise_time)
-        + f" (rise time {rise_time:g} s)"
-        for rise_time in RISE_TIMES
+        ],
+        scatter=max(np.ptp(f.searches) / f.bound for f in fastest),
+        held=_share,
+        calm=lambda f: f"{f.calm / f.bound:.0%}",
+        sudden=lambda f: f"{f.sudden / f.bound:.0%}",
+        step=(BRACKET[1] - BRACKET[0]) / 2**HALVINGS,
+        distance=DISTANCE,
+        command=MAX_COMMAND,
+        offset=HELD_OFFSET,
+        share=HELD_SHARE,
+        start=START,
+        repeats=REPEATS,
+        gains=GAINS,
+        rise_times=RISE_TIMES,
+        noise_gain=NOISE_GAIN,
     )
-    best = "; ".join(
-        f"gain {f.gain:g} with {f.held:.2f} m/s (rise time {rise_time:g} s)"
-        for rise_time in RISE_TIMES
-        for f in [max((f for f in fastest if f.rise_time == rise_time), key=lambda f: f.held)]
-    )
-    return [
-        f"The bound: the jet's torque is largest {at:.2f} m off the axis, {largest:.4f} Nm at "
-        f"{DISTANCE:g} m, so a command "
-        f"k tau_z is at most k times that on average, and at most {MAX_COMMAND:g} m/s, the largest "
-        f"command. A faster fan runs "
-        "away from any vehicle that flies by this control law.",
-        f"Held means: not lost, and within {HELD_OFFSET:g} m of the axis through 20 s, in at least "
-        f"{HELD_SHARE:.0%} of {seeds} paired seeds. The fan takes {START:g} s to reach its speed. "
-        f"A vehicle that is held stays where the torque grows with the offset, inside {at:.2f} m. "
-        f"Noise may carry it beyond and back, but at {HELD_OFFSET:g} m the torque is down to a "
-        f"fifth and few return. Speeds are found by halving, to {step:.0%} of the bound.",
-        f"Which seeds are flown matters: each speed held in the standard air is the mean of "
-        f"{REPEATS} searches with {seeds} seeds of their own, with Student's interval of 95 % in "
-        f"brackets. Single searches at the same gain and rise time differ by up to "
-        f"{max(np.ptp(f.searches) / f.bound for f in fastest):.0%} of the bound.",
-        f"Lag: in calm air (no gusts, no disturbance, no sensor noise) and behind a fan that "
-        f"starts gently, the gains "
-        f"{', '.join(f'{gain:g}' for gain in GAINS)} hold these shares of their bounds: "
-        f"{shares('calm')}. Flight loop and "
-        "filter cost little once the fan moves steadily. More than 100 % is a fan that outruns the "
-        "vehicle so slowly that "
-        "20 s do not lose it.",
-        f"A sudden start shows the rise time: {shares('sudden')}. The fan is past the torque's top "
-        f"before the filter has "
-        "reported it and the vehicle has gathered speed; the faster the fan, the more that costs.",
-        f"Noise limits before the bound does: in the standard air the same gains hold "
-        f"{held}. Near the bound the "
-        "vehicle rides on the flat top of the torque with no reserve, and any disturbance throws "
-        "it over. "
-        f"Held with one of them alone, at gain {NOISE_GAIN:g} and a rise time of {RISE_TIMES[0]:g} "
-        f"s, "
-        + ", ".join(
-            f"{noise}: {np.mean(found):.0%} [{low:.0%}, {high:.0%}]"
-            for noise, found in alone.items()
-            for low, high in [interval(found)]
-        )
-        + ". The actuators' unmodelled torque (0.01 Nm, a third of the jet's largest) reads like "
-        "the jet's own. A high gain "
-        f"turns it into motion, the more so through a slow filter, and a command cut at "
-        f"{MAX_COMMAND:g} m/s no longer "
-        f"averages it out. The best here: {best}.",
-    ]
 
 
 def _traces(

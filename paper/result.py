@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -37,3 +38,11 @@ class Result:
     timing: list[Comparison] = field(
         default_factory=list
     )  # what differs from run to run, and is kept apart for that
+
+
+def remarks(name: str, /, **values: Any) -> list[str]:
+    """Return the paragraphs of a figure's template, ``remarks/NAME.md.j2``, with these values."""
+    loader = PackageLoader(__package__, "remarks")
+    template = Environment(loader=loader, undefined=StrictUndefined).get_template(f"{name}.md.j2")
+    paragraphs = template.render(values).split("\n\n")
+    return [" ".join(text.split()) for text in paragraphs if text.strip()]
