@@ -1,0 +1,75 @@
+"""What identification says of made flights, kept: ``python -m tests.support.golden_identification``
+writes it anew after a change that is meant.
+"""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+
+from tests.identification.comparison.test_change import drawn
+from tests.identification.vehicle_fit.flown import ARM, MASS, inertial_flights
+from tests.support.paths import ROOT
+from windwrench.dynamics import load_vehicle
+from windwrench.dynamics.vehicle import EffectSetting
+from windwrench.envs.recording import record_flight
+from windwrench.identification.comparison.change import compare
+from windwrench.identification.comparison.words import change_data
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.rotor_faults.channels import channels_of_log
+from windwrench.identification.rotor_faults.detection import find_fault
+from windwrench.identification.rotor_faults.words import fault_data
+from windwrench.identification.vehicle_fit.exports import EXPORTS
+from windwrench.identification.vehicle_fit.geometry import parse_geometry
+from windwrench.identification.vehicle_fit.identify import identify
+from windwrench.identification.vehicle_fit.report import identified_data
+
+GOLDEN = ROOT / "tests" / "golden" / "identification.json"
+
+
+def failing_flight():
+    """An IMU flight whose rotor 3 loses 40 % of its thrust at 9 s, without the loop's answer."""
+    log, speeds = inertial_flights([3])[0]
+    lost = np.where(log.t > 9.0, 0.4, 0.0) * 6.0e-6 * speeds[:, 2] ** 2
+    force, rate = log.accelerometer.copy(), log.gyro.copy()
+    force[:, 2] -= lost / MASS
+    turn = np.column_stack([ARM * lost / 3.0e-3, -ARM * lost / 3.6e-3, -0.02 * lost / 6.0e-3])
+    rate += np.cumsum(turn * (log.t < 9.4)[:, None], axis=0) * log.period
+    return replace(log, accelerometer=force, gyro=rate)
+
+
+def made():
+    """Return all that is kept, as plain data."""
+    (one, speeds), (other, _) = inertial_flights(range(2))
+    crazyflie = load_vehicle("crazyflie")
+    lag = (EffectSetting("motor_lag", {"tau": 0.06}), EffectSetting("body_drag", {"dx": 0.02}))
+    columns = [record_flight(crazyflie, lag, name, 12.0, 1) for name in ("excite", "yaw")]
+    posed = [
+        FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], name="posed")
+        for c in columns
+    ]
+    arm = parse_geometry(str(ARM))
+    vehicles = {
+        "imu and commands": identify([one, other], MASS, arm),
+        "imu, commands and speeds": identify([replace(one, rotor_speeds=speeds)], MASS, arm),
+        "pose without an arm": identify(posed, crazyflie.mass, parse_geometry(None)),
+    }
+    rng = np.random.default_rng(4)
+    changes = {
+        str(moved): compare(drawn(rng, 2, moved), drawn(rng, 3))
+        for moved in ((0.0, 0.0, 0.0, 0.0), (0.08, -0.08, 0.08, 0.08), (0.1, 0.0, 0.0, 0.1))
+    }
+    faults = {
+        "none": find_fault(channels_of_log(one)),
+        "rotor": find_fault(channels_of_log(failing_flight())),
+    }
+    return {
+        "identified": {name: identified_data(v) for name, v in vehicles.items()},
+        "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles.items()},
+        "changes": {name: change_data(change) for name, change in changes.items()},
+        "faults": {name: fault_data(fault) for name, fault in faults.items()},
+    }
+
+
+if __name__ == "__main__":
+    GOLDEN.write_text(json.dumps(made(), indent=1) + "\n", encoding="utf-8")
