@@ -8,7 +8,7 @@ from typing import Any
 
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
-from ...runtime.lasting_workers import Lost, crew_of, each
+from ...runtime.workers import Lost, each
 from .flight import Job, diagnose_one, key_of, refusal
 from .manifest import FleetLog, natural
 from .outcomes import Outcome, Outcomes
@@ -84,13 +84,12 @@ def run_fleet(
             else:
                 yield Job(log if cluster is None else _absolute(log), key, without)
 
-    with crew_of(diagnose_one, jobs, cluster) as (crew, count):
-        for job, result in each(pending(), crew, count, limit_s):
-            if isinstance(result, Lost):
-                why = f"{job.log.path}: {result.words}"
-                keep(refusal(job.key, result.kind, why) | {"limit_s": limit_s})
-            else:
-                keep(result)
+    for job, result in each(diagnose_one, pending(), limit_s, jobs, cluster):
+        if isinstance(result, Lost):
+            why = f"{job.log.path}: {result.words}"
+            keep(refusal(job.key, result.kind, why) | {"limit_s": limit_s})
+        else:
+            keep(result)
     return done
 
 

@@ -5,6 +5,7 @@ import json
 import sys
 
 import pytest
+from pebble import ProcessExpired
 
 from windwrench.cli import main
 from windwrench.commands.running import plain
@@ -15,7 +16,7 @@ from windwrench.identification.fleet.manifest import find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES, run_fleet
 from windwrench.identification.logs.flight_log import FlightLog, write_log
-from windwrench.runtime import lasting_workers
+from windwrench.runtime import workers
 
 FOUND = {
     "status": "diagnosed",
@@ -59,29 +60,30 @@ def call(tmp_path, monkeypatch, capfd):
 
 
 class Here:
-    """A worker in this process, so that nothing has to start: it does, or loses, a task."""
+    """Workers in this process, so that nothing has to start: they do, or lose, a task."""
 
-    def __init__(self, work):
-        self.work, self.warm = work, False
+    count = 1
+
+    def __init__(self, work, count, most_seconds):
+        self.work = work
 
     def start(self, task):
-        future = lasting_workers.Future()
+        future = workers.Future()
         if "killer" in task.log.name:
-            future.set_exception(lasting_workers.BrokenProcessPool("gone"))
-        elif "endless" not in task.log.name:
+            future.set_exception(ProcessExpired("gone", -9))
+        elif "endless" in task.log.name:
+            future.set_exception(TimeoutError("Task timeout"))
+        else:
             future.set_result(self.work(task))
         return future
 
     def end(self):
         pass
 
-    def last_words(self):
-        return "its process was ended by SIGKILL"
-
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(lasting_workers, "_Process", Here)
+    monkeypatch.setattr(workers, "_Local", Here)
 
 
 @pytest.fixture
@@ -116,7 +118,9 @@ def test_no_log_stops_the_others(call, here, logs, tmp_path):
     assert result["individuals"]["ardrone2"] == {"diagnosed": 1, "refused": 0}
     table = list(csv.DictReader(open(tmp_path / "out" / "fleet.csv", newline="")))  # noqa: SIM115
     reasons = {line["log"]: line["reason"] for line in table}
-    assert reasons["alpha/killer.csv"].endswith("its process was ended by SIGKILL")
+    assert reasons["alpha/killer.csv"].endswith(
+        "its process was ended by SIGKILL, as where memory runs out"
+    )
     assert reasons["alpha/endless.csv"].endswith("it took more than 1 s")
     assert "missing column(s)" in reasons["alpha/copy.csv"]
     assert "the same flight as alpha/copy.csv" in reasons["alpha/flight2.csv"]

@@ -14,6 +14,7 @@ from tests.support.cluster_runs import TINY, assert_same_flights, assert_same_ru
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.runtime.cluster import spread
+from windwrench.runtime.workers import each
 from windwrench.training.rllib import register_with_rllib
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
 
@@ -150,3 +151,19 @@ def test_a_cluster_that_is_not_there_is_named():
         ray.shutdown()
     with pytest.raises(InputError, match=r"127\.0\.0\.1:1: no Ray cluster there"):
         next(spread(len, [[1]], "127.0.0.1:1"))
+
+
+def fleet_work(task):
+    """Answer, or end as the task says."""
+    if task == "exits":
+        os._exit(3)
+    if task == "sleeps":
+        time.sleep(600.0)
+    return task
+
+
+def test_a_task_that_dies_or_takes_too_long_costs_itself_alone(cluster):
+    tasks = [0, "exits", 1, "sleeps", 2]
+    done = dict(each(fleet_work, tasks, 15.0, cluster=cluster))
+    assert {task: done[task] for task in (0, 1, 2)} == {0: 0, 1: 1, 2: 2}
+    assert (done["exits"].kind, done["sleeps"].kind) == ("died", "time")

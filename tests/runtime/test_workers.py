@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from windwrench.runtime.lasting_workers import Lost, crew_of, each
+from windwrench.runtime.workers import Lost, each, workers
 
 
 def work(task):
@@ -36,9 +36,7 @@ def lives(process):
 
 
 def outcomes(tasks, count=1, limit=60.0):
-    with crew_of(work, count) as (crew, several):
-        assert several == count
-        return list(each(tasks, crew, several, limit))
+    return list(each(work, tasks, limit, count))
 
 
 def test_a_worker_stays_warm_and_alone(monkeypatch):
@@ -81,29 +79,44 @@ def test_tasks_are_taken_when_a_worker_is_free():
             taken.append(i)
             yield i
 
-    with crew_of(work, 1) as (crew, count):
-        running = each(tasks(), crew, count, 60.0)
-        next(running)
-        assert taken == [0]
-        running.close()
+    running = each(work, tasks(), 60.0, 1)
+    next(running)
+    assert taken == [0]
+    running.close()
 
 
 def test_a_worker_that_dies_while_it_waits_is_replaced():
     """As where another program took the memory."""
-    with crew_of(work, 1) as (crew, count):
-        running = each([0, 1], crew, count, 60.0)
-        _, (process, _) = next(running)
-        os.kill(process, signal.SIGKILL)
-        deadline = time.monotonic() + 20.0
-        while lives(process) and time.monotonic() < deadline:
-            multiprocessing.active_children()  # takes note of those that are gone
-            time.sleep(0.05)
-        time.sleep(0.5)  # for the pool to see it
-        (task, (other, _)) = next(running)
-        assert (task, other == process) == (1, False)
-        assert list(running) == []
+    running = each(work, [0, 1], 60.0, 1)
+    _, (process, _) = next(running)
+    os.kill(process, signal.SIGKILL)
+    deadline = time.monotonic() + 20.0
+    while lives(process) and time.monotonic() < deadline:
+        multiprocessing.active_children()  # takes note of those that are gone
+        time.sleep(0.05)
+    time.sleep(0.5)  # for the pool to see it
+    (task, (other, _)) = next(running)
+    assert (task, other == process) == (1, False)
+    assert list(running) == []
 
 
 def test_what_the_work_raises_is_raised():
     with pytest.raises(ValueError, match="raises"):
         outcomes([0, "raises", 1])
+
+
+def test_a_pool_maps_in_order_and_ends_at_once_where_its_block_fails():
+    with workers(2) as pool:
+        processes = {process for process, _ in pool.map(work, range(6))}
+    assert len(processes) <= 2
+    processes.clear()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(processes)
+    assert not any(map(lives, processes))
+
+
+def interrupted(processes):
+    with workers(1) as pool:
+        processes.add(pool.submit(work, 0).result()[0])
+        pool.submit(work, "sleeps")
+        raise KeyboardInterrupt

@@ -1,0 +1,142 @@
+"""An identified vehicle as other programs take it. What is not known is left out, and said.
+
+The texts are ``templates/``. Wind from drag in PX4 and ArduPilot: specific force along a body axis
+at airspeed v is predicted as ``MCOEF v + 0.5 rho v^2 / BCOEF`` (PX4,
+src/modules/ekf2/params_drag.yaml: kg/m^2 and 1/s; ArduPilot, libraries/AP_NavEKF3/AP_NavEKF3.cpp:
+kg/m/m and 1/s). Either part is left out where its coefficient is 0. PX4 starts with 100 kg/m^2 and
+0.15 1/s, so a part that was not found beside the other is set to 0: its start value would act
+beside what was found. Thrust curve: relative thrust ``T = f u^2 + (1 - f) u`` of a relative motor
+command u (PX4, THR_MDL_FAC; ArduPilot, MOT_THST_EXPO). Hover thrust is the share of the full thrust
+that carries the weight (MPC_THR_HOVER, MOT_THST_HOVER).
+
+RotorPy (``Multirotor`` and its vehicles' files): rotors at positions from the centre of mass,
+``rotor_directions`` the sign of a rotor's torque on the body about +z, ``k_d`` N/(rad/s m/s) of
+each rotor, ``c_D`` N/(m/s)^2 of the frame. drone-models (0.1.0, ``first_principles``): rotors in
+the Crazyflie's order, polynomials in rpm with the index as the power, ``L`` the distance from
+either axis, ``rotor_dyn_coef`` 1/s, ``drag_matrix`` N/(m/s) along body axes, negative. Gazebo
+(gz-sim, MulticopterMotorModel), once for each rotor: thrust ``motorConstant W^2``, torque
+``momentConstant`` (m) times thrust, drag ``rotorDragCoefficient W v`` across the rotor's axis.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...dynamics.effects import Role
+from .effect_settings import coefficient_of, effect_of, linear_drag
+from .result import ASSUMED, IDENTIFIED, Identified
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+AIR_DENSITY = 1.225  # kg/m3, at sea level, as both autopilots take it
+NO_BLUFF_BODY = 0.0  # of BCOEF: both leave that part out then
+_PER_RPM = (2.0 * math.pi / 60.0) ** 2  # (rad/s)^2 in one rpm^2
+_CRAZYFLIE = [3, 2, 1, 0]  # front-right, rear-right, rear-left, front-left
+
+
+@cache
+def _templates() -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(
+        loader=PackageLoader(__package__),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters["g6"] = lambda x: f"{x:.6g}"
+    made.filters["toml_float"] = lambda x: repr(float(f"{x:.6g}") + 0.0)
+    return made
+
+
+def _autopilot(
+    found: Identified, name: str, parameters: tuple[str, ...], most_ballistic: float
+) -> str:
+    """Return an autopilot's parameters: momentum drag (1/s), ballistic coefficients along x and y
+    (kg/m2), hover thrust (share of the full thrust), and the square's share in the thrust curve.
+    """
+    vehicle = found.vehicle
+    linear = [drag / vehicle.mass for drag in linear_drag(vehicle)[:2]]
+    quadratic = [coefficient_of(vehicle, Role.BODY_DRAG, 3 + i) for i in range(2)]
+    values: list[float | None] = [None] * 5
+    if max(*linear, *quadratic) > 0.0:
+        values[0] = max(float(np.mean(linear)), 0.0)
+        values[1:3] = (
+            0.5 * AIR_DENSITY * vehicle.mass / c if c > 0.0 else NO_BLUFF_BODY for c in quadratic
+        )
+    if vehicle.motor_curve is not None:
+        u = np.linspace(0.0, 1.0, 41)
+        thrust = np.polynomial.polynomial.polyval(u, vehicle.motor_curve.thrust)
+        # least squares of T - u = f (u^2 - u)
+        bend = u**2 - u
+        curve = bend @ (thrust / thrust[-1] - u) / (bend @ bend)
+        values[3:] = float(vehicle.weight / (4.0 * thrust[-1])), float(np.clip(curve, 0.0, 1.0))
+    limits = (1.0, most_ballistic, most_ballistic, math.inf, math.inf)  # stated beside the names
+    missing = [p for p, value in zip(parameters, values, strict=True) if value is None]
+    doubts = [f"# not known from these logs: {', '.join(missing)}"] if missing else []
+    doubts += [
+        f"# {p}: its stated range ends at {limit:g}"
+        for p, value, limit in zip(parameters, values, limits, strict=True)
+        if value is not None and value > limit
+    ]
+    full = found.by_name.get("thrust(1)")
+    if values[3] is not None and full is not None and full.status != IDENTIFIED:
+        doubts.append(
+            f"# {parameters[3]} and {parameters[4]}: the full thrust was not flown; {full.how}"
+        )
+    text = _templates().get_template(f"{name}.j2")
+    return text.render(
+        known=[(p, x) for p, x in zip(parameters, values, strict=True) if x is not None],
+        doubts="".join(f"{line}\n" for line in doubts),
+        drag_known=values[0] is not None,
+    ).removesuffix("\n")
+
+
+def _simulator(found: Identified, name: str) -> str:
+    """Return a simulator's parameters."""
+    v = found.vehicle
+    lag, drag = found[effect_of(Role.LAG)], linear_drag(v)
+    rows = [
+        np.sign(v.positions[_CRAZYFLIE, 1]),
+        -np.sign(v.positions[_CRAZYFLIE, 0]),
+        -v.spin[_CRAZYFLIE],
+    ]
+    notes = ""
+    if found.fit.drive.commands:
+        notes += (
+            "# these logs hold commands, no rotor speeds: k and p are scaled so that rotors hover "
+            f"at {v.hover_rate:.0f} rad/s; thrust and torque are right, speeds are not\n"
+        )
+    assumed = [e.name for e in found.estimates if e.status == ASSUMED]
+    notes += f"# assumed, not identified: {', '.join(assumed)}\n" if assumed else ""
+    text = _templates().get_template(f"{name}.j2")
+    return text.render(
+        v=v,
+        notes=notes,
+        positions=(v.positions - v.com).tolist(),
+        lag=lag.value if lag.status == IDENTIFIED else None,
+        drag=-np.diag(drag) if any(drag) else None,
+        rotor_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
+        effect=partial(coefficient_of, v),
+        mixing=rows,
+        per_rpm=_PER_RPM,
+        Role=Role,
+    ).removesuffix("\n")
+
+
+_PX4 = ("EKF2_MCOEF", "EKF2_BCOEF_X", "EKF2_BCOEF_Y", "MPC_THR_HOVER", "THR_MDL_FAC")
+_ARDUPILOT = (
+    *("EK3_DRAG_MCOEF", "EK3_DRAG_BCOEF_X", "EK3_DRAG_BCOEF_Y"),
+    *("MOT_THST_HOVER", "MOT_THST_EXPO"),
+)
+EXPORTS: dict[str, Callable[[Identified], str]] = {
+    "px4": lambda found: _autopilot(found, "px4", _PX4, 200.0),
+    "ardupilot": lambda found: _autopilot(found, "ardupilot", _ARDUPILOT, 1000.0),
+    "rotorpy": lambda found: _simulator(found, "rotorpy"),
+    "drone-models": lambda found: _simulator(found, "drone_models"),
+    "gazebo": lambda found: _simulator(found, "gazebo"),
+}
