@@ -9,8 +9,6 @@ from .runtime.interrupts import is_command, leaving_at_once
 with leaving_at_once(is_command()):
     import gymnasium
 
-    from .runtime.moved_modules import keep_old_paths
-
 __version__ = "1.0.0"
 
 _TASKS = {  # pytest imports this file a second time, as a folder's
@@ -31,5 +29,3 @@ for _name, (_single, _vector, _steps) in _TASKS.items():
             vector_entry_point=f"windwrench.envs.{_vector}" if _vector else None,
             max_episode_steps=_steps,
         )
-
-keep_old_paths()

@@ -19,9 +19,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from .. import __version__
-from ..runtime.compile_watch import watch
+from ..runtime.compile_notice import notice
 from ..runtime.whole_files import replaced
-from .bars import show_compiling
 from .durations import expected_duration, keep_duration
 from .terminal import DryRun, console, errors, run
 
@@ -76,7 +75,7 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     def command(*, as_json: bool, quiet: bool, dry_run: bool = False, **options: Any) -> None:
         run.begin(dry_run)
         console.quiet, errors.quiet = as_json or quiet, quiet
-        watch.sink = _show_compiling
+        notice.quiet = quiet
         begun = time.monotonic()
         try:
             outcome: dict[str, Any] = {"result": work(**options)}
@@ -133,10 +132,6 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
     )
     command.__annotations__ = {**work.__annotations__, **shared}
     return command
-
-
-def _show_compiling(text: str | None) -> None:
-    show_compiling(text, errors)
 
 
 def _words(value: object) -> str:

@@ -260,9 +260,6 @@ class Ranking:
         return next((s for s in self.sets if effect in s.effects), None)
 
 
-Gusts, Push = Disturbance, TransientDisturbance  # their older names
-
-
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What logs of one vehicle say about its model.

@@ -94,7 +94,6 @@ class Session:
         self._tell, self._flush = tell, flush
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
-        self._stopped = False
         self._begin_t: float | None = None
         self._kinds: set[str] = set()
         self._unrecorded: list[Row] = []

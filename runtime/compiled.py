@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 from numba import NumbaExperimentalFeatureWarning, njit, typeof
 from numba.core import event
 
-from .compile_watch import compiling, watch
+from .compile_notice import notice
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,10 +27,10 @@ class _Listener(event.Listener):  # type: ignore[misc]  # numba states no types
     """Hears from Numba what it compiles; what it loads from the disk is no such event."""
 
     def on_start(self, event: Any) -> None:
-        watch.begin(str(event.data["dispatcher"].__name__))
+        notice.begin()
 
     def on_end(self, event: Any) -> None:
-        watch.end()
+        notice.end()
 
 
 if multiprocessing.parent_process() is None:  # workers leave the telling to who started them
@@ -122,5 +122,6 @@ def compiled_meanwhile(
         except BaseException:
             other.kill()
             raise
-        with compiling(function.__name__):
-            other.wait()
+        notice.begin()
+        other.wait()
+        notice.end()

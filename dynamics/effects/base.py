@@ -28,7 +28,7 @@ none of them. There are four kinds:
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,7 +52,6 @@ Array = NDArray[np.float64]
 
 _POINTER = types.CPointer(types.float64)
 EFFECT_MODEL = types.void(_POINTER, _POINTER, _POINTER, _POINTER)  # of the C function
-LAW = EFFECT_MODEL  # its older name, in effects that users have written
 
 # vehicle: what a model may know of it
 MASS, GRAVITY, ROTOR_RADIUS, FLOOR, CEILING, VOLTAGE_REF, HOVER_RATE = range(7)
@@ -168,9 +167,6 @@ class Effect:
         possible: joint bounds: whether a vehicle can have these coefficients together.
         implausible: why found coefficients are no physics of this effect, as the rest of a sentence
             that begins with its name; empty where they are.
-        law: the older name of ``model``, in effects that users have written.
-        confused_with: which effects leave much the same traces: flights decide that now; in effects
-            that users have written.
 
     Raises:
         InputError: a word that there is not, or coefficients that the role does not have.
@@ -196,14 +192,9 @@ class Effect:
     starting_points: StartingPoints | None = None
     possible: "Callable[[Mapping[str, float], Vehicle], bool] | None" = None
     implausible: Implausible | None = None
-    law: Any = None
-    confused_with: InitVar[tuple[str, ...]] = ()
 
-    def __post_init__(self, confused_with: tuple[str, ...]) -> None:
-        """Let ``model`` and ``law`` be the same, whichever was given, and check the words."""
-        model = self.law if self.model is None else self.model
-        object.__setattr__(self, "model", model)
-        object.__setattr__(self, "law", model)
+    def __post_init__(self) -> None:
+        """Check the words."""
         check_words(self.name, self.family, self.role, self.needs)
         if self.role is not None:
             check_role(self.name, self.role, [c.unit for c in self.coefficients])

@@ -42,7 +42,6 @@ EFFECT = Effect(
         Coefficient("w", "rad/s", (3.0, 3.0), "frequency"),
     ),
     source="test",
-    confused_with=("wind",),
     excitation="any flight",
     model=model,
     # more
@@ -99,7 +98,7 @@ def test_a_law_that_does_nothing_one_by_one_must_say_where_to_start(tmp_path):
     with joined(tmp_path):
         with pytest.raises(InputError, match=r"hose\.py: effect hose: .*add starting_points="):
             get("hose")
-        assert get("told_hose").confused_with == ()  # what older files state is read no more
+        assert get("told_hose").starting_points is not None
 
 
 def test_joint_bounds_are_those_of_physics():

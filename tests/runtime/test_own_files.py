@@ -31,16 +31,16 @@ class Left:
 EFFECT = '''"""A pull along x, in proportion to x."""
 
 from numba import cfunc
-from windwrench.dynamics.effects.base import LAW, POSITION, Coefficient, Effect
+from windwrench.dynamics.effects.base import EFFECT_MODEL, POSITION, Coefficient, Effect
 
 
-@cfunc(LAW, cache=True)
-def law(c, vehicle, state, wrench):
+@cfunc(EFFECT_MODEL, cache=True)
+def model(c, vehicle, state, wrench):
     wrench[0] -= c[0] * state[POSITION]
 
 
 EFFECT = Effect(name="NAME", kind="wrench", coefficients=(Coefficient("k", "N/m", (0.1, 0.01), "stiffness"),), source="test",
-                confused_with=("constant_force",), excitation="flight along x", law=law)
+                excitation="flight along x", model=model)
 '''
 
 
