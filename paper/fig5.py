@@ -17,16 +17,15 @@ from typing import Any
 import numpy as np
 
 from ..envs.plant import TICK
-from ..estimator import ObserverTuning, UKFTuning
+from ..estimator import NonlinearObserver, ObserverTuning, UKFTuning, WrenchEKF, WrenchUKF
 from .fig5_estimators import (
     ERRORS,
     UKF_TUNED,
     Runner,
-    observer_runner,
+    runner,
     score,
     tune_observer,
     tune_ukf,
-    ukf_runner,
 )
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
@@ -81,8 +80,8 @@ def compare(seeds: int, progress: Progress, evaluations: int = 120) -> Result:
     scores: Scores = {}
     examples: dict[tuple[str, str], Array] = {}
     for (plant, flight, noise), flown in flights.items():
-        for name, runner in _runners(plant, noise, tunings).items():
-            states = [runner(f.samples) for f in flown]
+        for name, run_over in _runners(plant, noise, tunings).items():
+            states = [run_over(f.samples) for f in flown]
             scores[plant, flight, noise, name] = _rows(states, flown)
             if plant == "exact" and flight == "hover":
                 examples[noise, name] = states[0]
@@ -119,13 +118,13 @@ def _runners(
         ukf_low, position_noise=base.position_noise, attitude_noise=base.attitude_noise
     )
     return {
-        "UKF 1 s": ukf_runner(vehicle, base),
-        "EKF 1 s": ukf_runner(vehicle, base, linearised=True),
-        "observer 1 s": observer_runner(vehicle, ObserverTuning()),
-        "UKF low": ukf_runner(vehicle, ukf_low),
-        "observer low": observer_runner(vehicle, observer_low),
-        "UKF anew": ukf_runner(vehicle, ukf_anew),
-        "observer anew": observer_runner(vehicle, observer_anew),
+        "UKF 1 s": runner(WrenchUKF(vehicle, base, TICK)),
+        "EKF 1 s": runner(WrenchEKF(vehicle, base, TICK)),
+        "observer 1 s": runner(NonlinearObserver(vehicle, ObserverTuning(), TICK)),
+        "UKF low": runner(WrenchUKF(vehicle, ukf_low, TICK)),
+        "observer low": runner(NonlinearObserver(vehicle, observer_low, TICK)),
+        "UKF anew": runner(WrenchUKF(vehicle, ukf_anew, TICK)),
+        "observer anew": runner(NonlinearObserver(vehicle, observer_anew, TICK)),
     }
 
 

@@ -11,16 +11,10 @@ from scipy.optimize import minimize
 
 from ..dynamics import Vehicle
 from ..envs.plant import TICK
-from ..estimator import NonlinearObserver, ObserverTuning, UKFTuning, WrenchEKF, WrenchUKF
-from ..estimator.ekf import predict as ekf_predict
+from ..estimator import NonlinearObserver, ObserverTuning, UKFTuning, WrenchUKF
 from ..estimator.estimate import FORCE as FORCE_STATE
 from ..estimator.estimate import NIS, STATE_SIZE
 from ..estimator.estimate import TORQUE as TORQUE_STATE
-from ..estimator.observer import step as observer_step
-from ..estimator.sample import check_sample
-from ..estimator.ukf import correct_parts
-from ..estimator.ukf import step as ukf_step
-from ..runtime.compiled import Record, compiled
 from .fig5_flights import FORCE, STEADY, TORQUE, TRANSIENT, Array, Flight, window
 
 _FORCE_SIZE = float(np.linalg.norm(FORCE))
@@ -48,62 +42,15 @@ UKF_TUNED = ("motor_torque_noise", "torque_walk", "thrust_noise", "force_walk")
 ERRORS = ("force_transient", "force_steady", "torque_transient", "torque_steady")
 
 
-@compiled
-def _run_ukf(record: Record, z: Array, dt: float, voltage: float, out: Array) -> None:
-    f = record[0]
-    for k in range(1, len(z)):
-        ukf_step(f, z[k], 3, dt, voltage)
-        for i in range(STATE_SIZE):
-            out[k, i] = f.x[i]
-
-
-@compiled
-def _run_ekf(record: Record, z: Array, dt: float, voltage: float, out: Array) -> None:
-    f = record[0]
-    for k in range(1, len(z)):
-        usable = check_sample(f, z[k], 3)
-        ekf_predict(f, z[k, 0:4], dt, voltage)
-        correct_parts(f, z[k], usable)
-        for i in range(STATE_SIZE):
-            out[k, i] = f.x[i]
-
-
-@compiled
-def _run_observer(
-    model: Record, record: Record, z: Array, dt: float, voltage: float, out: Array
-) -> None:
-    f, o = model[0], record[0]
-    for k in range(1, len(z)):
-        observer_step(f, o, z[k], check_sample(f, z[k], 3), dt, voltage)
-        for i in range(STATE_SIZE):
-            out[k, i] = f.x[i]
-
-
-def ukf_runner(vehicle: Vehicle, tuning: UKFTuning, linearised: bool = False) -> Runner:
-    """Return what runs ``WrenchUKF`` over a flight, or ``WrenchEKF`` if ``linearised``."""
-    ukf = (WrenchEKF if linearised else WrenchUKF)(vehicle, tuning, TICK)
-    compiled_run = _run_ekf if linearised else _run_ukf
+def runner(estimator: WrenchUKF | NonlinearObserver) -> Runner:
+    """Return the run of an estimator over a flight."""
 
     def run(samples: Array) -> Array:
-        z, out = samples.copy(), np.zeros((len(samples), STATE_SIZE))
-        ukf.reset(z[0, 4:7], z[0, 7:11])
-        out[0] = ukf.record[0]["x"]
-        compiled_run(ukf.record, z, TICK, vehicle.voltage_ref, out)
-        return out
-
-    return run
-
-
-def observer_runner(vehicle: Vehicle, tuning: ObserverTuning) -> Runner:
-    """Return what runs ``NonlinearObserver`` over a flight."""
-    observer = NonlinearObserver(vehicle, tuning, TICK)
-
-    def run(samples: Array) -> Array:
-        z, out = samples.copy(), np.zeros((len(samples), STATE_SIZE))
-        observer.reset(z[0, 4:7], z[0, 7:11])
-        model, record = observer.records
-        out[0] = model[0]["x"]
-        _run_observer(model, record, z, TICK, vehicle.voltage_ref, out)
+        out = np.zeros((len(samples), STATE_SIZE))
+        estimator.reset(samples[0, 4:7], samples[0, 7:11])
+        for k in range(1, len(samples)):
+            row = samples[k]
+            out[k] = estimator.step(row[:4], row[4:7], row[7:11]).state
         return out
 
     return run
@@ -147,7 +94,10 @@ def tune_observer(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int)
     # much faster than the default: from there the optimum is a walk along one valley, slower pose
     # against faster gain
     p = _best(
-        lambda p: observer_runner(vehicle, build(p)), (3.0, 6.0, 10.0, 10.0), flights, evaluations
+        lambda p: runner(NonlinearObserver(vehicle, build(p), TICK)),
+        (3.0, 6.0, 10.0, 10.0),
+        flights,
+        evaluations,
     )
     return build(p)
 
@@ -164,7 +114,9 @@ def tune_ukf(vehicle: Vehicle, flights: Sequence[Flight], evaluations: int) -> U
 
     # the default believes the rotors too little for any of these flights
     start = (0.1 * default[0], 2.0 * default[1], 0.1 * default[2], 2.0 * default[3])
-    return build(_best(lambda p: ukf_runner(vehicle, build(p)), start, flights, evaluations))
+    return build(
+        _best(lambda p: runner(WrenchUKF(vehicle, build(p), TICK)), start, flights, evaluations)
+    )
 
 
 def _best(
