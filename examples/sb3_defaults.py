@@ -1,7 +1,7 @@
 """What ``normalize=True`` is worth: stable-baselines3's SAC with its defaults, with it and without.
 
 Install:  pip install '.[rl]'    (in a checkout)
-Run:      python sb3_defaults.py 3000 3    (decisions, seeds)
+Run:      python examples/sb3_defaults.py 3000 3    (decisions, seeds)
 """
 
 import sys
