@@ -8,8 +8,8 @@ import typer
 from typer.core import TyperGroup
 
 from . import __version__
+from .commands.benchmarking import benchmark
 from .commands.checking import check, convert
-from .commands.comparing import benchmark
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record

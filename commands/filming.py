@@ -1,6 +1,6 @@
 """Films of a flight: what each picture says, and where it goes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,52 +9,50 @@ from typing import Any
 import numpy as np
 
 from ..envs.captions import Caption, with_caption
+from ..envs.drawing import SCALES
 from ..envs.video import FPS, Film, save_picture
+from ..envs.wind_drawing import WIND_SCALES
 
 SIZE = 960, 540  # pixels
 
 
 @dataclass
 class Tally:
-    """What a film's corner says: the distance from where the vehicle should be, and the score.
+    """Errors and rewards of a flight so far, for the corner of its film."""
 
-    Attributes:
-        what: the distance is called.
-    """
+    squares: list[float] = field(default_factory=list)  # m2
+    rewards: list[float] = field(default_factory=list)  # at most 1
 
-    what: str
-    squares: list[float] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
-
-    def add(self, distance: float, reward: float) -> None:
-        """Count a decision: m, and the reward for it, at most 1."""
-        self.squares.append(distance * distance)
-        self.rewards.append(reward)
+    def add(self, info: Mapping[str, Any]) -> None:
+        """Count a decision."""
+        self.squares.append(float(info.get("error", info.get("offset"))) ** 2)
+        self.rewards.append(float(info["reward_tracking"]))
 
     def lines(self) -> tuple[str, ...]:
-        """Return what to say now."""
+        """Return the lines of text for now."""
         return (
-            f"{self.what} {np.sqrt(self.squares[-1]):.2f} m",
+            f"error {np.sqrt(self.squares[-1]):.2f} m",
             f"RMSE so far {np.sqrt(np.mean(self.squares)):.2f} m",
             f"score {np.mean(self.rewards):.2f} (mean reward, best 1)",
         )
 
 
 def caption_of(
-    loop: Any, viewer: Any, title: str, time: float, lines: tuple[str, ...], scales: Any
+    loop: Any, viewer: Any, title: str, info: Mapping[str, Any], tally: Tally
 ) -> Caption:
-    """Return what a picture of a closed loop says."""
-    state, external = loop.state, loop.external
+    """Return the caption of a picture of a task's closed loop."""
+    state, external, wind = loop.state, loop.external, info.get("wind")
+    lines = () if wind is None else (f"wind {np.linalg.norm(wind):.1f} m/s",)
     return Caption(
         title,
-        time,
+        float(info["time"]),
         state[16:19].copy(),
         float(state[15]),
         external[:3].copy(),
         float(external[5]),
-        lines,
+        (*tally.lines(), *lines),
         viewer.pixels_per_metre(loop.position),
-        scales,
+        SCALES if wind is None else WIND_SCALES,
     )
 
 

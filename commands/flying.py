@@ -1,4 +1,4 @@
-"""Flying: one episode in the jet, or a log of a flight."""
+"""Simulated flights: one episode of a task, or the log of a flight."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,7 +8,7 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError
-from .task_flying import fly_task_once
+from .filming import SIZE, Tally, caption_of, films, written
 from .terminal import (
     Out,
     VehicleOption,
@@ -99,15 +99,13 @@ def fly(
 
     Example: windwrench fly --scenario static --controller admittance --gif
     """
-    import numpy as np
-
     from ..dynamics.effects import parse_setting
-    from ..envs.drawing import SCALES
-    from ..envs.fan_tracking import FanTrackingEnv
-    from ..evaluation.benchmark import make_pilot, short_names
-    from ..evaluation.episodes import DECISIONS, fly_episode
+    from ..envs.fan_tracking import EPISODE_SECONDS
+    from ..envs.video import FPS
+    from ..evaluation.benchmark import check_request
+    from ..evaluation.episodes import fly_episode, loop_of, time_series
     from ..evaluation.pictures import draw_episode
-    from .filming import SIZE, Tally, caption_of, films, written
+    from ..evaluation.tasks import make_pilot, short_names, task_of
 
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     effects = [parse_setting(e) for e in effect or []]
@@ -115,89 +113,63 @@ def fly(
         raise InputError(
             "--view shows the flight in a window; expected it without --video and --gif"
         )
-    if task != "FanTracking":
-        return fly_task_once(
-            task,
-            scenario,
-            controller,
-            seed,
-            vehicle,
-            truth,
-            effects,
-            kinds,
-            film_seconds,
-            csv,
-            view,
-            rrd,
-            out,
-        )
-    controller = controller or "admittance"
-    pilot = make_pilot(controller)
-    mode = "rgb_array" if kinds else "human" if view else None
-    env = FanTrackingEnv(
+    known = task_of(task)
+    controller = controller or known.flown
+    check_request([controller], [scenario], 1, 0, task)
+    env = known.environment(
         scenario,
-        mode,
+        "rgb_array" if kinds else "human" if view else None,
         vehicle,
         effects,
+        truth=truth,
         width=SIZE[0],
         height=SIZE[1],
-        truth=truth,
     )
     folder = results_folder(out)
-    poses: list[Any] = []
-    tally = Tally("offset from the axis")
-    title = f"{task}, {scenario}: {short_names([controller])[controller]}"
+    shown = short_names([controller])[controller]
+    title = f"{task}, {scenario}: {shown}"
+    rate = known.decisions / EPISODE_SECONDS
+    every = max(1, round(rate / FPS))
+    tally = Tally()
     with (
         progress_bar() as progress,
-        films(folder, "fly", kinds, film_seconds) as film,
+        films(folder, "fly", kinds, film_seconds, every, rate) as film,
     ):
-        bar = progress.add_task("flying", total=DECISIONS)
+        bar = progress.add_task("flying", total=known.decisions)
 
-        def each() -> None:
+        def each(info: dict[str, Any]) -> None:
             progress.advance(bar)
-            loop, now = env.loop, env.episode["outcome"][0]
-            assert loop is not None
-            if rrd or csv:
-                poses.append((*loop.position, *loop.quaternion))
             if kinds:
-                tally.add(float(now["offset"]), float(now["reward_tracking"]))
-                film(
-                    env.render,
-                    lambda: caption_of(
-                        loop, env.viewer, title, float(now["time"]), tally.lines(), SCALES
-                    ),
-                )
+                tally.add(info)
+                film(env.render, lambda: caption_of(loop_of(env), env.viewer, title, info, tally))
 
-        episode = fly_episode(env, pilot, seed, each)
-    paths = [folder / "fly.png", *written(folder, "fly", kinds)]
+        episode = fly_episode(env, make_pilot(controller, task), seed, each, known.decisions)
     env.close()
+    paths = [folder / "fly.png", *written(folder, "fly", kinds)]
+    draw_episode(episode, title, paths[0])
     if csv:
-        from ..evaluation.episodes import time_series
         from ..identification.logs.tables import write_csv
 
-        write_csv(time_series(episode, np.array(poses)), folder / "fly.csv")
+        write_csv(time_series(episode), folder / "fly.csv")
         paths.append(folder / "fly.csv")
     if rrd:
         from ..envs.replay import Flight
         from ..envs.rerun_export import write_rrd
 
-        pose, seen = np.array(poses), episode.observation
         flight = Flight(
             episode.time,
-            pose[:, :3],
-            pose[:, 3:],
-            seen[:, 0:3],
-            seen[:, 3:6],
+            episode.position,
+            episode.quaternion,
+            episode.estimate[:, :3],
+            episode.estimate[:, 3:],
             episode.force,
             episode.torque,
-            episode.fan_y,
+            episode.fan_y if episode.in_jet else None,
         )
         write_rrd(flight, env.truth, folder / "fly.rrd")
         paths.append(folder / "fly.rrd")
-    shown = short_names([controller])[controller]
-    draw_episode(episode, f"{shown}, {scenario}", folder / "fly.png")
     table = Table(
-        "controller", "scenario", "fan", "RMSE (m)", "lost", "reward", box=box.SIMPLE_HEAD
+        *("controller", "scenario", "motion", "RMSE (m)", "lost", "reward"), box=box.SIMPLE_HEAD
     )
     table.add_row(
         shown,
@@ -210,9 +182,10 @@ def fly(
     console.print(table)
     say(*paths)
     return {
+        "task": task,
         "controller": controller,
         "scenario": scenario,
-        "fan": episode.motion,
+        "motion": episode.motion,
         "rmse_m": episode.rmse,
         "lost": episode.lost,
         "reward": episode.total_reward,

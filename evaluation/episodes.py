@@ -1,111 +1,135 @@
-"""Flying a controller through episodes, and what its tracking is worth."""
+"""Flying a controller through an episode of any task, and how well it holds the vehicle."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controllers import Controller
-from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET, FanTrackingEnv
+from ..envs.fan_tracking import DECISION_TICKS, EPISODE_SECONDS, LOST_OFFSET
 from ..envs.plant import TICK
-from ..runtime.errors import InputError
 from .briefing import briefing_of
 
 Array = NDArray[np.float64]
-DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)
+DECISIONS = round(EPISODE_SECONDS / TICK / DECISION_TICKS)  # of FanTracking
 # Seeds of episodes that score controllers; those of training and validation lie below, so none is
 # shared.
 FIRST_TEST_SEED = 1_000_000
-_SEEDS = 2**32  # of a benchmark
 
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """One flown episode, a sample a decision; the arrays end where the vehicle was lost."""
+    """One flown episode, a row a decision; the arrays end where the vehicle was lost."""
 
     seed: int
-    motion: str
+    motion: str  # of the fan, or the name of the reference
     lost: bool
     total_reward: float
+    decisions: int  # of a whole episode
     time: Array  # (n,) s
-    y: Array  # (n,) m, of the vehicle
-    fan_y: Array  # (n,) m
-    command: Array  # (n,) m/s
-    observation: Array  # (n, 8)
+    error: Array  # (n,) m, distance from the fan's axis or from the reference
+    position: Array  # (n, 3) m, true, world
+    quaternion: Array  # (n, 4), true, body to world
+    estimate: Array  # (n, 6) force N and torque Nm of the filter, world
     force: Array  # (n, 3) N, true, world
     torque: Array  # (n, 3) Nm, true, world
+    fan_y: Array  # (n,) m; not a number in a task without one fan path
+    observation: Array  # (n, size)
+
+    @property
+    def y(self) -> Array:
+        """Position (n,) of the vehicle along y, m."""
+        return self.position[:, 1]
+
+    @property
+    def in_jet(self) -> bool:
+        """Whether the task has a fan on one path."""
+        return bool(np.isfinite(self.fan_y).all())
+
+    @property
+    def command(self) -> Array:
+        """Command (n,) of FanTracking as it was flown, m/s."""
+        return self.observation[:, 7]
 
     @property
     def offset(self) -> Array:
-        """Offset (250,) m from the fan's axis; a lost vehicle's remaining time counts at 2.5 m."""
-        full = np.full(DECISIONS, LOST_OFFSET)
-        full[: len(self.y)] = np.minimum(np.abs(self.y - self.fan_y), LOST_OFFSET)
+        """Error (decisions,) of the whole episode, m; a lost vehicle's remaining time counts at
+        2.5 m.
+        """
+        full = np.full(self.decisions, LOST_OFFSET)
+        flown = np.nan_to_num(self.error, nan=LOST_OFFSET)
+        full[: len(flown)] = np.minimum(flown, LOST_OFFSET)
         return full
 
     @property
     def rmse(self) -> float:
-        """Root-mean-square offset over the whole episode, m."""
+        """Root-mean-square error over the whole episode, m."""
         return float(np.sqrt(np.mean(self.offset**2)))
 
 
+def loop_of(env: Any) -> Any:
+    """Return the closed loop that flies in an environment that has been reset."""
+    inner = getattr(env.unwrapped, "current", env.unwrapped)  # of a mixture of scenarios
+    return inner.loop if hasattr(inner, "loop") else inner.flight.loop
+
+
 def fly_episode(
-    env: FanTrackingEnv,
-    controller: Controller,
+    env: Any,
+    controller: Any,
     seed: int,
-    each: Callable[[], None] = lambda: None,
+    each: Callable[[dict[str, Any]], None] = lambda info: None,
     decisions: int = DECISIONS,
 ) -> Episode:
-    """Fly one episode, or its first ``decisions``, and return it; ``each`` is called after every
-    decision.
+    """Fly one episode of a task and return it.
 
-    A controller that has ``brief`` is told what the environment says of itself, first of all.
+    Args:
+        env: the environment.
+        controller: called with ``observation`` and ``info``. Its ``brief``, where it has one, is
+            called first, with ``briefing_of(env)``; its ``preview`` is how far ahead, s, it sees
+            the force of the wind.
+        seed: of the episode.
+        each: called with the ``info`` of every decision.
+        decisions: of a whole episode.
     """
+    if hasattr(env, "preview"):
+        env.preview = getattr(controller, "preview", 0.0)
     observation, info = env.reset(seed=seed)
     brief = getattr(controller, "brief", None)
     if brief is not None:
         brief(briefing_of(env))
     controller.reset()
-    rows: list[tuple[float, float, float, float]] = []
-    observations, forces, torques = [], [], []
-    total = 0.0
+    loop, rows, observations, total = loop_of(env), [], [], 0.0
     for _ in range(decisions):
         action = controller(observation, info)
         observation, reward, lost, _, info = env.step(np.asarray(action, dtype=np.float32))
         total += float(reward)
-        rows.append((info["time"], info["y"], info["fan_y"], float(observation[7])))
+        error = info["error"] if "error" in info else abs(info["offset"])
+        state = loop.state
+        rows.append(
+            (
+                *(info["time"], error, *loop.position, *loop.quaternion),
+                *(*state[16:19], *state[13:16], *info["force"], *info["torque"]),
+                info.get("fan_y", np.nan),
+            )
+        )
         observations.append(observation)
-        forces.append(info["force"])
-        torques.append(info["torque"])
-        each()
+        each(info)
         if lost:
             break
-    t, y, fan_y, command = np.array(rows).T
+    table = np.array(rows, dtype=np.float64)
     return Episode(
         seed,
-        info["fan_motion"],
+        info.get("fan_motion") or info.get("trajectory", ""),
         bool(info["lost"]),
         total,
-        t,
-        y,
-        fan_y,
-        command,
+        decisions,
+        table[:, 0],
+        table[:, 1],
+        *np.split(table[:, 2:21], [3, 7, 13, 16], axis=1),
+        table[:, 21],
         np.array(observations, dtype=np.float64),
-        np.array(forces),
-        np.array(torques),
     )
-
-
-def check_episodes(episodes: int, seed: int) -> None:
-    """Check how many episodes a benchmark is asked for, and its seed, which may be any of 32 bits.
-
-    Raises:
-        InputError: no episodes, or a seed out of range.
-    """
-    if episodes < 1:
-        raise InputError(f"benchmark: --episodes must be at least 1, got {episodes}")
-    if not 0 <= seed < _SEEDS:
-        raise InputError(f"benchmark: --seed must lie between 0 and {_SEEDS - 1}, got {seed}")
 
 
 def benchmark_seeds(seed: int, episodes: int) -> list[int]:
@@ -113,23 +137,22 @@ def benchmark_seeds(seed: int, episodes: int) -> list[int]:
     return [FIRST_TEST_SEED + 10_000 * seed + i for i in range(episodes)]
 
 
-def time_series(episode: Episode, poses: Array) -> dict[str, Array]:
-    """Return an episode as columns (n,), a row a decision; ``poses`` (n, 7) are position and
-    quaternion.
+def time_series(episode: Episode) -> dict[str, Array]:
+    """Return an episode as columns (n,), a row a decision.
 
-    ``t`` s; ``px, py, pz`` m and ``qw, qx, qy, qz``, true, body to world; ``fan_y`` m; ``command``
-    m/s along y; ``fx, fy, fz`` N and ``tx, ty, tz`` Nm, estimated, ``true_fx`` to ``true_tz`` true,
-    both in the world frame; ``vy`` m/s, estimated.
+    ``t`` s; ``error`` m; ``px, py, pz`` m and ``qw, qx, qy, qz``, true, body to world; ``fx, fy,
+    fz`` N and ``tx, ty, tz`` Nm, estimated, ``true_fx`` to ``true_tz`` true, both in the world
+    frame. Of FanTracking also ``fan_y`` m, ``command`` m/s along y and ``vy`` m/s, estimated.
     """
-    pose = ("px", "py", "pz", "qw", "qx", "qy", "qz")
     wrench = ("fx", "fy", "fz", "tx", "ty", "tz")
-    true = np.column_stack([episode.force, episode.torque])
-    return {
-        "t": episode.time,
-        **{name: poses[:, i] for i, name in enumerate(pose)},
-        "fan_y": episode.fan_y,
-        "command": episode.command,
-        **{name: episode.observation[:, i] for i, name in enumerate(wrench)},
-        **{f"true_{name}": true[:, i] for i, name in enumerate(wrench)},
-        "vy": episode.observation[:, 6],
-    }
+    names = ("px", "py", "pz", "qw", "qx", "qy", "qz", *wrench, *(f"true_{x}" for x in wrench))
+    parts = (
+        *(episode.position, episode.quaternion, episode.estimate),
+        *(episode.force, episode.torque),
+    )
+    columns = {"t": episode.time, "error": episode.error}
+    columns |= dict(zip(names, np.concatenate(parts, axis=1).T, strict=True))
+    if episode.in_jet:
+        columns["fan_y"], columns["command"] = episode.fan_y, episode.command
+        columns["vy"] = episode.observation[:, 6]
+    return columns

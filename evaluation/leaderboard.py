@@ -1,16 +1,22 @@
-"""The leaderboard's numbers, from the study's result files."""
+"""The leaderboard of a task: controllers, and kinds of policies, scored between hover (0) and
+oracle (1).
+"""
 
+import json
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..runtime.whole_files import replaced
+from .benchmark import Results
+from .episodes import Episode
 from .statistics import (
     hierarchical_bootstrap,
     hierarchical_draws,
-    interquartile_mean,
+    holm,
     interval_of,
     mean,
     paired_wins,
@@ -18,232 +24,235 @@ from .statistics import (
     relative_change,
     sign_probability,
 )
+from .tasks import STANDARD_TASK, TASKS, short_names
 
-Array = NDArray[np.float64]
-Result = Mapping[str, Any]
-Interval = tuple[float, float]
-REFERENCES = ("hover", "oracle")
-# laws that every controller is compared with, each with its best gains; two must have flown
-NEEDED = ("admittance", "ratio")
-RIVALS = (*NEEDED, "lead", "tracker")
-_CLAIM_RESAMPLES = 4_000  # enough for a p-value that is corrected for a hundred claims
+_RESAMPLES = 4_000
+_CLEAR = 0.05  # p-value, corrected
 
 
 @dataclass(frozen=True)
-class Line:
-    """All that is known of one controller: RMSE (seeds, episodes) in m and losses,
-    world by world.
-    """
+class Standing:
+    """One line of a leaderboard: a law, a policy, or all policies of a kind."""
 
-    name: str
-    group: str
-    trained_on: str
-    rmse: dict[str, Array]
-    lost: dict[str, Array]
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One controller against a rival. ``change`` is relative to the rival's mean RMSE: -0.1 is ten
-    per cent less error.
-    """
-
-    rival: str
-    change: float
-    interval: Interval  # 95 %, over policies and episodes, as all of them
-    p: float  # two-sided, of no change
-    wins: float  # paired episodes with a smaller RMSE
-    improvement: float  # probability of improvement
-    improvement_interval: Interval
-
-
-@dataclass(frozen=True)
-class Row:
-    """One controller in one world."""
-
-    world: str
-    name: str
-    group: str
-    seeds: int
-    episodes: int
-    rmse_m: float
-    interval: Interval  # 95 %, over policies and episodes
-    by_seed: tuple[float, ...]
-    median_m: float
+    controller: str
+    scenario: str
+    episodes: int  # of each policy
+    seed: int
+    rmse_m: float  # mean over episodes
+    rmse_ci95_m: tuple[float, float]  # over episodes; of a kind, over policies and episodes
+    median_rmse_m: float
     lost_fraction: float
-    lost_interval: Interval
-    score: float  # 0: hover, 1: oracle
-    share: float | None  # of the way from the admittance law to the limit, where that has flown
-    against: dict[str, Comparison]  # by law: with the gains that are best in this very world
+    score: float  # (hover - this) / (hover - oracle), of the means
+    wins_over_admittance: float  # null where the task has no admittance law
+    task: str
+    rival: str  # the law of ``wins_over_rival``
+    wins_over_rival: float  # share of the paired episodes with a smaller RMSE; a tie is half
+    change_over_rival: float  # of the mean RMSE
+    change_ci95: tuple[float, float]  # over policies and episodes
+    improvement_over_rival: float  # probability of improvement
+    best_law: str  # the designed law with the smallest mean RMSE in this scenario, of those flown
+    change_over_best: float
+    change_over_best_ci95: tuple[float, float]
+    # of no change, corrected (Holm); null for laws, and for policies of a kind
+    p_over_best: float | None
+    policies: int  # that this row counts together
+    most_lost_fraction: float  # of the policy that loses most
+    # (rival - this) / (rival - limit), of the means: the share of the way from the rival to the
+    # best that the measurements allow; null where ``limit`` does not fly
+    share_of_limit: float = math.nan
 
 
-def lines_of(results: Sequence[Result], plan: Mapping[str, Any]) -> list[Line]:
-    """Return the controllers of the study, those of which something is known, in
-    the plan's order.
+def leaderboard(
+    results: Results, controllers: Sequence[str], seed: int, task: str = STANDARD_TASK
+) -> list[Standing]:
+    """Return the leaderboard's rows, scenario by scenario, best first.
+
+    Policies of one kind that come with the kit (``sac-0``, ``sac-1``) have a row each, and one as a
+    kind (``sac``), whose intervals speak of other training seeds, too.
     """
-    episodes = plan["episodes"]
-    names = [*plan["designed"], *plan["learned"]]
-    if plan["ablation"]:
-        names += [plan["ablation"]["reference"], *plan["ablation"]["changes"]]
-    lines = []
+    names, known = list(dict.fromkeys(controllers)), TASKS[task]
+    kinds: dict[str, list[str]] = {}
     for name in names:
-        some = sorted(
-            (r for r in results if r["name"] == name),
-            key=lambda r: -1 if r["seed"] is None else r["seed"],
-        )
-        rmse: dict[str, Array] = {}
-        lost: dict[str, Array] = {}
-        for world in plan["worlds"]:
-            flown = [
-                s
-                for r in some
-                if len((s := r["scores"].get(world, {})).get("rmse_m", ())) >= episodes
-            ]
-            if flown:
-                rmse[world] = np.array([s["rmse_m"][:episodes] for s in flown], dtype=np.float64)
-                lost[world] = np.array([s["lost"][:episodes] for s in flown], dtype=np.float64)
-        if rmse:
-            lines.append(Line(name, some[0]["group"], some[0].get("scenario", ""), rmse, lost))
-    return lines
+        if name in known.policies():
+            kinds.setdefault(name.rpartition("-")[0], []).append(name)
+    kinds = {kind: each for kind, each in kinds.items() if len(each) > 1}
+    rows: list[Standing] = []
+    for scenario in dict.fromkeys(s for _, s in results):
+        flown = {
+            name: [results[each, scenario] for each in kinds.get(name, [name])]
+            for name in [*known.references(names), *kinds]
+            if name in kinds or (name, scenario) in results
+        }
+        some = [_row(task, scenario, seed, name, flown) for name in [*names, *kinds]]
+        rows.extend(sorted(some, key=lambda row: row.rmse_m))
+    return _corrected(rows)
 
 
-def best_of(lines: Sequence[Line], law: str, world: str) -> Line | None:
-    """Return the law with the gains, tuned or as it comes, that have the smallest mean RMSE in this
-    very world.
-
-    The choice looks at the test episodes, which favours the law and nobody else.
-    """
-    some = [
-        x
-        for x in lines
-        if x.group == "designed"
-        and (x.name == law or x.name.startswith(f"{law}-tuned"))
-        and world in x.rmse
-    ]
-    return min(some, key=lambda x: float(x.rmse[world].mean()), default=None)
-
-
-def compare(x: Array, rival: Line, world: str) -> Comparison:
-    """Return how errors (seeds, episodes) in a world compare with a rival's."""
-    y = rival.rmse[world]
-    draws = hierarchical_draws(relative_change, x, y, resamples=_CLAIM_RESAMPLES)
-    return Comparison(
-        rival=rival.name,
-        change=float(relative_change(x, y)),
-        interval=interval_of(draws),
-        p=sign_probability(draws),
-        wins=float(paired_wins(x, y)),
-        improvement=float(probability_of_improvement(-x, -y)),
-        improvement_interval=hierarchical_bootstrap(probability_of_improvement, -x, -y),
+def _row(
+    task: str,
+    scenario: str,
+    seed: int,
+    name: str,
+    flown: Mapping[str, Sequence[Sequence[Episode]]],
+) -> Standing:
+    """Return the row of a law, a policy or a kind; ``flown`` holds the episodes of each policy."""
+    known = TASKS[task]
+    rmse = {law: np.array([[e.rmse for e in one] for one in of]) for law, of in flown.items()}
+    means = {law: float(of.mean()) for law, of in rmse.items()}
+    designed = [law for law in known.laws if law in rmse and law not in ("hover", *known.bounds)]
+    best = min(designed, key=means.__getitem__)
+    rival, x = known.rival, rmse[name]
+    over_rival, over_best = (
+        hierarchical_draws(relative_change, x, rmse[law], resamples=_RESAMPLES)
+        for law in (rival, best)
+    )
+    interval = known.interval if len(x) == 1 else hierarchical_bootstrap
+    wins = float(paired_wins(x, rmse[rival]))
+    lost = [float(np.mean([e.lost for e in one])) for one in flown[name]]
+    return Standing(
+        controller=name,
+        scenario=scenario,
+        episodes=x.shape[1],
+        seed=seed,
+        rmse_m=means[name],
+        rmse_ci95_m=interval(mean, x, resamples=_RESAMPLES),
+        median_rmse_m=float(np.median(x)),
+        lost_fraction=float(np.mean(lost)),
+        score=_share(means["hover"], means[name], means["oracle"]),
+        wins_over_admittance=wins if rival == "admittance" else math.nan,
+        task=task,
+        rival=rival,
+        wins_over_rival=wins,
+        change_over_rival=float(relative_change(x, rmse[rival])),
+        change_ci95=interval_of(over_rival),
+        improvement_over_rival=float(probability_of_improvement(-x, -rmse[rival])),
+        best_law=best,
+        change_over_best=float(relative_change(x, rmse[best])),
+        change_over_best_ci95=interval_of(over_best),
+        p_over_best=None if name in known.laws else sign_probability(over_best),
+        policies=len(x),
+        most_lost_fraction=max(lost),
+        share_of_limit=_share(means[rival], means[name], means.get("limit", math.nan)),
     )
 
 
-def rows_of(
-    results: Sequence[Result], plan: Mapping[str, Any], ablation: bool = False
-) -> list[Row]:
-    """Return the rows of the leaderboard, or of the ablations, world by world, best first."""
-    lines = lines_of(results, plan)
-    by_name = {x.name: x for x in lines}
-    rows = []
-    for world in plan["worlds"]:
-        if any(name not in by_name or world not in by_name[name].rmse for name in REFERENCES):
-            continue
-        hover, oracle = (float(by_name[name].rmse[world].mean()) for name in REFERENCES)
-        rivals = {law: best_of(lines, law, world) for law in RIVALS}
-        if any(rivals[law] is None for law in NEEDED):
-            continue
-        some = []
-        for line in lines:
-            if world not in line.rmse or (line.group == "ablation") is not ablation:
-                continue
-            x = line.rmse[world]
-            some.append(
-                Row(
-                    world=world,
-                    name=line.name,
-                    group=line.group,
-                    seeds=len(x),
-                    episodes=x.shape[1],
-                    rmse_m=float(x.mean()),
-                    interval=hierarchical_bootstrap(mean, x),
-                    by_seed=tuple(x.mean(axis=1).tolist()),
-                    median_m=float(np.median(x)),
-                    lost_fraction=float(line.lost[world].mean()),
-                    lost_interval=hierarchical_bootstrap(mean, line.lost[world]),
-                    score=(hover - float(x.mean())) / (hover - oracle),
-                    share=_share(by_name, world, float(x.mean())),
-                    against={
-                        law: compare(x, rival, world)
-                        for law, rival in rivals.items()
-                        if rival is not None
-                    },
-                )
-            )
-        rows.extend(sorted(some, key=lambda row: row.rmse_m))
-    return rows
-
-
-def _share(by_name: Mapping[str, Line], world: str, rmse: float) -> float | None:
-    ends = [by_name[n].rmse.get(world) if n in by_name else None for n in ("admittance", "limit")]
-    if ends[0] is None or ends[1] is None:
-        return None
-    start, end = (float(x.mean()) for x in ends if x is not None)
-    return (start - rmse) / (start - end) if start > end else None
-
-
-def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Array | None:
-    """Return scores (seeds, worlds * episodes) between hover (0) and oracle (1) of each world; None
-    where one is missing.
+def _share(start: float, here: float, end: float) -> float:
+    """Return the share of the way from one RMSE to a smaller one; not a number where there is no
+    way.
     """
-    by_name = {x.name: x for x in lines}
-    if any(
-        world not in line.rmse or any(world not in by_name[n].rmse for n in REFERENCES)
-        for world in worlds
-    ):
-        return None
-    columns = []
-    for world in worlds:
-        hover, oracle = (float(by_name[n].rmse[world].mean()) for n in REFERENCES)
-        columns.append((hover - line.rmse[world]) / (hover - oracle))
-    seeds = min(len(c) for c in columns)
-    return np.concatenate([c[:seeds] for c in columns], axis=1)
+    return (start - here) / (start - end) if start > end else math.nan
 
 
-@dataclass(frozen=True)
-class Aggregate:
-    """One controller over several worlds: mean of its scores, none of them left out."""
-
-    name: str
-    seeds: int
-    score: float
-    interval: Interval  # 95 %, over policies and episodes
-    middle: float  # interquartile mean, of the middle half of the scores
-    middle_interval: Interval
-    lost: float  # share of all episodes
-    lost_interval: Interval
+def _corrected(rows: Sequence[Standing]) -> list[Standing]:
+    """Return the rows with p-values corrected (Holm) for all that a page shows of them."""
+    claims = {id(row): row.p_over_best for row in shown(rows) if row.p_over_best is not None}
+    p = dict(zip(claims, holm(list(claims.values())).tolist(), strict=True))
+    return [replace(row, p_over_best=p.get(id(row))) for row in rows]
 
 
-def aggregate(lines: Sequence[Line], worlds: Sequence[str]) -> list[Aggregate]:
-    """Return what controllers reach over all worlds, best mean score first; the interquartile mean,
-    which does not see a lost episode, stands beside it, not in its place.
+def write_leaderboard(rows: Sequence[Standing], folder: Path) -> Path:
+    """Write the rows as ``leaderboard.json``, at once or not at all; return its path.
+
+    A number that means nothing is null.
     """
-    found = []
-    for line in lines:
-        scores = None if line.group == "ablation" else normalised(line, lines, worlds)
-        if scores is None:
-            continue
-        lost = np.concatenate([line.lost[w][: len(scores)] for w in worlds], axis=1)
-        blocks = len(worlds)
-        found.append(
-            Aggregate(
-                name=line.name,
-                seeds=len(scores),
-                score=float(mean(scores)),
-                interval=hierarchical_bootstrap(mean, scores, blocks=blocks),
-                middle=float(interquartile_mean(scores)),
-                middle_interval=hierarchical_bootstrap(interquartile_mean, scores, blocks=blocks),
-                lost=float(lost.mean()),
-                lost_interval=hierarchical_bootstrap(mean, lost, blocks=blocks),
-            )
+    path = folder / "leaderboard.json"
+    data = [
+        {key: None if value != value else value for key, value in asdict(row).items()}
+        for row in rows
+    ]
+    with replaced(path) as partial:
+        partial.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def shown(rows: Sequence[Standing]) -> list[Standing]:
+    """Return the rows without policies that the row of their kind counts."""
+    kinds = {row.controller for row in rows if row.policies > 1}
+    return [row for row in rows if row.controller.rpartition("-")[0] not in kinds]
+
+
+def summary(rows: Sequence[Standing]) -> str:
+    """Return what the rows say as a list, a scenario a line: losses first, then which policies are
+    better or worse than the best designed law at a corrected p-value below 0.05.
+    """
+    lines = []
+    for scenario in dict.fromkeys(row.scenario for row in rows):
+        some = [row for row in shown(rows) if row.scenario == scenario]
+        lost: dict[str, list[str]] = {}
+        for row in sorted(some, key=lambda row: -row.lost_fraction):
+            lost.setdefault(_lost(row), []).append(f"`{row.controller}`")
+        parts = [
+            f"{', '.join(names)} {'none' if told == '0.0 %' else told}"
+            for told, names in lost.items()
+        ]
+        told = "; ".join(parts) if len(lost) > 1 else f"all {next(iter(lost))}"
+        if list(lost) == ["0.0 %"]:
+            told = "nothing"
+        judged = [row for row in some if row.p_over_best is not None and row.p_over_best < _CLEAR]
+        better = [row for row in judged if row.change_over_best < 0]
+        worse = [row for row in judged if row.change_over_best > 0]
+        lines.append(
+            f"* **{scenario}**, {some[0].episodes} episodes each. Lost: {told}. Against the best "
+            f"designed law there, `{some[0].best_law}`: clearly worse {_listed(worse)}; clearly "
+            f"better {_listed(better)}."
         )
-    return sorted(found, key=lambda one: -one.score)
+    return "\n".join(lines) + "\n" if lines else ""
+
+
+def _listed(rows: Sequence[Standing]) -> str:
+    return (
+        ", ".join(
+            f"`{row.controller}` {_told(row.change_over_best, row.change_over_best_ci95)}"
+            for row in rows
+        )
+        or "none"
+    )
+
+
+def _lost(row: Standing) -> str:
+    told = f"{100 * row.lost_fraction:.1f} %"
+    if row.most_lost_fraction > row.lost_fraction:
+        told += f" (most {100 * row.most_lost_fraction:.1f} %)"
+    return told
+
+
+def table(rows: Sequence[Standing]) -> dict[str, list[str]]:
+    """Return the rows as columns of text by their titles: policies as kinds."""
+    rows = shown(rows)
+    names = short_names([row.controller for row in rows])
+    columns: dict[str, list[str]] = {}
+    for row in rows:
+        low, high = row.rmse_ci95_m
+        p, designed = row.p_over_best, row.controller in TASKS[row.task].laws
+        cells = {
+            "scenario": row.scenario,
+            "law": names[row.controller],
+            "policies": "-" if designed else str(row.policies),
+            "RMSE (m), 95 %": f"{row.rmse_m:.3f} ({low:.3f}-{high:.3f})",
+            "median": f"{row.median_rmse_m:.3f}",
+            "lost": _lost(row),
+            "score": f"{row.score:.2f}",
+            "wins": f"{100 * row.wins_over_rival:.0f} %",
+            "P": f"{row.improvement_over_rival:.2f}",
+            f"against {row.rival}, 95 %": _told(row.change_over_rival, row.change_ci95),
+            "against the best law, 95 %": _told(row.change_over_best, row.change_over_best_ci95),
+            "p": "-" if p is None else f"{p:.3f}",
+        }
+        if not math.isnan(row.share_of_limit):
+            cells["to the limit"] = f"{100 * row.share_of_limit:.0f} %"
+        for title, text in cells.items():
+            columns.setdefault(title, []).append(text)
+    return columns
+
+
+def markdown(rows: Sequence[Standing]) -> str:
+    """Return the rows as a table for a page."""
+    columns = table(rows)
+    left = ("scenario", "law", "RMSE", "against")
+    rule = ["-" if title.startswith(left) else "-:" for title in columns]
+    lines = [list(columns), rule, *zip(*columns.values(), strict=True)] if columns else []
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _told(change: float, interval: tuple[float, float]) -> str:
+    return f"{100 * change:+.0f} % ({100 * interval[0]:+.0f} to {100 * interval[1]:+.0f})"

@@ -7,7 +7,7 @@ results' folder must lie where all of them see it.
 
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,10 +88,21 @@ def run_job(job: Job, folder: Path) -> dict[str, Any]:
     }
 
 
-def run_jobs(jobs: Sequence[Job], folder: Path, address: str) -> list[dict[str, Any]]:
-    """Do the runs of a sweep with Ray Tune; return what each was worth, in their order.
+def run_jobs(
+    jobs: Sequence[Job],
+    folder: Path,
+    address: str,
+    work: Callable[[Job, Path], dict[str, Any]] = run_job,
+) -> list[dict[str, Any]]:
+    """Do the runs of a sweep with Ray Tune; return the result of each, in their order.
 
-    A run whose process or machine is lost is taken up again elsewhere, from its last checkpoint.
+    A run whose process or machine is lost goes on elsewhere, from its last checkpoint.
+
+    Args:
+        jobs: of ``jobs_of``.
+        folder: of the results, which every machine sees.
+        address: of the cluster.
+        work: does one run in a worker process.
 
     Raises:
         InputError: as ``connected``, or a run failed for good.
@@ -103,7 +114,7 @@ def run_jobs(jobs: Sequence[Job], folder: Path, address: str) -> list[dict[str, 
         root = folder.resolve()
 
         def trial(space: dict[str, Any]) -> None:
-            tune.report(run_job(by_name[space["run"]], root))
+            tune.report(work(by_name[space["run"]], root))
 
         tuner = tune.Tuner(
             tune.with_resources(trial, {"cpu": 1}),

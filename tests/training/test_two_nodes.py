@@ -8,6 +8,7 @@ import pytest
 from tests.support.cluster_runs import TINY, assert_same_flights, assert_same_runs
 from windwrench.evaluation.benchmark import fly_all
 from windwrench.training.sweep import jobs_of, run_job, run_jobs
+from windwrench.training.train import train
 
 pytestmark = pytest.mark.slow
 
@@ -55,21 +56,31 @@ def test_training_survives_the_loss_of_a_node(two_nodes, tmp_path):
         reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
     )
     jobs = jobs_of("sac", "base", range(2), TINY, [])
-    over = threading.Event()
+    lost, over = tmp_path / "lost", threading.Event()
 
-    def kill():
-        while not over.is_set():
-            begun = [(tmp_path / "there" / job.name / "checkpoint.pt").exists() for job in jobs]
-            ended = [(tmp_path / "there" / job.name / "last.npz").exists() for job in jobs]
-            if all(begun) and not any(ended):
-                two_nodes.lose_one()
-                return
+    def wait_for(*marks):
+        while not all(mark.exists() for mark in marks) and not over.is_set():
             time.sleep(0.02)
 
-    killer = threading.Thread(target=kill)
+    def held_at_its_first_checkpoint(job, folder):
+        """Train until the first checkpoint, wait there until a node is lost, and go on."""
+        if not lost.exists():
+            train(job.config, job.scenario, job.seed, folder / job.name, stop_after=1)
+            (folder / job.name / "held").touch()
+            while not lost.exists():
+                time.sleep(0.02)
+        return run_job(job, folder)
+
+    def kill_once_both_wait():
+        wait_for(*(tmp_path / "there" / job.name / "held" for job in jobs))
+        if not over.is_set():
+            two_nodes.lose_one()
+            lost.touch()
+
+    killer = threading.Thread(target=kill_once_both_wait)
     killer.start()
     try:
-        there = run_jobs(jobs, tmp_path / "there", two_nodes.address)
+        there = run_jobs(jobs, tmp_path / "there", two_nodes.address, held_at_its_first_checkpoint)
     finally:
         over.set()
         killer.join()
