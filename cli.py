@@ -15,7 +15,7 @@ from .commands.exporting import export_c
 from .commands.flying import fly, record
 from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.identifying import identify
-from .commands.learning import imitate, train, tune
+from .commands.learning import train
 from .commands.library import effects
 from .commands.live import live
 from .commands.logs import diagnose, estimate
@@ -93,8 +93,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     reproduce,
     effects,
     train,
-    imitate,
-    tune,
 )
 _STUDIES: tuple[Callable[..., Any], ...] = (trials, real_flights, close_loop, leaderboard)
 for command in (*_COMMANDS, *_STUDIES):

@@ -79,7 +79,7 @@ def _fly(env: FanTrackingEnv, seeds: list[int], report: Report) -> list[Episode]
     flown: list[Episode] = []
     done = 0
 
-    def each() -> None:
+    def each(info: dict[str, Any]) -> None:
         nonlocal done
         done += 1
         report(done / (DECISIONS * len(seeds)))

@@ -23,7 +23,8 @@ from ..controllers.task_policy import TaskPolicy
 from ..controllers.trained_policy import save_policy
 from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_SCALES
 from ..envs.fan_tracking_2d import SCALES_2D
-from ..evaluation.task_benchmark import TASKS, fly_task_episode
+from ..evaluation.episodes import fly_episode
+from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork, Sequences, fit
 from .learners import dense_weights
 from .seeds import training_seed, validation_seeds
@@ -202,7 +203,8 @@ def validate(policy: TaskPolicy, task: str) -> tuple[float, int]:
     """Return the mean RMSE (m) over the validation episodes, and how many were lost."""
     known = TASKS[task]
     env = known.environment(SCENARIO)
-    flown = [fly_task_episode(env, policy, s, known) for s in validation_seeds(VALIDATION)]
+    seeds = validation_seeds(VALIDATION)
+    flown = [fly_episode(env, policy, seed, decisions=known.decisions) for seed in seeds]
     return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
 
 

@@ -1,4 +1,4 @@
-"""Tuning the hand-designed laws, on validation episodes, with the care that learning gets."""
+"""Tuning the gains of the designed laws of every task, on validation episodes."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,36 +7,56 @@ from typing import Any
 import numpy as np
 import yaml
 
-from ..controllers import LAWS
 from ..evaluation.episodes import fly_episode
+from ..evaluation.tasks import STANDARD_TASK, TASKS, make_environment, task_of
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-# the ranges searched, each on a logarithmic scale: far beyond what was seen to work
-RANGES: dict[str, dict[str, tuple[float, float]]] = {
-    "admittance": {"gain": (4.0, 80.0)},
-    "ratio": {"gain": (1.5, 40.0), "least_force": (0.02, 0.5)},
-    "lead": {"gain": (3.0, 40.0), "lead": (0.3, 15.0), "least_force": (0.02, 0.5)},
-    "admittance-pid": {"gain": (4.0, 80.0), "integral": (0.05, 30.0), "lead": (0.1, 30.0)},
-    "tracker": {
-        "gain": (0.5, 5.0),
-        "damping": (0.05, 2.0),
-        "acceleration": (0.005, 0.3),
-        "jumps": (0.05, 1.5),
-        "speed": (0.1, 0.5),
-    },
-    "tracker-informed": {
-        "gain": (0.5, 5.0),
-        "damping": (0.05, 2.0),
-        "ahead": (0.08, 0.8),
-        "spread": (0.03, 0.4),
-    },
+Ranges = dict[str, tuple[float, float]]
+_FAN_2D: Ranges = {"gain": (4.0, 60.0), "gain_z": (4.0, 60.0)}
+_PD: Ranges = {"kp": (0.5, 60.0), "kd": (0.1, 15.0)}
+_PID: Ranges = {**_PD, "ki": (0.1, 60.0)}
+_WIND: dict[str, Ranges] = {
+    "pid": _PID,
+    "pid-force": {**_PID, "gain": (0.3, 1.2), "lead": (0.02, 1.0)},
+    "indi": {**_PD, "cutoff": (0.5, 10.0), "gain": (0.3, 1.2)},
+    "l1": {**_PD, "pole": (0.3, 20.0), "bandwidth": (0.5, 30.0)},
+    "oracle": {**_PID, "gain": (0.5, 1.2), "preview": (0.03, 0.5)},
 }
-# gains with which the search begins where they are not the law's own defaults: what it found has
-# become those
+# the ranges searched, each on a logarithmic scale: far beyond what was seen to work
+RANGES: dict[str, dict[str, Ranges]] = {
+    "FanTracking": {
+        "admittance": {"gain": (4.0, 80.0)},
+        "ratio": {"gain": (1.5, 40.0), "least_force": (0.02, 0.5)},
+        "lead": {"gain": (3.0, 40.0), "lead": (0.3, 15.0), "least_force": (0.02, 0.5)},
+        "admittance-pid": {"gain": (4.0, 80.0), "integral": (0.05, 30.0), "lead": (0.1, 30.0)},
+        "tracker": {
+            "gain": (0.5, 5.0),
+            "damping": (0.05, 2.0),
+            "acceleration": (0.005, 0.3),
+            "jumps": (0.05, 1.5),
+            "speed": (0.1, 0.5),
+        },
+        "tracker-informed": {
+            "gain": (0.5, 5.0),
+            "damping": (0.05, 2.0),
+            "ahead": (0.08, 0.8),
+            "spread": (0.03, 0.4),
+        },
+    },
+    "FanTracking2D": {
+        "admittance": _FAN_2D,
+        "ratio": {"gain": (2.0, 30.0), "gain_z": (2.0, 30.0), "least_force": (0.03, 0.4)},
+        "oracle": {"gain": (0.5, 8.0)},
+    },
+    "WindHover": _WIND,
+    "WindTrajectory": _WIND,
+}
+# gains of FanTracking with which a search begins in place of the law's defaults: the defaults are
+# what a search found
 STARTS: dict[str, dict[str, float]] = {
     "admittance-pid": {"gain": 18.0, "integral": 4.0, "lead": 4.0},
     "tracker": {"gain": 1.5, "damping": 0.3, "acceleration": 0.03, "jumps": 0.3, "speed": 0.25},
@@ -45,14 +65,31 @@ STARTS: dict[str, dict[str, float]] = {
 _PRUNE_AFTER = 10  # episodes
 
 
-def check_law(name: str) -> None:
-    """Check the name of a law that has something to tune.
+def check_request(task: str, law: str, scenario: str, trials: int, episodes: int) -> None:
+    """Check what ``tune`` is asked for.
 
     Raises:
-        InputError: there is none of this name.
+        InputError: an unknown task, law or scenario, no trials, or too many episodes.
     """
-    if name not in RANGES:
-        raise unknown_name("law", name, RANGES)
+    known = task_of(task)
+    if law not in RANGES[task]:
+        raise unknown_name("law", law, RANGES[task])
+    if task == STANDARD_TASK:
+        check_training_env(scenario)
+    elif scenario not in known.scenarios:
+        raise unknown_name("scenario", scenario, known.scenarios)
+    if trials < 1:
+        raise InputError(f"tune: trials must be at least 1, got {trials}")
+    validation_seeds(episodes)
+
+
+def first_gains(task: str, law: str) -> dict[str, float]:
+    """Return the gains with which a search begins: those of ``STARTS``, or the law's defaults,
+    limited to the ranges.
+    """
+    defaults = {**vars(TASKS[task].laws[law]()), **STARTS.get(law, {})}
+    ranges = RANGES[task][law].items()
+    return {name: min(max(float(defaults[name]), low), high) for name, (low, high) in ranges}
 
 
 def tune(
@@ -62,43 +99,43 @@ def tune(
     episodes: int,
     seed: int = 0,
     advance: Callable[[int], None] = lambda done: None,
+    task: str = STANDARD_TASK,
 ) -> dict[str, Any]:
     """Search a law's gains for the smallest mean RMSE over validation episodes (Optuna,
     tree-structured Parzen estimator).
 
     Args:
-        law: a key of ``RANGES``.
-        scenario: scenario or tier.
-        trials: gains tried; the first are the law's own defaults, or those of ``STARTS``.
+        law: a key of ``RANGES[task]``.
+        scenario: of the task; of FanTracking also a tier.
+        trials: gains tried; the first are those of ``first_gains``.
         episodes: validation episodes of each; a trial far behind is given up after ten.
         seed: of the search.
         advance: called with the number of trials done.
+        task: one of ``evaluation.tasks.TASKS``.
 
     Returns:
         ``gains``, ``rmse_m`` and ``lost`` of the best, ``default_rmse_m`` of the first gains tried,
             and the request.
 
     Raises:
-        InputError: an unknown law or scenario, no trials, or too many episodes.
+        InputError: as ``check_request``.
     """
     import optuna
 
-    check_law(law)
-    check_training_env(scenario)
-    if trials < 1:
-        raise InputError(f"tune: --trials must be at least 1, got {trials}")
-    seeds = validation_seeds(episodes)
-    env: Any = make_training_env(scenario)
+    check_request(task, law, scenario, trials, episodes)
+    known, ranges, seeds = task_of(task), RANGES[task][law], validation_seeds(episodes)
+    in_tier = task == STANDARD_TASK
+    env: Any = make_training_env(scenario) if in_tier else make_environment(task, scenario)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
     def objective(trial: Any) -> float:
         gains = {
             name: trial.suggest_float(name, low, high, log=True)
-            for name, (low, high) in RANGES[law].items()
+            for name, (low, high) in ranges.items()
         }
-        controller, rmse, lost = LAWS[law](**gains), [], 0
+        controller, rmse, lost = known.laws[law](**gains), [], 0
         for k, one in enumerate(seeds):
-            episode = fly_episode(env, controller, one)
+            episode = fly_episode(env, controller, one, decisions=known.decisions)
             rmse.append(episode.rmse)
             lost += episode.lost
             if k + 1 == _PRUNE_AFTER:
@@ -112,13 +149,12 @@ def tune(
         sampler=optuna.samplers.TPESampler(seed=seed),
         pruner=optuna.pruners.PercentilePruner(60.0, n_startup_trials=4),
     )
-    default = LAWS[law]()
-    start = {name: float(getattr(default, name)) for name in RANGES[law]}
-    study.enqueue_trial({**start, **STARTS.get(law, {})})
+    study.enqueue_trial(first_gains(task, law))
     study.optimize(
         objective, n_trials=trials, callbacks=[lambda _, trial: advance(trial.number + 1)]
     )
     return {
+        "task": task,
         "law": law,
         "scenario": scenario,
         "gains": study.best_params,
@@ -132,8 +168,8 @@ def tune(
 
 
 def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
-    """Write what a search found into a file of tuned gains, in place of what it held for this law
-    and scenario.
+    """Write what a search found into a file of tuned gains, in place of the entry for this law and
+    scenario of FanTracking, or for this law of another task.
 
     Raises:
         InputError: the file is there but holds no gains.
@@ -145,11 +181,11 @@ def keep_gains(found: dict[str, Any], path: Path, command: str) -> None:
             raise InputError(
                 f"{path}: expected laws, scenarios and their gains, as in controllers/tuned.yaml"
             )
+    places = ("law", "scenario") if found["task"] == STANDARD_TASK else ("task", "law")
     rounded = {name: float(f"{value:.4g}") for name, value in found["gains"].items()}
-    rest = {key: value for key, value in found.items() if key not in ("law", "scenario", "gains")}
-    kept.setdefault(found["law"], {})[found["scenario"]] = {
+    kept.setdefault(found[places[0]], {})[found[places[1]]] = {
         "gains": rounded,
-        **rest,
+        **{k: v for k, v in found.items() if k not in ("gains", "task", "law", places[1])},
         "command": command,
     }
     with replaced(path) as partial:

@@ -182,7 +182,7 @@ def fly_episodes(
     for seed in seeds:
         errors: list[Array] = []
 
-        def keep(errors: list[Array] = errors) -> None:
+        def keep(info: Mapping[str, Any], errors: list[Array] = errors) -> None:
             loop = env.loop
             assert loop is not None
             x = loop.state

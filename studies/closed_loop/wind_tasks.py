@@ -17,8 +17,8 @@ from windwrench.controllers.flight import FlightGains
 from windwrench.controllers.task_laws import make_task_law
 from windwrench.dynamics.vehicle import EffectSetting, Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
-from windwrench.evaluation.episodes import benchmark_seeds
-from windwrench.evaluation.task_benchmark import TASKS, fly_task_episode
+from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
+from windwrench.evaluation.tasks import TASKS
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit
 from windwrench.runtime.regular_files import read_json
@@ -99,7 +99,7 @@ def _fly(job: _Job) -> dict[str, Any]:
         )
         for name in (*LAWS, *(ADAPTIVE if model == "declared" else ())):
             law = make_task_law(name, setting.task)
-            flown = [fly_task_episode(env, law, seed, task) for seed in job.seeds]
+            flown = [fly_episode(env, law, seed, decisions=task.decisions) for seed in job.seeds]
             out[f"{name} {model}"] = {
                 "rmse_m": [float(f"{e.rmse:.6g}") for e in flown],
                 "lost": sum(e.lost for e in flown),

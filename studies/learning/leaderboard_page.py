@@ -8,17 +8,6 @@ import numpy as np
 
 from windwrench.controllers.flight_response import half_response
 from windwrench.controllers.tuned import tuned_gains
-from windwrench.evaluation.leaderboard import (
-    Comparison,
-    Line,
-    Result,
-    Row,
-    aggregate,
-    best_of,
-    compare,
-    lines_of,
-    rows_of,
-)
 from windwrench.evaluation.statistics import holm
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.page_files import write_text
@@ -29,6 +18,17 @@ from windwrench.studies.learning.leaderboard_pictures import (
     draw_profiles,
     draw_summary,
     draw_tracking,
+)
+from windwrench.studies.learning.scores import (
+    Comparison,
+    Line,
+    Result,
+    Row,
+    aggregate,
+    best_of,
+    compare,
+    lines_of,
+    rows_of,
 )
 from windwrench.studies.learning.study import Places, entries_of, is_done
 from windwrench.training.training_envs import TIERS
@@ -580,7 +580,7 @@ def _tuning() -> str:
             )
     return (
         "## Tuning\n\nWhat designed laws were given, to set beside the decisions of training: gains "
-        "searched on validation episodes (`windwrench tune`). A set of gains that is far behind "
+        "searched on validation episodes (`windwrench train tune`). A set of gains that is far behind "
         "after ten episodes is given up. Before: the gains that the search began with.\n\n"
         + "\n".join(table)
     )
@@ -599,7 +599,7 @@ def _how(plan: Mapping[str, Any], results: Sequence[Result], places: Places) -> 
   gains of these laws come from validation episodes alone.
 * Seeds of episodes: training below 900 000, validation from there, test from 1 000 000 on. The best of a run's validations,
   not the last, is the policy that is scored.
-* The designed controllers' gains are tuned on 60 validation episodes (`windwrench tune`); what was found, and the
+* The designed controllers' gains are tuned on 60 validation episodes (`windwrench train tune`); what was found, and the
   command, is in `controllers/tuned.yaml`.
 * A policy is a file of weights with a card beside it (`training/policies`) and is flown without a
   deep-learning library: `windwrench benchmark --controllers sac-0,tracker,admittance --scenarios base,fast`.

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from windwrench.evaluation.benchmark import make_pilot
 from windwrench.evaluation.episodes import FIRST_TEST_SEED, fly_episode
-from windwrench.evaluation.leaderboard import Line, Result, Row, normalised
 from windwrench.evaluation.pictures import COLOURS
 from windwrench.evaluation.statistics import hierarchical_bootstrap, performance_profile
+from windwrench.evaluation.tasks import make_pilot
 from windwrench.runtime.page_files import write_png
+from windwrench.studies.learning.scores import Line, Result, Row, normalised
 from windwrench.training.training_envs import make_training_env
 
 _LEARNED = {

@@ -1,4 +1,4 @@
-"""The leaderboard's numbers, from the study's result files."""
+"""The numbers of the study's leaderboard, from its result files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .statistics import (
+from windwrench.evaluation.statistics import (
     hierarchical_bootstrap,
     hierarchical_draws,
     interquartile_mean,

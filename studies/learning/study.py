@@ -21,8 +21,8 @@ from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, sa
 from windwrench.dynamics.effects import parse_setting
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.envs.watched_fan_tracking import scenario_env
-from windwrench.evaluation.benchmark import make_pilot
 from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
+from windwrench.evaluation.tasks import make_pilot
 from windwrench.runtime.errors import InputError, unknown_name
 from windwrench.runtime.page_files import write_json
 from windwrench.runtime.workers import shared_dict, workers
@@ -185,7 +185,7 @@ def fly_world(
     """
     ahead, uncertain = half_response(), []
 
-    def note() -> None:
+    def note(info: Mapping[str, Any]) -> None:
         if isinstance(pilot, Limit):
             uncertain.append(pilot.deviation_ahead(ahead))
 

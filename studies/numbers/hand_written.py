@@ -28,11 +28,11 @@ def reproduction(kept: Kept) -> str:
 
 def tasks(kept: Kept) -> str:
     """Return the page of the tasks, whose tables are those of ``windwrench benchmark --task``."""
-    from windwrench.evaluation.task_leaderboard import TaskRow, markdown, summary
+    from windwrench.evaluation.leaderboard import Standing, markdown, summary
 
     page = _page("tasks")
     for task in _TASKS:
-        rows = [TaskRow(**row) for row in kept(f"results/tasks/{task}.json.gz")]
+        rows = [Standing(**row) for row in kept(f"results/tasks/{task}.json.gz")]
         begin, end = f"<!-- {task}: begin -->", f"<!-- {task}: end -->"
         before, rest = page.split(begin)
         page = f"{before}{begin}\n\n{summary(rows)}\n{markdown(rows)}\n{end}{rest.split(end)[1]}"

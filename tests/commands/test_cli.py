@@ -138,6 +138,7 @@ def test_benchmark_writes_the_leaderboard(tmp_path):
     assert (tmp_path / "out" / "leaderboard.png").read_bytes().startswith(PNG)
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "leaderboard.json",
+        "leaderboard.md",
         "leaderboard.png",
         "run.json",
     }

@@ -15,8 +15,9 @@ from windwrench.controllers.trained_policy import (
 )
 from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
-from windwrench.evaluation.benchmark import fly_all, leaderboard
+from windwrench.evaluation.benchmark import fly_all
 from windwrench.evaluation.episodes import fly_episode
+from windwrench.evaluation.leaderboard import leaderboard
 
 CARD = {
     "algorithm": "test",

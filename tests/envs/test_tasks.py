@@ -20,7 +20,7 @@ from windwrench.envs.wind_hover import WindHoverEnv
 from windwrench.envs.wind_scenarios import START, WIND_SCENARIOS
 from windwrench.envs.wind_trajectory import WindTrajectoryEnv
 from windwrench.envs.windy_flight import WindyFlight
-from windwrench.evaluation.task_benchmark import TASKS
+from windwrench.evaluation.tasks import TASKS
 
 NAMES = ("FanTracking2D", "WindHover", "WindTrajectory")
 KEPT = json.loads(GOLDEN.read_text(encoding="utf-8"))

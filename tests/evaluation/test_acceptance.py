@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from windwrench.evaluation.benchmark import fly_all, leaderboard
+from windwrench.evaluation.benchmark import fly_all
+from windwrench.evaluation.leaderboard import leaderboard
 
 CONTROLLERS = ["hover", "admittance", "ratio", "oracle"]
 

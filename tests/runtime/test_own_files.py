@@ -13,7 +13,7 @@ from windwrench.cli import app
 from windwrench.controllers.own_file import is_file_name, load_controller
 from windwrench.dynamics import InputError, effects, load_vehicle
 from windwrench.dynamics.effects import compile_effects, parse_setting
-from windwrench.evaluation.benchmark import make_pilot
+from windwrench.evaluation.tasks import make_pilot
 from windwrench.identification.report.words import effect_summary
 
 LAWS = """

@@ -11,9 +11,9 @@ import yaml
 from windwrench.controllers import Limit, Tracker
 from windwrench.dynamics import InputError
 from windwrench.evaluation.benchmark import fly_all
-from windwrench.evaluation.leaderboard import aggregate, lines_of, rows_of
 from windwrench.runtime.provenance import commit, made_by
 from windwrench.studies.learning.leaderboard_page import _answers, _verdict, write_page
+from windwrench.studies.learning.scores import aggregate, lines_of, rows_of
 from windwrench.studies.learning.study import (
     Places,
     do_entry,

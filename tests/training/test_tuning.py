@@ -10,6 +10,8 @@ from windwrench.cli import main
 from windwrench.controllers import CONTROLLERS, LAWS, make_controller
 from windwrench.controllers.tuned import tuned_gains
 from windwrench.dynamics import InputError
+from windwrench.evaluation.tasks import TASKS
+from windwrench.training.tune import RANGES, first_gains, keep_gains, tune
 
 
 def test_tuned_laws_fly_with_the_gains_in_the_file():
@@ -23,14 +25,26 @@ def test_tuned_laws_fly_with_the_gains_in_the_file():
             )
             assert {name: getattr(controller, name) for name in found["gains"]} == found["gains"]
             assert found["rmse_m"] <= found["default_rmse_m"]
-            assert found["command"].startswith(f"windwrench tune {law} --scenario {scenario} ")
+            command = f"windwrench train tune --scenario {scenario} --set controller={law} "
+            assert found["command"].startswith(command)
     assert {"admittance-tuned", "ratio-tuned-fast"} <= set(CONTROLLERS)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_search_begins_inside_its_ranges(task):
+    for law, ranges in RANGES[task].items():
+        start = first_gains(task, law)
+        TASKS[task].laws[law](**start)
+        assert all(low <= start[name] <= high for name, (low, high) in ranges.items())
 
 
 def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp_path):
     pytest.importorskip("optuna", reason="optuna is not installed: pip install 'windwrench[rl]'")
-    from windwrench.training.tune import keep_gains, tune
-
+    other = tune("oracle", "base", trials=2, episodes=1, task="FanTracking2D")
+    assert other["rmse_m"] <= other["default_rmse_m"]
+    keep_gains(other, tmp_path / "tuned.yaml", "the command")
+    kept = yaml.safe_load((tmp_path / "tuned.yaml").read_text(encoding="utf-8"))
+    assert kept["FanTracking2D"]["oracle"]["gains"].keys() == {"gain"}
     found = tune("admittance", "static", trials=3, episodes=3, seed=1)
     again = tune("admittance", "static", trials=3, episodes=3, seed=1)
     assert found == again
@@ -57,9 +71,12 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
         (("train", "sac", "--set", "learner.gama=1"), "Did you mean 'learner.gamma'"),
         (("train", "sac", "--steps", "0"), "--steps"),
         (("train", "sac", "--search", "steps"), "expected KEY=VALUE|VALUE"),
-        (("imitate", "--scenario", "wid"), "Did you mean 'wide'"),
-        (("tune", "admitance"), "Did you mean 'admittance'"),
-        (("tune", "ratio", "--episodes", "200000"), "there are 100000 episodes"),
+        (("train", "imitation", "--scenario", "wid"), "Did you mean 'wide'"),
+        (("train", "tune", "--set", "controller=admitance"), "Did you mean 'admittance'"),
+        (("train", "tune", "--set", "task=WindHovr"), "Did you mean 'WindHover'"),
+        (("train", "tune", "--set", "episodes=200000"), "there are 100000 episodes"),
+        (("train", "tune", "--set", "trials=0"), "trials must be at least 1"),
+        (("train", "tune", "--seeds", "2"), "expected no --seeds"),
         (("leaderboard", "--only", "sack"), "Did you mean 'sac'"),
         (("leaderboard", "--plan", "nowhere.yaml"), "nowhere.yaml"),
         (("leaderboard", "--results", "empty", "--policies", "empty"), "holds no scores of hover"),

@@ -1,0 +1,192 @@
+"""The leaderboards of all tasks: numbers as kept, rows, pages and pictures."""
+
+import json
+import re
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from tests.support.paths import ROOT
+from windwrench.evaluation.benchmark import count_flights, fly_all
+from windwrench.evaluation.episodes import Episode, benchmark_seeds
+from windwrench.evaluation.leaderboard import (
+    leaderboard,
+    markdown,
+    shown,
+    summary,
+    write_leaderboard,
+)
+from windwrench.evaluation.pictures import draw_leaderboard
+from windwrench.evaluation.tasks import TASKS, short_names
+
+GOLDEN = json.loads((ROOT / "tests" / "golden" / "leaderboards.json").read_text(encoding="utf-8"))
+EPISODES, SEED = 2, 3
+# of every row of ``leaderboard.json``, in this order
+KEYS = [
+    "controller",
+    "scenario",
+    "episodes",
+    "seed",
+    "rmse_m",
+    "rmse_ci95_m",
+    "median_rmse_m",
+    "lost_fraction",
+    "score",
+    "wins_over_admittance",
+]
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Of a task, what was asked for, the episodes and the rows; each task is flown once."""
+    kept = {}
+
+    def fly(task):
+        if task not in kept:
+            names, scenarios = GOLDEN[task]["controllers"], GOLDEN[task]["scenarios"]
+            results = fly_all(names, scenarios, EPISODES, SEED, jobs=1, task=task)
+            kept[task] = names, results, leaderboard(results, names, SEED, task)
+        return kept[task]
+
+    return fly
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_episodes_and_rows_are_those_that_were_kept(task, flown):
+    _, results, rows = flown(task)
+    episodes = {
+        f"{name} {scenario}": [[e.seed, e.rmse, e.lost, e.total_reward] for e in each]
+        for (name, scenario), each in results.items()
+    }
+    assert episodes == GOLDEN[task]["episodes"]
+    # null stands for a number that means nothing
+    found = [json.loads(json.dumps(asdict(row)).replace("NaN", "null")) for row in rows]
+    assert [
+        {key: row[key] for key in kept}
+        for row, kept in zip(found, GOLDEN[task]["rows"], strict=True)
+    ] == GOLDEN[task]["rows"]
+
+
+def test_all_controllers_fly_the_same_episodes(flown):
+    _, results, _ = flown("FanTracking")
+    for scenario in GOLDEN["FanTracking"]["scenarios"]:
+        some = [each for (_, world), each in results.items() if world == scenario]
+        for other in some[1:]:
+            assert [e.seed for e in other] == benchmark_seeds(SEED, EPISODES)
+            for a, b in zip(some[0], other, strict=True):
+                count = min(len(a.fan_y), len(b.fan_y))
+                np.testing.assert_array_equal(a.fan_y[:count], b.fan_y[:count])
+
+
+def test_the_number_of_processes_changes_nothing(flown):
+    names, results, _ = flown("FanTracking2D")
+    advanced = []
+    split = fly_all(["ratio"], ["base"], EPISODES, SEED, 2, advanced.append, task="FanTracking2D")
+    assert sum(advanced) == count_flights(["ratio"], ["base"], EPISODES, "FanTracking2D") == 8
+    assert set(split) == set(results)
+    for key, each in split.items():
+        assert [e.rmse for e in each] == [e.rmse for e in results[key]]
+    assert "ratio" in names
+
+
+def test_scores_and_wins_are_those_of_the_means(flown):
+    _, results, rows = flown("FanTracking")
+    by_name = {row.controller: row for row in rows if row.scenario == "static"}
+    rmse = {
+        name: np.array([e.rmse for e in each])
+        for (name, scenario), each in results.items()
+        if scenario == "static"
+    }
+    assert (by_name["hover"].score, by_name["oracle"].score) == (0.0, 1.0)
+    way = rmse["admittance"].mean() - rmse["limit"].mean()
+    for name, row in by_name.items():
+        assert row.rmse_m == pytest.approx(rmse[name].mean())
+        assert row.wins_over_admittance == row.wins_over_rival
+        gain = rmse["admittance"].mean() - row.rmse_m
+        assert row.share_of_limit == pytest.approx(gain / way if way > 0 else np.nan, nan_ok=True)
+    assert by_name["admittance"].wins_over_admittance == 0.5
+
+
+@pytest.mark.parametrize("task", ["FanTracking", "WindHover"])
+def test_the_file_has_the_documented_keys_and_pages_have_losses(task, tmp_path, flown):
+    _, results, rows = flown(task)
+    path = write_leaderboard(rows, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["leaderboard.json"]
+
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    written = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    assert all(list(row)[: len(KEYS)] == KEYS for row in written)
+    assert (written[0]["wins_over_admittance"] is None) == (task == "WindHover")
+    draw_leaderboard(rows, results, tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+    table = markdown(rows).splitlines()
+    assert "| lost |" in table[0]
+    assert ("to the limit" in table[0]) == (task == "FanTracking")
+    assert len(table) == 2 + len(shown(rows))
+    assert len({line.count("|") for line in table}) == 1
+
+
+def test_where_hover_and_oracle_are_alike_there_is_no_score(flown):
+    names, results, _ = flown("FanTracking2D")
+    same = dict.fromkeys(results, results["hover", "base"])
+    assert all(np.isnan(row.score) for row in leaderboard(same, names, SEED, "FanTracking2D"))
+
+
+def episode(seed, level, lost):
+    """An episode of a constant error, as far as a leaderboard looks at it."""
+    n = 500
+    blank = np.zeros((n, 3))
+    return Episode(
+        seed, "", lost, 0.0, n, np.arange(n) * 0.04, np.full(n, level), blank, np.zeros((n, 4)),
+        np.zeros((n, 6)), blank, blank, np.full(n, np.nan), blank,
+    )  # fmt: skip
+
+
+def test_policies_of_a_kind_stand_together_and_their_losses_show(tmp_path):
+    rng, episodes = np.random.default_rng(0), 12
+
+    def flown(level, lost=0):
+        return [episode(k, level * rng.uniform(0.9, 1.1), k < lost) for k in range(episodes)]
+
+    policies = [f"sac-{k}" for k in range(3)]
+    results = {
+        (name, "base"): flown(level)
+        for name, level in {"hover": 0.2, "pid": 0.1, "pid-force": 0.08, "oracle": 0.07}.items()
+    }
+    results |= {
+        (name, "base"): flown(level, lost)
+        for name, level, lost in zip(policies, (0.05, 0.06, 0.07), (0, 3, 0), strict=True)
+    }
+    rows = leaderboard(results, ["pid", "pid-force", *policies], 0, "WindHover")
+    sac = next(row for row in rows if row.controller == "sac")
+    singles = [row for row in rows if row.controller in policies]
+    assert (sac.policies, sac.best_law) == (3, "pid-force")
+    assert sac.rmse_m == pytest.approx(np.mean([row.rmse_m for row in singles]))
+    assert (sac.lost_fraction, sac.most_lost_fraction) == (pytest.approx(3 / 36), 3 / 12)
+    low, high = sac.rmse_ci95_m
+    assert all(high - low > np.ptp(row.rmse_ci95_m) for row in singles)  # other seeds, too
+    assert sac.p_over_best < 0.05
+    assert all(row.p_over_best is None for row in rows if row is not sac)
+    assert {row.controller for row in shown(rows)} == {"sac", "pid", "pid-force"}
+    assert "8.3 % (most 25.0 %)" in markdown(rows)
+    told = summary(rows)
+    assert "Lost: `sac` 8.3 % (most 25.0 %); `pid-force`, `pid` none." in told
+    assert re.search(r"`pid-force`: clearly worse none; clearly better `sac` -\d+ %", told)
+    nothing = [replace(row, lost_fraction=0.0, most_lost_fraction=0.0) for row in rows]
+    assert "Lost: nothing." in summary(nothing)
+    draw_leaderboard(rows, results, tmp_path / "a.png")
+
+
+def test_tables_show_names_and_not_paths():
+    names = ["runs/a/best.npz", "runs/b/best.npz", "x/sac-0.npz", "hover", "laws.py:Mine"]
+    assert short_names(names) == {
+        "runs/a/best.npz": "a/best",
+        "runs/b/best.npz": "b/best",
+        "x/sac-0.npz": "sac-0",
+        "hover": "hover",
+        "laws.py:Mine": "laws.py:Mine",
+    }
+    assert short_names(["a/sac-0.npz", "sac-0"]) == {"a/sac-0.npz": "a/sac-0", "sac-0": "sac-0"}
