@@ -118,6 +118,8 @@ def fly_episode(
         if lost:
             break
     table = np.array(rows, dtype=np.float64)
+    parts = np.split(table[:, 2:21], [3, 7, 13, 16], axis=1)
+    position, quaternion, estimate, force, torque = parts
     return Episode(
         seed,
         info.get("fan_motion") or info.get("trajectory", ""),
@@ -126,7 +128,11 @@ def fly_episode(
         decisions,
         table[:, 0],
         table[:, 1],
-        *np.split(table[:, 2:21], [3, 7, 13, 16], axis=1),
+        position,
+        quaternion,
+        estimate,
+        force,
+        torque,
         table[:, 21],
         np.array(observations, dtype=np.float64),
     )
