@@ -1,0 +1,56 @@
+"""What was said of known conventions is said again: right and certain stays so, wrong stays out."""
+
+import pytest
+
+from tests.support.golden_readings import available, load_golden, recorded
+from tests.support.parameters import mostly_slow
+
+GOLDEN = load_golden()
+QUICK = ("table tests", "random", "file tests", "hostile 0", "hostile nanobench")
+
+
+def cases(way):
+    return mostly_slow([c for c in GOLDEN if c.startswith(way)], lambda c: c.startswith(QUICK))
+
+
+def found(case):
+    if not available(case):
+        pytest.skip(f"the file of {case} is not there (WINDWRENCH_DATA names another folder)")
+    return recorded(case)
+
+
+@pytest.mark.parametrize("case", cases("random"))
+def test_a_table_in_a_random_convention_is_right_or_marked_as_a_guess(case):
+    said = found(case)
+    assert "wrong" not in said
+    assert not set(GOLDEN[case]["right"].split()) - set(said["right"].split())
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize("case", cases("table"))
+def test_the_map_of_a_measured_table_keeps_what_is_certain(case):
+    said = found(case)
+    for way, expected in GOLDEN[case].items():
+        here = said.get(way, said.get("both"))
+        for field, value in expected.items():
+            assert here[field].removesuffix(" (a guess)") == value.removesuffix(" (a guess)")
+            assert " (a guess)" in value or here[field] == value
+
+
+@pytest.mark.measured
+@pytest.mark.parametrize("case", cases("file"))
+def test_a_measured_file_raises_the_doubts_that_it_raised(case):
+    assert found(case) == GOLDEN[case]
+
+
+@pytest.mark.parametrize("case", cases("hostile"))
+def test_a_flight_in_another_convention_is_named(case):
+    def by_kind(said, use):
+        return {k: v for v, kinds in said.get(use, said.get("both")).items() for k in kinds}
+
+    said = found(case)
+    for use in ("diagnosis", "estimate"):
+        here = by_kind(said, use)
+        for kind, expected in by_kind(GOLDEN[case], use).items():
+            allowed = {expected, "named"} if expected == "passed" else {expected}
+            assert here[kind] in allowed, f"{use}, {kind}"

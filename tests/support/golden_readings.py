@@ -1,0 +1,217 @@
+"""What the kit says of the conventions of known logs: named right, not named, or named wrong.
+
+``python -m tests.support.golden_readings`` writes ``tests/golden/readings.json`` anew. An answer
+that was right and certain must stay so, and none may become wrong and certain.
+"""
+
+import json
+import re
+import sys
+import tempfile
+import warnings
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from tests.support import golden_logs
+from tests.support.data_paths import DATA, EXAMPLE, EXCERPTS
+from tests.support.hostile_conventions import HOSTILE
+from tests.support.paths import ROOT
+from tests.support.random_tables import fields_of, flight, random_table, save
+from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.identification import read_log
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.layout_guess import is_parquet, is_text_table, open_any_table
+from windwrench.identification.logs.map_guess import guess_map
+from windwrench.identification.logs.screening import screen_for_estimate, screen_log
+from windwrench.identification.report.log_check import check_log
+from windwrench.runtime.errors import InputError
+
+GOLDEN = ROOT / "tests" / "golden" / "readings.json"
+TABLES = 60
+FLIGHTS = (  # vehicle, trajectory, seed, seconds
+    ("ardrone2", "excite", 1, 15.0),
+    ("crazyflie", "hover", 2, 10.0),
+    ("hummingbird", "circle", 3, 14.0),
+    ("crazyflie", "fast", 4, 14.0),
+    ("ardrone2", "gentle", 5, 14.0),
+    ("hummingbird", "yaw", 6, 14.0),
+)
+MEASURED = {  # logs that are written in other conventions, too
+    "nanobench": (EXCERPTS / "nanobench" / "B5_helix_fast_rep2.csv.gz", "crazyflie"),
+    "crazyswarm2": (EXCERPTS / "crazyswarm2" / "log202.csv.gz", "crazyflie"),
+    "racer": (DATA / "racer" / "flight_e.csv.gz", "vehicle.yaml"),
+    "labelled": (DATA / "flights" / "labelled_03.csv.gz", "vehicle.yaml"),
+}
+
+
+@cache
+def flown(index):
+    """Return one of the simulated flights."""
+    return flight(*FLIGHTS[index])
+
+
+def _vehicle(name, path):
+    return load_vehicle(path.parent / name if name.endswith(".yaml") else name)
+
+
+@cache
+def _measured(name):
+    path, vehicle = MEASURED[name]
+    model = _vehicle(vehicle, path)
+    return read_log(path, vehicle=model), model
+
+
+def files():
+    """Return the measured files by their names, and the vehicle of each."""
+    found = {}
+    for case in golden_logs.cases():
+        name, _, way = case.rpartition(" ")
+        room, _, rest = name.partition("/")
+        if way == "vehicle" and room != "form":
+            folder = {"shared": DATA, "tests": EXCERPTS, "shipped": EXAMPLE.parent}[room]
+            path = folder / rest
+            vehicle = golden_logs.VEHICLES.get(path.parent.name, "ardrone2")
+            found[name] = path, vehicle
+    return found
+
+
+def cases():
+    """Return the names of all cases."""
+    found = [f"file {name}" for name in files()]
+    found += [
+        f"table {name}" for name, (path, _) in files().items() if is_text_table(path) or
+        is_parquet(path)
+    ]  # fmt: skip
+    found += [f"random {number}" for number in range(TABLES)]
+    return found + [f"hostile {name}" for name in (*map(str, range(len(FLIGHTS))), *MEASURED)]
+
+
+def recorded(case):
+    """Return what is said of a case."""
+    way, _, name = case.partition(" ")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return {"file": _file, "table": _table, "random": _random, "hostile": _hostile}[way](name)
+
+
+def _plain(text, folder):
+    """Return a sentence without its paths and without a list of columns."""
+    return text.replace(f"{folder}/", "").partition("; found t")[0]
+
+
+def available(case):
+    """Return whether a case's file is there."""
+    way, _, name = case.partition(" ")
+    if way == "hostile" and name in MEASURED:
+        return MEASURED[name][0].exists()
+    return way in ("random", "hostile") or name in files()
+
+
+def _file(name):
+    path, vehicle = files()[name]
+    try:
+        found = check_log(path, vehicle=_vehicle(vehicle, path))
+    except InputError as error:
+        return {"error": _plain(str(error), path.parent)}
+    said = [d for d in found.doubts if not d.startswith(("guessed", "the noise"))]
+    return {
+        "read_by": found.read_by,
+        "doubts": [_plain(text, path.parent) for text in said],
+        "notes": len(found.log.notes),
+    }
+
+
+def _fields(guess):
+    """Return the fields of a guessed map by their names, each with whether it is certain."""
+    doubtful = {(r.section, r.field) for r in guess.doubts}
+    return {
+        "/".join(key): (value if isinstance(value, str) else str(value), key not in doubtful)
+        for key, value in fields_of(guess.log_map).items()
+    }
+
+
+def _table(name):
+    path, vehicle = files()[name]
+    said = {}
+    for way, model in (("alone", None), ("vehicle", _vehicle(vehicle, path))):
+        try:
+            table, layout = open_any_table(path)
+            found = _fields(guess_map(table, layout, model))
+        except InputError as error:
+            said[way] = {"error": _plain(str(error), path.parent)}
+        else:
+            said[way] = {
+                key: value if sure else f"{value} (a guess)" for key, (value, sure) in found.items()
+            }
+    return {"both": said["alone"]} if said["alone"] == said["vehicle"] else said
+
+
+def random_case(number):
+    """Return a flight's table in a random convention, and the vehicle by which it is guessed."""
+    log = flown(number % len(FLIGHTS))
+    written = random_table(log, np.random.default_rng(7000 + number))
+    return written, load_vehicle(log.vehicle) if number // len(FLIGHTS) % 2 else None
+
+
+def _random(name):
+    written, vehicle = random_case(int(name))
+    with tempfile.TemporaryDirectory() as folder:
+        table, layout = open_any_table(save(written, Path(folder) / "table.csv"))
+        found = _fields(guess_map(table, layout, vehicle))
+    said = {"right": [], "right guess": [], "wrong guess": [], "wrong": []}
+    true = {"/".join(key): value for key, value in fields_of(written.log_map).items()}
+    for key in sorted(set(found) | set(true)):
+        value = true.get(key)
+        text = value if isinstance(value, str) else str(value)
+        is_right = key in found and found[key][0] == text
+        is_sure = key in found and found[key][1]
+        said[f"{'right' if is_right else 'wrong'}{'' if is_sure else ' guess'}"].append(key)
+    return {verdict: " ".join(fields) for verdict, fields in said.items() if fields}
+
+
+def _hostile(name):
+    if name in MEASURED:
+        log, vehicle = _measured(name)
+    else:
+        log = replace(flown(int(name)), accelerometer=None, gyro=None, command=None)
+        vehicle = load_vehicle(log.vehicle)
+    log = replace(log, source="flight.csv")
+    said = {"diagnosis": {}, "estimate": {}}
+    for kind in ("as it is", *HOSTILE):
+        make, words = HOSTILE.get(kind, (lambda same: same, "^$"))
+        changed = make(log)
+        for use, screen in (("diagnosis", screen_log), ("estimate", screen_for_estimate)):
+            said[use].setdefault(_screened(screen, changed, vehicle, words), []).append(kind)
+    same = said["diagnosis"] == said["estimate"]
+    return {"both": said["diagnosis"]} if same else said
+
+
+def _screened(screen, log, vehicle, words):
+    """Return whether a log's convention was named, or the sentence by which it was refused."""
+    try:
+        said = screen(log, vehicle)
+    except InputError as error:
+        text = str(error).removeprefix("flight.csv: ")
+        return "named" if re.search(words, text) else text
+    notes = said[1] if said and isinstance(said[0], FlightLog) else said
+    return "named" if any(re.search(words, note) for note in notes) else "passed"
+
+
+def load_golden():
+    """Return what was recorded, by the cases' names."""
+    return json.loads(GOLDEN.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else GOLDEN
+    only = sys.argv[2] if len(sys.argv) > 2 else ""
+    lines = [
+        f"{json.dumps(case)}: {json.dumps(recorded(case))}"
+        for case in cases()
+        if case.startswith(only)
+    ]
+    out.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    print(f"wrote {len(lines)} cases to {out}")
