@@ -45,16 +45,12 @@ QUANTITIES: dict[str, Quantity] = {
     "command": Quantity(1.0, LAST_COMMAND, odd=True),
     # how far it has flown along y since the episode's start, by its own estimated velocity
     "path_y": Quantity(1.0, VELOCITY_Y, summed=True, odd=True),
-    # what only a simulator knows, or an estimator beside the filter: for ablations (see
-    # ``sensing``)
+    # what only a simulator knows, and the filter's deviations: for ablations
     "true_torque_z": Quantity(0.03, 2, "torque", odd=True),
     "true_force_x": Quantity(0.5, 0, "force"),
     "true_force_y": Quantity(0.5, 1, "force", odd=True),
     "std_torque_z": Quantity(0.005, 2, "std_torque"),
     "std_force_x": Quantity(0.05, 0, "std_force"),
-    "observer_torque_z": Quantity(0.03, 2, "observer_torque", odd=True),
-    "observer_force_x": Quantity(0.5, 0, "observer_force"),
-    "observer_force_y": Quantity(0.5, 1, "observer_force", odd=True),
 }
 
 

@@ -5,10 +5,8 @@ are consistent.
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
 from .estimate import WrenchEstimate, WrenchEstimator
-from .fixed_lag import FixedLagSmoother
 from .late_poses import TimedFilter
 from .noise_fit import NoiseFit, NoiseFitSettings, fit_noise
-from .observer import NonlinearObserver, ObserverTuning
 from .recovery import Recovery
 from .smoother import RecordingUKF, SmoothedSeries, smooth
 from .tuning import UKFTuning
@@ -17,11 +15,8 @@ from .ukf_batch import WrenchEstimates, WrenchUKFBatch
 
 __all__ = [
     "ConstantGainFilter",
-    "FixedLagSmoother",
     "NoiseFit",
     "NoiseFitSettings",
-    "NonlinearObserver",
-    "ObserverTuning",
     "RecordingUKF",
     "Recovery",
     "SmoothedSeries",

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..envs.plant import TICK
-from ..estimator import NonlinearObserver, ObserverTuning, UKFTuning, WrenchEKF, WrenchUKF
+from ..estimator import UKFTuning, WrenchEKF, WrenchUKF
 from .fig5_estimators import (
     ERRORS,
     UKF_TUNED,
@@ -29,6 +29,7 @@ from .fig5_estimators import (
 )
 from .fig5_flights import FLIGHTS, NOISES, PLANTS, Array, Flight, fly, vehicle_at
 from .fig5_picture import draw
+from .observer import NonlinearObserver, ObserverTuning
 from .result import Comparison, Progress, Result, remarks
 
 TITLE = "Fig. 5: force and torque at two noise levels, against a nonlinear observer and an EKF"

@@ -11,11 +11,12 @@ from scipy.optimize import minimize
 
 from ..dynamics import Vehicle
 from ..envs.plant import TICK
-from ..estimator import NonlinearObserver, ObserverTuning, UKFTuning, WrenchUKF
+from ..estimator import UKFTuning, WrenchUKF
 from ..estimator.estimate import FORCE as FORCE_STATE
 from ..estimator.estimate import NIS, STATE_SIZE
 from ..estimator.estimate import TORQUE as TORQUE_STATE
 from .fig5_flights import FORCE, STEADY, TORQUE, TRANSIENT, Array, Flight, window
+from .observer import NonlinearObserver, ObserverTuning
 
 _FORCE_SIZE = float(np.linalg.norm(FORCE))
 _TORQUE_SIZE = float(np.linalg.norm(TORQUE))

@@ -10,7 +10,6 @@ from windwrench.dynamics import InputError
 from windwrench.envs import FanTrackingEnv
 from windwrench.envs.plant import NOISE
 from windwrench.envs.vector import FanTrackingVectorEnv
-from windwrench.envs.watched_fan_tracking import SensingFanTracking
 
 
 @pytest.mark.parametrize("estimator", ["ukf", "constant-gain"])
@@ -33,20 +32,6 @@ def test_a_decision_is_sixteen_ticks_with_numpy_s_normals(estimator):
             np.testing.assert_array_equal(one, other)
         assert env.loop.time == twin.loop.time
     assert env.np_random.uniform() == twin.np_random.uniform()
-
-
-def test_watching_every_tick_from_python_changes_nothing():
-    env, watched = FanTrackingEnv("gusty"), SensingFanTracking("gusty", observer=True)
-    np.testing.assert_array_equal(env.reset(seed=2)[0], watched.reset(seed=2)[0])
-    for command in (0.3, -2.0, 0.1):
-        one, other = (
-            env.step(np.array([command], np.float32)),
-            watched.step(np.array([command], np.float32)),
-        )
-        np.testing.assert_array_equal(one[0], other[0])
-        assert one[1:4] == other[1:4]
-        assert one[4]["time"] == other[4]["time"]
-    assert other[4]["observer_force"][0] == pytest.approx(other[4]["force"][0], abs=0.3)
 
 
 def test_the_reward_is_that_of_c_s_pow_to_the_last_bit():

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD, yawing_flight
-from tests.support.literal_ukf import matrix
+from tests.support.flights import PERIOD, matrix, yawing_flight
+from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchEKF, WrenchUKF
 from windwrench.estimator.bias_states import restart_biases
-from windwrench.estimator.consistency import chi2_band, simulate_model, state_error
+from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.error_state import displace
 from windwrench.estimator.imu import expected_imu
 

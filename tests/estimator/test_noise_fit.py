@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
-from windwrench.estimator.consistency import simulate_model
 from windwrench.estimator.innovations import fisher_information, innovations, pieces_of
 from windwrench.estimator.noise_fit import NoiseFitSettings, fit_noise, nis_sentence, tuning_note
 from windwrench.estimator.rise_time import rise_times

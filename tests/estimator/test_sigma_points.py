@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.estimator import NonlinearObserver, WrenchUKF
+from windwrench.estimator import WrenchUKF
 from windwrench.estimator.error_state import displace, error_from
 from windwrench.estimator.filter_record import drive, propagate
 from windwrench.estimator.sigma_points import errors_of_points, propagate_points, spread_points
+from windwrench.paper import NonlinearObserver
 from windwrench.runtime.compiled import compiled
 
 VEHICLE = load_vehicle("ardrone2")

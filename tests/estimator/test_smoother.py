@@ -5,13 +5,13 @@ hold.
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD, yawing_flight
-from tests.support.literal_smoother import LiteralSmoother
-from tests.support.literal_ukf import matrix
+from tests.support.flights import PERIOD, matrix, yawing_flight
+from tests.support.model_flights import simulate_model
+from tests.support.reference_smoother import ReferenceSmoother, as_reference
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoother
-from windwrench.estimator.consistency import chi2_band, simulate_model, state_error
+from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.smoother import RecordingUKF, smooth
 from windwrench.estimator.ukf import default_covariance
 
@@ -75,7 +75,7 @@ def test_equals_the_literal_smoother_over_a_yawing_flight(effects):
 
         vehicle_com = compile_effects(vehicle).vehicle.com
     fast = RecordingUKF(vehicle, ANISOTROPIC, PERIOD)
-    slow = LiteralSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, wrench)
+    slow = ReferenceSmoother(compile_effects(vehicle).vehicle, ANISOTROPIC, PERIOD, wrench)
     start = (
         flight["true_x"][0],
         flight["true_q"][0],
@@ -96,16 +96,7 @@ def test_equals_the_literal_smoother_over_a_yawing_flight(effects):
     found = fast.smooth(covariance=True)
     for k, (state, P) in enumerate(slow.smoothed()):
         e = found.estimate(k)
-        sign = np.sign(state["q"] @ e.quaternion)
-        for ours, theirs in (
-            (e.position, state["x"]),
-            (sign * e.quaternion, state["q"]),
-            (e.velocity, state["v"]),
-            (e.angular_velocity, state["w"]),
-            (e.torque, state["tau"]),
-            (e.force, state["f"]),
-        ):
-            assert np.allclose(ours, theirs, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         size = np.sqrt(np.diag(P))
         assert np.allclose(e.covariance / np.outer(size, size), P / np.outer(size, size), atol=1e-7)
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.data_paths import NANOBENCH, data_file
+from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.estimator import UKFTuning
-from windwrench.estimator.consistency import simulate_model
 from windwrench.estimator.estimate import STATUSES
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.flight_phases import (

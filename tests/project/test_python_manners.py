@@ -14,11 +14,8 @@ from windwrench.dynamics import EffectSetting, InputError, Mocap, Vehicle, load_
 from windwrench.dynamics.effects.base import Coefficient, Effect
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.estimator import (
-    FixedLagSmoother,
     NoiseFit,
     NoiseFitSettings,
-    NonlinearObserver,
-    ObserverTuning,
     Recovery,
     SmoothedSeries,
     TimedFilter,
@@ -26,12 +23,12 @@ from windwrench.estimator import (
     WrenchUKF,
     WrenchUKFBatch,
 )
-from windwrench.estimator.consistency import ConsistencyReport, ModelRun
 from windwrench.identification import FlightLog, findings
+from windwrench.paper import ObserverTuning
 
 DOCUMENTED = (
     *(Coefficient, Effect, EffectSetting, Mocap, MotorCurve, Vehicle),
-    *(ConsistencyReport, ModelRun, NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
+    *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
     *(SmoothedSeries, UKFTuning, FlightLog),
     *(c for c in vars(findings).values() if inspect.isclass(c) and dataclasses.is_dataclass(c)),
 )
@@ -53,24 +50,20 @@ def test_help_says_what_each_field_is(kind):
 def filters():
     ukf = WrenchUKF(VEHICLE)
     ukf.reset(*POSE)
-    observer = NonlinearObserver(VEHICLE)
-    observer.reset(*POSE)
     batch = WrenchUKFBatch(VEHICLE, 2)
     batch.reset(*POSE)
-    return ukf, observer, batch
+    return ukf, batch
 
 
 def test_repr_is_short_and_says_what_it_is():
-    ukf, observer, batch = filters()
+    ukf, batch = filters()
     assert repr(ukf) == "<WrenchUKF of ardrone2: period 0.005 s, tracking>"
-    assert repr(observer).startswith("<NonlinearObserver of ardrone2: period 0.005 s")
     assert repr(batch) == "<WrenchUKFBatch of 2 x ardrone2: period 0.005 s>"
     estimate = ukf.step(SPEEDS, *POSE)
     assert repr(estimate).startswith("<WrenchEstimate tracking: force (")
     assert " Nm, NIS " in repr(estimate)
     assert "coasting" in repr(ukf.step(SPEEDS))
     assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimates of 2: 2 coasting>"
-    assert "of 0.3 s: <WrenchUKF" in repr(FixedLagSmoother(ukf))
     assert "0 late, 0 too late: <WrenchUKF" in repr(TimedFilter(ukf))
     made = made_diagnosis(made_trace(5.0))
     log = FlightLog(np.arange(3.0), np.zeros((3, 3)), np.tile(POSE[1], (3, 1)), np.ones((3, 4)))
@@ -104,14 +97,13 @@ def test_repr_is_short_and_says_what_it_is():
     ],
 )
 def test_a_wrong_argument_is_named_with_its_type(speeds, position, quaternion, words):
-    ukf, observer, _ = filters()
-    for estimator in (ukf, observer):
-        before = estimator.estimate.state.copy()
-        with pytest.raises(InputError) as error:
-            estimator.step(speeds, position, quaternion)
-        assert words in str(error.value)
-        np.testing.assert_array_equal(estimator.estimate.state, before)
-        assert estimator.step(SPEEDS, *POSE).status == "tracking"
+    ukf, _ = filters()
+    before = ukf.estimate.state.copy()
+    with pytest.raises(InputError) as error:
+        ukf.step(speeds, position, quaternion)
+    assert words in str(error.value)
+    np.testing.assert_array_equal(ukf.estimate.state, before)
+    assert ukf.step(SPEEDS, *POSE).status == "tracking"
 
 
 def test_a_batch_refuses_the_same():

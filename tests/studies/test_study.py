@@ -72,7 +72,6 @@ PLAN = {
         "changes": {
             "truth instead": ["features.frame=[true_torque_z, true_force_x]"],
             "with deviations": ["features.frame=[torque_z, std_torque_z]"],
-            "an observer": ["features.frame=[observer_torque_z]"],
             "slower": ["repeat=2"],
         },
     },

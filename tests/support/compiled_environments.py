@@ -5,7 +5,8 @@ import numpy as np
 
 import windwrench  # noqa: F401  registers the environments
 from windwrench.dynamics import load_vehicle
-from windwrench.estimator import NonlinearObserver, WrenchEKF, ukf_lanes
+from windwrench.estimator import WrenchEKF, ukf_lanes
+from windwrench.paper import NonlinearObserver
 
 
 def compile_environments():

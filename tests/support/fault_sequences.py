@@ -9,7 +9,6 @@ from windwrench.dynamics.vehicle import Vehicle
 from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.estimator import (
     ConstantGainFilter,
-    NonlinearObserver,
     WrenchEKF,
     WrenchEstimate,
     WrenchUKF,
@@ -23,7 +22,6 @@ FILTERS = {
     "ukf": WrenchUKF,
     "ekf": WrenchEKF,
     "constant gain": ConstantGainFilter,
-    "observer": NonlinearObserver,
 }
 HEIGHT = 1.2  # m
 PERIOD = 0.005  # s, of the long flight
@@ -68,7 +66,6 @@ class Flight:
         self.speeds = hover(vehicle)
         self.position = np.array([0.0, 0.0, HEIGHT])
         self.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-        self.fixed_period = kind == "observer"
 
     def feed(
         self,
@@ -78,7 +75,7 @@ class Flight:
         dt: float | None = None,
     ) -> WrenchEstimate:
         """Step the estimator and check what it says."""
-        if dt is None or self.fixed_period:
+        if dt is None:
             estimate: WrenchEstimate = self.estimator.step(speeds, position, quaternion)
         else:
             self.estimator.predict(speeds, dt)
@@ -102,7 +99,7 @@ class Flight:
         """Feed one fault."""
         rng = np.random.default_rng(seed)
         speeds, position, quaternion = self.speeds, self.position, self.quaternion
-        step = None if self.fixed_period else float(rng.choice([self.dt, 1e-3, 0.01, 0.1]))
+        step = float(rng.choice([self.dt, 1e-3, 0.01, 0.1]))
         away = rng.standard_normal(3)
         away *= size / np.linalg.norm(away)
         if kind == "long gap":

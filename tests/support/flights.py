@@ -3,9 +3,32 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.support.literal_ukf import cross, matrix, multiply
-
 PERIOD = 0.005
+
+
+def cross(a, b):
+    """As ``numpy.cross``, bit for bit, without what that takes to accept any shape."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+def multiply(a, b):
+    return np.array(
+        [
+            a[0] * b[0] - a[1:] @ b[1:],
+            *(a[0] * b[1:] + b[0] * a[1:] + cross(a[1:], b[1:])),
+        ]
+    )
+
+
+def skew(a):
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def matrix(q):
+    """(7)"""
+    q0, qv = q[0], q[1:]
+    return (q0**2 - qv @ qv) * np.eye(3) + 2 * np.outer(qv, qv) + 2 * q0 * skew(qv)
 
 
 def yawing_flight(

@@ -1,0 +1,155 @@
+"""The nonlinear observer: exact where it should be, unmoved by what carries no information."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.flights import PERIOD, yawing_flight
+from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.paper import NonlinearObserver, ObserverTuning
+
+VEHICLE = load_vehicle("ardrone2")
+FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])  # of yawing_flight
+
+
+def loaded_hover(observer, steps, force, torque):
+    """Hover tilted so that the rotors balance a force and a torque (world); return forces and
+    torques (steps, 3).
+    """
+    lift = np.array([0.0, 0.0, VEHICLE.weight]) - force
+    axis = np.cross([0.0, 0.0, 1.0], lift)
+    sine = np.linalg.norm(axis) / np.linalg.norm(lift)
+    attitude = Rotation.from_rotvec(axis / max(np.linalg.norm(axis), 1e-12) * np.arcsin(sine))
+    rotors = VEHICLE.rotor_speeds(np.linalg.norm(lift), -attitude.inv().apply(torque))
+    pose = [0, 0, 1], attitude.as_quat(scalar_first=True)
+    observer.reset(*pose)
+    estimates = [observer.step(rotors, *pose) for _ in range(steps)]
+    return (
+        np.array([e.force for e in estimates]),
+        np.array([e.torque for e in estimates]),
+        estimates[-1],
+    )
+
+
+def fly(observer, flight, missing=(), signs=None):
+    """Return force, torque, position, velocity and body-rate errors (steps, 15)."""
+    observer.reset(
+        flight["true_x"][0], flight["true_q"][0], None, flight["velocity"][0], flight["omega"][0]
+    )
+    out = []
+    for k in range(1, len(flight["rotors"])):
+        q = flight["quaternion"][k] * (1.0 if signs is None else signs[k])
+        e = observer.step(
+            flight["rotors"][k], *(() if k in missing else (flight["position"][k], q))
+        )
+        moving = e.position - flight["true_x"][k], e.velocity - flight["velocity"][k]
+        turning = e.angular_velocity - flight["omega"][k]
+        out.append(np.concatenate([e.force - FORCE, e.torque - TORQUE, *moving, turning]))
+    return np.array(out)
+
+
+def test_steady_state_is_exact_after_a_rise_of_a_second():
+    force, torque = np.array([0.4, -0.3, 0.5]), np.array([0.02, -0.01, 0.015])
+    forces, torques, e = loaded_hover(NonlinearObserver(VEHICLE), 3000, force, torque)
+    np.testing.assert_allclose(forces[-1], force, atol=1e-9)
+    np.testing.assert_allclose(torques[-1], torque, atol=1e-9)
+    np.testing.assert_allclose(e.position, [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(e.velocity, 0, atol=1e-9)
+    np.testing.assert_allclose(e.angular_velocity, 0, atol=1e-9)
+    assert np.isnan(e.nis)
+    for signal in (forces[:, 2], torques[:, 0], torques[:, 2]):
+        rise = PERIOD * (
+            np.argmax(signal > 0.9 * signal[-1]) - np.argmax(signal > 0.1 * signal[-1])
+        )
+        assert rise == pytest.approx(1.0, abs=0.02)
+
+
+def test_the_error_decays_exponentially_at_the_gain():
+    observer = NonlinearObserver(
+        VEHICLE, ObserverTuning(force_gain=(1.0, 2.0, 4.0), position_cutoff_hz=1000.0)
+    )
+    forces, _, _ = loaded_hover(observer, 400, np.array([0, 0, 0.5]), np.zeros(3))
+    t = PERIOD * np.arange(1, 401)
+    assert np.allclose(forces[:, 2], 0.5 * (1.0 - np.exp(-4.0 * t)), atol=2e-3)
+
+
+@pytest.mark.parametrize("cutoff", [0.5, 10.0, 2e4])
+def test_any_cutoff_is_stable_and_unbiased_in_motion(cutoff):
+    tuning = ObserverTuning(position_cutoff_hz=cutoff, attitude_cutoff_hz=cutoff)
+    observer = NonlinearObserver(VEHICLE, tuning)
+    observer.reset([0, 0, 1], [1, 0, 0, 0], None, [1.0, -0.5, 0.2], [0, 0, 2.0])
+    hover = np.full(4, VEHICLE.hover_rate)
+    for k in range(1, 2001):
+        t = k * PERIOD
+        e = observer.step(hover, [t, -0.5 * t, 1 + 0.2 * t], [np.cos(t), 0, 0, np.sin(t)])
+    assert np.allclose(e.velocity, [1.0, -0.5, 0.2], atol=1e-8)
+    assert np.allclose(e.angular_velocity, [0, 0, 2.0], atol=1e-3)
+    assert np.allclose(e.position, [t, -0.5 * t, 1 + 0.2 * t], atol=1e-7)
+    assert np.allclose(e.force, 0, atol=1e-8)
+    assert np.allclose(e.torque, 0, atol=1e-6)
+
+
+def test_a_yawing_flight_is_no_wrench():
+    flight = yawing_flight(VEHICLE, 2501, sigma_position=0.0, sigma_attitude=0.0, substeps=6)
+    clean = fly(NonlinearObserver(VEHICLE), flight)[1200:]
+    bounds = np.repeat([2e-3, 5e-5, 1e-3, 1e-3], 3)
+    np.testing.assert_array_less(np.abs(clean[:, :12]).max(axis=0), bounds)
+    flight = yawing_flight(VEHICLE, 2501, seed=2, substeps=3)
+    errors = fly(NonlinearObserver(VEHICLE), flight)
+    noisy = np.sqrt(np.mean(errors[1200:] ** 2, axis=0))
+    np.testing.assert_array_less(noisy[:12], np.repeat([6e-3, 0.6e-3, 1e-3, 0.01], 3))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], 2501)
+    np.testing.assert_array_equal(fly(NonlinearObserver(VEHICLE), flight, signs=signs), errors)
+
+
+def test_missing_measurements_leave_the_wrench_where_it_was():
+    flight = yawing_flight(VEHICLE, 2501, seed=1, substeps=3)
+    random = set(np.random.default_rng(3).choice(2501, 1250, replace=False))
+    errors = fly(NonlinearObserver(VEHICLE), flight, missing=random)[1200:]
+    assert np.sqrt(np.mean(errors[:, :3] ** 2)) < 8e-3
+    assert np.sqrt(np.mean(errors[:, 3:6] ** 2)) < 1e-3
+    # half a second blind, then the pose again
+    errors = fly(NonlinearObserver(VEHICLE), flight, missing=range(1500, 1600))
+    assert np.abs(errors[1499:1598, :3] - errors[1498, :3]).max() < 1e-12
+    assert np.abs(errors[1499:1598, 6:9]).max() < 0.05
+    assert np.abs(errors[1599:, :3]).max() < 0.15
+    assert np.abs(errors[1599:, 3:6]).max() < 5e-3
+    assert np.abs(errors[-100:, :3]).max() < 0.03
+
+
+def test_declared_effects_are_not_a_wrench():
+    drag = EffectSetting("rotor_drag", {"kdx": 3e-4, "kdy": 3e-4})
+    offset = EffectSetting("com_offset", {"cx": 0.01, "cy": -0.006, "cz": 0.0})
+    force = {}
+    for vehicle in (VEHICLE, VEHICLE.with_effects(drag, offset)):
+        observer = NonlinearObserver(vehicle)
+        observer.reset([0, 0, 1], [1, 0, 0, 0], None, [1.0, 0, 0])
+        speeds = np.full(4, VEHICLE.hover_rate)
+        for k in range(1, 2001):
+            e = observer.step(speeds, [k * PERIOD, 0, 1], [1, 0, 0, 0])
+        force[vehicle is VEHICLE] = np.concatenate([e.force, e.torque])
+    pull = 3e-4 * 4 * VEHICLE.hover_rate
+    torque = VEHICLE.weight * np.array([-0.006, -0.01])
+    np.testing.assert_allclose(force[True], 0.0, atol=1e-6)
+    # the wrench that cancels drag and the offset thrust in a steady translation
+    np.testing.assert_allclose(force[False][0], pull, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(force[False][3:5]), np.abs(torque), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: ObserverTuning(force_gain=-1.0), "force_gain"),
+        (lambda: ObserverTuning(torque_gain=(1.0, 2.0)), "torque_gain"),
+        (lambda: ObserverTuning(attitude_cutoff_hz=(1.0, 2.0, 3.0)), "attitude_cutoff_hz"),
+        (lambda: NonlinearObserver(VEHICLE, period=0.0), "period"),
+        (lambda: NonlinearObserver(VEHICLE).reset([0, 0], [1, 0, 0, 0]), "position"),
+        (
+            lambda: NonlinearObserver(VEHICLE).step([1, 2, 3, 4], [0, 0, 1], [2, 0, 0, 0]),
+            "quaternion",
+        ),
+    ],
+)
+def test_bad_input_is_named(make, words):
+    with pytest.raises(InputError, match=words):
+        make()

@@ -1,0 +1,214 @@
+"""Flights drawn from the filter's own model: each of its assumptions holds to the letter."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
+from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
+from windwrench.estimator.filter_record import BIASES, N, drive, filter_record, propagate
+from windwrench.estimator.imu import expected_imu
+from windwrench.estimator.ukf import default_covariance
+from windwrench.runtime.compiled import compiled
+
+
+@dataclass(frozen=True, eq=False)
+class ModelRun:
+    """Truth and measurement at the end of each of K steps, in the units of the filter."""
+
+    initial_position: Array  # (3,), which the filter starts with; the truth is drawn around it
+    initial_quaternion: Array
+    initial_velocity: Array
+    initial_angular_velocity: Array
+    initial_covariance: Array  # (18, 18)
+    rotor_speeds: Array  # (K, 4), and so on
+    measured_position: Array
+    measured_quaternion: Array
+    position: Array
+    quaternion: Array
+    velocity: Array
+    angular_velocity: Array
+    torque: Array
+    force: Array
+    gyro: Array  # (K, 3) as measured
+    accelerometer: Array
+    gyro_bias: Array  # (K, 3) in them
+    accelerometer_bias: Array
+
+    def truth(self, k):
+        """Return the true state after step ``k`` in the order in which ``nees`` takes it."""
+        return (
+            self.position[k],
+            self.quaternion[k],
+            self.velocity[k],
+            self.angular_velocity[k],
+            self.torque[k],
+            self.force[k],
+        )
+
+
+def simulate_model(
+    vehicle,
+    tuning,
+    rotor_speeds,
+    period=0.005,
+    seed=0,
+    position=(0.0, 0.0, 1.0),
+    quaternion=(1.0, 0.0, 0.0, 0.0),
+    velocity=(0.0, 0.0, 0.0),
+    angular_velocity=(0.0, 0.0, 0.0),
+    covariance=None,
+    rate_gain=20.0,
+    push=None,
+):
+    """Return a flight in which the filter's assumptions hold to the letter.
+
+    Every step draws a rotor torque error and a rotor force error (body frame), moves the external
+    torque and force (world) by their walks, and measures the pose, all normal with the deviations
+    of ``tuning``. The start is drawn from ``covariance`` about the given pose and twist, with no
+    external wrench in the mean. ``rate_gain`` (1/s) is of a loop on the true body rate, without
+    which a walk of the torque spins the vehicle up. ``push`` (K, 6), Nm and N, is added to the
+    external torque and force after each step.
+    """
+    speeds = np.array(rotor_speeds, dtype=np.float64)
+    P = default_covariance(vehicle, tuning) if covariance is None else covariance
+    start = np.zeros(20)
+    start[POSITION], start[QUATERNION] = position, quaternion
+    start[VELOCITY], start[RATE] = velocity, angular_velocity
+    rng = np.random.default_rng(seed)
+    steps = len(speeds)
+    process = rng.standard_normal((steps, 12))
+    for n, deviation in enumerate(
+        (tuning.motor_torque_noise, tuning.thrust_noise, tuning.torque_walk, tuning.force_walk)
+    ):
+        process[:, 3 * n : 3 * n + 3] *= np.asarray(deviation, dtype=np.float64)
+    if push is not None:
+        process[:, 6:] += push
+    measurement = rng.standard_normal((steps, 6))
+    measurement[:, :3] *= np.asarray(tuning.attitude_noise, dtype=np.float64) / 4.0  # (16)
+    measurement[:, 3:] *= np.asarray(tuning.position_noise, dtype=np.float64)
+    states, measured = np.empty((steps, 20)), np.empty((steps, 7))
+    imu, biases = _inertial_noise(tuning, steps, seed)
+    record = filter_record(vehicle, tuning, period)
+    drawn = rng.multivariate_normal(np.zeros(N), P, method="cholesky")
+    unmix = np.ascontiguousarray(np.linalg.inv(vehicle.mixing)[:, 1:]) @ vehicle.inertia * rate_gain
+    _simulate(
+        record,
+        start,
+        drawn,
+        speeds,
+        unmix,
+        vehicle.omega_max,
+        process,
+        measurement,
+        period,
+        vehicle.voltage_ref,
+        states,
+        measured,
+        imu,
+    )
+    return ModelRun(
+        start[POSITION],
+        start[QUATERNION],
+        start[VELOCITY],
+        start[RATE],
+        P,
+        speeds,
+        measured[:, :3],
+        measured[:, 3:],
+        states[:, POSITION],
+        states[:, QUATERNION],
+        states[:, VELOCITY],
+        states[:, RATE],
+        states[:, TORQUE],
+        states[:, FORCE],
+        imu[:, :3],
+        imu[:, 3:],
+        biases[:, :3],
+        biases[:, 3:],
+    )
+
+
+def _inertial_noise(tuning, steps, seed):
+    """Return what gyro and accelerometer (K, 6) measure beside the truth, and the biases in it."""
+    rng = np.random.default_rng([seed, 1])
+
+    def deviations(gyro, accelerometer):
+        return np.concatenate([np.broadcast_to(gyro, 3), np.broadcast_to(accelerometer, 3)])
+
+    walk = rng.standard_normal((steps, BIASES))
+    walk *= deviations(tuning.gyro_bias_walk, tuning.accelerometer_bias_walk)
+    walk[0] += rng.standard_normal(BIASES) * deviations(
+        tuning.gyro_bias_std, tuning.accelerometer_bias_std
+    )
+    biases = np.cumsum(walk, axis=0)
+    white = rng.standard_normal((steps, BIASES))
+    return biases + white * deviations(tuning.gyro_noise, tuning.accelerometer_noise), biases
+
+
+@compiled
+def _simulate(
+    record,
+    start,
+    error,
+    speeds,
+    rate_loop,
+    fastest,
+    process,
+    measurement,
+    dt,
+    voltage,
+    states,
+    measured,
+    imu,
+):
+    f = record[0]
+    x, after = f.x, f.next
+    inertial = np.empty(6)
+    quaternion_from_mrp(error[0:3], f.q)
+    quaternion_multiply(f.q, start[3:7], x[3:7])
+    normalise(x[3:7])
+    for i in range(3):
+        x[i] = start[i] + error[6 + i]
+        x[7 + i] = start[7 + i] + error[9 + i]
+        x[10 + i] = start[10 + i] + error[3 + i]
+        x[13 + i] = error[12 + i]
+        x[16 + i] = error[15 + i]
+    for k in range(len(speeds)):
+        noise = process[k]
+        for i in range(4):
+            square = speeds[k, i] * speeds[k, i]
+            for j in range(3):
+                square += rate_loop[i, j] * (start[10 + j] - x[10 + j])
+            speeds[k, i] = min(math.sqrt(max(square, 0.0)), fastest)
+        drive(f, speeds[k], dt, voltage)
+        for i in range(3):
+            f.rotor_wrench[1 + i] += noise[i]
+        propagate(f, x, dt, after)
+        # the force error is in the body frame and acts through the mass alone
+        for i in range(3):
+            push = (
+                f.rotation[i, 0] * noise[3]
+                + f.rotation[i, 1] * noise[4]
+                + f.rotation[i, 2] * noise[5]
+            )
+            push *= dt / f.body.mass
+            after[i] += 0.5 * dt * push
+            after[7 + i] += push
+            after[13 + i] += noise[6 + i]
+            after[16 + i] += noise[9 + i]
+        normalise(after[3:7])
+        for i in range(19):
+            x[i] = after[i]
+        f.time += dt
+        states[k] = x
+        quaternion_from_mrp(measurement[k, 0:3], f.q)
+        quaternion_multiply(f.q, x[3:7], measured[k, 3:7])
+        for i in range(3):
+            measured[k, i] = x[i] + measurement[k, 3 + i]
+        # the accelerometer feels the step's noise: the torque's is in the rotors' wrench already
+        expected_imu(f, x, inertial)
+        for i in range(3):
+            imu[k, i] += inertial[i]
+            imu[k, 3 + i] += inertial[3 + i] + noise[3 + i] / f.body.mass
