@@ -461,9 +461,9 @@ def _with_rotor_faults(
     found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
 ) -> "Diagnosis":
     """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
-    from ..identification.rotor_faults.detection import find_fault
-    from ..identification.rotor_faults.reading import channels_of
-    from ..identification.rotor_faults.words import fault_data
+    from ..identification.comparison.fault_channels import channels_of
+    from ..identification.comparison.fault_detection import find_fault
+    from ..identification.comparison.fault_words import fault_data
 
     faults = []
     with working("looking for a rotor that lost thrust"):
@@ -485,10 +485,9 @@ def _rotor_faults(
 ) -> dict[str, Any]:
     """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
     from ..dynamics.vehicle_file import load_vehicle
-    from ..identification.rotor_faults.channels import sample
-    from ..identification.rotor_faults.detection import find_fault
-    from ..identification.rotor_faults.reading import read_channels
-    from ..identification.rotor_faults.words import fault_data, headline, write_faults
+    from ..identification.comparison.fault_channels import read_channels, sample
+    from ..identification.comparison.fault_detection import find_fault
+    from ..identification.comparison.fault_words import fault_data, headline, write_faults
 
     model = None if vehicle is None else load_vehicle(vehicle)
     read = [read_channels(path, reader, model, log_map) for path in logs]

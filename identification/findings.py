@@ -294,7 +294,7 @@ class Diagnosis:
         floor_is_bound: whether the logs' noise was filtered before they were written (or is not
             white for another reason): then the floor is a lower bound.
         rotor_faults: one a log that can show it: whether a rotor lost thrust during the flight, as
-            plain data (``rotor_faults/words.py``); empty where that was not looked for.
+            plain data (``comparison/fault_words.py``); empty where that was not looked for.
         needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
             beside the IMU.
         doubts: why names are tentative, by the check that says so: sentences, which are notes as

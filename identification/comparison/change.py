@@ -226,8 +226,6 @@ def _scatters(
 def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
     """Return the logarithms (..., n) of multivariate Student's t densities with ``means`` (n, 4)
     and ``scales`` (..., n, 4, 4) at ``x`` (4,).
-
-    Many small matrices: Cholesky's rows are worked out for all of them together.
     """
     dof = len(x)
     constant = (
@@ -235,17 +233,11 @@ def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
         - gammaln(0.5 * freedom)
         - 0.5 * dof * math.log(freedom * math.pi)
     )
-    root: dict[tuple[int, int], Array] = {}
-    y: list[Array] = []  # what is left, whitened
-    for i in range(dof):
-        for j in range(i + 1):
-            rest = scales[..., i, j] - sum(root[i, k] * root[j, k] for k in range(j))
-            root[i, j] = np.sqrt(rest) if i == j else rest / root[j, j]
-        left = x[i] - means[:, i] - sum(root[i, k] * y[k] for k in range(i))
-        y.append(left / root[i, i])
-    diagonal = sum(np.log(root[i, i]) for i in range(dof))
-    bent = np.log1p(sum(np.square(one) for one in y) / freedom)
-    return np.asarray(constant - diagonal - 0.5 * (freedom + dof) * bent)
+    root = np.linalg.cholesky(scales)
+    whitened = np.linalg.solve(root, (x - means)[..., None])[..., 0]
+    log_size = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+    bent = np.log1p(np.square(whitened).sum(axis=-1) / freedom)
+    return np.asarray(constant - log_size - 0.5 * (freedom + dof) * bent)
 
 
 def _weigh(

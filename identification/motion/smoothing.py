@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, savgol_filter, sosfiltfilt
+from scipy.signal import butter, lfilter, savgol_filter, sosfiltfilt
 
 Array = NDArray[np.float64]
 
@@ -71,6 +71,26 @@ def high_pass(x: Array, share_of_rate: float) -> Array:
     impulse[100] = 1.0
     kept = np.linalg.norm(sosfiltfilt(sections, impulse))  # of white noise
     return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
+
+
+def lagged(x: Array, lag: float, period: float) -> Array:
+    """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
+    effect of the library has it, each sample held over the step that ends there.
+    """
+    if lag <= 1e-9:
+        return x
+    keep = np.exp(-period / lag)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], x, axis=0, zi=keep * x[:1])[0])
+
+
+def resampled(t: Array, times: Array, x: Array) -> Array:
+    """Return ``x`` (m, k), measured at ``times`` (m,), linear between them, at ``t`` (n,)."""
+    return np.column_stack([np.interp(t, times, column) for column in x.T])
+
+
+def unbroken(t: Array, rows: NDArray[np.intp], gap: float) -> list[NDArray[np.intp]]:
+    """Return the runs of ``rows`` between which no more than ``gap`` s pass."""
+    return np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
 
 
 def derivative(x: Array, period: float, order: int = 1) -> Array:

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
-from ..motion.smoothing import derivative, low_pass
+from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import Piece
 from .spectra import SPECTRUM, Complex, Segment, segments_of
 
@@ -49,16 +48,6 @@ class Balance:
     seconds: float
     band: float  # Hz
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
-
-
-def lagged(x: Array, lag: float, period: float) -> Array:
-    """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
-    effect of the library has it, each sample held over the step that ends there.
-    """
-    if lag <= 1e-9:
-        return x
-    keep = np.exp(-period / lag)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], x, axis=0, zi=keep * x[:1])[0])
 
 
 def balance(

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
+from ..motion.smoothing import lagged
 from .channels import Piece
-from .columns import lagged
 
 Array = NDArray[np.float64]
 

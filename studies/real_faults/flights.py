@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from windwrench.identification.rotor_faults.channels import Channels
+from windwrench.identification.comparison.fault_channels import Channels
 from windwrench.runtime.compiled import compiled
 
 Array = NDArray[np.float64]

@@ -31,7 +31,7 @@ STOREYS = (
     {"logs.screening", "findings"},
     {"inertial_wrench"},
     {"wrench_series"},
-    {"prediction", "inference", "comparison", "rotor_faults", "vehicle_fit"},
+    {"prediction", "inference", "comparison", "vehicle_fit"},
     {"posterior"},
     {"diagnosis"},
     {"report"},

@@ -14,11 +14,11 @@ from windwrench.dynamics import load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.recording import record_flight
 from windwrench.identification.comparison.change import compare
+from windwrench.identification.comparison.fault_channels import channels_of_log
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.fault_words import fault_data
 from windwrench.identification.comparison.words import change_data
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.rotor_faults.channels import channels_of_log
-from windwrench.identification.rotor_faults.detection import find_fault
-from windwrench.identification.rotor_faults.words import fault_data
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify

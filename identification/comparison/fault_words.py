@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...runtime.page_files import write_json, write_png
-from .channels import Samples
-from .detection import ALL, NOTHING, OTHER, RotorFault
+from .fault_channels import Samples
+from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 
 _PLACES = ("front-left", "rear-left", "rear-right", "front-right")
 _NAMED = 0.05  # probability from which a rival is mentioned

@@ -7,14 +7,20 @@ by a window that would smear the time of a fault.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.signal import lfilter
 
+from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
+from ..logs.readers import px4_channels
+from ..logs.readers.recognise import reader_by_content
+from ..logs.reading import read_log
+from ..motion.smoothing import lagged, resampled
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -80,14 +86,55 @@ class Samples:
         source = self.channels
         first, last = source.command_times[0], source.command_times[-1]
         fine = np.arange(first, last + FINE, FINE)
-        u = np.column_stack([np.interp(fine, source.command_times, c) for c in source.command.T])
+        u = resampled(fine, source.command_times, source.command)
         u /= np.median(np.interp(self.t, fine, u.mean(axis=1)))
         x = np.maximum(u - dead, 0.0) / (1.0 - dead)
-        thrust = bend * x * x + (1.0 - bend) * x
-        if lag > 0.0:
-            keep = float(np.exp(-FINE / lag))
-            thrust = lfilter([1.0 - keep], [1.0, -keep], thrust, axis=0, zi=keep * thrust[:1])[0]
-        return _means(fine, thrust, self.t)
+        return _means(fine, lagged(bend * x * x + (1.0 - bend) * x, lag, FINE), self.t)
+
+
+def read_channels(
+    path: Path,
+    reader: str | None = None,
+    vehicle: Vehicle | None = None,
+    log_map: str | None = None,
+) -> tuple[Channels, tuple[str, ...]]:
+    """Return a file's gyro, accelerometer and commands, and notes on where they came from: those of
+    a PX4 log at their own rates, others as their reader gives them.
+
+    Raises:
+        InputError: the file cannot be read, or lacks one of the three.
+    """
+    if log_map is None and reader in (None, "px4_ulog") and _is_ulog(path):
+        return _of_ulog(path)
+    log = read_log(path, reader, vehicle, log_map)
+    return channels_of_log(log), log.notes
+
+
+def channels_of(path: Path, log: FlightLog) -> Channels:
+    """Return the channels of a log that was read from a file: a PX4 log's own rates are in the file
+    alone.
+
+    Raises:
+        InputError: gyro, accelerometer or commands are missing.
+    """
+    return _of_ulog(path)[0] if _is_ulog(path) else channels_of_log(log)
+
+
+def _is_ulog(path: Path) -> bool:
+    reader = reader_by_content(path)
+    return reader is not None and reader.name == "px4_ulog"
+
+
+def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]]:
+    streams, notes, motors = px4_channels.read_streams(path)
+    first, second, third, fourth = (f"PX4 motor {motor}" for motor in motors)
+    names = ("gyro", "accelerometer", "command")
+    channels = Channels(
+        str(path),
+        *(part for name in names for part in streams[name]),
+        motor_names=(first, second, third, fourth),
+    )
+    return channels, notes
 
 
 def channels_of_log(log: FlightLog) -> Channels:
@@ -140,7 +187,7 @@ def sample(channels: Channels) -> Samples:
     if len(edges) < 3:
         raise InputError(f"{c.name}: gyro, accelerometer and commands do not overlap in time")
     t = 0.5 * (edges[1:] + edges[:-1])
-    gyro = np.column_stack([np.interp(edges, c.gyro_times, axis) for axis in c.gyro.T])
+    gyro = resampled(edges, c.gyro_times, c.gyro)
     force = _means(c.accelerometer_times, c.accelerometer, t)
     total = np.interp(t, c.command_times, c.command.sum(axis=1))
     flying = total > _least(c)
@@ -191,27 +238,12 @@ def _between(c: Channels, t: Array) -> Array:
 
 def _means(times: Array, values: Array, middles: Array) -> Array:
     """Return the means (N, d) over the grid's intervals of what is linear between ``times``."""
-    steps = np.diff(times)[:, None]
-    area = np.concatenate([[np.zeros(values.shape[1])], 0.5 * (values[1:] + values[:-1]) * steps])
-    area = np.cumsum(area, axis=0)
-    ends = [middles - 0.5 * STEP, middles + 0.5 * STEP]
+    new = np.diff(times, prepend=-np.inf) > 0.0
+    integral = make_interp_spline(times[new], values[new], k=1).antiderivative()
     low, high = (
-        np.column_stack(
-            [_integral(end, times, v, a) for v, a in zip(values.T, area.T, strict=True)]
-        )
-        for end in ends
+        integral(np.clip(middles + half, times[0], times[-1])) for half in (-0.5 * STEP, 0.5 * STEP)
     )
-    means: Array = (high - low) / STEP
-    return means
-
-
-def _integral(at: Array, times: Array, values: Array, area: Array) -> Array:
-    """Return the integral from the first time to ``at`` of what is linear between ``times``."""
-    i = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
-    d = np.clip(at, times[0], times[-1]) - times[i]
-    slope = (values[i + 1] - values[i]) / (times[i + 1] - times[i])
-    found: Array = area[i] + values[i] * d + 0.5 * slope * d * d
-    return found
+    return np.asarray((high - low) / STEP)
 
 
 def _end(c: Channels, t: Array) -> tuple[float, str]:

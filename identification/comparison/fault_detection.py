@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from .balance import AT_ONCE, Balance, Begin
-from .channels import STEP, Channels, Samples, sample
-from .noise import Noise
+from .fault_balance import AT_ONCE, Balance, Begin
+from .fault_channels import STEP, Channels, Samples, sample
+from .fault_noise import Noise
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from ...runtime.compiled import compiled
-from .channels import STEP, Samples
-from .noise import Noise, fit_noise
+from .fault_channels import STEP, Samples
+from .fault_noise import Noise, fit_noise
 
 Array = NDArray[np.float64]
 

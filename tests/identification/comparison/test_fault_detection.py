@@ -8,11 +8,11 @@ from typer.testing import CliRunner
 
 from tests.support.data_paths import data_file
 from windwrench.cli import app
-from windwrench.identification.rotor_faults.balance import AT_ONCE, Balance, Begin
-from windwrench.identification.rotor_faults.channels import sample
-from windwrench.identification.rotor_faults.detection import find_fault
-from windwrench.identification.rotor_faults.noise import ORDER, fit_noise
-from windwrench.identification.rotor_faults.words import fault_data, headline
+from windwrench.identification.comparison.fault_balance import AT_ONCE, Balance, Begin
+from windwrench.identification.comparison.fault_channels import sample
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
+from windwrench.identification.comparison.fault_words import fault_data, headline
 from windwrench.studies.real_faults.flights import draw_flight
 
 

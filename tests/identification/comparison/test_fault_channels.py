@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.rotor_faults.channels import (
+from windwrench.identification.comparison.fault_channels import (
     STEP,
     Channels,
     channels_of_log,
     sample,
 )
+from windwrench.identification.logs.flight_log import FlightLog
 
 
 def hover(seconds=8.0, rate=200.0, command_rate=200.0, **changed):
