@@ -12,11 +12,10 @@ from ...dynamics.vehicle import EffectSetting, Mocap, MotorCurve, Vehicle
 from ..logs.flight_log import FlightLog
 from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
-from .geometry import Geometry
+from .geometry import USUAL, Geometry
 from .motors import MotorResponse
 from .result import IDENTIFIED, Estimate
 from .solve import Fit
-from .usual import USUAL
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ Specific force and angular velocity come from the IMU where the log has one, and
 derivatives where it has none. Rotors come as measured speeds, or as motor commands.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..motion.signals import log_signals
-from ..motion.smoothing import derivative, low_pass
+from ..motion.smoothing import derivative, low_pass, resampled, unbroken
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,8 @@ class ChannelSettings:
     fastest_hz: float = 200.0
     # share of the hover thrust's command below which a vehicle stands on the ground
     flying_share: float = 0.3
+    # share of different values among all, below which rotor speeds are rounded
+    few_values: float = 0.2
 
 
 CHANNELS = ChannelSettings()
@@ -51,6 +53,13 @@ class Piece:
     rotor_speeds: Array | None  # (n, 4) rad/s
     command: Array | None  # (n, 4), 0 to 1
     voltage: Array | None  # (n,) V
+
+    def mapped(self, change: Callable[[Array], Array]) -> "Piece":
+        """Return the piece with each of its series changed."""
+        series = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(
+            self, **{n: change(x) for n, x in series.items() if isinstance(x, np.ndarray)}
+        )
 
 
 @dataclass(frozen=True)
@@ -98,6 +107,17 @@ def sources_of(logs: Sequence[FlightLog]) -> Sources:
     )
 
 
+def rounding_step(logs: Sequence[FlightLog]) -> float:
+    """Return the step (rad/s) to which logged rotor speeds are rounded, as the numbers themselves
+    show it; 0 where it would not matter.
+    """
+    values = np.concatenate([log.rotor_speeds.ravel() for log in logs])
+    kept = np.unique(np.round(values, 6))
+    if len(kept) < 3 or len(kept) > CHANNELS.few_values * len(values):
+        return 0.0
+    return float(np.median(np.diff(kept)))
+
+
 def pieces_of(
     logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]], gravity: float
 ) -> tuple[list[Piece], Sources]:
@@ -113,11 +133,12 @@ def pieces_of(
     """
     sources = sources_of(logs)
     pieces: list[Piece] = []
-    for number, (log, window) in enumerate(zip(logs, windows, strict=True)):
-        found = _pieces(log, number, sources, gravity)
-        for piece in found:
-            for part in _inside(piece, window, log.t[0]):
-                pieces += _flying(part)
+    for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
+        posed = "pose" in (sources.rate, sources.force)
+        for piece in (_posed if posed else _inertial)(log, number, sources, gravity):
+            inside = (piece.t >= log.t[0] + first) & (piece.t <= log.t[0] + last)
+            for part in _cut(piece, inside):
+                pieces += _cut(part, _flying(part))
     if not pieces:
         raise InputError(
             f"{logs[0].name}: no piece of {CHANNELS.shortest_piece:g} s in flight is unbroken "
@@ -126,15 +147,8 @@ def pieces_of(
     return pieces, sources
 
 
-def _pieces(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
-    if sources.rate == "pose" or sources.force == "pose":
-        return _posed(log, number, sources, gravity)
-    return _inertial(log, number, sources, gravity)
-
-
-def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
-    """Pieces whose force, and rate where there is no gyro, are the pose's derivatives."""
-    out = []
+def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[Piece]:
+    """Yield pieces whose force, and rate where there is no gyro, are the pose's derivatives."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
         force = inverse.apply(s.acceleration + np.array([0.0, 0.0, gravity]))
@@ -145,28 +159,25 @@ def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> lis
             rate = _sensor(log, log.gyro, s.t)
             turning = derivative(rate, s.period)
         velocity = inverse.apply(s.velocity)
-        out.append(_piece(log, number, s.t, s.period, force, rate, turning, velocity, sources))
-    return out
+        yield _piece(log, number, s.t, s.period, force, rate, turning, velocity, sources)
 
 
-def _inertial(log: FlightLog, number: int, sources: Sources, gravity: float) -> list[Piece]:
-    """Pieces whose rate, and force if any, are the IMU's; velocity is the pose's, where it is."""
+def _inertial(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[Piece]:
+    """Yield pieces whose rate, and force if any, are the IMU's; velocity is the pose's, where there
+    is one.
+    """
     assert log.gyro is not None
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]))
-    step = np.diff(log.t[read])
-    period = float(np.median(step))
-    breaks = np.flatnonzero(step > max(CHANNELS.gap, 3.5 * period)) + 1
-    out = []
-    for rows in np.split(read, breaks):
+    period = float(np.median(np.diff(log.t[read])))
+    for rows in unbroken(log.t, read, max(CHANNELS.gap, 3.5 * period)):
         if len(rows) < 16 or log.t[rows[-1]] - log.t[rows[0]] < CHANNELS.shortest_piece:
             continue
         t = np.arange(log.t[rows[0]], log.t[rows[-1]], period)
         rate = _sensor(log, log.gyro, t)
         force = None if log.accelerometer is None else _sensor(log, log.accelerometer, t)
-        turning = derivative(rate, period)
         velocity = _velocity(log, t) if sources.velocity else None
-        out.append(_piece(log, number, t, period, force, rate, turning, velocity, sources))
-    return out
+        turning = derivative(rate, period)
+        yield _piece(log, number, t, period, force, rate, turning, velocity, sources)
 
 
 def _piece(
@@ -180,42 +191,43 @@ def _piece(
     velocity: Array | None,
     sources: Sources,
 ) -> Piece:
-    def at(columns: Array | None) -> Array | None:
-        if columns is None:
-            return None
-        return np.column_stack([np.interp(t, log.t, c) for c in columns.T])
-
-    speeds = at(log.rotor_speeds) if sources.rotors == "rotor speeds" else None
-    command = at(log.command)
-    voltage = at(None if log.voltage is None else log.voltage[:, None])
+    speeds = log.rotor_speeds if sources.rotors == "rotor speeds" else None
+    piece = Piece(
+        number,
+        t,
+        period,
+        force,
+        turning,
+        rate,
+        velocity,
+        None if speeds is None else resampled(t, log.t, speeds),
+        None if log.command is None else resampled(t, log.t, log.command),
+        None if log.voltage is None else np.interp(t, log.t, log.voltage),
+    )
     if period < 0.8 / CHANNELS.fastest_hz:
-        thin = 1.0 / CHANNELS.fastest_hz
-        times = np.arange(t[0], t[-1], thin)
+        period = 1.0 / CHANNELS.fastest_hz
+        thin = np.arange(t[0], t[-1], period)
 
-        def thinned(x: Array | None) -> Array | None:
-            if x is None:
-                return None
-            quiet = low_pass(x, 0.4 * CHANNELS.fastest_hz, period)
-            return np.column_stack([np.interp(times, t, c) for c in quiet.T])
+        def thinned(x: Array) -> Array:
+            slow = low_pass(x, 0.4 * CHANNELS.fastest_hz, piece.period)
+            return resampled(thin, t, slow) if x.ndim > 1 else np.interp(thin, t, slow)
 
-        many = (force, rate, turning, velocity, speeds, command, voltage)
-        force, thin_rate, thin_turning, velocity, speeds, command, voltage = map(thinned, many)
-        assert thin_rate is not None
-        assert thin_turning is not None
-        t, period, rate, turning = times, thin, thin_rate, thin_turning
-    smooth = low_pass(rate, CHANNELS.product_hz, period)
-    moving = None if velocity is None else low_pass(velocity, CHANNELS.product_hz, period)
-    volts = None if voltage is None else voltage[:, 0]
-    return Piece(number, t, period, force, turning, smooth, moving, speeds, command, volts)
+        piece = replace(piece.mapped(thinned), t=thin, period=period)
+
+    def smooth(x: Array) -> Array:
+        return low_pass(x, CHANNELS.product_hz, period)
+
+    moving = None if piece.velocity is None else smooth(piece.velocity)
+    return replace(piece, angular_velocity=smooth(piece.angular_velocity), velocity=moving)
 
 
 def _sensor(log: FlightLog, values: Array, t: Array) -> Array:
     read = np.isfinite(values[:, 0])
-    return np.column_stack([np.interp(t, log.t[read], c) for c in values[read].T])
+    return resampled(t, log.t[read], values[read])
 
 
 def _velocity(log: FlightLog, t: Array) -> Array | None:
-    """Return the velocity (n, 3) in body axes at times, NaN where the pose does not say."""
+    """Return the velocity (n, 3) in body axes at times; None where the pose does not say all."""
     try:
         signals = log_signals(log)
     except InputError:
@@ -224,50 +236,26 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
     for s in signals:
         inside = (t >= s.t[0]) & (t <= s.t[-1])
         body = Rotation.from_matrix(s.rotation).inv().apply(s.velocity)
-        out[inside] = np.column_stack([np.interp(t[inside], s.t, c) for c in body.T])
+        out[inside] = resampled(t[inside], s.t, body)
     return None if np.isnan(out).any() else out
 
 
-def _inside(piece: Piece, window: tuple[float, float], start: float) -> list[Piece]:
-    keep = (piece.t >= start + window[0]) & (piece.t <= start + window[1])
-    return _cut(piece, keep)
-
-
-def _flying(piece: Piece) -> list[Piece]:
-    """Return the parts of a piece in which the rotors carry the vehicle, without take-off and
-    landing.
-    """
+def _flying(piece: Piece) -> NDArray[np.bool_]:
+    """Return where the rotors carry the vehicle, without take-off and landing."""
     drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
     assert drive is not None
     load = low_pass(np.mean(np.square(drive), axis=1), 1.0, piece.period)
     usual = float(np.median(load[load > 0.1 * np.quantile(load, 0.95)]))
-    return _cut(piece, load > CHANNELS.flying_share * usual)
+    return np.asarray(load > CHANNELS.flying_share * usual)
 
 
 def _cut(piece: Piece, keep: NDArray[np.bool_]) -> list[Piece]:
+    """Return the runs of samples that are kept, if they are long enough."""
     if keep.all():
         return [piece]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(int)))
-    out = []
-    for a, b in edges.reshape(-1, 2):
-        if (b - a) * piece.period < CHANNELS.shortest_piece:
-            continue
-
-        def part(x: Array | None, a: int = int(a), b: int = int(b)) -> Array | None:
-            return None if x is None else x[a:b]
-
-        out.append(
-            Piece(
-                piece.log,
-                piece.t[a:b],
-                piece.period,
-                part(piece.specific_force),
-                piece.angular_acceleration[a:b],
-                piece.angular_velocity[a:b],
-                part(piece.velocity),
-                part(piece.rotor_speeds),
-                part(piece.command),
-                part(piece.voltage),
-            )
-        )
-    return out
+    return [
+        piece.mapped(lambda x, a=a, b=b: x[a:b])  # type: ignore[misc]
+        for a, b in edges.reshape(-1, 2).tolist()
+        if (b - a) * piece.period >= CHANNELS.shortest_piece
+    ]

@@ -6,24 +6,24 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ...dynamics.effects import Role, get
 from .channels import Piece, Sources
 from .effect_settings import effect_of, estimate_name
-from .geometry import Geometry
+from .geometry import USUAL, Geometry
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
 from .solve import Fit
 from .spectra import SPECTRUM
-from .usual import USUAL
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 Function = Callable[[Values], float]
+Interval = tuple[float, float, float]  # value, low and high
+
+UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 
 
-class Reading:
+class Intervals:
     """Values and 95 % intervals of a fit's parameters, and of what follows from them."""
 
     def __init__(self, fit: Fit) -> None:
@@ -36,7 +36,7 @@ class Reading:
         )
         self._covariance = fit.covariance
 
-    def interval(self, what: Function, logarithm: bool = True) -> tuple[float, float, float]:
+    def of(self, what: Function, logarithm: bool = True) -> Interval:
         """Return value, low and high of a function of the parameters in SI units; of a positive
         quantity as a ratio.
         """
@@ -56,14 +56,6 @@ class Reading:
         n = len(self.fit.model.free)
         named = zip(self.fit.names[n:], theta[n:], strict=True)
         return {**self.fit.model.values(theta[:n]), **{name: float(x) for name, x in named}}
-
-
-def _value(name: str, factor: float = 1.0) -> Function:
-    return lambda v: factor * v[name]
-
-
-def _over(value: float, name: str) -> Function:
-    return lambda v: value / v[name]
 
 
 def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
@@ -91,53 +83,219 @@ def estimates_of(
         kept: names of the further effects that show.
         weight: N.
     """
-    read = Reading(fit)
-    out: list[Estimate] = []
-
-    def say(
-        name: str, of: Function, unit: str, how: str, status: str = IDENTIFIED, log: bool = True
-    ) -> None:
-        known = read.interval(of, log)
-        if log and status == IDENTIFIED and not told(known):
-            status, how = NOTHING, f"{how}: the interval is wider than half the value"
-        out.append(Estimate(name, *known, unit, status, how))
-
+    found = _Estimates(fit, sources, geometry, kept)
     vertical = f"{sources.force} along body z against {sources.rotors}, with the mass given"
     if fit.drive.commands:
-        _curve(say, fit, pieces, weight, vertical)
+        found.say_curve(pieces, weight, vertical)
     else:
-        say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
-    arm, arm_range = _arm(out, read, geometry)
-    _inertia(out, read, sources, arm, arm_range, not_told, kept)
-    _yaw(out, read, sources, arm, arm_range)
-    _lag(out, read, sources)
-    _centre(out, read, sources, geometry, arm)
-    _drag(out, read, sources, arm, kept)
-    return out
+        found.say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
+    found.say_arm()
+    found.say_inertia(*not_told)
+    found.say_yaw()
+    found.say_lag()
+    found.say_centre()
+    found.say_drag()
+    return found.said
 
 
-def _curve(
-    say: Callable[..., None], fit: Fit, pieces: Sequence[Piece], weight: float, how: str
-) -> None:
-    exponents = fit.drive.exponents
-    for j, e in enumerate(exponents):
-        say(f"thrust u^{e}", lambda v, j=j: v[f"a{j}"], "N", how, IDENTIFIED, False)
-    flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
-    low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
-    for u in (0.25, 0.5, 0.75, 1.0):
-        inside = low <= u <= high
-        say(
-            f"thrust({u:g})",
-            lambda v, u=u: thrust_of(v, exponents, u),
-            "N",
-            how
-            if inside
-            else f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}",
-            IDENTIFIED if inside else ASSUMED,
+class _Estimates:
+    """What is said of one vehicle, and the lengths that the rest scales with."""
+
+    def __init__(self, fit: Fit, sources: Sources, geometry: Geometry, kept: Sequence[str]) -> None:
+        self.fit, self.sources, self.geometry, self.kept = fit, sources, geometry, kept
+        self.intervals = Intervals(fit)
+        self.said: list[Estimate] = []
+        self.arm = 1.0  # m for each unit of the rotors' positions
+        self.arm_range = (1.0, 1.0)  # shares of it
+        self.rotors = f"against {sources.rotors}"
+
+    def add(
+        self, name: str, known: Interval, unit: str, how: str, status: str = IDENTIFIED
+    ) -> None:
+        self.said.append(Estimate(name, *known, unit, status, how))
+
+    def say(self, name: str, of: Function, unit: str, how: str, status: str = IDENTIFIED) -> None:
+        """Add a positive quantity, or that its interval is too wide."""
+        known = self.intervals.of(of)
+        if status == IDENTIFIED and not told(known):
+            status, how = NOTHING, f"{how}: the interval is wider than half the value"
+        self.add(name, known, unit, how, status)
+
+    def scaled(self, known: Interval) -> Interval:
+        """Return what is a number times the arm, with the range of an arm that is assumed."""
+        value, *ends = (self.arm * x for x in known)
+        corners = [end * share for end in ends for share in self.arm_range]
+        return value, min(corners), max(corners)
+
+    def say_curve(self, pieces: Sequence[Piece], weight: float, how: str) -> None:
+        exponents = self.fit.drive.exponents
+        for j, e in enumerate(exponents):
+            known = self.intervals.of(lambda v, j=j: v[f"a{j}"], False)  # type: ignore[misc]
+            self.add(f"thrust u^{e}", known, "N", how)
+        flown = np.concatenate([p.command.ravel() for p in pieces if p.command is not None])
+        low, high = np.clip(np.quantile(flown, [0.005, 0.995]), 0.0, 1.0)
+        beyond = f"continues the curve beyond the commands flown, {low:.2f} to {high:.2f}"
+        for u in (0.25, 0.5, 0.75, 1.0):
+            self.say(
+                f"thrust({u:g})",
+                lambda v, u=u: thrust_of(v, exponents, u),  # type: ignore[misc]
+                "N",
+                *((how, IDENTIFIED) if low <= u <= high else (beyond, ASSUMED)),
+            )
+        self.say("hover command", lambda v: _hover(v, exponents, weight), "1", how)
+        if "gamma" in self.fit.names:
+            known = self.intervals.of(lambda v: v["gamma"], False)
+            self.add("voltage_exponent", known, "1", how + " and voltage")
+
+    def say_arm(self) -> None:
+        if self.geometry.known:
+            self.add("arm_l", 3 * (self.geometry.arm,), "m", "--geometry", GIVEN)
+            return
+        # with rotors at unit distance the fit's inertia is inertia over arm, which for a usual
+        # radius of gyration is gyration * mass * arm
+        values = self.fit.values
+        value = 0.5 * (values["Jx"] + values["Jy"]) / self.fit.model.mass / USUAL.gyration
+        low, high = (value * USUAL.gyration / g for g in reversed(USUAL.gyration_range))
+        how = (
+            f"turning shows arm over inertia alone; with {USUAL.gyration:g} mass arm^2 for the "
+            f"inertia, {USUAL.gyration_range[0]:g} to {USUAL.gyration_range[1]:g}"
         )
-    say("hover command", lambda v: _hover(v, exponents, weight), "1", how)
-    if "gamma" in fit.names:
-        say("voltage_exponent", lambda v: v["gamma"], "1", how + " and voltage", log=False)
+        self.add("arm_l", (value, low, high), "m", how, ASSUMED)
+        self.arm, self.arm_range = value, (low / value, high / value)
+
+    def say_inertia(self, reasons: Mapping[str, str], instead: Mapping[str, float]) -> None:
+        given = (IDENTIFIED, "given") if self.geometry.known else (ASSUMED, "assumed")
+        motions = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}
+        for axis, motion in motions.items():
+            name = axis + axis[1]
+            if axis not in reasons:
+                known = self.scaled(self.intervals.of(lambda v, axis=axis: v[axis]))  # type: ignore[misc]
+                how = f"{self.sources.rate} in {motion} {self.rotors}, with the arm {given[1]}"
+                self.add(name, known, "kg m2", how, given[0])
+                continue
+            value = instead[axis] * self.arm
+            if axis == "Jz":
+                x, y = self.said[-2:]
+                low, high = USUAL.flat_range
+                low, high = low * (x.low + y.low), high * (x.high + y.high)
+                usual = f"{USUAL.flat:g} of Jxx + Jyy, {USUAL.flat_range[0]:g} to 1"
+            else:
+                low, high = (value * g / USUAL.gyration for g in USUAL.gyration_range)
+                usual = f"{USUAL.gyration:g} mass arm^2"
+            self.add(name, (value, low, high), "kg m2", f"{reasons[axis]}; {usual}", ASSUMED)
+        for axis, across in (("Jx", 1), ("Jy", 0)):
+            if axis not in reasons:
+                length = float(np.mean(np.abs(self.fit.drive.positions[:, across])))
+                known = self.intervals.of(lambda v, n=length, axis=axis: n / v[axis])  # type: ignore[misc]
+                how = f"{self.sources.rate} {self.rotors}: needs no arm"
+                self.add(f"l/{axis}{axis[1]}", known, "1/(kg m)", how)
+        if "products of inertia" in self.kept:
+            for name in ("Jxy", "Jxz", "Jyz"):
+                known = self.scaled(self.intervals.of(lambda v, n=name: v[n], False))  # type: ignore[misc]
+                self.add(name, known, "kg m2", f"{self.sources.rate} across axes", given[0])
+
+    def say_yaw(self) -> None:
+        how = f"{self.sources.rate} in yaw {self.rotors}"
+        gain = self.intervals.of(lambda v: v["reach"] / v["Jz"])
+        inertia = next(e for e in self.said if e.name == "Jzz")
+        doubtful = self.fit.drive.band < SPECTRUM.band
+        if doubtful or not told(gain):
+            how = "the flight hardly accelerates in yaw"
+            if doubtful:
+                how = "quick motion contradicts slow motion in these logs"
+            self.add("(p/k)/Jzz", gain, "1/(kg m)", how, NOTHING)
+            length = float(np.mean(np.abs(self.fit.drive.positions[:, :2]))) * self.arm
+            low, high = (r * length for r in USUAL.reach_range)
+            ratio, status = (USUAL.reach * length, low, high), ASSUMED
+            how = f"{how}; {USUAL.reach:g} of the arm"
+        else:
+            self.add("(p/k)/Jzz", gain, "1/(kg m)", how)
+            ratio, status = self.scaled(self.intervals.of(lambda v: v["reach"])), IDENTIFIED
+            if inertia.status == ASSUMED:
+                # the inertia about z is not told by the flight: the ratio is, and carries it
+                values = (inertia.value, inertia.low, inertia.high)
+                a, b, c = (x * y for x, y in zip(gain, values, strict=True))
+                ratio, status, how = (a, b, c), ASSUMED, f"{how}, with the Jzz that is assumed"
+        self.add("p/k", ratio, "m", how, status)
+        if not self.fit.drive.commands:
+            k = self.said[0].value
+            known = (ratio[0] * k, ratio[1] * k, ratio[2] * k)
+            if status == IDENTIFIED:
+                known = self.intervals.of(lambda v: v["reach"] * v["a0"])
+            self.add("p", known, "Nm/(rad/s)^2", how, status)
+
+    def say_lag(self) -> None:
+        name = effect_of(Role.LAG)
+        if "lag" in self.fit.names:
+            how = f"force and turning {self.rotors}"
+            if not self.fit.drive.commands:
+                how += ", which therefore are commanded, not measured"
+            known, status = self.intervals.of(lambda v: v["lag"]), IDENTIFIED
+            if not told(known):
+                status, how = NOTHING, "a time offset of the motion does nearly the same here"
+        else:
+            known, status = UNKNOWN, NOTHING
+            how = (
+                "force follows the logged rotor speeds at once: they are measured, and no command "
+                "is logged beside them"
+            )
+        self.add(name, known, "s", how, status)
+        known = self.intervals.of(lambda v: v["delay"], False)
+        self.add("time_offset", known, "s", "of the motion behind the rotors")
+
+    def say_centre(self) -> None:
+        how = (
+            "constant share of thrust in roll and pitch torque: a centre of mass off the rotors' "
+            "middle, or unequal rotors"
+        )
+        for axis in "xy":
+            value, low, high = self.intervals.of(lambda v, n=f"c{axis}": v[n], False)  # type: ignore[misc]
+            status = IDENTIFIED if self.geometry.known else ASSUMED
+            reason = how
+            if high - low > 0.5 * self.geometry.arm:
+                status = NOTHING
+                reason = "thrust hardly changes: a constant torque does the same"
+            known = (self.arm * value, self.arm * low, self.arm * high)
+            self.add(f"com {axis}", known, "m", reason, status)
+        if self.sources.force == "pose":
+            known = self.intervals.of(lambda v: -v["rz"], False)
+            wide = known[2] - known[0] > 0.5 * self.arm * self.geometry.arm
+            how = "the pose's point swings about it: or the markers' middle is off"
+            self.add("com z", known, "m", how, NOTHING if wide else IDENTIFIED)
+
+    def say_drag(self) -> None:
+        if not self.sources.velocity:
+            how = "no velocity is known: the logs have no position"
+            self.add("drag", UNKNOWN, "N/(m/s)", how, NOTHING)
+            return
+        along = f"{self.sources.force} along body x and y against velocity"
+        damped = f"{self.sources.rate} against its own derivative"
+        # a further effect's name; its role, and the coefficients there; the fit's parameters, and
+        # what they are multiplied by
+        drags = ("rotor drag", "linear drag", "quadratic drag")
+        rows: list[tuple[str, Role, int, str, float, str]] = []
+        for kind, role, first in zip(
+            drags, (Role.ROTOR_DRAG, Role.BODY_DRAG, Role.BODY_DRAG), (0, 0, 3), strict=True
+        ):
+            rows += [(kind, role, first + i, f"{kind} {a}", 1.0, along) for i, a in enumerate("xy")]
+        rows += [
+            ("vertical drag", Role.BODY_DRAG, 2, "linear drag z", 1.0, along),
+            ("inflow", Role.INFLOW_THRUST, 0, "rotor drag z", 1.0, "force along body z"),
+            ("lift", Role.TRANSLATIONAL_LIFT, 0, "lift", 0.25, "force along body z"),
+        ]
+        for i, a in enumerate("xyz"):
+            rows.append((f"damping {a}", Role.RATE_DAMPING, i, f"damping {a}", self.arm, damped))
+        for kind, role, index, parameter, factor, how in rows:
+            if kind in self.kept:
+                known = self.intervals.of(
+                    lambda v, f=factor, n=parameter: f * v[n],  # type: ignore[misc]
+                    role == Role.RATE_DAMPING,
+                )
+                unit = get(effect_of(role)).coefficients[index].unit
+                self.add(estimate_name(role, index), known, unit, how)
+        if not set(drags) & set(self.kept):
+            known = (0.0, math.nan, math.nan)
+            self.add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)
 
 
 def _hover(values: Values, exponents: Sequence[int], weight: float) -> float:
@@ -149,269 +307,3 @@ def _hover(values: Values, exponents: Sequence[int], weight: float) -> float:
         else:
             high = middle
     return 0.5 * (low + high)
-
-
-def _arm(
-    out: list[Estimate], read: Reading, geometry: Geometry
-) -> tuple[float, tuple[float, float]]:
-    """Return the arm's length and its range as shares of it, and say it."""
-    if geometry.known:
-        out.append(
-            Estimate("arm_l", geometry.arm, geometry.arm, geometry.arm, "m", GIVEN, "--geometry")
-        )
-        return 1.0, (1.0, 1.0)
-    # with rotors at unit distance the fit's inertia is inertia over arm, which for a usual radius
-    # of gyration is gyration * mass * arm
-    mass = read.fit.model.mass
-
-    def ratio(v: Values) -> float:
-        return 0.5 * (v["Jx"] + v["Jy"]) / mass
-
-    value = ratio(read.fit.values) / USUAL.gyration
-    low, high = (value * USUAL.gyration / g for g in reversed(USUAL.gyration_range))
-    out.append(
-        Estimate(
-            "arm_l",
-            value,
-            low,
-            high,
-            "m",
-            ASSUMED,
-            f"turning shows arm over inertia alone; with {USUAL.gyration:g} mass arm^2 for the "
-            f"inertia, {USUAL.gyration_range[0]:g} to {USUAL.gyration_range[1]:g}",
-        )
-    )
-    return value, (low / value, high / value)
-
-
-def _times(
-    known: tuple[float, float, float], factor: float, share: tuple[float, float]
-) -> tuple[float, float, float]:
-    value, low, high = (factor * x for x in known)
-    a, b = (low, high) if low <= high else (high, low)
-    corners = [a * share[0], a * share[1], b * share[0], b * share[1]]
-    return value, min(corners), max(corners)
-
-
-def _inertia(
-    out: list[Estimate],
-    read: Reading,
-    sources: Sources,
-    arm: float,
-    arm_range: tuple[float, float],
-    not_told: tuple[Mapping[str, str], Mapping[str, float]],
-    kept: Sequence[str],
-) -> None:
-    fixed, instead = not_told
-    scaled = arm_range != (1.0, 1.0)
-    for name, axis in (("Jxx", "Jx"), ("Jyy", "Jy"), ("Jzz", "Jz")):
-        if axis in fixed:
-            value = instead[axis] * arm
-            if axis == "Jz":
-                both = out[-1], out[-2]
-                low, high = (
-                    share * sum(e.low if i == 0 else e.high for e in both)
-                    for i, share in enumerate(USUAL.flat_range)
-                )
-                how = f"{fixed[axis]}; {USUAL.flat:g} of Jxx + Jyy, {USUAL.flat_range[0]:g} to 1"
-            else:
-                low, high = (value * g / USUAL.gyration for g in USUAL.gyration_range)
-                how = f"{fixed[axis]}; {USUAL.gyration:g} mass arm^2"
-            out.append(Estimate(name, value, low, high, "kg m2", ASSUMED, how))
-            continue
-        known = read.interval(_value(axis))
-        motion = {"Jx": "roll", "Jy": "pitch", "Jz": "yaw while rolling or pitching"}[axis]
-        how = f"{sources.rate} in {motion} against {sources.rotors}, with the arm"
-        out.append(
-            Estimate(
-                name,
-                *_times(known, arm, arm_range),
-                "kg m2",
-                ASSUMED if scaled else IDENTIFIED,
-                how + (" assumed" if scaled else " given"),
-            )
-        )
-    for name, axis in (("l/Jxx", "Jx"), ("l/Jyy", "Jy")):
-        if axis not in fixed:
-            length = read.fit.drive.positions
-            own = float(np.mean(np.abs(length[:, 1 if axis == "Jx" else 0])))
-            known = read.interval(_over(own, axis))
-            how = f"{sources.rate} against {sources.rotors}: needs no arm"
-            out.append(Estimate(name, *known, "1/(kg m)", IDENTIFIED, how))
-    if "products of inertia" in kept:
-        for name in ("Jxy", "Jxz", "Jyz"):
-            known = read.interval(_value(name), False)
-            status = ASSUMED if scaled else IDENTIFIED
-            out.append(
-                Estimate(
-                    name,
-                    *_times(known, arm, arm_range),
-                    "kg m2",
-                    status,
-                    f"{sources.rate} across axes",
-                )
-            )
-
-
-def _yaw(
-    out: list[Estimate],
-    read: Reading,
-    sources: Sources,
-    arm: float,
-    arm_range: tuple[float, float],
-) -> None:
-    commands = read.fit.drive.commands
-    how = f"{sources.rate} in yaw against {sources.rotors}"
-    gain = read.interval(lambda v: v["reach"] / v["Jz"])
-    name = "(p/k)/Jzz"
-    doubtful = read.fit.drive.band < SPECTRUM.band
-    if doubtful or not told(gain):
-        reason = (
-            "quick motion contradicts slow motion in these logs"
-            if doubtful
-            else "the flight hardly accelerates in yaw"
-        )
-        out.append(Estimate(name, *gain, "1/(kg m)", NOTHING, reason))
-        length = float(np.mean(np.abs(read.fit.drive.positions[:, :2]))) * arm
-        low, high = (r * length for r in USUAL.reach_range)
-        value = USUAL.reach * length
-        out.append(
-            Estimate("p/k", value, low, high, "m", ASSUMED, f"{reason}; {USUAL.reach:g} of the arm")
-        )
-    else:
-        out.append(Estimate(name, *gain, "1/(kg m)", IDENTIFIED, how))
-        known = read.interval(lambda v: v["reach"])
-        inertia = next(e for e in out if e.name == "Jzz")
-        if inertia.status == ASSUMED:
-            # the inertia about z is not told by the flight: the ratio is, and carries it
-            reach = gain[0] * inertia.value
-            low, high = gain[1] * inertia.low, gain[2] * inertia.high
-            out.append(
-                Estimate(
-                    "p/k", reach, low, high, "m", ASSUMED, f"{how}, with the Jzz that is assumed"
-                )
-            )
-        else:
-            out.append(Estimate("p/k", *_times(known, arm, arm_range), "m", IDENTIFIED, how))
-    if not commands:
-        ratio, k = out[-1], out[0]
-        if ratio.status == IDENTIFIED:
-            known = read.interval(lambda v: v["reach"] * v["a0"])
-        else:
-            known = (ratio.value * k.value, ratio.low * k.value, ratio.high * k.value)
-        out.append(Estimate("p", *known, "Nm/(rad/s)^2", ratio.status, ratio.how))
-
-
-def _lag(out: list[Estimate], read: Reading, sources: Sources) -> None:
-    name = effect_of(Role.LAG)
-    if "lag" in read.fit.names:
-        how = f"force and turning against {sources.rotors}" + (
-            "" if read.fit.drive.commands else ", which therefore are commanded, not measured"
-        )
-        known = read.interval(lambda v: v["lag"])
-        status = IDENTIFIED
-        if not told(known):
-            status, how = NOTHING, "a time offset of the motion does nearly the same here"
-        out.append(Estimate(name, *known, "s", status, how))
-    else:
-        out.append(
-            Estimate(
-                name,
-                math.nan,
-                math.nan,
-                math.nan,
-                "s",
-                NOTHING,
-                "force follows the logged rotor speeds at once: they are measured, and no command "
-                "is logged beside them",
-            )
-        )
-    known = read.interval(lambda v: v["delay"], False)
-    out.append(Estimate("time_offset", *known, "s", IDENTIFIED, "of the motion behind the rotors"))
-
-
-def _centre(
-    out: list[Estimate], read: Reading, sources: Sources, geometry: Geometry, arm: float
-) -> None:
-    how = (
-        "constant share of thrust in roll and pitch torque: a centre of mass off the rotors' "
-        "middle, or unequal rotors"
-    )
-    for name in ("cx", "cy"):
-        known = read.interval(_value(name), False)
-        wide = known[2] - known[0] > 0.5 * geometry.arm
-        status = NOTHING if wide else IDENTIFIED if geometry.known else ASSUMED
-        reason = "thrust hardly changes: a constant torque does the same" if wide else how
-        value, low, high = (arm * x for x in known)
-        out.append(Estimate(f"com {name[1]}", value, low, high, "m", status, reason))
-    if sources.force == "pose":
-        known = read.interval(lambda v: -v["rz"], False)
-        wide = known[2] - known[0] > 0.5 * arm * geometry.arm
-        out.append(
-            Estimate(
-                "com z",
-                *known,
-                "m",
-                NOTHING if wide else IDENTIFIED,
-                "the pose's point swings about it: or the markers' middle is off",
-            )
-        )
-
-
-def _drag(
-    out: list[Estimate], read: Reading, sources: Sources, arm: float, kept: Sequence[str]
-) -> None:
-    if not sources.velocity:
-        out.append(
-            Estimate(
-                "drag",
-                math.nan,
-                math.nan,
-                math.nan,
-                "N/(m/s)",
-                NOTHING,
-                "no velocity is known: the logs have no position",
-            )
-        )
-        return
-    how = f"{sources.force} along body x and y against velocity"
-    # the role that holds it, and where its coefficient along x is
-    kinds = {
-        "rotor drag": (Role.ROTOR_DRAG, 0),
-        "linear drag": (Role.BODY_DRAG, 0),
-        "quadratic drag": (Role.BODY_DRAG, 3),
-    }
-
-    def say(role: Role, index: int, known: tuple[float, float, float], how: str) -> None:
-        unit = get(effect_of(role)).coefficients[index].unit
-        out.append(Estimate(estimate_name(role, index), *known, unit, IDENTIFIED, how))
-
-    any_of = [k for k in kinds if k in kept]
-    for kind in any_of:
-        role, first = kinds[kind]
-        for i, axis in enumerate("xy"):
-            say(role, first + i, read.interval(_value(f"{kind} {axis}"), False), how)
-    if "vertical drag" in kept:
-        say(Role.BODY_DRAG, 2, read.interval(lambda v: v["linear drag z"], False), how)
-    if "inflow" in kept:
-        known = read.interval(lambda v: v["rotor drag z"], False)
-        say(Role.INFLOW_THRUST, 0, known, "force along body z")
-    if "lift" in kept:
-        known = read.interval(lambda v: v["lift"] / 4.0, False)
-        say(Role.TRANSLATIONAL_LIFT, 0, known, "force along body z")
-    for i, axis in enumerate("xyz"):
-        if f"damping {axis}" in kept:
-            known = read.interval(_value(f"damping {axis}", arm))
-            say(Role.RATE_DAMPING, i, known, f"{sources.rate} against its own derivative")
-    if not any_of:
-        out.append(
-            Estimate(
-                "drag",
-                0.0,
-                math.nan,
-                math.nan,
-                "N/(m/s)",
-                NOTHING,
-                "none stands out of the disturbances",
-            )
-        )

@@ -1,4 +1,4 @@
-"""Where the rotors stand, as a user says it: an arm's length or four positions."""
+"""Where the rotors stand, as a user says it, and what is usual of quadrotors."""
 
 from dataclasses import dataclass
 
@@ -11,6 +11,28 @@ Array = NDArray[np.float64]
 
 QUADRANT = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
 SPIN = np.array([-1.0, 1.0, -1.0, 1.0])  # about body +z, in the same order
+
+
+@dataclass(frozen=True)
+class Usual:
+    """Ratios of the vehicles that come with the kit (0.03 to 0.5 kg), for what a flight does not
+    tell; each has a range that is claimed in place of an interval.
+    """
+
+    # Jz over Jx + Jy: 0.88 to 0.96 of those vehicles; of a flat body it is 1, the most there is
+    flat: float = 0.9
+    flat_range: tuple[float, float] = (0.75, 1.0)
+    # (Jx + Jy) / 2 over mass times the squared arm: 0.35 to 0.58 of those vehicles
+    gyration: float = 0.45
+    gyration_range: tuple[float, float] = (0.25, 0.8)
+    # reaction torque over thrust, as a share of the arm: 0.18 to 0.24 of those vehicles
+    reach: float = 0.2
+    reach_range: tuple[float, float] = (0.1, 0.4)
+    radius: float = 0.78  # of a rotor, as a share of the arm: 0.71 to 0.83
+    hover_speed: float = 1000.0  # rad/s, where no log says what a rotor's speed is
+
+
+USUAL = Usual()
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,18 +18,16 @@ from ...dynamics.effects import Role
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
-from .channels import Piece, Sources, pieces_of
+from .channels import Piece, Sources, pieces_of, rounding_step
 from .columns import Drive
 from .effect_settings import effect_of
-from .estimates import Reading, estimates_of, thrust_of
-from .geometry import SPIN, Geometry
+from .estimates import Intervals, estimates_of, thrust_of
+from .geometry import SPIN, USUAL, Geometry
 from .motors import MotorResponse, motor_response
 from .parameters import DELAY, FORCE_BIAS, OPTIONAL, POSITIVE, first_model, with_more
 from .result import ESTIMATES, IDENTIFIED, NOTHING, Estimate, Identified, told
-from .rounding import rounding_step
 from .solve import Fit, fall_with, solve, step_with
 from .spectra import SPECTRUM
-from .usual import USUAL
 
 Array = NDArray[np.float64]
 Report = Callable[[float, str], None]
@@ -146,7 +144,7 @@ def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
     nonlinear = tuple(name for name in fit.names[len(fit.model.free) :] if name != "delay")
     drive = replace(fit.drive, delay=0.0)
     alone = solve(pieces, drive, fit.model, fit.theta[: len(fit.model.free)], nonlinear)
-    known = Reading(alone).interval(lambda v: v["lag"])
+    known = Intervals(alone).of(lambda v: v["lag"])
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
 
@@ -232,15 +230,15 @@ def _hover_thrust(fit: Fit, weight: float) -> tuple[float, float]:
     """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
     its standard deviation.
     """
-    read = Reading(fit)
+    intervals = Intervals(fit)
     exponents = fit.drive.exponents
     # where the start's curve, in which each power carries its share, carries the weight
     scale = fit.model.scale
     u = (weight / (4.0 * scale[f"a{len(exponents) - 1}"])) ** (1.0 / exponents[-1])
-    value, low, high = read.interval(
+    value, low, high = intervals.of(
         lambda v: 4.0 * thrust_of(v, exponents, u) / weight, logarithm=False
     )
-    return value, (high - low) / (2.0 * read.width * max(abs(value), 1e-9))
+    return value, (high - low) / (2.0 * intervals.width * max(abs(value), 1e-9))
 
 
 def _rises(fit: Fit) -> bool:

@@ -1,14 +1,19 @@
-"""Which parameters a fit has, from what the logs measure, and where they start."""
+"""Which parameters a fit has, from what the logs measure, and where they start: at plain least
+squares, axis by axis, in which every coefficient is linear.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
+from ...runtime.errors import InputError
 from .channels import Piece, Sources
-from .columns import Drive
+from .columns import Drive, rotor_columns
+from .geometry import USUAL
 from .model import Model
-from .starting import check_order, first_gains, first_thrust
 
 Array = NDArray[np.float64]
 
@@ -70,9 +75,9 @@ def first_model(
     check_order(gains)
     arm = float(np.mean(np.abs(drive.positions[:, :2])))
     # what hardly turns starts at the inertia that such a vehicle usually has
-    usual = 0.45 * mass * arm**2
+    usual = USUAL.gyration * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
-    flat = 0.9 * float(inertia.sum())
+    flat = USUAL.flat * float(inertia.sum())
     reach = abs(float(gains[2])) * flat
     reach = float(np.clip(reach, 1e-3 * arm, 10.0 * arm))
     size = {
@@ -108,16 +113,13 @@ def first_model(
     start[free.index("reach")] = 1.0
     turned = bool(gains[2] < 0.0)
     if turned:
-        drive = Drive(**{**drive.__dict__, "spin": -drive.spin})
+        drive = replace(drive, spin=-drive.spin)
     return model, start, drive, turned
 
 
 def with_more(model: Model, start: Array, names: Sequence[str]) -> tuple[Model, Array]:
     """Return a model with further parameters, which start at nothing."""
-    more = Model(
-        model.mass, model.powers, (*model.free, *names), model.scale, model.fixed, model.prior
-    )
-    return more, np.concatenate([start, np.zeros(len(names))])
+    return replace(model, free=(*model.free, *names)), np.concatenate([start, np.zeros(len(names))])
 
 
 def _mean_speed(pieces: list[Piece], drive: Drive) -> float:
@@ -127,3 +129,48 @@ def _mean_speed(pieces: list[Piece], drive: Drive) -> float:
 
 def _rate(gravity: float, arm: float) -> float:
     return float(np.sqrt(gravity / arm))  # 1/s: of a vehicle's own motion
+
+
+def first_thrust(pieces: list[Piece], drive: Drive, weight: float) -> list[float]:
+    """Return the size of each basis coefficient at which it alone would carry the weight."""
+    totals = [rotor_columns(piece, drive) for piece in pieces]
+    return [
+        weight / max(float(np.mean(np.concatenate([t[f"T{j}"] for t in totals]))), 1e-12)
+        for j in range(len(drive.exponents))
+    ]
+
+
+def first_gains(pieces: list[Piece], drive: Drive, thrust: list[float]) -> Array:
+    """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly: about x and y the
+    inertia's inverse, about z that times torque over thrust (m).
+    """
+    gains = []
+    for i, letter in enumerate("XYZ"):
+        cross = power = 0.0
+        for piece in pieces:
+            columns = rotor_columns(piece, drive)
+            torque = sum(a * columns[f"{letter}{j}"] for j, a in enumerate(thrust))
+            assert isinstance(torque, np.ndarray)
+            # turning is the integral of torque: compared where neither is differentiated
+            spin = np.cumsum(torque - torque.mean()) * piece.period
+            rate = piece.angular_velocity[:, i]
+            cross += float(np.sum(_swing(spin, piece.period) * _swing(rate, piece.period)))
+            power += float(np.sum(np.square(_swing(spin, piece.period))))
+        gains.append(cross / power if power > 0.0 else 0.0)
+    return np.array(gains)
+
+
+def _swing(x: Array, period: float) -> Array:
+    """Return what of ``x`` (n,) is faster than about 0.5 Hz."""
+    sections = butter(2, [1.0 * period, min(0.9, 16.0 * period)], btype="bandpass", output="sos")
+    return np.asarray(sosfiltfilt(sections, x))
+
+
+def check_order(gains: Array) -> None:
+    """Raise InputError where roll and pitch turn against their rotors."""
+    for axis, gain in zip(("roll", "pitch"), gains, strict=False):
+        if gain < 0.0:
+            raise InputError(
+                f"{axis} turns against the torque of its rotors; expected rotors in the order "
+                "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
+            )
