@@ -128,10 +128,11 @@ def _is_ulog(path: Path) -> bool:
 def _of_ulog(path: Path) -> tuple[Channels, tuple[str, ...]]:
     streams, notes, motors = px4_channels.read_streams(path)
     first, second, third, fourth = (f"PX4 motor {motor}" for motor in motors)
-    names = ("gyro", "accelerometer", "command")
     channels = Channels(
         str(path),
-        *(part for name in names for part in streams[name]),
+        *streams["gyro"],
+        *streams["accelerometer"],
+        *streams["command"],
         motor_names=(first, second, third, fourth),
     )
     return channels, notes

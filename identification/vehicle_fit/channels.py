@@ -6,6 +6,7 @@ derivatives where it has none. Rotors come as measured speeds, or as motor comma
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,10 @@ class Piece:
     def mapped(self, change: Callable[[Array], Array]) -> "Piece":
         """Return the piece with each of its series changed."""
         series = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(
-            self, **{n: change(x) for n, x in series.items() if isinstance(x, np.ndarray)}
-        )
+        changed: dict[str, Any] = {
+            name: change(x) for name, x in series.items() if isinstance(x, np.ndarray)
+        }
+        return replace(self, **changed)
 
 
 @dataclass(frozen=True)
