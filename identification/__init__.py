@@ -2,7 +2,7 @@
 
 from typing import Any
 
-__all__ = ["FlightLog", "diagnose", "estimate_log", "read_log", "report_data"]
+__all__ = ["FlightLog", "diagnose", "estimate_log", "predict", "read_log", "report_data"]
 
 
 def __getattr__(name: str) -> Any:
@@ -16,6 +16,10 @@ def __getattr__(name: str) -> Any:
         from .wrench_series import estimate_log
 
         return estimate_log
+    if name == "predict":
+        from .prediction import predict
+
+        return predict
     if name == "diagnose":
         from .diagnosis import diagnose
 

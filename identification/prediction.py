@@ -1,10 +1,10 @@
-"""How well a vehicle's model, with the effects that it declares, predicts a logged flight: in
-metres and as NIS.
+"""What a vehicle's model, with the effects that it declares, predicts of a logged flight, and how
+well: in metres and as NIS.
 
-Both figures run the very model of plant and filter. ``rollout_error`` is what a planner would see:
-the model is let go from the flight's own state and compared with the flight a second later.
-``nis_without_wrench_state`` is what a filter would see that has nothing but the model to explain
-the motion with.
+All three run the model of plant and filter. ``predict`` and ``rollout_error`` give what a planner
+would see: the model is let go from the flight's own state, and compared with the flight a second
+later. ``nis_without_wrench_state`` is what a filter would see that has nothing but the model to
+explain the motion with.
 """
 
 import math
@@ -28,7 +28,7 @@ from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, log_signals
-from .motion.smoothing import CUTOFFS, continuous, low_pass
+from .motion.smoothing import CUTOFFS, continuous, low_pass, unbroken
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
@@ -44,7 +44,7 @@ class PredictionSettings:
     # s at an end of unbroken pose, where a low-pass has but one side to go by
     start_margin: float = 0.5
     end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
-    most_starts: int = 2000  # in a piece, spread over it: each keeps a model of 25 kB
+    most_starts: int = 2000  # of an error's predictions in a piece, spread over it
     longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
     step_tolerance: float = 0.1  # of a period: a step so little too long is still one step
     # of its usual standard deviation: a wrench state that cannot move
@@ -59,19 +59,60 @@ _MOTION_STEPS, _STEP_TOLERANCE = PREDICTION.motion_steps, PREDICTION.step_tolera
 _MODEL = np.dtype([*MODEL_FIELDS, ("acceleration", "f8", (6,)), ("rotation", "f8", (3, 3))])
 
 
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """The motion that a model predicts from each of n starts, over m steps of ``period``."""
+
+    start: NDArray[np.intp]  # (n,) rows of the log
+    period: float  # s
+    position: Array  # (n, m, 3) m, world; the first is a period after the start
+    velocity: Array  # (n, m, 3) m/s, world
+    quaternion: Array  # (n, m, 4) body to world
+    angular_velocity: Array  # (n, m, 3) rad/s, body
+
+
+def predict(log: FlightLog, vehicle: Vehicle, horizon_s: float = 0.5, every: int = 1) -> Prediction:
+    """Predict a flight from its own states by a vehicle's model and the logged rotor speeds alone.
+
+    The model starts from the flight's position, velocity, attitude and angular velocity, and from
+    then on is given the logged rotor speeds and voltage; a rotor speed holds over the interval that
+    ends at its sample. Rotors and effects start with the memory that the flight before gave them.
+    Declared sensing effects are taken out of the log.
+
+    What limits a prediction is its start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of
+    angular velocity is 16 mm. See ``start_states``.
+
+    Args:
+        log: the flight.
+        vehicle: whose model predicts, with its declared effects.
+        horizon_s: s.
+        every: samples from start to start. Starts without a whole horizon behind them, before the
+            next break of the pose, are left out.
+
+    Raises:
+        InputError: no stretch of pose is unbroken for 3 s, or the vehicle has more effects than a
+            model holds.
+    """
+    log = undo_log_sensing(log, vehicle)
+    starts, paths = [], []
+    for piece in log_signals(log):
+        ahead = max(1, round(horizon_s / piece.period))
+        begun = np.arange(0, len(piece.t) - ahead, every)
+        _, path = _rolled_out(piece, vehicle, begun, ahead, float(log.t[0]))
+        rows = np.interp(piece.t[begun], log.t, np.arange(len(log.t)))
+        starts.append(np.rint(rows).astype(np.intp))
+        paths.append(path)
+    x = np.concatenate(paths)
+    return Prediction(
+        np.concatenate(starts), piece.period, x[..., :3], x[..., 7:10], x[..., 3:7], x[..., 10:13]
+    )
+
+
 def rollout_error(
     log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float = 1.0, every: float = 0.25
 ) -> float:
-    """Return the RMS distance (m) between flight and model after ``horizon`` s of open-loop
-    prediction.
-
-    Every ``every`` s the model starts from the flight's position, velocity, attitude and angular
-    velocity, and from then on is given the logged rotor speeds and voltage alone; a rotor speed
-    holds over the interval that ends at its sample. Rotors and effects start with the memory that
-    the flight before gave them. Declared sensing effects are taken out of the log.
-
-    What limits the figure is the start: 1 mrad of tilt is 5 mm after a second, 10 mrad/s of angular
-    velocity is 16 mm. See ``start_states``.
+    """Return the RMS distance (m) between flight and model after ``horizon`` s of prediction, as
+    ``predict`` makes them.
 
     Args:
         log: the flight.
@@ -92,60 +133,42 @@ def rollout_error(
         pieces = log_signals(log)
     except InputError:
         return math.nan
-    squares = [
-        _squared_errors(piece, vehicle, segments, horizon, every, float(log.t[0]))
-        for piece in pieces
-    ]
-    squared = np.concatenate(squares)
-    return math.sqrt(float(np.mean(squared))) if squared.size else math.nan
+    squares = []
+    for piece in pieces:
+        ahead = max(1, round(horizon / piece.period))
+        starts = _start_samples(piece, segments, horizon, every)
+        starts = starts[starts + ahead < len(piece.t)]
+        if starts.size:
+            starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
+            states, path = _rolled_out(piece, vehicle, starts, ahead, float(log.t[0]))
+            off = path[:, -1, :3] - states[starts + ahead, :3]
+            squares.append(np.sum(np.square(off), axis=1))
+    return math.sqrt(float(np.mean(np.concatenate(squares)))) if squares else math.nan
 
 
-def _squared_errors(
-    signals: Signals,
-    vehicle: Vehicle,
-    segments: Segments,
-    horizon: float,
-    every: float,
-    take_off: float,
-) -> Array:
-    """Return the squared distances (starts,) in m2 over one unbroken piece of a log that began at
-    ``take_off`` s.
+def _rolled_out(
+    signals: Signals, vehicle: Vehicle, starts: NDArray[np.intp], ahead: int, take_off: float
+) -> tuple[Array, Array]:
+    """Return the flight's states (n, STATE_SIZE) over one unbroken piece of a log that began at
+    ``take_off`` s, and the states (starts, ahead, STATE_SIZE) that the model predicts.
     """
-    period = signals.period
-    ahead = max(1, round(horizon / period))
-    starts = _start_samples(signals, segments, horizon, every)
-    starts = starts[starts + ahead < len(signals.t)]
-    if not starts.size:
-        return np.empty(0)
-    starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
-    substeps = max(1, math.ceil(period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
-    dt = period / substeps
-    voltage = np.zeros(len(signals.t)) if signals.voltage is None else signals.voltage
-    # one model that flies along, and a copy of it for every start
-    models = np.zeros(1 + len(starts), dtype=_MODEL)
-    load_model(models[0], vehicle)
-    models[0]["time"] = signals.t[0] - take_off
+    substeps = max(1, math.ceil(signals.period / PREDICTION.longest_rotor_step - _STEP_TOLERANCE))
+    dt = signals.period / substeps
+    columns = signals.columns()
     modelled = np.zeros((len(signals.t), 6))
-    # another memory layout would be another type, and compiled anew
-    speeds, voltage, position, rotation, velocity, rate = map(
-        np.ascontiguousarray,
-        (
-            signals.rotor_speeds,
-            voltage,
-            signals.position,
-            signals.rotation,
-            signals.velocity,
-            signals.angular_velocity,
-        ),
-    )
-    _fly_along(
-        models, starts, dt, substeps, speeds, voltage, position, rotation, velocity, rate, modelled
-    )
-    states = start_states(signals, modelled)
-    ends = states[starts]
-    _roll_out(models, starts, dt, substeps, ahead, speeds, voltage, ends)
-    squares: Array = np.sum(np.square(ends[:, :3] - states[starts + ahead, :3]), axis=1)
-    return squares
+    path = np.zeros((len(starts), ahead, STATE_SIZE))
+    states = np.zeros((0, STATE_SIZE))
+    # along the flight once for the model's accelerations, and once more with the starts' states
+    for begun in (starts[:0], starts):
+        # the model that flies along, and the copy of it that is let go
+        models = np.zeros(2, dtype=_MODEL)
+        load_model(models[0], vehicle)
+        models[0]["time"] = signals.t[0] - take_off
+        modelled[:] = 0.0
+        _fly_along(models, begun, ahead, dt, substeps, *columns, states, modelled, path)
+        if not len(begun):
+            states = start_states(signals, modelled)
+    return states, path
 
 
 def _start_samples(
@@ -223,6 +246,7 @@ def _integrate_angular_velocity(rate: Array, period: float, out: Array) -> None:
 def _fly_along(
     models: Record,
     starts: np.ndarray,
+    ahead: int,
     dt: float,
     substeps: int,
     speeds: Array,
@@ -231,14 +255,16 @@ def _fly_along(
     rotation: Array,
     velocity: Array,
     rate: Array,
+    states: Array,
     modelled: Array,
+    path: Array,
 ) -> None:
-    """Run the first model along a flight: accelerations (n, 6), and the model as it was at each
-    start in the others.
+    """Run the first model along a flight and write its accelerations (n, 6); let a copy of it go at
+    each start, and write the states (starts, ahead, STATE_SIZE) that it comes to.
     """
-    f = models[0]
-    nothing = np.zeros(3)
-    at = 0
+    f, g = models[0], models[1]
+    nothing, after = np.zeros(3), np.zeros(path.shape[2])
+    at, fine = 0, dt / _MOTION_STEPS
     for k in range(len(speeds)):
         if k > 0:
             j = k - 1
@@ -259,35 +285,17 @@ def _fly_along(
                 for i in range(6):
                     modelled[k, i] += f.acceleration[i] / substeps
         if at < len(starts) and starts[at] == k:
+            models[1] = f
+            x = states[k].copy()
+            for i in range(ahead):
+                for _ in range(substeps):
+                    drive(g, speeds[k + 1 + i], dt, voltage[k + 1 + i])
+                    for _ in range(_MOTION_STEPS):
+                        propagate(g, x, fine, after)
+                        x[:] = after
+                    g.time += dt
+                path[at, i] = x
             at += 1
-            models[at] = f
-
-
-@compiled
-def _roll_out(
-    models: Record,
-    starts: np.ndarray,
-    dt: float,
-    substeps: int,
-    ahead: int,
-    speeds: Array,
-    voltage: Array,
-    states: Array,
-) -> None:
-    """Carry each state (starts, STATE_SIZE) ``ahead`` samples on, in place, by a model of its own
-    behind the first.
-    """
-    after = np.zeros(states.shape[1])
-    fine = dt / _MOTION_STEPS
-    for n in range(len(starts)):
-        g, x = models[1 + n], states[n]
-        for k in range(starts[n] + 1, starts[n] + ahead + 1):
-            for _ in range(substeps):
-                drive(g, speeds[k], dt, voltage[k])
-                for _ in range(_MOTION_STEPS):
-                    propagate(g, x, fine, after)
-                    x[:] = after
-                g.time += dt
 
 
 def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segments) -> float:
@@ -333,7 +341,7 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     )
     valid = np.ascontiguousarray(log.valid)
     nis = np.full(len(t), np.nan)
-    for rows in np.split(seen, np.flatnonzero(np.diff(log.t[seen]) > PREDICTION.longest_gap) + 1):
+    for rows in unbroken(log.t, seen, PREDICTION.longest_gap):
         piece = slice(int(rows[0]), int(rows[-1]) + 1)
         ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
         ukf.record[0]["time"] = t[rows[0]] - t[0]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.compiled import compiled
+from .smoothing import resampled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -323,9 +324,7 @@ def fuse(
     rotation, heading_std = _first_guess(times, rates, forces, gravity, noise, positions, attitudes)
     linear = np.zeros((count + 1, 12))
     if positions is not None:
-        linear[:, 3:6] = np.column_stack(
-            [np.interp(times, positions.t, x) for x in positions.values.T]
-        )
+        linear[:, 3:6] = resampled(times, positions.t, positions.values)
     measured = _measurements(times, positions, attitudes)
     sizes = np.maximum(noise, [FUSION.least_gyro_noise, FUSION.least_accelerometer_noise])
     walks = np.array([FUSION.gyro_bias_walk, FUSION.accelerometer_bias_walk])
@@ -412,10 +411,7 @@ def _heading(
     at = np.arange(times[0] + step, times[-1] - step, 0.5 * step)
 
     def second_difference(t: Array, x: Array) -> Array:
-        a, b, c = (
-            np.column_stack([np.interp(at + k * step, t, column) for column in x.T[:2]])
-            for k in (-1, 0, 1)
-        )
+        a, b, c = (resampled(at + k * step, t, x[:, :2]) for k in (-1, 0, 1))
         return np.asarray(a - 2.0 * b + c)
 
     own = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])

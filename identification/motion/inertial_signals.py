@@ -18,7 +18,7 @@ from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .inertial_fusion import FusedMotion, Readings, fuse
 from .signals import SIGNALS, Signals
-from .smoothing import CUTOFFS, derivative, high_pass, low_pass
+from .smoothing import CUTOFFS, derivative, high_pass, low_pass, resampled, robust_std, unbroken
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -89,7 +89,7 @@ def _level(x: Array | None) -> float:
     read = np.empty((0, 3)) if x is None else x[np.isfinite(x).all(axis=1)]
     if len(read) < 50:
         return 0.0
-    return float(np.median(np.abs(high_pass(read, CUTOFFS.noise_share_of_rate))) / 0.6745)
+    return robust_std(high_pass(read, CUTOFFS.noise_share_of_rate))
 
 
 def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
@@ -99,10 +99,9 @@ def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     read = np.flatnonzero(np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0]))
     if not len(read):
         return []
-    breaks = np.flatnonzero(np.diff(log.t[read]) > INERTIAL_SIGNALS.gap) + 1
     return [
         rows
-        for rows in np.split(read, breaks)
+        for rows in unbroken(log.t, read, INERTIAL_SIGNALS.gap)
         if len(rows) > 50 and log.t[rows[-1]] - log.t[rows[0]] > SIGNALS.shortest_piece
     ]
 
@@ -148,7 +147,7 @@ def _piece(
     even = even[even <= own[-1]]
 
     def sampled(times: Array, x: Array) -> Array:
-        found = np.column_stack([np.interp(even, times, column) for column in x.T])
+        found = resampled(even, times, x)
         return low_pass(found, 0.4 / period, fine)[::thin] if thin > 1 else found
 
     gyro, force = (sampled(own, x[rows]) for x in (log.gyro, log.accelerometer))
@@ -159,7 +158,7 @@ def _piece(
     t, gyro, force, speeds = t[:count], gyro[:count], force[:count], speeds[:count]
 
     def at_samples(x: Array) -> Array:
-        return np.column_stack([np.interp(t, fused.t, column) for column in x.T])
+        return resampled(t, fused.t, x)
 
     gyro = gyro - at_samples(fused.gyro_bias)
     force = force - at_samples(fused.accelerometer_bias)
@@ -217,9 +216,8 @@ def _fused(
     fused = fuse(t, gyro, force, gravity, quieter, positions, attitudes)
     if positions is None:
         return fused
-    at = np.column_stack([np.interp(positions.t, fused.t, x) for x in fused.position.T])
-    off = positions.values - at
-    found = 1.3 * _robust(off)  # a smoother leaves less than the noise
+    off = positions.values - resampled(positions.t, fused.t, fused.position)
+    found = 1.3 * robust_std(off - np.median(off, axis=0))  # a smoother leaves less than the noise
     std = max(found, INERTIAL_SIGNALS.least_position_std)
     near = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
     positions = Readings(positions.t[near], positions.values[near], std)
@@ -231,13 +229,13 @@ def _fused(
                 np.swapaxes(fused.rotation[near[still]], 1, 2) @ attitudes.values[still]
             ).as_rotvec()
             attitudes = replace(
-                attitudes, std=max(1.3 * _robust(off), INERTIAL_SIGNALS.least_attitude_std)
+                attitudes,
+                std=max(
+                    1.3 * robust_std(off - np.median(off, axis=0)),
+                    INERTIAL_SIGNALS.least_attitude_std,
+                ),
             )
     return fuse(t, gyro, force, gravity, quieter, positions, attitudes)
-
-
-def _robust(x: Array) -> float:
-    return float(np.median(np.abs(x - np.median(x, axis=0))) / 0.6745)
 
 
 def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:

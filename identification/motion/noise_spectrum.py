@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..logs.flight_log import FlightLog
+from .smoothing import unbroken
 
 Array = NDArray[np.float64]
 
@@ -99,10 +100,9 @@ def _channels(log: FlightLog) -> Iterator[tuple[str, list[Array], float]]:
         rows = np.flatnonzero(np.isfinite(x).all(axis=1)) if x is not None else np.zeros(0, int)
         if x is None or len(rows) <= NOISE_SPECTRUM.segment:
             continue
-        steps = np.diff(log.t[rows])
-        period = float(np.median(steps))
-        breaks = np.flatnonzero(steps > NOISE_SPECTRUM.gap * period) + 1
-        pieces = [piece for piece in np.split(rows, breaks) if len(piece) > NOISE_SPECTRUM.segment]
+        period = float(np.median(np.diff(log.t[rows])))
+        pieces = unbroken(log.t, rows, NOISE_SPECTRUM.gap * period)
+        pieces = [piece for piece in pieces if len(piece) > NOISE_SPECTRUM.segment]
         turning = name == "attitude"
         yield name, [_angle(quaternion[r]) if turning else x[r] for r in pieces], period
 

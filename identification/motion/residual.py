@@ -53,21 +53,7 @@ def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehi
     body = load_model(models[0], vehicle)
     count = len(signals.t)
     rotors, effects = np.empty((count, 4)), np.empty((count, 6))
-    voltage = np.zeros(count) if signals.voltage is None else signals.voltage
-    speeds, volts, position, rotation, velocity, rate = (
-        np.ascontiguousarray(x)
-        for x in (
-            signals.rotor_speeds,
-            voltage,
-            signals.position,
-            signals.rotation,
-            signals.velocity,
-            signals.angular_velocity,
-        )
-    )
-    _run_model(
-        models, signals.period, speeds, volts, position, rotation, velocity, rate, rotors, effects
-    )
+    _run_model(models, signals.period, *signals.columns(), rotors, effects)
     return rotors, effects, body
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ...dynamics.vehicle import Mocap, Vehicle
 from ..logs.flight_log import FlightLog
 from .inertial_signals import imu_noise, pose_rate, reads_imu
-from .smoothing import CUTOFFS, high_pass
+from .smoothing import CUTOFFS, high_pass, robust_std
 
 Array = NDArray[np.float64]
 
@@ -50,14 +50,10 @@ def sensor_noise(log: FlightLog, vehicle: Vehicle) -> SensorNoise:
         turned[:-1].inv() * turned[1:]
     ).as_rotvec()  # white noise differenced: twice its power, and a known shape
     return SensorNoise(
-        _level(position),
-        _level(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
+        robust_std(position),
+        robust_std(high_pass(np.cumsum(angle, axis=0), CUTOFFS.noise_share_of_rate)),
         step / np.sqrt(12.0),
     )
-
-
-def _level(x: Array) -> float:
-    return float(np.median(np.abs(x)) / 0.6745)  # of a normal distribution, whatever the outliers
 
 
 def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> FlightLog:

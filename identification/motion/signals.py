@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
-from .smoothing import CUTOFFS, continuous, derivative, low_pass
+from .smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,7 @@ class SignalSettings:
     """Which pieces of a log have signals."""
 
     shortest_piece: float = 3.0  # s of unbroken pose
+    gap: float = 0.1  # s without a pose, which ends a piece of a fast log
 
 
 SIGNALS = SignalSettings()
@@ -45,6 +46,15 @@ class Signals:
     rotor_speeds: Array  # (n, 4) rad/s, of the interval that ends at the sample
     voltage: Array | None  # (n,) V
 
+    def columns(self) -> tuple[Array, Array, Array, Array, Array, Array]:
+        """Return rotor speeds, voltage (0 where unknown), position, rotation, velocity and angular
+        velocity, contiguous: compiled code would be compiled anew for another memory layout.
+        """
+        voltage = np.zeros(len(self.t)) if self.voltage is None else self.voltage
+        moving = (self.position, self.rotation, self.velocity, self.angular_velocity)
+        speeds, volts, *motion = map(np.ascontiguousarray, (self.rotor_speeds, voltage, *moving))
+        return speeds, volts, motion[0], motion[1], motion[2], motion[3]
+
 
 def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signals]:
     """Return the motion over each unbroken piece of a log that is long enough to say something.
@@ -56,12 +66,10 @@ def log_signals(log: FlightLog, wide_hz: float = CUTOFFS.pose_hz) -> list[Signal
         InputError: no piece is longer than 3 s.
     """
     seen = np.flatnonzero(log.valid)
-    breaks = np.flatnonzero(np.diff(log.t[seen]) > max(0.1, 3.5 * log.period)) + 1
-    pieces = [piece for piece in np.split(seen, breaks) if len(piece) > 8]
     out = [
         _piece(log, piece, wide_hz)
-        for piece in pieces
-        if log.t[piece[-1]] - log.t[piece[0]] > SIGNALS.shortest_piece
+        for piece in unbroken(log.t, seen, max(SIGNALS.gap, 3.5 * log.period))
+        if len(piece) > 8 and log.t[piece[-1]] - log.t[piece[0]] > SIGNALS.shortest_piece
     ]
     if not out:
         raise InputError(
@@ -74,21 +82,14 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
     period = log.period
     t = np.arange(log.t[rows[0]], log.t[rows[-1]] + 0.5 * period, period)
     t = t[t <= log.t[rows[-1]]]
-
-    def even(x: Array) -> Array:
-        return np.column_stack([np.interp(t, log.t[rows], column) for column in x[rows].T])
-
-    q = continuous(log.quaternion[rows])
-    q = low_pass(
-        np.column_stack([np.interp(t, log.t[rows], column) for column in q.T]), wide_hz, period
-    )
+    q = resampled(t, log.t[rows], continuous(log.quaternion[rows]))
+    q = low_pass(q, wide_hz, period)
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     dq = derivative(q, period)
     w, v, dw, dv = q[:, :1], q[:, 1:], dq[:, :1], dq[:, 1:]
     angular_velocity = 2.0 * (w * dv - dw * v - np.cross(v, dv))
-    position = low_pass(even(log.position), wide_hz, period)
+    position = low_pass(resampled(t, log.t[rows], log.position[rows]), wide_hz, period)
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
-    speeds = np.column_stack([np.interp(t, log.t, column) for column in log.rotor_speeds.T])
     return Signals(
         t,
         period,
@@ -98,6 +99,6 @@ def _piece(log: FlightLog, rows: NDArray[np.intp], wide_hz: float) -> Signals:
         derivative(position, period, 2),
         angular_velocity,
         derivative(angular_velocity, period),
-        speeds,
+        resampled(t, log.t, log.rotor_speeds),
         voltage,
     )

@@ -73,6 +73,11 @@ def high_pass(x: Array, share_of_rate: float) -> Array:
     return np.asarray(sosfiltfilt(sections, x, axis=0), dtype=np.float64) / kept
 
 
+def robust_std(x: Array) -> float:
+    """Return the standard deviation of normal noise about zero, whatever the outliers."""
+    return float(np.median(np.abs(x)) / 0.6745)
+
+
 def lagged(x: Array, lag: float, period: float) -> Array:
     """Return ``x`` (n, ...) through a first-order lag (s), at rest before the first sample: as the
     effect of the library has it, each sample held over the step that ends there.

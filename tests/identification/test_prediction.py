@@ -11,6 +11,7 @@ from windwrench.dynamics.effects import get
 from windwrench.envs.plant import PlantSettings
 from windwrench.envs.recording import record_flight
 from windwrench.estimator import UKFTuning
+from windwrench.identification import predict
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.sensing_effects import undo_log_sensing
@@ -176,6 +177,30 @@ def test_a_whole_model_is_right_to_the_start(clean):
     assert rollout_error(clean, VEHICLE, SEGMENTS) < 0.06
     exact = fly(settings=replace(QUIET, sensor_noise=False))
     assert rollout_error(exact, VEHICLE, SEGMENTS) < 0.05
+
+
+def test_predictions_start_where_a_whole_horizon_follows(clean):
+    log = without_pose(clean, slice(2000, 2100))
+    made = predict(log, VEHICLE, horizon_s=0.25, every=7)
+    n, steps = len(made.start), 50
+    assert made.period == pytest.approx(0.005)
+    assert (
+        made.position.shape == made.velocity.shape == made.angular_velocity.shape == (n, steps, 3)
+    )
+    assert made.quaternion.shape == (n, steps, 4)
+    assert made.start[0] == 0
+    assert set(np.diff(made.start[made.start < 1950])) == {7}
+    assert not np.any((made.start > 1999 - steps) & (made.start < 2100))
+    ends = made.start + steps
+    assert ends.max() < len(log.t)
+    assert log.valid[ends].all()
+    inside = (made.start > 200) & (ends < 1900)
+    off = made.position[inside, -1] - log.position[ends[inside]]
+    assert np.sqrt(np.mean(np.sum(off**2, axis=1))) < 0.02  # the pose's noise is 0.005 m an axis
+    turned = np.abs(np.sum(made.quaternion[inside, -1] * log.quaternion[ends[inside]], axis=1))
+    assert 2 * np.degrees(np.arccos(np.minimum(turned, 1.0))).mean() < 2.0
+    ahead = made.position[:, 1:] - made.position[:, :-1]
+    np.testing.assert_allclose(ahead, 0.005 * made.velocity[:, 1:], atol=2e-3)
 
 
 def test_a_missing_mass_falls_as_it_must():

@@ -19,6 +19,7 @@ from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_words import fault_data
 from windwrench.identification.comparison.words import change_data
 from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.vehicle_fit.exports import EXPORTS
 from windwrench.identification.vehicle_fit.geometry import parse_geometry
 from windwrench.identification.vehicle_fit.identify import identify
@@ -63,7 +64,17 @@ def made():
         "none": find_fault(channels_of_log(one)),
         "rotor": find_fault(channels_of_log(failing_flight())),
     }
+    blocks = [(2.0, 6.0), (7.0, 11.0)]
+    models = {"plain": crazyflie, "with its effects": crazyflie.with_effects(*lag)}
     return {
+        "prediction": {
+            name: [
+                f(log, model, blocks)
+                for log in posed
+                for f in (rollout_error, nis_without_wrench_state)
+            ]
+            for name, model in models.items()
+        },
         "identified": {name: identified_data(v) for name, v in vehicles.items()},
         "exports": {n: {k: f(v) for k, f in EXPORTS.items()} for n, v in vehicles.items()},
         "changes": {name: change_data(change) for name, change in changes.items()},
