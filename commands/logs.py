@@ -174,7 +174,7 @@ def estimate(
         "seconds": flight.t[-1] - flight.t[0],
         "smoothed": smooth,
         "status": counts(series),
-        "restarts": series.restarts,
+        "restarts": int(series.restarts[-1]),
     }
     if fit is not None:
         result["tuning"] = fit.as_dict()

@@ -4,14 +4,14 @@ are consistent.
 
 from .constant_gain import ConstantGainFilter
 from .ekf import WrenchEKF
-from .estimate import WrenchEstimate, WrenchEstimator
+from .estimate import WrenchEstimate
 from .late_poses import TimedFilter
 from .noise_fit import NoiseFit, NoiseFitSettings, fit_noise
 from .recovery import Recovery
-from .smoother import RecordingUKF, SmoothedSeries, smooth
+from .smoother import RecordingUKF
 from .tuning import UKFTuning
 from .ukf import WrenchUKF
-from .ukf_batch import WrenchEstimates, WrenchUKFBatch
+from .ukf_batch import WrenchUKFBatch
 
 __all__ = [
     "ConstantGainFilter",
@@ -19,15 +19,11 @@ __all__ = [
     "NoiseFitSettings",
     "RecordingUKF",
     "Recovery",
-    "SmoothedSeries",
     "TimedFilter",
     "UKFTuning",
     "WrenchEKF",
     "WrenchEstimate",
-    "WrenchEstimates",
-    "WrenchEstimator",
     "WrenchUKF",
     "WrenchUKFBatch",
     "fit_noise",
-    "smooth",
 ]

@@ -14,14 +14,13 @@ from typing import Any
 
 import numpy as np
 from numba import carray
-from numpy.typing import ArrayLike
 
 from ..dynamics.rotation import attitude_error
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.errors import InputError
 from .error_state import fold
-from .estimate import COASTING, NIS, TRACKING, Array, WrenchEstimate
+from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
 from .hover_covariance import (
     carry_at_hover,
@@ -208,6 +207,8 @@ class ConstantGainFilter(WrenchUKF):
 
     _compiled_step = staticmethod(_step_record)
     _step_by_address = staticmethod(_step_at)
+    _no_imu = "correct_imu needs a covariance; use WrenchUKF"
+    _converged: Array | None = None
 
     def __init__(
         self,
@@ -218,45 +219,26 @@ class ConstantGainFilter(WrenchUKF):
         recovery: Recovery | None = None,
     ) -> None:
         super().__init__(vehicle, tuning, period, gate, recovery)
-        super().reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
-        self._converged, hover = _converged(self.record.tobytes(), vehicle.voltage_ref)
-        f = self.record[0]
+        self.reset((0.0, 0.0, _HEIGHT), (1.0, 0.0, 0.0, 0.0))
+        P, hover = _converged(self.record.tobytes(), vehicle.voltage_ref)
+        self._converged, f = P, self.record[0]
         f["hover"] = hover
         inverse = 1.0 / f["noise"]
         # with P after the correction: K = P H' / R, and the innovation's inverse covariance is (R -
         # H P H') within / R
-        f["gain"] = self._converged[:, _MEASURED] * inverse
-        left = np.diag(f["noise"]) - self._converged[np.ix_(_MEASURED, _MEASURED)]
+        f["gain"] = P[:, _MEASURED] * inverse
+        left = np.diag(f["noise"]) - P[np.ix_(_MEASURED, _MEASURED)]
         f["information"] = inverse[:, None] * left * inverse
-        f["P"] = f["converged"] = self._converged
+        f["P"] = f["converged"] = P
         walks = f["thrust"] / f["force_walk"], f["motor_torque"] / f["torque_walk"]
         f["settle"] = _SETTLE * period * math.sqrt(float(np.max(walks)))
         f["steady"] = 1
 
-    def reset(
-        self,
-        position: ArrayLike,
-        quaternion: ArrayLike,
-        covariance: ArrayLike | None = None,
-        velocity: ArrayLike = (0.0, 0.0, 0.0),
-        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
-        """Start at a pose, without an external wrench; a ``covariance`` is checked and makes no
-        difference.
-        """
-        super().reset(position, quaternion, covariance, velocity, angular_velocity)
-        f = self.record[0]
-        f["P"], f["steady"] = self._converged, 1
-
-    def correct_imu(
-        self, gyro: ArrayLike | None = None, accelerometer: ArrayLike | None = None
-    ) -> WrenchEstimate:
-        """Refuse: there is a gain for pose alone.
-
-        Raises:
-            InputError: always.
-        """
-        raise InputError("ConstantGainFilter: correct_imu needs a covariance; use WrenchUKF")
+    def _begin(self) -> None:
+        """Start with the converged covariance, whatever ``reset`` was given."""
+        if self._converged is not None:
+            f = self.record[0]
+            f["P"], f["steady"] = self._converged, 1
 
 
 @compiled_without_gil

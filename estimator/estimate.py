@@ -1,15 +1,16 @@
-"""What every estimator of this kit is given and returns."""
+"""What every estimator of this kit returns."""
 
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..runtime.arguments import in_brackets
+from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Layout of the state vector: the estimate and nothing else
+# Layout of the state vector
 POSITION, QUATERNION, VELOCITY = slice(0, 3), slice(3, 7), slice(7, 10)
 RATE, TORQUE, FORCE = slice(10, 13), slice(13, 16), slice(16, 19)
 NIS = 19
@@ -17,112 +18,139 @@ STATE_SIZE = 20
 # What became of the last step's measurement, in the filter's memory
 TRACKING, COASTING, REJECTED, RESTARTED = 0.0, 1.0, 2.0, 3.0
 STATUSES = ("tracking", "coasting", "rejected", "restarted")
-# Behind the state the covariance, then the status and how often the estimator restarted
-STATUS, RESTARTS = STATE_SIZE + 18 * 18, STATE_SIZE + 18 * 18 + 1
-ESTIMATE_SIZE = RESTARTS + 1
+# Layout of an estimate's numbers: the state, the status, the restarts, then perhaps the covariance
+STATUS, RESTARTS, WITHOUT_COVARIANCE = STATE_SIZE, STATE_SIZE + 1, STATE_SIZE + 2
+ESTIMATE_SIZE = WITHOUT_COVARIANCE + 18 * 18
 
 
 class WrenchEstimate:
-    """The state that an estimator believes in after one step; later steps do not change it."""
+    """The estimate of one filter, of each filter of a batch, or at each time of a series.
 
-    __slots__ = ("_numbers",)
+    Shapes below are those of one filter's estimate; those of a batch or series have its axis in
+    front. Later steps do not change an estimate.
 
-    def __init__(self, numbers: Array) -> None:
-        # (346,) state, covariance, status and count of restarts, one after the other
-        self._numbers = numbers
+    Args:
+        numbers: (22,) state, status and restarts, or (346,), the covariance behind them.
+        std: (18,) standard deviations of the error state, where there is no covariance.
+    """
+
+    __slots__ = ("_std", "numbers")
+
+    def __init__(self, numbers: Array, std: Array | None = None) -> None:
+        self.numbers = numbers
+        self._std = std
 
     def __repr__(self) -> str:
+        name, codes = type(self).__name__, np.atleast_1d(self.status_code)
+        if self.numbers.ndim > 1:
+            counts = [(int(np.sum(codes == i)), word) for i, word in enumerate(STATUSES)]
+            words = ", ".join(f"{count} {word}" for count, word in counts if count)
+            return f"<{name} of {len(codes)}: {words}>"
         return (
-            f"<{type(self).__name__} {self.status}: force {in_brackets(self.force)} N, torque "
+            f"<{name} {self.status}: force {in_brackets(self.force)} N, torque "
             f"{in_brackets(self.torque)} Nm, NIS {self.nis:.3g}>"
         )
+
+    def at(self, i: int) -> "WrenchEstimate":
+        """Return the estimate at place ``i`` of the axis in front."""
+        return WrenchEstimate(self.numbers[i], None if self._std is None else self._std[i])
 
     @property
     def state(self) -> Array:
         """All of the estimate (20,), laid out by this module's constants."""
-        return self._numbers[:STATE_SIZE]
+        return self.numbers[..., :STATE_SIZE]
 
     @property
     def covariance(self) -> Array:
         """Covariance (18, 18) of the error state (rho, omega, x, v, torque, force), rho being a
         world-frame MRP.
+
+        Raises:
+            InputError: the estimate has none: a batch's stands in the batch, a smoothed one must
+                be asked for.
         """
-        return self._numbers[STATE_SIZE:STATUS].reshape(18, 18)
+        if self.numbers.shape[-1] != ESTIMATE_SIZE:
+            raise InputError(
+                "WrenchEstimate: no covariance here; a batch has its own, and smooth takes "
+                "covariance=True"
+            )
+        return self.numbers[..., WITHOUT_COVARIANCE:].reshape(*self.numbers.shape[:-1], 18, 18)
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations (18,) of the same."""
+        if self._std is None:
+            return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return self._std
+
+    @property
+    def std_torque(self) -> Array:
+        """Standard deviation (3,) of the torque, Nm."""
+        return self.std[..., 12:15]
+
+    @property
+    def std_force(self) -> Array:
+        """Standard deviation (3,) of the force, N."""
+        return self.std[..., 15:18]
 
     @property
     def position(self) -> Array:
         """Position (3,) of the geometric centre, m, world."""
-        return self._numbers[POSITION]
+        return self.numbers[..., POSITION]
 
     @property
     def quaternion(self) -> Array:
         """Attitude (4,), body to world, scalar first."""
-        return self._numbers[QUATERNION]
+        return self.numbers[..., QUATERNION]
 
     @property
     def velocity(self) -> Array:
         """Velocity (3,), m/s, world."""
-        return self._numbers[VELOCITY]
+        return self.numbers[..., VELOCITY]
 
     @property
     def angular_velocity(self) -> Array:
         """Angular velocity (3,), rad/s, body."""
-        return self._numbers[RATE]
+        return self.numbers[..., RATE]
 
     @property
     def torque(self) -> Array:
         """External torque (3,) about the centre of mass, Nm, world."""
-        return self._numbers[TORQUE]
+        return self.numbers[..., TORQUE]
 
     @property
     def force(self) -> Array:
         """External force (3,), N, world."""
-        return self._numbers[FORCE]
+        return self.numbers[..., FORCE]
 
     @property
-    def nis(self) -> float:
-        """Normalised innovation squared of the last measurement; NaN where there was none."""
-        return float(self._numbers[NIS])
+    def nis(self) -> Any:
+        """Normalised innovation squared of the last measurement, a number; NaN where there was
+        none.
+        """
+        nis = self.numbers[..., NIS]
+        return nis if self.numbers.ndim > 1 else float(nis)
 
     @property
-    def status(self) -> str:
-        """What became of the last step's measurement.
+    def status_code(self) -> Any:
+        """What became of the last step's measurement, an index of ``STATUSES``."""
+        code = self.numbers[..., STATUS]
+        return code.astype(np.int64) if self.numbers.ndim > 1 else int(code)
+
+    @property
+    def status(self) -> Any:
+        """The same as a word.
 
         "tracking": it was taken in; "coasting": there was none, the estimate is a prediction, or
         held where a gap has left nothing to predict from; "rejected": the gate refused it;
         "restarted": pose and twist start anew at it, after a gap, or because it and those before it
         contradict what was estimated (``estimator.recovery``).
         """
-        return STATUSES[int(self._numbers[STATUS])]
+        code = self.status_code
+        return [STATUSES[i] for i in code] if self.numbers.ndim > 1 else STATUSES[code]
 
     @property
-    def restarts(self) -> int:
-        """How often the estimator restarted since its ``reset``."""
-        return int(self._numbers[RESTARTS])
-
-
-class WrenchEstimator(Protocol):
-    """What the estimators share: reset at a pose, then one step a sample."""
-
-    def reset(
-        self,
-        position: ArrayLike,
-        quaternion: ArrayLike,
-        covariance: ArrayLike | None = None,
-        velocity: ArrayLike = (0.0, 0.0, 0.0),
-        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
-        """Start at a pose, without an external wrench."""
-        ...
-
-    def step(
-        self,
-        rotor_speeds: ArrayLike,
-        position: ArrayLike | None = None,
-        quaternion: ArrayLike | None = None,
-        voltage: float | None = None,
-    ) -> WrenchEstimate:
-        """Predict over one period with the rotor speeds (4,) of that period, then take in the pose
-        at its end.
-        """
-        ...
+    def restarts(self) -> Any:
+        """How often the estimator restarted since its ``reset``, a whole number."""
+        restarts = self.numbers[..., RESTARTS]
+        return restarts.astype(np.int64) if self.numbers.ndim > 1 else int(restarts)

@@ -45,9 +45,9 @@ FILTER = np.dtype(
         *MODEL_FIELDS,
         # the estimate, in one piece
         ("x", "f8", (STATE_SIZE,)),
-        ("P", "f8", (N, N)),
         ("status", "f8"),  # what became of the last step's measurement
         ("restarts", "f8"),  # since the reset
+        ("P", "f8", (N, N)),
         # gaps, refusals and restarts: estimator.recovery
         ("gap", "f8", (3,)),  # s since a position, an attitude was believed, and one was refused
         ("seen", "f8", (7,)),  # position and quaternion that were believed last
@@ -125,7 +125,7 @@ FILTER = np.dtype(
         ("imu", IMU),
     ]
 )
-ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to x and P
+ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
 
 
 def filter_record(

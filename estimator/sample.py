@@ -11,8 +11,7 @@ from ..dynamics.model import rewrite_sample
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
-from .estimate import ESTIMATE_SIZE, RESTARTS, STATE_SIZE, STATUS, Array
-from .filter_record import N
+from .estimate import Array
 
 POSITION, ATTITUDE = 1, 2  # the parts of a pose; their sum is both
 
@@ -156,21 +155,3 @@ def undo_first_pose(record: Record) -> None:
         rewrite_sample(f, 0.0, 3, -1.0)
         for i in range(7):
             f.x[i] = f.sample[4 + i]
-
-
-@compiled
-def copy_estimate(f: Record, out: Array) -> None:
-    """Write state (20), covariance (18 x 18), status and count of restarts one after the other into
-    ``out`` (346,).
-    """
-    for i in range(STATE_SIZE):
-        out[i] = f.x[i]
-    for i in range(N):
-        for j in range(N):
-            out[STATE_SIZE + N * i + j] = f.P[i, j]
-    out[STATUS], out[RESTARTS] = f.status, f.restarts
-
-
-def empty_estimate() -> Array:
-    """Return an array that ``copy_estimate`` can fill."""
-    return np.empty(ESTIMATE_SIZE)

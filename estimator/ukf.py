@@ -375,6 +375,7 @@ class WrenchUKF:
     _compiled_step = staticmethod(_step_record)
     _compiled_step_with_biases = staticmethod(_step_with_biases)
     _step_by_address = staticmethod(_step_at)
+    _no_imu = ""  # why a kind of filter takes no inertial measurements
 
     def __init__(
         self,
@@ -486,6 +487,10 @@ class WrenchUKF:
         for name in ("status", "restarts", "gap", "refused", "lasting", "in_row", "jumps"):
             f[name] = 0.0
         f["seen"] = f["x"][:7]
+        self._begin()
+
+    def _begin(self) -> None:
+        """Do what a kind of filter adds to ``reset``."""
 
     @property
     def step_address(self) -> int:
@@ -599,6 +604,8 @@ class WrenchUKF:
         Raises:
             InputError: a shape is wrong or a number is not finite; the filter stays as it was.
         """
+        if self._no_imu:
+            raise InputError(f"{type(self).__name__}: {self._no_imu}")
         z = np.zeros(6)
         for name, value, where in (
             ("gyro", gyro, slice(0, 3)),

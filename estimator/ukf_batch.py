@@ -9,24 +9,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..dynamics.vehicle import Vehicle
 from ..runtime.arguments import described, real_numbers
 from ..runtime.compiled import compiled_without_gil
 from ..runtime.errors import InputError
-from .estimate import (
-    FORCE,
-    NIS,
-    POSITION,
-    QUATERNION,
-    RATE,
-    STATE_SIZE,
-    STATUSES,
-    TORQUE,
-    VELOCITY,
-    Array,
-)
+from .estimate import STATE_SIZE, WITHOUT_COVARIANCE, Array, WrenchEstimate
 from .filter_record import N
 from .recovery import Recovery
 from .sample import negative_speeds
@@ -76,70 +65,6 @@ class _Records:
     @property
     def covariance(self) -> Array:
         return np.array(self._records["P"])
-
-
-class WrenchEstimates:
-    """What a batch of filters believes after a step; later steps do not change it."""
-
-    __slots__ = ("_numbers",)
-
-    def __init__(self, numbers: Array) -> None:
-        self._numbers = numbers  # (n, 22): state, status, count of restarts
-
-    def __repr__(self) -> str:
-        status = self.status
-        counts = ", ".join(f"{status.count(s)} {s}" for s in STATUSES if s in status)
-        return f"<{type(self).__name__} of {len(status)}: {counts}>"
-
-    @property
-    def state(self) -> Array:
-        """All of the estimates (n, 20), laid out by the constants of ``estimator.estimate``."""
-        return self._numbers[:, :STATE_SIZE]
-
-    @property
-    def position(self) -> Array:
-        """Positions (n, 3) of the geometric centres, m, world."""
-        return self.state[:, POSITION]
-
-    @property
-    def quaternion(self) -> Array:
-        """Attitudes (n, 4), body to world, scalar first."""
-        return self.state[:, QUATERNION]
-
-    @property
-    def velocity(self) -> Array:
-        """Velocities (n, 3), m/s, world."""
-        return self.state[:, VELOCITY]
-
-    @property
-    def angular_velocity(self) -> Array:
-        """Angular velocities (n, 3), rad/s, body."""
-        return self.state[:, RATE]
-
-    @property
-    def torque(self) -> Array:
-        """External torques (n, 3) about the centres of mass, Nm, world."""
-        return self.state[:, TORQUE]
-
-    @property
-    def force(self) -> Array:
-        """External forces (n, 3), N, world."""
-        return self.state[:, FORCE]
-
-    @property
-    def nis(self) -> Array:
-        """Normalised innovation squared (n,) of the last measurements; NaN where there was none."""
-        return self.state[:, NIS]
-
-    @property
-    def status(self) -> list[str]:
-        """What became of the last step's measurements, n words of ``WrenchEstimate.status``."""
-        return [STATUSES[int(status)] for status in self._numbers[:, STATE_SIZE]]
-
-    @property
-    def restarts(self) -> NDArray[np.int64]:
-        """How often each filter restarted (n,) since its ``reset``."""
-        return self._numbers[:, STATE_SIZE + 1].astype(np.int64)
 
 
 class WrenchUKFBatch:
@@ -256,9 +181,9 @@ class WrenchUKFBatch:
         return self._memory.covariance
 
     @property
-    def estimate(self) -> WrenchEstimates:
+    def estimate(self) -> WrenchEstimate:
         """What the filters believe now."""
-        return WrenchEstimates(self._memory.state)
+        return WrenchEstimate(self._memory.state)
 
     def step(
         self,
@@ -266,7 +191,7 @@ class WrenchUKFBatch:
         position: ArrayLike | None = None,
         quaternion: ArrayLike | None = None,
         voltage: ArrayLike | None = None,
-    ) -> WrenchEstimates:
+    ) -> WrenchEstimate:
         """Predict over one period with the rotor speeds of that period, then take in the poses at
         its end.
 
@@ -306,9 +231,9 @@ class WrenchUKFBatch:
                 f"(filter {bad})"
             )
         volts = self._voltage if voltage is None else _rows("voltage", voltage, (), self.count)
-        out = np.empty((self.count, STATE_SIZE + 2))
+        out = np.empty((self.count, WITHOUT_COVARIANCE))
         self._memory.step(z, parts, self.period, volts, out)
-        return WrenchEstimates(out)
+        return WrenchEstimate(out)
 
 
 def _rows(name: str, value: ArrayLike, shape: tuple[int, ...], count: int) -> Array:

@@ -8,15 +8,26 @@ that miss some thrust and torque anew in each step. Attitude and biases come fro
 standard deviations.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import UKFTuning
+from ..estimator import UKFTuning, WrenchEstimate
+from ..estimator.estimate import (
+    COASTING,
+    FORCE,
+    NIS,
+    POSITION,
+    QUATERNION,
+    RATE,
+    STATUS,
+    TORQUE,
+    TRACKING,
+    VELOCITY,
+    WITHOUT_COVARIANCE,
+)
 from .logs.flight_log import FlightLog
 from .motion.inertial_signals import (
     InertialSignals,
@@ -29,39 +40,27 @@ from .motion.residual import acting_wrench, needed_wrench
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class InertialWrench:
-    """The wrench at every row of a log, and the motion that it was read from."""
-
-    force: Array  # (N, 3) N, world
-    torque: Array  # (N, 3) Nm, world
-    std_force: Array  # (N, 3) N
-    std_torque: Array  # (N, 3) Nm
-    position: Array  # (N, 3) m; NaN where nothing measured it, as the velocity is
-    quaternion: Array  # (N, 4) body to world, scalar first
-    velocity: Array  # (N, 3) m/s
-    angular_velocity: Array  # (N, 3) rad/s, body
-    inside: NDArray[np.bool_]  # (N,) rows within an unbroken piece of IMU readings
-    notes: tuple[str, ...]
-
-
 def inertial_wrench(
-    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None
-) -> InertialWrench:
-    """Return the smoothed external wrench of a log by its gyro and accelerometer.
+    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning
+) -> tuple[WrenchEstimate, tuple[str, ...]]:
+    """Return the smoothed estimate at every row (N,) of a log by its gyro and accelerometer, and
+    notes.
+
+    The status is "tracking" within an unbroken piece of IMU readings, else "coasting". Position and
+    velocity are NaN where nothing measured them; there is no NIS.
 
     Args:
         log: with gyro, accelerometer and rotor speeds; poses in it are used.
         vehicle: as declared.
-        tuning: of the wrench filter; default ``UKFTuning.for_vehicle(vehicle, log.period)``.
+        tuning: of the wrench filter.
 
     Raises:
         InputError: no unbroken piece of IMU readings is longer than 3 s.
     """
-    tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
     noise = imu_noise(log)
     count = len(log.t)
-    columns, inside = np.zeros((count, 25)), np.zeros(count, dtype=np.bool_)
+    columns, numbers = np.zeros((count, 25)), np.zeros((count, WITHOUT_COVARIANCE))
+    numbers[:, STATUS], numbers[:, NIS] = COASTING, np.nan
     before = 0
     pieces = inertial_signals(log, vehicle.gravity)
     for number, s in enumerate(pieces):
@@ -70,27 +69,21 @@ def inertial_wrench(
         end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
         rows = slice(before, end)
         columns[rows] = np.column_stack([np.interp(log.t[rows], s.t, x) for x in found.T])
-        inside[rows] = (log.t[rows] >= s.t[0]) & (log.t[rows] <= s.t[-1] + log.period)
+        inside = (log.t[rows] >= s.t[0]) & (log.t[rows] <= s.t[-1] + log.period)
+        numbers[rows, STATUS] = np.where(inside, TRACKING, COASTING)
         before = end
-    force, torque, std_force, std_torque, position, velocity, rate = (
-        columns[:, 3 * i : 3 * i + 3] for i in range(7)
-    )
+    std = np.full((count, 18), np.nan)
+    numbers[:, FORCE], numbers[:, TORQUE] = columns[:, 0:3], columns[:, 3:6]
+    std[:, 15:18], std[:, 12:15] = columns[:, 6:9], columns[:, 9:12]
+    numbers[:, POSITION], numbers[:, VELOCITY] = columns[:, 12:15], columns[:, 15:18]
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from them
-        position, velocity = np.full((2, count, 3), np.nan)
+        numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
     quaternion = columns[:, 21:]
-    quaternion = quaternion / np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
-    return InertialWrench(
-        force,
-        torque,
-        std_force,
-        std_torque,
-        position,
-        quaternion,
-        velocity,
-        rate,
-        inside,
-        _notes(log, pieces, vehicle),
+    numbers[:, RATE] = columns[:, 18:21]
+    numbers[:, QUATERNION] = (
+        quaternion / np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
     )
+    return WrenchEstimate(numbers, std), _notes(log, pieces, vehicle)
 
 
 def _piece(

@@ -1,15 +1,14 @@
 """The external wrench over a flight log: the wrench filter run from its first row to its last."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchUKF, fit_noise
-from ..estimator.estimate import STATUSES
+from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
+from ..estimator.estimate import COASTING, NIS, REJECTED, STATUS, STATUSES, WITHOUT_COVARIANCE
 from ..estimator.noise_fit import NoiseFitSettings, tuning_note
 from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
@@ -27,27 +26,29 @@ GATE = 0.9999
 _REPORTED = 10_000  # rows between two reports of progress
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchSeries:
-    """The estimate at every row of a log. Standard deviations are the filter's own."""
+class WrenchSeries(WrenchEstimate):
+    """The estimate at every row (N,) of a log.
 
-    t: Array  # (N,) s
-    force: Array  # (N, 3) N, world
-    torque: Array  # (N, 3) Nm, world
-    std_force: Array  # (N, 3) N
-    std_torque: Array  # (N, 3) Nm
-    nis: Array  # (N,) normalised innovation squared; NaN where there was no pose to compare with
-    position: Array  # (N, 3) m, world
-    quaternion: Array  # (N, 4) body to world, scalar first
-    velocity: Array  # (N, 3) m/s, world
-    angular_velocity: Array  # (N, 3) rad/s, body
-    vehicle: Vehicle  # as it was declared to the filter
-    tuning: UKFTuning  # of the filter
-    # (N,) what became of each row's pose, an index of ``estimator.estimate.STATUSES``; the
-    # filter's, smoothed or not
-    status: NDArray[np.int64]
-    restarts: int  # of the filter
-    notes: tuple[str, ...] = ()
+    Standard deviations are the filter's own. NIS, status and restarts are those of the filter,
+    smoothed or not; NIS is NaN where there was no pose to compare with.
+
+    Attributes:
+        t: (N,) s.
+        vehicle: as it was declared to the filter.
+        tuning: of the filter.
+        notes: sentences for the user.
+    """
+
+    def __init__(
+        self,
+        estimate: WrenchEstimate,
+        t: Array,
+        vehicle: Vehicle,
+        tuning: UKFTuning,
+        notes: tuple[str, ...],
+    ) -> None:
+        super().__init__(estimate.numbers, estimate.std)
+        self.t, self.vehicle, self.tuning, self.notes = t, vehicle, tuning, notes
 
 
 def estimate_log(
@@ -89,18 +90,11 @@ def estimate_log(
     log, doubts = screen_for_estimate(log, vehicle)
     if reads_imu(log) or (smooth and smooths_imu(log)):
         return _by_imu(log, vehicle, tuning, doubts)
-    seen = np.flatnonzero(log.valid)
-    period = log.period
-    ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, period=period, gate=gate)
-    count = len(log.t)
-    state, deviation = np.empty((count, 19)), np.empty((count, 6))
-    nis, status = np.full(count, np.nan), np.full(count, STATUSES.index("coasting"))
+    first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
+    ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
+    numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
     events = np.zeros(count, dtype=np.int64)  # of a recording filter: the one that ends a row
-    restarts: list[float] = []  # s
-
-    first = int(seen[0])
     ukf.reset(log.position[first], log.quaternion[first])
-    status[first] = STATUSES.index("tracking")
     with np.errstate(
         over="ignore", invalid="ignore"
     ):  # an estimate that overflows is refused below
@@ -108,46 +102,28 @@ def estimate_log(
             if k % _REPORTED == 0:
                 report(k / count)
             if k > first:
-                _predict(ukf, log, k, period)
+                _predict(ukf, log, k)
                 if not smooth:
                     _take_in_imu(ukf, log, k)
                 if log.valid[k]:
-                    nis[k] = ukf.correct(log.position[k], log.quaternion[k]).nis
-                status[k] = STATUSES.index(ukf.estimate.status)
-                if ukf.estimate.restarts > len(restarts):
-                    restarts.append(float(log.t[k]))
+                    ukf.correct(log.position[k], log.quaternion[k])
             estimate = ukf.estimate
-            state[k] = estimate.state[:19]
-            deviation[k] = np.sqrt(np.diagonal(estimate.covariance)[12:18])
+            numbers[k], std[k] = estimate.numbers[:WITHOUT_COVARIANCE], estimate.std
             if isinstance(ukf, RecordingUKF):
                 events[k] = ukf.events - 1
-    state[:first], deviation[:first] = state[first], deviation[first]
-    if not (np.isfinite(state).all() and np.isfinite(deviation).all()):
-        bad = int(np.flatnonzero(~np.isfinite(np.column_stack([state, deviation])).all(axis=1))[0])
+    numbers[:first], std[:first] = numbers[first], std[first]
+    broken = ~np.isfinite(np.column_stack([numbers[:, :NIS], std])).all(axis=1)
+    if broken.any():
         raise InputError(
-            f"{log.source or log.name}: the estimate overflows at t = {log.t[bad]:.6g} s; expected "
-            f"rotor speeds and poses that {vehicle.name} can fly"
+            f"{log.source or log.name}: the estimate overflows at t = {log.t[broken][0]:.6g} s; "
+            f"expected rotor speeds and poses that {vehicle.name} can fly"
         )
-    if isinstance(ukf, RecordingUKF):
-        smoothed = ukf.smooth(events)
-        state, deviation = smoothed.state[:, :19], smoothed.std[:, 12:18]
-    return WrenchSeries(
-        t=log.t,
-        force=state[:, 16:19],
-        torque=state[:, 13:16],
-        std_force=deviation[:, 3:6],
-        std_torque=deviation[:, 0:3],
-        nis=nis,
-        position=state[:, 0:3],
-        quaternion=state[:, 3:7],
-        velocity=state[:, 7:10],
-        angular_velocity=state[:, 10:13],
-        vehicle=vehicle,
-        tuning=ukf.tuning,
-        status=status,
-        restarts=len(restarts),
-        notes=(*log.notes, *doubts, *_notes(log, status, restarts, smooth)),
-    )
+    found = ukf.smooth(events) if isinstance(ukf, RecordingUKF) else WrenchEstimate(numbers, std)
+    found.numbers[~log.valid, NIS] = np.nan
+    found.numbers[:first, STATUS] = COASTING
+    series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts))
+    series.notes += tuple(_notes(log, series, smooth))
+    return series
 
 
 def smooths_imu(log: FlightLog) -> bool:
@@ -160,25 +136,8 @@ def _by_imu(
 ) -> WrenchSeries:
     """Return the wrench at every row, smoothed from gyro and accelerometer."""
     tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
-    found = inertial_wrench(log, vehicle, tuning)
-    status = np.where(found.inside, STATUSES.index("tracking"), STATUSES.index("coasting"))
-    return WrenchSeries(
-        t=log.t,
-        force=found.force,
-        torque=found.torque,
-        std_force=found.std_force,
-        std_torque=found.std_torque,
-        nis=np.full(len(log.t), np.nan),
-        position=found.position,
-        quaternion=found.quaternion,
-        velocity=found.velocity,
-        angular_velocity=found.angular_velocity,
-        vehicle=vehicle,
-        tuning=tuning,
-        status=status,
-        restarts=0,
-        notes=(*log.notes, *doubts, *found.notes),
-    )
+    found, notes = inertial_wrench(log, vehicle, tuning)
+    return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes))
 
 
 def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
@@ -191,27 +150,24 @@ def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
     """
     if reads_imu(log):
         return ()
-    series = estimate_log(log, vehicle)
-    restarts = log.t[series.status == STATUSES.index("restarted")]
-    return tuple(_notes(log, series.status, restarts.tolist(), False))
+    return tuple(_notes(log, estimate_log(log, vehicle), False))
 
 
 def counts(series: WrenchSeries) -> dict[str, int]:
     """Return how many rows have each status: tracking, coasting, rejected, restarted."""
-    return {name: int(np.sum(series.status == i)) for i, name in enumerate(STATUSES)}
+    return {name: int(np.sum(series.status_code == i)) for i, name in enumerate(STATUSES)}
 
 
-def _notes(
-    log: FlightLog, status: NDArray[np.int64], restarts: list[float], smooth: bool
-) -> Iterator[str]:
+def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
     """Say what became of measurements that were not simply taken in."""
-    refused = np.flatnonzero(status == STATUSES.index("rejected"))
+    refused = np.flatnonzero(series.status_code == REJECTED)
+    restarts = np.repeat(log.t[1:], np.diff(series.restarts))  # s
     if refused.size:
         yield (
             f"{refused.size} of {int(log.valid.sum())} poses jump from those before and were "
             f"refused, the first at t = {log.t[refused[0]]:.6g} s"
         )
-    if restarts:
+    if restarts.size:
         often = f", {len(restarts)} times in all" if len(restarts) > 1 else ""
         yield (
             f"the filter restarted at t = {restarts[0]:.6g} s{often}: after a gap in the poses, or "
@@ -268,12 +224,12 @@ def _columns(log: FlightLog) -> tuple[Array, Array, Array, Array, Array | None]:
     return log.t, log.rotor_speeds, position, log.quaternion, log.voltage
 
 
-def _predict(ukf: WrenchUKF, log: FlightLog, k: int, period: float) -> None:
+def _predict(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
     """Carry the filter from row ``k - 1`` to row ``k`` in equal steps of at most one period."""
     dt = float(log.t[k] - log.t[k - 1])
     speeds = 0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k])
     voltage = None if log.voltage is None else 0.5 * float(log.voltage[k - 1] + log.voltage[k])
-    for step in steps_between(dt, period):
+    for step in steps_between(dt, ukf.period):
         ukf.predict(speeds, step, voltage)
 
 
@@ -302,7 +258,7 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
         columns |= {f"{prefix}f{axis}": force[:, i] for i, axis in enumerate("xyz")}
         columns |= {f"{prefix}t{axis}": torque[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
-    columns["status"] = series.status.astype(np.float64)
+    columns["status"] = series.numbers[:, STATUS]
     path = Path(out_dir) / "wrench.csv"
     write_csv(columns, path)
     return path

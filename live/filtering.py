@@ -152,8 +152,7 @@ class LiveFilter:
 
     def _output(self, row: Row, estimate: WrenchEstimate, late: bool = False) -> Output:
         assert self._timed is not None
-        deviation = np.sqrt(np.diagonal(estimate.covariance)[12:18])
-        std = np.concatenate([deviation[3:6], deviation[0:3]])
+        std = np.concatenate([estimate.std_force, estimate.std_torque])
         if row.has_pose and estimate.status == "rejected":
             self._tallies.counts["refused"] += 1
         return Output(row, self._timed.time, estimate, std, late)

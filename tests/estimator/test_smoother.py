@@ -12,7 +12,8 @@ from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import compile_effects
 from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoother
 from windwrench.estimator.consistency import chi2_band, state_error
-from windwrench.estimator.smoother import RecordingUKF, smooth
+from windwrench.estimator.row_steps import steps_between
+from windwrench.estimator.smoother import RecordingUKF
 from windwrench.estimator.ukf import default_covariance
 
 VEHICLE = load_vehicle("ardrone2")
@@ -47,6 +48,23 @@ def model_run(steps, seed=1, tuning=None):
     return simulate_model(
         VEHICLE, tuning, np.full((steps, 4), VEHICLE.hover_rate), seed=seed, **YAWED
     )
+
+
+def smooth(t, speeds, x, q, restarted=(), covariance=False, tuning=None):
+    """Return the smoothed estimate at the rows of a log, the filter started at the first and the
+    ``restarted`` ones.
+    """
+    ukf = RecordingUKF(VEHICLE, tuning, float(np.median(np.diff(t))))
+    events = []
+    for k in range(len(t)):
+        if k == 0 or k in restarted:
+            ukf.reset(x[k], q[k])
+        else:
+            for step in steps_between(t[k] - t[k - 1], ukf.period):
+                ukf.predict(0.5 * (speeds[k - 1] + speeds[k]), step)
+            ukf.correct(x[k], q[k])
+        events.append(ukf.events - 1)
+    return ukf.smooth(events, covariance)
 
 
 def rms(error):
@@ -95,7 +113,7 @@ def test_equals_the_literal_smoother_over_a_yawing_flight(effects):
             slow.correct(x, q)
     found = fast.smooth(covariance=True)
     for k, (state, P) in enumerate(slow.smoothed()):
-        e = found.estimate(k)
+        e = found.at(k)
         np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         size = np.sqrt(np.diag(P))
         assert np.allclose(e.covariance / np.outer(size, size), P / np.outer(size, size), atol=1e-7)
@@ -235,7 +253,7 @@ def smoothed_nees(runs, steps, vehicle=VEHICLE, tuning=None, missing=()):
                 ukf.step(run.rotor_speeds[k], run.measured_position[k], run.measured_quaternion[k])
         found = ukf.smooth(covariance=True)
         for k in range(steps):
-            e = found.estimate(1 + k)
+            e = found.at(1 + k)
             error, P = state_error(e, *run.truth(k)), e.covariance
             for n, part in enumerate((slice(0, 18), slice(12, 15), slice(15, 18))):
                 out[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
@@ -269,7 +287,7 @@ def test_consistent_with_effects_and_anisotropic_noise():
 
 def test_the_last_estimate_is_the_filters_and_earlier_ones_are_better():
     run = model_run(1500)
-    found = smooth(VEHICLE, UKFTuning(), *log_of(run))
+    found = smooth(*log_of(run), tuning=UKFTuning())
     ukf = WrenchUKF(VEHICLE, UKFTuning())
     ukf.reset(run.measured_position[0], run.measured_quaternion[0])
     filtered = []
@@ -315,18 +333,16 @@ def test_a_gap_is_bridged_better_than_the_filter_coasts():
 def test_nothing_is_smoothed_across_a_restart():
     run = model_run(600)
     t, speeds, x, q = log_of(run)
-    flags = np.zeros(600, dtype=bool)
-    flags[[0, 250]] = True
-    whole = smooth(VEHICLE, None, t, speeds, x, q, restarted=flags, covariance=True)
-    before = smooth(VEHICLE, None, t[:250], speeds[:250], x[:250], q[:250])
-    after = smooth(VEHICLE, None, t[250:], speeds[250:], x[250:], q[250:])
+    whole = smooth(t, speeds, x, q, restarted=[250])
+    before = smooth(t[:250], speeds[:250], x[:250], q[:250])
+    after = smooth(t[250:], speeds[250:], x[250:], q[250:])
     for found, part in ((before, slice(0, 250)), (after, slice(250, None))):
         # times are rounded, and so are their differences
         assert np.allclose(whole.state[part, :19], found.state[:, :19], rtol=0, atol=1e-9)
         assert np.allclose(whole.std[part], found.std, rtol=1e-9)
     moved = x.copy()
     moved[250:] += [100.0, 0, 0]
-    jump = smooth(VEHICLE, None, t, speeds, moved, q, restarted=flags)
+    jump = smooth(t, speeds, moved, q, restarted=[250])
     assert np.array_equal(jump.state[:250], whole.state[:250], equal_nan=True)
     assert rms(jump.force - whole.force) < 1e-9
 
@@ -361,30 +377,25 @@ def test_a_link_is_cut_where_there_is_no_joint_distribution():
 def test_blocks_change_nothing(block, monkeypatch):
     log = log_of(model_run(300))
     log[2][100:120] = np.nan
-    whole = smooth(VEHICLE, None, *log, covariance=True)
+    whole = smooth(*log, covariance=True)
     monkeypatch.setattr(smoother, "_BLOCK", block)
-    pieces = smooth(VEHICLE, None, *log, covariance=True)
+    pieces = smooth(*log, covariance=True)
     assert np.array_equal(whole.state, pieces.state, equal_nan=True)
     assert np.array_equal(whole.covariance, pieces.covariance)
 
 
-def test_a_recording_filter_is_the_filter_and_smooths_as_the_arrays_do():
-    run = model_run(200)
-    _, speeds, x, q = log_of(run)
+def test_a_recording_filter_is_the_filter():
+    _, speeds, x, q = log_of(model_run(200))
     x[40:50], q[45:60] = np.nan, np.nan
     plain, recording = WrenchUKF(VEHICLE, None, PERIOD), RecordingUKF(VEHICLE, None, PERIOD)
     for ukf in (plain, recording):
         ukf.reset(x[0], q[0])
-    ends = [0]
-    for k in range(1, 200):
-        mean = 0.5 * (speeds[k - 1] + speeds[k])
-        a, b = (ukf.step(mean, x[k], q[k]) for ukf in (plain, recording))
-        assert np.array_equal(a.state, b.state, equal_nan=True)
-        ends.append(recording.events - 1)
-    steady = PERIOD * np.arange(200)
-    found = recording.smooth(ends)
-    arrays = smooth(VEHICLE, UKFTuning.for_vehicle(VEHICLE, PERIOD), steady, speeds, x, q)
-    assert np.allclose(found.state[:, :19], arrays.state[:, :19], rtol=0, atol=1e-8)
+    steps = [[ukf.step(speeds[k], x[k], q[k]) for k in range(1, 200)] for ukf in (plain, recording)]
+    for a, b in zip(*steps, strict=True):
+        np.testing.assert_array_equal(a.state, b.state)
+    found = recording.smooth()
+    np.testing.assert_array_equal(found.nis[1:], [e.nis for e in steps[0]])
+    assert found.status[1:] == [e.status for e in steps[0]]
     with pytest.raises(InputError, match="inertial"):
         recording.correct_imu(np.zeros(3))
 
@@ -397,7 +408,7 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
     lost = slice(150, 150 + 40 * (seed + 1))
     x[lost], q[lost] = np.nan, np.nan
     t = np.cumsum(rng.choice([0.001, 0.005, 0.02], 400))
-    found = smooth(VEHICLE, None, t, speeds, x, q, covariance=True)
+    found = smooth(t, speeds, x, q, covariance=True)
     assert np.isfinite(found.state[:, :19]).all()
     scale = 1.0 / found.std
     eigenvalues = np.linalg.eigvalsh(found.covariance * scale[:, :, None] * scale[:, None, :])
@@ -405,20 +416,9 @@ def test_covariances_stay_positive_definite_whatever_was_flown(seed):
 
 
 def test_bad_input_is_refused():
-    t, speeds, x, q = log_of(model_run(20))
-    for bad, words in (
-        ((t[:5], speeds, x, q), "got shapes"),
-        ((t[::-1], speeds, x, q), "strictly increase"),
-        ((t, speeds, x, 2 * q), "length 1"),
-        ((t, speeds, np.full_like(x, np.nan), q), "at least one row"),
-    ):
-        with pytest.raises(InputError, match=words):
-            smooth(VEHICLE, None, *bad)
-    with pytest.raises(InputError, match="voltage"):
-        smooth(VEHICLE, None, t, speeds, x, q, voltage=[12.0])
-    with pytest.raises(InputError, match="restarted"):
-        smooth(VEHICLE, None, t, speeds, x, q, restarted=[True])
-    with pytest.raises(InputError, match=r"covariance=True"):
-        smooth(VEHICLE, None, t, speeds, x, q).estimate(0)
+    ukf = RecordingUKF(VEHICLE)
     with pytest.raises(InputError, match="start"):
-        RecordingUKF(VEHICLE).smooth()
+        ukf.smooth()
+    ukf.reset([0, 0, 1], [1, 0, 0, 0])
+    with pytest.raises(InputError, match=r"covariance=True"):
+        _ = ukf.smooth().covariance

@@ -325,7 +325,7 @@ def _judged(
 ) -> tuple[str, str]:
     if _names_it(series.notes, _clean_estimate(number).notes, fault):
         return "noted", "; ".join(series.notes)
-    if _same_wrench(series.t, force, torque, series.status, number):
+    if _same_wrench(series.t, force, torque, series.status_code, number):
         return "same", ""
     return "wrong", "; ".join(series.notes)
 

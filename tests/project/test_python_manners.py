@@ -17,7 +17,6 @@ from windwrench.estimator import (
     NoiseFit,
     NoiseFitSettings,
     Recovery,
-    SmoothedSeries,
     TimedFilter,
     UKFTuning,
     WrenchUKF,
@@ -29,7 +28,7 @@ from windwrench.paper import ObserverTuning
 DOCUMENTED = (
     *(Coefficient, Effect, EffectSetting, Mocap, MotorCurve, Vehicle),
     *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
-    *(SmoothedSeries, UKFTuning, FlightLog),
+    *(UKFTuning, FlightLog),
     *(c for c in vars(findings).values() if inspect.isclass(c) and dataclasses.is_dataclass(c)),
 )
 VEHICLE = load_vehicle("ardrone2")
@@ -63,7 +62,7 @@ def test_repr_is_short_and_says_what_it_is():
     assert repr(estimate).startswith("<WrenchEstimate tracking: force (")
     assert " Nm, NIS " in repr(estimate)
     assert "coasting" in repr(ukf.step(SPEEDS))
-    assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimates of 2: 2 coasting>"
+    assert repr(batch.step(np.tile(SPEEDS, (2, 1)))) == "<WrenchEstimate of 2: 2 coasting>"
     assert "0 late, 0 too late: <WrenchUKF" in repr(TimedFilter(ukf))
     made = made_diagnosis(made_trace(5.0))
     log = FlightLog(np.arange(3.0), np.zeros((3, 3)), np.tile(POSE[1], (3, 1)), np.ones((3, 4)))
@@ -73,7 +72,6 @@ def test_repr_is_short_and_says_what_it_is():
         (made.traces[0], "<Trace of flight: 125 samples"),
         (made.signatures[0], "<Signature of rotor_drag: Fx over body velocity x (m/s), 125 points"),
         (log, "<FlightLog without a name: 3 samples, 0 to 2 s>"),
-        (SmoothedSeries(np.zeros((7, 20)), np.zeros((7, 18))), "<SmoothedSeries at 7 times>"),
     ):
         assert repr(thing).startswith(words)
         assert len(repr(thing)) < 160
