@@ -3,7 +3,7 @@ without it all of the page is there.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,18 @@ def write_page(
         verdicts=fleet.verdicts,
         changes=[change_in_words(one) for one in changes(fleet)],
         kinds=[(count, _KINDS.get(kind, kind)) for kind, count in fleet.refused.items()],
-        trends=(_trend(one) for one in fleet.trends),
-        any_trend=bool(fleet.trends),
-        flights=(_flight(row) for row in rows() if row["status"] == "diagnosed"),
-        refusals=(_refusal(row) for row in rows() if row["status"] == "refused"),
+        trends=fleet.trends,
+        flights=(row for row in rows() if row["status"] == "diagnosed"),
+        refusals=(row for row in rows() if row["status"] == "refused"),
+        reasons=_KINDS,
+        tones=_TONES,
+        missing=MISSING,
+        short=short,
+        slope=_slope,
+        meaning=coefficient_meaning,
+        picture=small_picture,
+        in_words=in_words,
+        coefficients=_coefficients,
         rate=f"{100 * DRIFT.false_discoveries:g}",
         least=DRIFT.least_flights,
         command=command.encode("utf-8", "replace").decode(),
@@ -114,6 +122,16 @@ def change_in_words(one: Trend | Appearance) -> str:
     )
 
 
+def _coefficients(effect: Mapping[str, Any]) -> str:
+    """Return a named effect's coefficients with their deviations and units."""
+    numbers = []
+    for name, value in effect["coefficients"].items():
+        unit = effect["units"].get(name, "")
+        known = (math.nan if v is None else v for v in (value, effect["std"].get(name)))
+        numbers.append(f"{name} {with_std(*known)}{'' if unit == '1' else f' {unit}'}")
+    return ", ".join(numbers)
+
+
 def short(value: float | None) -> str:
     """Return a number with three digits, with an exponent where it needs one."""
     if value is None or not math.isfinite(value):
@@ -124,31 +142,6 @@ def short(value: float | None) -> str:
 def _slope(one: Trend) -> str:
     low, high = one.per_flight_ci95 or (None, None)
     return f"{short(one.per_flight)} [{short(low)}, {short(high)}]"
-
-
-def _trend(one: Trend) -> dict[str, Any]:
-    series = one.series
-    low, high = one.mean_ci95
-    return {
-        "id": series.id,
-        "effect": series.effect,
-        "coefficient": series.coefficient,
-        "meaning": coefficient_meaning(series.effect, series.coefficient),
-        "unit": "" if series.unit == "1" else series.unit,
-        "named": len(series.flights),
-        "among": one.among,
-        "sure": sum(series.sure),
-        "mean": short(one.mean),
-        "mean_key": one.mean,
-        "interval": f"[{short(low)}, {short(high)}]",
-        "slope": MISSING if one.per_flight is None else _slope(one),
-        "slope_key": 0.0 if one.per_flight is None else one.per_flight,
-        "p": MISSING if one.adjusted_p is None else short(one.adjusted_p),
-        "p_key": 2.0 if one.adjusted_p is None else one.adjusted_p,
-        "drifts": one.drifts,
-        "tentative": one.tentative,
-        "picture": small_picture(one),
-    }
 
 
 def small_picture(one: Trend) -> dict[str, Any] | None:
@@ -188,41 +181,3 @@ def small_picture(one: Trend) -> dict[str, Any] | None:
         line["y2"] = up(one.ends[1])
     alt = f"{len(y)} values over flights {x[0]:.0f} to {x[-1]:.0f}"
     return {"points": points, "line": line, "alt": alt, "width": _WIDTH, "height": _HEIGHT}
-
-
-def _flight(row: Mapping[str, Any]) -> dict[str, Any]:
-    before, after = (row["error"][side]["force_rms_N"] for side in ("before", "after"))
-    return {
-        **{key: row[key] for key in ("id", "flight", "log")},
-        "verdict": row["verdict"],
-        "tone": _TONES.get(row["verdict"], "warn"),
-        "headline": row["headline"],
-        "effects": list(_effects(row["effects"])),
-        "before": short(before),
-        "before_key": before or 0.0,
-        "after": short(after),
-        "after_key": after or 0.0,
-    }
-
-
-def _refusal(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        **{key: row[key] for key in ("id", "flight", "log", "reason")},
-        "kind": _KINDS.get(row["kind"], row["kind"]),
-    }
-
-
-def _effects(effects: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    for effect in effects:
-        numbers = []
-        for name, value in effect["coefficients"].items():
-            unit = effect["units"].get(name, "")
-            std = effect["std"].get(name)
-            text = with_std(*(math.nan if v is None else v for v in (value, std)))
-            numbers.append(f"{name} {text}{'' if unit == '1' else f' {unit}'}")
-        yield {
-            "name": effect["name"],
-            "others": in_words(effect["indistinguishable_from"], "or"),
-            "tentative": effect["tentative"],
-            "numbers": ", ".join(numbers),
-        }
