@@ -18,18 +18,22 @@ counts.
 
 import csv
 import io
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.file_limits import LIMITS
+from ...runtime.forms import STRICT, checked
 from ...runtime.regular_files import read_bytes
 from ...runtime.yaml_file import read_yaml
 from ..logs.log_map import load_map
@@ -40,7 +44,7 @@ MANIFEST = "fleet.yaml"  # is found by itself in a folder of logs
 VEHICLE_FILE = "vehicle.yaml"
 _TABLES = (".csv", ".csv.gz", ".parquet")
 _BAG_FOLDER = "metadata.yaml"  # marks a ROS 2 bag, a folder that is one log
-_KEYS = ("log", "vehicle", "id", "reader", "map", "time")
+_COLUMNS = ("log", "vehicle", "id", "reader", "map", "time")  # of a manifest in CSV
 _ORDERS = ("name", "modified")
 _MOST_BYTES = LIMITS.table_line * 64  # of a manifest in CSV
 
@@ -58,16 +62,41 @@ class FleetLog:
     time: float | None = None  # s; orders the flights of an individual; None: their names do
 
 
+_MOMENT: TypeAdapter[float | datetime | None] = TypeAdapter(
+    Annotated[float | datetime | None, Field(union_mode="left_to_right")]
+)
+
+
+def _seconds(value: Any) -> float | None:
+    """Return a time (a number, a date, or a text that is one) in seconds."""
+    try:
+        moment = _MOMENT.validate_python(value)
+    except ValidationError:
+        raise InputError(
+            f"time {value!r}: expected a number or a date such as 2026-03-01T10:00"
+        ) from None
+    if isinstance(moment, datetime):
+        moment = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    if moment is not None and not math.isfinite(moment):
+        raise InputError(f"time {value!r}: expected a finite number")
+    return moment
+
+
+_Text = Annotated[str | None, BeforeValidator(lambda value: value if value is None else str(value))]
+
+
 @dataclass(frozen=True)
 class Entry:
     """What a manifest says of the logs that fit a pattern."""
 
-    log: str
-    vehicle: str | None = None
-    id: str = ""
-    reader: str | None = None
-    map: str | None = None  # a map's name or file, in place of a reader
-    time: float | None = None
+    __pydantic_config__ = STRICT
+
+    log: Annotated[str, BeforeValidator(str)]
+    vehicle: _Text = None
+    id: _Text = None
+    reader: _Text = None
+    map: _Text = None  # a map's name or file, in place of a reader
+    time: Annotated[float | None, BeforeValidator(_seconds)] = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +114,7 @@ def read_manifest(path: Path) -> Manifest:
     Raises:
         InputError: it cannot be read, or a field is unknown, missing or malformed.
     """
-    by_modified = False
+    order = "name"
     if path.suffix.lower() in (".yaml", ".yml"):
         given = read_yaml(path, "a fleet's manifest")
         if not isinstance(given, dict) or not isinstance(given.get("logs"), list):
@@ -93,15 +122,14 @@ def read_manifest(path: Path) -> Manifest:
         for key in given:
             if key not in ("logs", "order"):
                 raise unknown_name("key", str(key), ("logs", "order"), str(path))
-        order = given.get("order", "name")
+        order = str(given.get("order", order))
         if order not in _ORDERS:
-            raise unknown_name("order", str(order), _ORDERS, str(path))
-        by_modified = order == "modified"
+            raise unknown_name("order", order, _ORDERS, str(path))
         found = [(f"logs, entry {i}", entry) for i, entry in enumerate(given["logs"], 1)]
     else:
         found = list(_csv_entries(path))
     entries = tuple(_entry(entry, f"{path}: {where}", path.parent) for where, entry in found)
-    return Manifest(path.parent, entries, by_modified)
+    return Manifest(path.parent, entries, by_modified=order == "modified")
 
 
 def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
@@ -109,7 +137,7 @@ def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
     try:
         rows = csv.DictReader(io.StringIO(data.decode("utf-8-sig")), strict=True)
         if "log" not in (rows.fieldnames or ()):
-            raise InputError(f"{path}: missing column log; expected {', '.join(_KEYS)}")
+            raise InputError(f"{path}: missing column log; expected {', '.join(_COLUMNS)}")
         for row in rows:
             if None in row or None in row.values():
                 raise InputError(
@@ -125,52 +153,18 @@ def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
 def _entry(given: Any, where: str, folder: Path) -> Entry:
     if not isinstance(given, Mapping) or "log" not in given:
         raise InputError(f"{where}: expected a mapping with a pattern named log")
-    for key in given:
-        if key not in _KEYS:
-            raise unknown_name("key", str(key), _KEYS, where)
-    vehicle = None if given.get("vehicle") is None else str(given["vehicle"])
-    if vehicle is not None and vehicle.endswith((".yaml", ".yml")):
-        vehicle = str(folder / vehicle)
-    reader = None if given.get("reader") is None else str(given["reader"])
-    if reader is not None:
-        find_reader(reader)
-    log_map = None if given.get("map") is None else str(given["map"])
-    if log_map is not None:
-        if log_map.endswith((".yaml", ".yml")):
-            log_map = str(folder / log_map)
-        load_map(log_map)
-    return Entry(
-        str(given["log"]),
-        vehicle,
-        str(given.get("id") or ""),
-        reader,
-        log_map,
-        _seconds(given.get("time"), where),
-    )
-
-
-def _seconds(value: Any, where: str) -> float | None:
-    """Return a time (a number, a date, or a text that is one) in seconds."""
-    if value is None:
-        return None
-    try:
-        if isinstance(value, str):
-            try:
-                value = float(value)
-            except ValueError:
-                value = datetime.fromisoformat(value)
-        if isinstance(value, date) and not isinstance(value, datetime):
-            value = datetime(value.year, value.month, value.day)
-        if isinstance(value, datetime):
-            value = (value if value.tzinfo else value.replace(tzinfo=UTC)).timestamp()
-        seconds = float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(
-            f"{where}: time {value!r}: expected a number or a date such as 2026-03-01T10:00"
-        ) from error
-    if not abs(seconds) < float("inf"):
-        raise InputError(f"{where}: time {value!r}: expected a finite number")
-    return seconds
+    entry = checked(Entry, given, where)
+    files = {
+        name: str(folder / value)
+        for name in ("vehicle", "map")
+        if (value := getattr(entry, name)) is not None and value.endswith((".yaml", ".yml"))
+    }
+    entry = replace(entry, **files)
+    if entry.reader is not None:
+        find_reader(entry.reader)
+    if entry.map is not None:
+        load_map(entry.map)
+    return entry
 
 
 def find_logs(
