@@ -174,6 +174,10 @@ class Ranking:
     structure: float
     tempering: float  # power of the likelihood, 1 where its scatter is what it should be
 
+    def likeliest_with(self, effect: str) -> RankedSet | None:
+        """Return the likeliest set that has an effect; None where no set has it."""
+        return next((s for s in self.sets if effect in s.effects), None)
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:

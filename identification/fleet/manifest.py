@@ -154,12 +154,10 @@ def _entry(given: Any, where: str, folder: Path) -> Entry:
     if not isinstance(given, Mapping) or "log" not in given:
         raise InputError(f"{where}: expected a mapping with a pattern named log")
     entry = checked(Entry, given, where)
-    files = {
-        name: str(folder / value)
-        for name in ("vehicle", "map")
-        if (value := getattr(entry, name)) is not None and value.endswith((".yaml", ".yml"))
-    }
-    entry = replace(entry, **files)
+    for name in ("vehicle", "map"):
+        value = getattr(entry, name)
+        if value is not None and value.endswith((".yaml", ".yml")):
+            entry = replace(entry, **{name: str(folder / value)})
     if entry.reader is not None:
         find_reader(entry.reader)
     if entry.map is not None:

@@ -12,36 +12,17 @@ import math
 from collections.abc import Iterable
 from functools import cache
 from importlib import resources
-from typing import Any
 
 from ... import __version__
 from ...runtime.page_files import page_template
-from ..findings import Diagnosis, NamedEffect, Probabilities
-from .first_screen import next_step, sureness_sentences
+from ..findings import Diagnosis
+from . import words
 from .plot_numbers import (
     candidate_bars,
     plot_data,
     plots_of_signatures,
     plots_over_frequency,
     plots_over_time,
-)
-from .words import (
-    MISSING,
-    carried_by,
-    coefficient_meaning,
-    confusion,
-    duration,
-    effect_summary,
-    error_sentences,
-    headline,
-    in_words,
-    percent,
-    probability_sentences,
-    ranking_sentences,
-    remainder_sentence,
-    rounded,
-    scale_of,
-    with_std,
 )
 
 _TONES = {
@@ -60,52 +41,27 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     signatures, bars = plots_of_signatures(diagnosis), candidate_bars(diagnosis)
     data = plot_data(diagnosis, time, frequency, signatures)
     library, script = _library(), _file("page.js")
-    table = error_table(diagnosis)
+    shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
-        headline=headline(diagnosis),
-        errors=error_sentences(diagnosis),
-        remainder=remainder_sentence(diagnosis),
-        sureness=sureness_sentences(diagnosis),
-        next_step=next_step(diagnosis),
+        found=diagnosis,
+        words=words,
+        tone=_TONES.get(diagnosis.verdict, "warn"),
+        stated=diagnosis.probabilities,
+        table=error_table(diagnosis),
+        missing=words.MISSING,
+        alike=[words.confusion(e) for e in diagnosis.effects if e.indistinguishable_from],
+        held_out=_held_out(diagnosis),
+        over_time=time,
+        over_frequency=frequency,
+        signatures=signatures,
+        bars=bars,
+        more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),
         data=_in_script(json.dumps(data, separators=(",", ":"), allow_nan=False)) if data else "",
         library=library,
         library_style=_file("uplot/uPlot.min.css"),
         script=script,
         toggles=data["time"]["effects"] if "time" in data else [],
-        verdict=diagnosis.verdict,
-        tone=_TONES.get(diagnosis.verdict, "warn"),
-        vehicle=diagnosis.declared.name,
-        logs=diagnosis.logs,
-        test_logs=diagnosis.test_logs,
-        seconds=duration(diagnosis.seconds),
-        cutoff=f"{diagnosis.cutoff_hz:.3g} Hz",
-        effects=[_effect(effect, diagnosis.probabilities) for effect in diagnosis.effects],
-        table=table,
-        missing=any(MISSING in (row["before"], row["after"]) for row in table),
-        held_out=_held_out(diagnosis),
-        held_out_sum=_held_out_sum(diagnosis),
-        over_time=time,
-        over_frequency=frequency,
-        pieces=[
-            f"{trace.log}, {trace.t[0]:.1f} to {trace.t[-1]:.1f} s" for trace in diagnosis.traces
-        ],
-        signatures=signatures,
-        bars=bars,
-        ranking=ranking_sentences(diagnosis),
-        floor_is_bound=diagnosis.floor_is_bound,
-        more_candidates=[
-            f"{c.name} {percent(c.gain)}"
-            for c in diagnosis.candidates
-            if c.name not in {bar.name for bar in bars}
-        ],
-        structure=[
-            {"where": s.where, "test": s.test, "gain": percent(s.gain)} for s in diagnosis.structure
-        ],
-        alike=[confusion(effect) for effect in diagnosis.effects if effect.indistinguishable_from],
-        probabilities=probability_sentences(diagnosis),
-        advice=diagnosis.advice,
-        notes=diagnosis.notes,
         command=command,
         version=__version__,
     )
@@ -138,87 +94,28 @@ def _policy(scripts: Iterable[str]) -> str:
     return f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}"
 
 
-def evidence_words(key: str) -> str:
-    """Return what a key of ``NamedEffect.evidence``, which ``report.json`` has as it is, stands
-    for.
-    """
-    words = {
-        "energy_explained": "share of the deviance explained",
-        "energy_explained_in_noise_units": "deviance explained",
-        "largest_coefficient_in_typical_sizes": "largest coefficient in typical sizes",
-    }
-    return words.get(key, key.replace("_", " "))
-
-
 def error_table(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Return the rows of the error before, after and at the floor: what, unit and three rounded
     numbers.
     """
-    before, after, unknown = diagnosis.before, diagnosis.after, math.nan
-    rows = [
-        ("Force, rms", "N", before.force_rms, after.force_rms, diagnosis.floor_force_rms),
-        ("Torque, rms", "Nm", before.torque_rms, after.torque_rms, diagnosis.floor_torque_rms),
-        (
-            "Position after 1 s of prediction, rms",
-            "m",
-            before.rollout_1s_position_rms,
-            after.rollout_1s_position_rms,
-            unknown,
-        ),
-        (
-            "NIS of a filter without wrench states, mean",
-            "",
-            before.nis_without_wrench_state,
-            after.nis_without_wrench_state,
-            6.0,
-        ),
-    ]
-    table = []
-    for what, unit, *numbers in rows:
-        factor, unit = scale_of(numbers, unit) if unit else (1.0, "")
-        # an error of zero before and after is one that these logs cannot tell
-        told = any(numbers[:2])
-        texts = [rounded(factor * number) if told else MISSING for number in numbers]
-        if not unit:
-            texts[2] = "6"
-        table.append(
-            {
-                "what": what,
-                "unit": unit,
-                "before": texts[0],
-                "after": texts[1],
-                "floor": texts[2] if told and math.isfinite(numbers[2]) else "",
-            }
-        )
-    return table
-
-
-def _effect(effect: NamedEffect, stated: Probabilities | None) -> dict[str, Any]:
-    rows = []
-    for name, value in effect.coefficients.items():
-        unit = effect.units.get(name, "")
-        rows.append(
-            {
-                "name": name,
-                "value": with_std(value, effect.std.get(name, math.nan)),
-                "unit": "" if unit == "1" else unit,
-                "meaning": coefficient_meaning(effect.name, name),
-            }
-        )
-    evidence = ", ".join(
-        f"{evidence_words(key)} {percent(value) if 'share' in key else rounded(value)}"
-        for key, value in effect.evidence.items()
-    )
-    return {
-        "name": effect.name,
-        "others": in_words(effect.indistinguishable_from, "or"),
-        "tentative": effect.tentative,
-        "probability": percent(stated.names.get(effect.name, 0.0)) if stated else "",
-        "summary": effect_summary(effect.name),
-        "evidence": evidence,
-        "rows": rows,
-        "carried": carried_by(effect),
+    floors = {
+        "force_rms": ("Force, rms", "N", diagnosis.floor_force_rms),
+        "torque_rms": ("Torque, rms", "Nm", diagnosis.floor_torque_rms),
+        "rollout_1s_position_rms": ("Position after 1 s of prediction, rms", "m", math.nan),
+        "nis_without_wrench_state": ("NIS of a filter without wrench states, mean", "", 6.0),
     }
+    table = []
+    for name, (what, unit, floor) in floors.items():
+        before, after = (getattr(side, name) for side in (diagnosis.before, diagnosis.after))
+        factor, unit = words.scale_of((before, after, floor), unit) if unit else (1.0, "")
+        # an error of zero before and after is one that these logs cannot tell
+        told = bool(before or after)
+        old, new, least = (
+            words.rounded(factor * x) if told else words.MISSING for x in (before, after, floor)
+        )
+        least = (least if unit else "6") if told and math.isfinite(floor) else ""
+        table.append({"what": what, "unit": unit, "before": old, "after": new, "floor": least})
+    return table
 
 
 def _held_out(diagnosis: Diagnosis) -> list[str]:
@@ -227,9 +124,3 @@ def _held_out(diagnosis: Diagnosis) -> list[str]:
     for log, start, end in diagnosis.held_out_segments:
         lines.setdefault(log, []).append(f"{start:.1f}–{end:.1f}")
     return [f"{log}: {', '.join(blocks)} s" for log, blocks in lines.items()]
-
-
-def _held_out_sum(diagnosis: Diagnosis) -> str:
-    count = len(diagnosis.held_out_segments)
-    total = sum(end - start for _, start, end in diagnosis.held_out_segments)
-    return f"{count} {'block' if count == 1 else 'blocks'}, {duration(total)}"

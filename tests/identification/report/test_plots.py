@@ -17,7 +17,6 @@ from tests.support.browser import look, needs_browser
 from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.identification.findings import CHANNELS, Probabilities
 from windwrench.identification.report.files import write_report
-from windwrench.identification.report.first_screen import next_step, sureness_sentences
 from windwrench.identification.report.page import error_table, report_page
 from windwrench.identification.report.plot_numbers import (
     plot_data,
@@ -26,7 +25,7 @@ from windwrench.identification.report.plot_numbers import (
     plots_over_time,
     telling_samples,
 )
-from windwrench.identification.report.words import rounded
+from windwrench.identification.report.words import next_step, rounded, sureness_sentences
 
 UPLOT = {
     "uPlot.iife.min.js": "19c8d4c6ad88929a79f4ae49d6f7161566dfd0ba3d15cc495e974f787eb78f1f",
