@@ -154,15 +154,17 @@ def _entry(given: Any, where: str, folder: Path) -> Entry:
     if not isinstance(given, Mapping) or "log" not in given:
         raise InputError(f"{where}: expected a mapping with a pattern named log")
     entry = checked(Entry, given, where)
-    for name in ("vehicle", "map"):
-        value = getattr(entry, name)
-        if value is not None and value.endswith((".yaml", ".yml")):
-            entry = replace(entry, **{name: str(folder / value)})
+    entry = replace(entry, vehicle=_beside(folder, entry.vehicle), map=_beside(folder, entry.map))
     if entry.reader is not None:
         find_reader(entry.reader)
     if entry.map is not None:
         load_map(entry.map)
     return entry
+
+
+def _beside(folder: Path, name: str | None) -> str | None:
+    """Return a file's name as the manifest means it, below its folder."""
+    return str(folder / name) if name is not None and name.endswith((".yaml", ".yml")) else name
 
 
 def find_logs(
