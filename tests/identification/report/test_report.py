@@ -34,7 +34,7 @@ from windwrench.identification.report.words import (
 )
 
 DRAG = {"kdx": 2.4e-4, "kdy": 1.8e-4}
-TRIED = ["rotor_drag", "body_drag", "mass", "constant_force", "constant_torque", "thrust_scale", "inflow_thrust", "rate_damping", "motor_lag", "com_offset", "thrust_axis_tilt", "world_tilt", "translational_lift", "flapping_moment", "rotor_inertia", "latency", "clock_offset"]
+TRIED = ("rotor_drag", "body_drag", "mass", *(f"effect_{i}" for i in range(14)))
 
 
 @pytest.fixture(scope="module")
@@ -142,12 +142,12 @@ def test_the_numbers(reports):
     assert [p.name for p in paths] == ["report.json", "report.html", "vehicle.yaml"]
     assert set(paths[0].parent.iterdir()) == set(paths)
     data = strict(paths[0])
-    assert list(data)[:7] == ["verdict", "remainder", "effects", "alternatives", "unknown", "error", "advice"]
+    first = "verdict remainder effects alternatives unknown error advice"
+    assert " ".join(list(data)[:7]) == first
     assert (data["verdict"], data["remainder"]) == ("explained", "random")
     (effect,) = data["effects"]
-    assert (
-        list(effect)
-        == ["name", "coefficients", "std", "units", "tentative", "indistinguishable_from", "evidence", "channels", "probability"]
+    assert " ".join(effect) == (
+        "name coefficients std units tentative indistinguishable_from evidence channels probability"
     )
     assert effect["name"] == "rotor_drag"
     assert effect["coefficients"] == DRAG
