@@ -4,7 +4,6 @@ Flights are written as they are read: none are held.
 
 import csv
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,32 +11,16 @@ from typing import Any
 
 from ... import __version__
 from ...runtime.whole_files import replaced
+from ..report.files import plain
 from .drift import Fleet
 from .page import write_page
 from .picture import draw_fleet
 
 Row = Mapping[str, Any]
 _COLUMNS = (
-    "id",
-    "flight",
-    "log",
-    "time",
-    "vehicle",
-    "status",
-    "reason",
-    "verdict",
-    "residual",
-    "effect",
-    "coefficient",
-    "value",
-    "std",
-    "unit",
-    "tentative",
-    "indistinguishable_from",
-    "force_before_N",
-    "force_after_N",
-    "torque_before_Nm",
-    "torque_after_Nm",
+    *("id", "flight", "log", "time", "vehicle", "status", "reason", "verdict", "residual"),
+    *("effect", "coefficient", "value", "std", "unit", "tentative", "indistinguishable_from"),
+    *("force_before_N", "force_after_N", "torque_before_Nm", "torque_after_Nm"),
 )
 
 
@@ -87,7 +70,7 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
                 **data,
             }
         )
-    found: dict[str, Any] = _plain(
+    found: dict[str, Any] = plain(
         {
             "version": __version__,
             "logs": sum(sum(counts.values()) for counts in fleet.individuals.values()),
@@ -125,13 +108,3 @@ def _lines(row: Row) -> Iterable[dict[str, Any]]:
                 "tentative": effect["tentative"],
                 "indistinguishable_from": " ".join(effect["indistinguishable_from"]),
             }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if math.isfinite(value) else None
-    return value

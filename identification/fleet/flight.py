@@ -20,7 +20,7 @@ from ..diagnosis import diagnose
 from ..logs.flight_log import FlightLog
 from ..logs.log_map import load_map
 from ..logs.reading import read_log
-from ..report.files import report_data
+from ..report.files import printable, report_data
 from .manifest import FleetLog
 
 _CODE = ("runtime", "dynamics", "estimator", "identification")
@@ -28,15 +28,8 @@ _NOT_CODE = ("identification/fleet", "identification/report")  # tell what was f
 _BLOCK = 2**20  # bytes read at a time
 # of report.json, what a fleet keeps of a flight
 _KEPT = (
-    "verdict",
-    "remainder",
-    "headline",
-    "effects",
-    "error",
-    "notes",
-    "seconds",
-    "vehicle",
-    "floor_is_lower_bound",
+    *("verdict", "remainder", "headline", "effects", "error"),
+    *("notes", "seconds", "vehicle", "floor_is_lower_bound"),
 )
 
 
@@ -99,7 +92,7 @@ def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
         kind: input (the log or its vehicle), memory, time, died, or error (a fault of the kit).
         reason: one line.
     """
-    text = " ".join(reason.encode("utf-8", "replace").decode().split())
+    text = " ".join(printable(reason).split())
     return {"key": key, "status": "refused", "kind": kind, "reason": text}
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from ... import __version__
 from ...runtime.page_files import page_template
 from ...runtime.whole_files import replaced
+from ..report.files import printable
 from ..report.words import MISSING, coefficient_meaning, in_words, with_std
 from .drift import DRIFT, Appearance, Fleet, Trend
 
@@ -63,7 +64,7 @@ def write_page(
         coefficients=_coefficients,
         rate=f"{100 * DRIFT.false_discoveries:g}",
         least=DRIFT.least_flights,
-        command=command.encode("utf-8", "replace").decode(),
+        command=printable(command),
         version=__version__,
     )
     with replaced(path) as partial, open(partial, "w", encoding="utf-8") as file:

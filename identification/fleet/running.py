@@ -9,6 +9,7 @@ from typing import Any
 from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
 from ...runtime.workers import Lost, each
+from ..report.files import printable
 from .flight import Job, diagnose_one, key_of, refusal
 from .manifest import FleetLog, natural
 from .outcomes import Outcome, Outcomes
@@ -104,16 +105,16 @@ def _key_of_name(log: FleetLog) -> str:
 
 def _absolute(log: FleetLog) -> FleetLog:
     """Return a log whose paths mean the same in every working folder."""
-    vehicle, reader = log.vehicle, log.reader
-    if vehicle is not None and vehicle.endswith((".yaml", ".yml")):
-        vehicle = os.path.abspath(vehicle)
+
+    def file(name: str | None) -> str | None:
+        return os.path.abspath(name) if name and name.endswith((".yaml", ".yml")) else name
+
+    reader = log.reader
     if reader is not None and ":" in reader:
         name, _, option = reader.partition(":")
         reader = f"{name}:{os.path.abspath(option)}"
-    log_map = log.map
-    if log_map is not None and log_map.endswith((".yaml", ".yml")):
-        log_map = os.path.abspath(log_map)
-    return replace(log, path=os.path.abspath(log.path), vehicle=vehicle, reader=reader, map=log_map)
+    path = os.path.abspath(log.path)
+    return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
 
 def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
@@ -138,9 +139,9 @@ def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
         last = name
         outcome = outcomes[one.key]
         yield {
-            "id": _text(name),
+            "id": printable(name),
             "flight": number,
-            "log": _text(one.log.name),
+            "log": printable(one.log.name),
             "time": one.log.time,
             **{k: v for k, v in outcome.items() if k not in ("key", "cost", "limit_s")},
         }
@@ -153,7 +154,3 @@ def _vehicle_name(one: Done, outcomes: Outcomes, models: dict[str, str]) -> str:
     if one.log.vehicle not in models:
         models[one.log.vehicle] = load_vehicle(one.log.vehicle).name
     return models[one.log.vehicle]
-
-
-def _text(name: str) -> str:
-    return name.encode("utf-8", "replace").decode()

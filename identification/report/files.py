@@ -44,7 +44,7 @@ def write_report(
         InputError: a file cannot be written.
     """
     folder = Path(folder)
-    command = _printable(command or _command(diagnosis, folder))
+    command = printable(command or _command(diagnosis, folder))
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     page = report_page(_printable_names(diagnosis), command)
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
@@ -106,8 +106,8 @@ def report_data(diagnosis: Diagnosis) -> dict[str, Any]:
         "version": __version__,
         "schema_version": SCHEMA_VERSION,
     }
-    plain: dict[str, Any] = _plain(data)
-    return plain
+    kept: dict[str, Any] = plain(data)
+    return kept
 
 
 def report_schema() -> dict[str, Any]:
@@ -126,20 +126,22 @@ def _errors(errors: Errors) -> dict[str, float]:
     }
 
 
-def _plain(value: Any) -> Any:
-    """Return a value as strict JSON can hold it."""
+def plain(value: Any) -> Any:
+    """Return a value as strict JSON can hold it: six significant digits, None for what is not
+    finite, a question mark for each byte of a file's name that is no text.
+    """
     if isinstance(value, Mapping):
-        return {_printable(str(key)): _plain(item) for key, item in value.items()}
+        return {printable(str(key)): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
         return float(f"{value:.6g}") if math.isfinite(value) else None
-    return _printable(value) if isinstance(value, str) else value
+    return printable(value) if isinstance(value, str) else value
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """Return a text with a question mark for each byte of a file's name that is no text."""
     return text.encode("utf-8", "replace").decode()
 
@@ -148,29 +150,19 @@ def _printable_names(diagnosis: Diagnosis) -> Diagnosis:
     """Return a diagnosis whose names of files can all be written."""
     return replace(
         diagnosis,
-        declared=replace(diagnosis.declared, name=_printable(diagnosis.declared.name)),
-        logs=tuple(map(_printable, diagnosis.logs)),
-        test_logs=tuple(map(_printable, diagnosis.test_logs)),
-        notes=tuple(map(_printable, diagnosis.notes)),
-        traces=tuple(replace(trace, log=_printable(trace.log)) for trace in diagnosis.traces),
-        pushes=tuple(replace(push, log=_printable(push.log)) for push in diagnosis.pushes),
+        declared=replace(diagnosis.declared, name=printable(diagnosis.declared.name)),
+        logs=tuple(map(printable, diagnosis.logs)),
+        test_logs=tuple(map(printable, diagnosis.test_logs)),
+        notes=tuple(map(printable, diagnosis.notes)),
+        traces=tuple(replace(trace, log=printable(trace.log)) for trace in diagnosis.traces),
+        pushes=tuple(replace(push, log=printable(push.log)) for push in diagnosis.pushes),
         held_out_segments=tuple(
-            (_printable(log), start, end) for log, start, end in diagnosis.held_out_segments
+            (printable(log), start, end) for log, start, end in diagnosis.held_out_segments
         ),
     )
 
 
 def _command(diagnosis: Diagnosis, folder: Path) -> str:
     tests = [word for log in diagnosis.test_logs for word in ("--test", log)]
-    return shlex.join(
-        [
-            "windwrench",
-            "diagnose",
-            *diagnosis.logs,
-            *tests,
-            "--vehicle",
-            diagnosis.declared.name,
-            "--out",
-            str(folder),
-        ]
-    )
+    given = [*diagnosis.logs, *tests, "--vehicle", diagnosis.declared.name, "--out", str(folder)]
+    return shlex.join(["windwrench", "diagnose", *given])
