@@ -439,7 +439,7 @@ def _compare(
     """Find what changed between two sets of flights; write change.json and change.png."""
     from ..identification.comparison.change import compare
     from ..identification.comparison.trim import trim_of_log
-    from ..identification.comparison.words import change_data, headline, write_change
+    from ..identification.comparison.words import change_data, change_headline, write_change
 
     every, model = read_flights([*logs, *against], reader, vehicle, log_map)
     folder = results_folder(out)
@@ -448,7 +448,7 @@ def _compare(
     written = write_change(change, folder)
     log_notes(text for log in every for text in log.notes)
     console.print(f"vehicle: {model.name}", highlight=False, markup=False)
-    console.print(headline(change), highlight=False, markup=False)
+    console.print(change_headline(change), highlight=False, markup=False)
     table = Table("where something changed", "probability", box=box.SIMPLE_HEAD)
     for name, chance in sorted(change.places.items(), key=lambda item: -item[1]):
         table.add_row(name, f"{chance:.3f}")
@@ -463,7 +463,7 @@ def _with_rotor_faults(
     """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
     from ..identification.comparison.fault_channels import channels_of
     from ..identification.comparison.fault_detection import find_fault
-    from ..identification.comparison.fault_words import fault_data
+    from ..identification.comparison.words import fault_data
 
     faults = []
     with working("looking for a rotor that lost thrust"):
@@ -487,7 +487,7 @@ def _rotor_faults(
     from ..dynamics.vehicle_file import load_vehicle
     from ..identification.comparison.fault_channels import read_channels, sample
     from ..identification.comparison.fault_detection import find_fault
-    from ..identification.comparison.fault_words import fault_data, headline, write_faults
+    from ..identification.comparison.words import fault_data, fault_headline, write_faults
 
     model = None if vehicle is None else load_vehicle(vehicle)
     read = [read_channels(path, reader, model, log_map) for path in logs]
@@ -504,6 +504,6 @@ def _rotor_faults(
         console.print(
             f"{fault.name}: {fault.seconds:.1f} s in flight{ended}", highlight=False, markup=False
         )
-        console.print(headline(fault), highlight=False, markup=False)
+        console.print(fault_headline(fault), highlight=False, markup=False)
     say(*written)
     return {"rotor_faults": [fault_data(fault) for fault, _ in found]}

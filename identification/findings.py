@@ -217,7 +217,7 @@ class Diagnosis:
     # reason): then the floor is a lower bound
     floor_is_bound: bool = False
     # one a log that can show it: whether a rotor lost thrust during the flight, as plain data
-    # (``comparison/fault_words.py``); empty where that was not looked for
+    # (``comparison/words.py``); empty where that was not looked for
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
     # effects that these logs cannot show because the pose is missing, or too slow, beside the IMU
     needs_pose: tuple[str, ...] = ()

@@ -1,6 +1,8 @@
-"""What changed between two sets of flights, in sentences, as data and as a picture."""
+"""What changed between two sets of flights, and which rotor lost thrust during one: in sentences, as
+data and as pictures.
+"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +10,28 @@ import numpy as np
 
 from ...runtime.page_files import write_json, write_png
 from .change import NOWHERE, SOMETHING_ELSE, Change
+from .fault_channels import Samples
+from .fault_detection import ALL, NOTHING, OTHER, RotorFault
 from .trim import Trim
 
-_NAMED = 0.05  # probability from which another place is mentioned
+_PLACES = ("front-left", "rear-left", "rear-right", "front-right")
+_NAMED = 0.05  # probability from which a rival is mentioned
+_RED, _BLUE, _GREY, _DARK = "#d1495b", "#30638e", "#8a8a8a", "#4a4a4a"
 
 
-def headline(change: Change) -> str:
-    """Return the finding, as sure as it is."""
+def _cannot_tell(chances: Mapping[str, float], likeliest: str, name: Callable[[str], str]) -> str:
+    """Return that the likeliest finding is not sure, and its rivals."""
+    rivals = [
+        f"{name(rival)} ({p:.2f})"
+        for rival, p in sorted(chances.items(), key=lambda item: -item[1])
+        if rival != likeliest and p >= _NAMED
+    ]
+    told = f"Cannot tell {name(likeliest)} ({chances[likeliest]:.2f})"
+    return f"{told} from {' or '.join(rivals) or 'the other possibilities'}."
+
+
+def change_headline(change: Change) -> str:
+    """Return what changed, as sure as it is."""
     place, chance = change.place, change.places[change.place]
     if place == NOWHERE:
         if change.sure:
@@ -26,14 +43,9 @@ def headline(change: Change) -> str:
             f"Cannot tell whether anything changed: nothing with probability {chance:.2f}; if "
             f"something did, it is likeliest at {other} ({change.places[other]:.2f})."
         )
-    others = [
-        f"{name} ({p:.2f})"
-        for name, p in sorted(change.places.items(), key=lambda item: -item[1])
-        if name != place and p >= _NAMED
-    ]
     if change.sure:
         return f"Changed: {place} (probability {chance:.2f}). {_kind(change)}"
-    return f"Cannot tell {place} ({chance:.2f}) from {' or '.join(others)}. {_kind(change)}"
+    return f"{_cannot_tell(change.places, place, str)} {_kind(change)}"
 
 
 def _kind(change: Change) -> str:
@@ -74,7 +86,7 @@ def change_data(change: Change) -> dict[str, Any]:
 
     names = ("left_less_right", "front_less_rear", "diagonals", "log_total")
     return {
-        "headline": headline(change),
+        "headline": change_headline(change),
         "place": change.place,
         "sure": change.sure,
         "probabilities": change.places,
@@ -97,18 +109,18 @@ def write_change(change: Change, folder: Path) -> tuple[Path, Path]:
     """
     data, picture = folder / "change.json", folder / "change.png"
     write_json(change_data(change), data)
-    write_png(_draw(change), picture)
+    write_png(_draw_change(change), picture)
     return data, picture
 
 
-def _draw(change: Change) -> Any:
+def _draw_change(change: Change) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     for trims, colour, label in (
-        (change.before, "#30638e", "before"),
-        (change.after, "#d1495b", "after"),
+        (change.before, _BLUE, "before"),
+        (change.after, _RED, "after"),
     ):
         # as seen from above, front up: what lies to the left is drawn to the left
         x = [-100 * trim.shares[0] for trim in trims]
@@ -123,9 +135,110 @@ def _draw(change: Change) -> Any:
     left.axis("equal")
     names = sorted(change.places, key=change.places.__getitem__)
     chances = [change.places[name] for name in names]
-    right.barh(names, chances, color=["#d1495b" if n == change.place else "#8a8a8a" for n in names])
+    right.barh(names, chances, color=[_RED if n == change.place else _GREY for n in names])
     right.set_xlim(0.0, 1.0)
-    right.axvline(change.sure_from, color="#4a4a4a", lw=1, ls="--")
+    right.axvline(change.sure_from, color=_DARK, lw=1, ls="--")
     right.set_xlabel("probability that something changed there")
     right.set_title(f"sure from {change.sure_from:g} (dashed)", fontsize=10)
+    return figure
+
+
+def place_of(fault: RotorFault, rotor: int) -> str:
+    """Return the name of a rotor (1 to 4), and the log's own name where it has one."""
+    own = "" if fault.motor_names is None else f"; {fault.motor_names[rotor - 1]} in the log"
+    return f"rotor {rotor} ({_PLACES[rotor - 1]}{own})"
+
+
+def fault_headline(fault: RotorFault) -> str:
+    """Return which rotor lost thrust, when and how much, as sure as that is."""
+    likeliest = fault.likeliest
+    chance = fault.probabilities[likeliest]
+    sure = f"(probability {chance:.2f})" if chance < 0.9995 else "(probability above 0.999)"
+    if not fault.sure:
+        return _cannot_tell(fault.probabilities, likeliest, lambda name: _finding(fault, name))
+    if likeliest == NOTHING:
+        return f"No rotor lost thrust {sure}."
+    if likeliest == OTHER:
+        return (
+            f"No rotor fault explains what happened: a force or torque began that no rotor makes, "
+            f"a gust, a load or a collision {sure}."
+        )
+    if likeliest == ALL:
+        return f"All rotors lost thrust at once {sure}: the battery, the air, or the vehicle."
+    place = place_of(fault, fault.rotor)
+    when, low, high = fault.onset
+    left, least, most = (100 * share for share in fault.remaining)
+    return (
+        f"R{place[1:]} lost {100 - left:.0f} % of its thrust "
+        f"({100 - most:.0f} to {100 - least:.0f}) at t = {when:.3f} s ({low:.3f} to {high:.3f}, "
+        f"the log's clock) {sure}."
+    )
+
+
+def _finding(fault: RotorFault, name: str) -> str:
+    if name in (NOTHING, ALL, OTHER):
+        return name
+    return f"a fault of {place_of(fault, int(name))}"
+
+
+def fault_data(fault: RotorFault) -> dict[str, Any]:
+    """Return the finding as plain data."""
+    names = {str(i): f"rotor {i}" for i in range(1, 5)}
+    found = fault.likeliest in names
+    return {
+        "log": fault.name,
+        "headline": fault_headline(fault),
+        "found": names.get(fault.likeliest, fault.likeliest),
+        "sure": fault.sure,
+        "probabilities": {names.get(k, k): p for k, p in fault.probabilities.items()},
+        "rotor": fault.rotor if found else None,
+        "motor": fault.motor_names[fault.rotor - 1] if found and fault.motor_names else None,
+        "onset_s": fault.onset[0] if found else None,
+        "onset_ci95_s": list(fault.onset[1:]) if found else None,
+        "remaining": fault.remaining[0] if found else None,
+        "remaining_ci95": list(fault.remaining[1:]) if found else None,
+        "flight_s": fault.seconds,
+        "ended_because": fault.ended or None,
+    }
+
+
+def write_faults(found: Sequence[tuple[RotorFault, Samples]], folder: Path) -> tuple[Path, Path]:
+    """Write ``rotor_faults.json`` and ``rotor_faults.png`` into a folder and return their paths.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    data, picture = folder / "rotor_faults.json", folder / "rotor_faults.png"
+    write_json([fault_data(fault) for fault, _ in found], data)
+    write_png(_draw_faults(found), picture)
+    return data, picture
+
+
+def _draw_faults(found: Sequence[tuple[RotorFault, Samples]]) -> Any:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.2 * len(found)), layout="constrained")
+    axes = np.atleast_2d(figure.subplots(len(found), 2, squeeze=False))
+    for (fault, samples), (left, right) in zip(found, axes, strict=True):
+        for axis, colour in zip(range(3), (_RED, _BLUE, _GREY), strict=True):
+            left.plot(
+                samples.t, samples.angular_acceleration[:, axis], color=colour, lw=1,
+                label=f"about {'xyz'[axis]}",
+            )  # fmt: skip
+        left.set_ylabel("angular acceleration, rad/s2")
+        left.legend(frameon=False, loc="upper left", fontsize=8)
+        command = samples.channels.command
+        for i in range(4):
+            u = np.interp(samples.t, samples.channels.command_times, command[:, i])
+            right.plot(samples.t, u, lw=1, label=f"rotor {i + 1}")
+        right.set_ylabel("command")
+        right.legend(frameon=False, loc="upper left", fontsize=8)
+        for axis_ in (left, right):
+            axis_.set_xlabel("t, s (the log's clock)")
+            if fault.likeliest in ("1", "2", "3", "4"):
+                axis_.axvline(fault.onset[0], color=_DARK, lw=1, ls="--")
+                axis_.set_xlim(fault.onset[0] - 3.0, samples.t[-1] + 0.1)
+        left.set_title(Path(fault.name).name, fontsize=9)
+        chance = fault.probabilities[fault.likeliest]
+        right.set_title(f"{_finding(fault, fault.likeliest)}: {chance:.3f}", fontsize=9)
     return figure

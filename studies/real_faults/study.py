@@ -13,8 +13,8 @@ from windwrench.dynamics.vehicle_file import load_vehicle
 from windwrench.identification.comparison.change import NOWHERE, Change, compare
 from windwrench.identification.comparison.fault_channels import read_channels
 from windwrench.identification.comparison.fault_detection import NOTHING, find_fault
-from windwrench.identification.comparison.fault_words import fault_data
 from windwrench.identification.comparison.trim import trim_of_log
+from windwrench.identification.comparison.words import fault_data
 from windwrench.identification.logs.reading import read_log
 from windwrench.runtime.errors import InputError
 from windwrench.runtime.provenance import commit

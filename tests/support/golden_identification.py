@@ -16,8 +16,7 @@ from windwrench.envs.recording import record_flight
 from windwrench.identification.comparison.change import compare
 from windwrench.identification.comparison.fault_channels import channels_of_log
 from windwrench.identification.comparison.fault_detection import find_fault
-from windwrench.identification.comparison.fault_words import fault_data
-from windwrench.identification.comparison.words import change_data
+from windwrench.identification.comparison.words import change_data, fault_data
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import nis_without_wrench_state, rollout_error
 from windwrench.identification.vehicle_fit.exports import EXPORTS

@@ -19,7 +19,7 @@ from windwrench.identification.comparison.change import (
     compare,
 )
 from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
-from windwrench.identification.comparison.words import headline, write_change
+from windwrench.identification.comparison.words import change_headline, write_change
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 
@@ -121,7 +121,7 @@ def test_simulated_changes_are_named_without_a_true_model(effect, place, tmp_pat
     assert change.place == place
     data, picture = write_change(change, tmp_path)
     said = json.loads(data.read_text(encoding="utf-8"))
-    assert said["headline"] == headline(change)
+    assert said["headline"] == change_headline(change)
     assert place in said["headline"]
     assert picture.stat().st_size > 5000
     assert compare(before, before).place == NOWHERE
@@ -173,7 +173,7 @@ def test_a_change_of_its_own_kind_is_something_else():
     rng = np.random.default_rng(6)
     found = [compare(drawn(rng, 3, (0.0, 0.0, 0.25, -0.25)), drawn(rng, 3)) for _ in range(10)]
     assert np.mean([c.place == SOMETHING_ELSE for c in found]) > 0.9
-    assert "otherwise than" in headline(found[0])
+    assert "otherwise than" in change_headline(found[0])
 
 
 def test_another_battery_voltage_makes_the_total_less_certain():

@@ -12,7 +12,7 @@ from windwrench.identification.comparison.fault_balance import AT_ONCE, Balance,
 from windwrench.identification.comparison.fault_channels import sample
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
-from windwrench.identification.comparison.fault_words import fault_data, headline
+from windwrench.identification.comparison.words import fault_data, fault_headline
 from windwrench.studies.real_faults.flights import draw_flight
 
 
@@ -66,7 +66,7 @@ def test_a_failing_rotor_is_named_with_its_time():
     assert found.onset[1] <= drawn.onset <= found.onset[2]
     assert found.onset[2] - found.onset[1] < 0.1
     assert 0.5 * drawn.loss < 1.0 - found.remaining[0] < 1.5 * drawn.loss
-    said = headline(found)
+    said = fault_headline(found)
     assert f"Rotor {drawn.rotor} (" in said
     assert fault_data(found)["rotor"] == drawn.rotor
     assert json.dumps(fault_data(found))
@@ -75,7 +75,7 @@ def test_a_failing_rotor_is_named_with_its_time():
 def test_a_flight_without_a_fault_names_no_rotor():
     found = find_fault(draw_flight(0, "none").channels)
     assert found.likeliest == "nothing"
-    assert headline(found).startswith("No rotor lost thrust")
+    assert fault_headline(found).startswith("No rotor lost thrust")
     assert fault_data(found)["rotor"] is None
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
 
