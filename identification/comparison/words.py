@@ -1,5 +1,5 @@
-"""What changed between two sets of flights, and which rotor lost thrust during one: in sentences, as
-data and as pictures.
+"""What changed between two sets of flights, and which rotor lost thrust during one: sentences,
+data and pictures.
 """
 
 from collections.abc import Callable, Mapping, Sequence
