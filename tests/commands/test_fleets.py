@@ -143,26 +143,6 @@ def test_a_fleet_of_which_nothing_is_left_says_so(call, here, logs):
     assert "fleet.html" in error
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("logs", "--limit", "5"), "--limit: expected --fleet"),
-        (("logs", "--manifest", "x.csv"), "--manifest: expected --fleet"),
-        (("logs", "--fleet", "--test", "x.csv"), "expected no --test"),
-        (("logs", "--fleet", "--manifest", "x.csv"), "x.csv: cannot be read"),
-        (("logs", "--fleet", "--without", "drag"), "--without: unknown effect 'drag'"),
-        (("logs", "--fleet", "--reader", "px5"), "unknown reader 'px5'"),
-        (("logs", "--fleet", "--vehicle", "x"), "unknown vehicle 'x'"),
-        (("nothing", "--fleet"), "nothing: no such file"),
-    ],
-)
-def test_a_request_that_cannot_be_is_named(call, logs, arguments, words):
-    code, _, error = call(*arguments, "--out", "new")
-    assert code == 2
-    assert words in error
-    assert len(error.strip().splitlines()) == 1
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("cluster", [None, "local"])
 def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):

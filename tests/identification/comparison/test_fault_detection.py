@@ -80,15 +80,6 @@ def test_a_flight_without_a_fault_names_no_rotor():
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
 
 
-def test_the_command_says_what_does_not_go_together(tmp_path):
-    log = tmp_path / "a.csv"
-    log.write_text("t\n0\n", encoding="utf-8")
-    words = ["diagnose", str(log), "--rotor-faults", "--against", str(log)]
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code != 0
-    assert "--rotor-faults" in str(result.exception)
-
-
 @pytest.mark.measured
 @pytest.mark.slow
 @pytest.mark.parametrize(

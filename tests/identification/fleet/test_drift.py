@@ -144,8 +144,3 @@ def test_drifts_are_told_and_chance_is_not():
     assert [one.drifts for one in fleet.trends] == sorted(
         (one.drifts for one in fleet.trends), reverse=True
     )
-
-
-def test_a_fleet_of_refused_logs_is_one():
-    fleet = fleet_of([row("a", 1, status="refused")])
-    assert (fleet.trends, fleet.appearances, dict(fleet.refused)) == ((), (), {"input": 1})

@@ -89,49 +89,6 @@ def test_the_files_own_times_order_them_on_request(folder):
     assert all(log.time is not None for log in logs)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("- a", "expected a mapping with a list named logs"),
-        ("logs: []\nordre: name", "did you mean 'order'"),
-        ("logs: []\norder: size", "unknown order 'size'"),
-        ("logs: [{vehicle: ardrone2}]", "entry 1: expected a mapping with a pattern named log"),
-        ("logs: [{log: '*', vehicel: ardrone2}]", "entry 1: unknown key 'vehicel'"),
-        ("logs: [{log: '*', time: soon}]", "entry 1: time 'soon': expected a number or a date"),
-        ("logs: [{log: '*', reader: px5}]", "unknown reader 'px5'"),
-        ("logs: [{log: '*', vehicle: ardrone3}]", "unknown vehicle 'ardrone3'"),
-        ("logs: [{log: '*', vehicle: none.yaml}]", "none.yaml: cannot be read as a vehicle file"),
-    ],
-)
-def test_a_wrong_manifest_is_named(tmp_path, text, words):
-    (tmp_path / "a.csv").write_text("")
-    (tmp_path / "fleet.yaml").write_text(text)
-    with pytest.raises(InputError) as error:
-        find_logs([tmp_path])
-    assert words.lower() in str(error.value).lower()
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("vehicle\nardrone2\n", "missing column log"),
-        ("log,vehicle\na,b,c\n", "line 2: expected 2 fields"),
-        ("log,colour\na,b\n", "line 2: unknown key 'colour'"),
-    ],
-)
-def test_a_wrong_table_is_named(tmp_path, text, words):
-    (tmp_path / "fleet.csv").write_text(text)
-    with pytest.raises(InputError, match=words):
-        read_manifest(tmp_path / "fleet.csv")
-
-
-def test_no_log_is_named(tmp_path):
-    with pytest.raises(InputError, match="no flight log found"):
-        find_logs([tmp_path])
-    with pytest.raises(InputError, match="no such file"):
-        find_logs([tmp_path / "a.csv"])
-
-
 def test_names_are_ordered_as_people_do():
     names = ["b", "flight10", "flight9", "2", "10", "", "flight9b"]
     assert sorted(names, key=natural) == ["", "2", "10", "b", "flight9", "flight9b", "flight10"]

@@ -8,7 +8,6 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 
 from tests.support.browser import look, needs_browser
@@ -433,21 +432,6 @@ def test_the_same_diagnosis_gives_the_same_page(reports, tmp_path):
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_long_flights_stay_small(diagnosis, tmp_path):
-    trace = diagnosis.traces[0]
-    n = 200 * 600
-    t = np.arange(n) / 200
-    noise = np.random.default_rng(0).standard_normal((n, 6))
-    long = replace(trace, t=t, before=noise, after=0.1 * noise, held_out=t % 20 < 5, parts={})
-    signature = replace(diagnosis.signatures[0], x=t, residual=noise[:, 0], fitted=noise[:, 1])
-    made = replace(
-        diagnosis,
-        traces=(long, replace(long, log="b"), replace(long, log="c")),
-        signatures=12 * (signature,),
-    )
-    assert write_report(made, tmp_path)[1].stat().st_size < 1_000_000
-
-
 def test_nothing_to_draw(diagnosis, tmp_path):
     bare = replace(
         diagnosis,
@@ -470,21 +454,6 @@ def test_nothing_to_draw(diagnosis, tmp_path):
 @needs_browser
 class TestInABrowser:
     """What chromium makes of the page at the width of a telephone and of a desk."""
-
-    @pytest.mark.slow
-    def test_the_looking_finds_faults(self, tmp_path):
-        page = (
-            "<!DOCTYPE html><p style='width:400px'>wide</p><img src='data:image/png;base64,AA'>"
-            "<svg width=50 height=20><text x=40 y=10>far too "
-            "long</text></svg><script>console.error('ouch')</script>"
-        )
-        found = look(page, 360, tmp_path)
-        assert found["width"] == 360
-        assert found["scroll_width"] > 360
-        assert found["wide"]
-        assert found["missing"]
-        assert found["cut"]
-        assert any("ouch" in line for line in found["complaints"])
 
     @pytest.mark.parametrize(
         ("kind", "width", "scripts"),
@@ -511,14 +480,3 @@ class TestInABrowser:
         assert found["small"] == []
         assert found["cut"] == []
         assert headline(made) in found["text"]
-
-    @pytest.mark.slow
-    def test_dark(self, reports, tmp_path):
-        page = reports["plain"][1][1].read_text("utf-8")
-        looks = [look(page, 360, tmp_path, dark) for dark in (False, True)]
-        shades = [
-            [sum(map(int, re.findall(r"\d+", found[what])[:3])) for what in ("background", "ink")]
-            for found in looks
-        ]
-        assert shades[0][0] > 600 > 200 > shades[0][1]
-        assert shades[1][0] < 200 < 600 < shades[1][1]

@@ -161,8 +161,3 @@ def test_rotors_that_turn_the_other_way_are_recognised(inertial):
 def test_a_part_that_is_too_short_is_refused(inertial, window):
     with pytest.raises(InputError, match="no piece of 3 s"):
         identify([inertial[0][0]], MASS, parse_geometry(str(ARM)), [window])
-
-
-def test_a_mass_is_needed(inertial):
-    with pytest.raises(InputError, match="--mass"):
-        identify([inertial[0][0]], -1.0, parse_geometry(None))

@@ -13,7 +13,6 @@ from windwrench.identification.vehicle_fit.columns import (
 from windwrench.identification.vehicle_fit.geometry import SPIN, parse_geometry
 from windwrench.identification.vehicle_fit.model import coefficients
 from windwrench.identification.vehicle_fit.result import told
-from windwrench.runtime.errors import InputError
 
 
 def test_coefficients_are_newton_and_euler():
@@ -76,20 +75,6 @@ def test_the_lag_is_that_of_the_effect():
         state += (1 - np.exp(-0.005 / 0.03)) * (x[k] - state)
         assert y[k] == pytest.approx(state)
     assert lagged(x, 0.0, 0.005) is x
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("long", "is not made of numbers"),
-        ("-0.1", "expected the rotors' distance"),
-        ("0.1,0.1;0.1,-0.1;-0.1,-0.1;-0.1,0.1", "one in each quadrant"),
-        ("0.1,0.1;-0.1,0.1;-0.1,-0.1", "four positions"),
-    ],
-)
-def test_a_geometry_that_is_none_is_refused(text, says):
-    with pytest.raises(InputError, match=says):
-        parse_geometry(text)
 
 
 @pytest.mark.parametrize(
