@@ -7,63 +7,31 @@ as many as the measurement has (6).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from ..dynamics.rotation import attitude_error
 from ..runtime.errors import InputError
+from .error_state import error_from
 from .estimate import Array, WrenchEstimate
 from .filter_record import N
 
 MEASURED = 6  # numbers in a pose
 
 
-def state_error(
-    estimate: WrenchEstimate,
-    true_position: ArrayLike,
-    true_quaternion: ArrayLike,
-    true_velocity: ArrayLike,
-    true_angular_velocity: ArrayLike,
-    true_torque: ArrayLike,
-    true_force: ArrayLike,
-) -> Array:
+def state_error(estimate: WrenchEstimate, truth: Array) -> Array:
     """Return truth minus estimate (18,), in the order of the covariance: (rho, omega, x, v, torque,
     force).
 
-    rho is the world-frame MRP that turns the estimated attitude into the true one; positions are in
-    m, velocities in m/s (world), body rates in rad/s, torque in Nm and force in N (world).
+    rho is the world-frame MRP that turns the estimated attitude into the true one. ``truth`` (20,)
+    is a state laid out by the constants of ``estimator.estimate``.
     """
     error = np.empty(N)
-    attitude_error(np.asarray(true_quaternion, dtype=np.float64), estimate.quaternion, error[0:3])
-    error[3:6] = np.subtract(true_angular_velocity, estimate.angular_velocity)
-    error[6:9] = np.subtract(true_position, estimate.position)
-    error[9:12] = np.subtract(true_velocity, estimate.velocity)
-    error[12:15] = np.subtract(true_torque, estimate.torque)
-    error[15:18] = np.subtract(true_force, estimate.force)
+    error_from(truth, estimate.state, error)
     return error
 
 
-def nees(
-    estimate: WrenchEstimate,
-    true_position: ArrayLike,
-    true_quaternion: ArrayLike,
-    true_velocity: ArrayLike,
-    true_angular_velocity: ArrayLike,
-    true_torque: ArrayLike,
-    true_force: ArrayLike,
-) -> float:
-    """Return the normalised estimation error squared of one estimate; see ``state_error`` for the
-    arguments.
-    """
-    error = state_error(
-        estimate,
-        true_position,
-        true_quaternion,
-        true_velocity,
-        true_angular_velocity,
-        true_torque,
-        true_force,
-    )
+def nees(estimate: WrenchEstimate, truth: Array) -> float:
+    """Return the normalised estimation error squared; arguments as of ``state_error``."""
+    error = state_error(estimate, truth)
     return float(error @ np.linalg.solve(estimate.covariance, error))
 
 

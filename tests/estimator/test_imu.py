@@ -227,16 +227,12 @@ def test_pose_and_imu_of_one_moment_may_come_in_either_order():
     for f in (other, apart):
         difference = np.concatenate(
             [
-                state_error(one.estimate, *_state_of(f.estimate)),
+                state_error(one.estimate, f.estimate.state),
                 f.gyro_bias - one.gyro_bias,
                 f.accelerometer_bias - one.accelerometer_bias,
             ]
         )
         assert np.max(np.abs(difference) / deviation) < 0.02
-
-
-def _state_of(e):
-    return e.position, e.quaternion, e.velocity, e.angular_velocity, e.torque, e.force
 
 
 def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VEHICLE):
@@ -259,7 +255,7 @@ def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VE
             e, P = f.estimate, f.covariance_with_biases
             error = np.concatenate(
                 [
-                    state_error(e, *flight.truth(k)),
+                    state_error(e, flight.state[k]),
                     flight.gyro_bias[k] - f.gyro_bias,
                     flight.accelerometer_bias[k] - f.accelerometer_bias,
                 ]

@@ -254,7 +254,7 @@ def smoothed_nees(runs, steps, vehicle=VEHICLE, tuning=None, missing=()):
         found = ukf.smooth(covariance=True)
         for k in range(steps):
             e = found.at(1 + k)
-            error, P = state_error(e, *run.truth(k)), e.covariance
+            error, P = state_error(e, run.state[k]), e.covariance
             for n, part in enumerate((slice(0, 18), slice(12, 15), slice(15, 18))):
                 out[n, r, k] = error[part] @ np.linalg.solve(P[part, part], error[part])
     return out

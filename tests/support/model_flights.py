@@ -25,6 +25,7 @@ class ModelRun:
     rotor_speeds: Array  # (K, 4), and so on
     measured_position: Array
     measured_quaternion: Array
+    state: Array  # (K, 20) the truth, laid out as the filter's; its parts follow
     position: Array
     quaternion: Array
     velocity: Array
@@ -35,17 +36,6 @@ class ModelRun:
     accelerometer: Array
     gyro_bias: Array  # (K, 3) in them
     accelerometer_bias: Array
-
-    def truth(self, k):
-        """Return the true state after step ``k`` in the order in which ``nees`` takes it."""
-        return (
-            self.position[k],
-            self.quaternion[k],
-            self.velocity[k],
-            self.angular_velocity[k],
-            self.torque[k],
-            self.force[k],
-        )
 
 
 def simulate_model(
@@ -117,6 +107,7 @@ def simulate_model(
         speeds,
         measured[:, :3],
         measured[:, 3:],
+        states,
         states[:, POSITION],
         states[:, QUATERNION],
         states[:, VELOCITY],
