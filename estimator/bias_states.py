@@ -25,7 +25,7 @@ import numpy as np
 
 from ..dynamics.effects.base import STEP
 from ..runtime.compiled import Record, compiled
-from .covariance import carry_rows
+from .covariance import carry_rows, root_of
 from .error_state import error_from
 from .estimate import NIS, Array
 from .filter_record import AGREEING, BIASES, COMPANIONS, N
@@ -57,21 +57,13 @@ def load_imu(f: np.void, tuning: UKFTuning, gate: float | None) -> None:
 def _forget(f: Record) -> None:
     imu = f.imu
     imu.known, imu.refused, imu.in_row = 0, 0, 0
-    for s in range(2):
-        imu.doubt[s] = -1.0
-    for i in range(COMPANIONS):
-        imu.mean[i] = 0.0
-        for j in range(COMPANIONS):
-            imu.rest[i, j] = 0.0
-        imu.rest[i, i] = imu.prior[i] if i < BIASES else 1.0
-    # a bias is in its sensor from the first sample on; what a step's noise does there, the first
-    # step says
+    imu.doubt[:] = -1.0
+    imu.mean[:], imu.rest[:], imu.regression[:] = 0.0, 0.0, 0.0
+    # a bias is in its sensor from the first sample on; the noise of a step, from the first step on
+    imu.sensitivity[:], imu.bias_covariance[:] = 0.0, 0.0
     for i in range(BIASES):
-        for j in range(COMPANIONS):
-            imu.sensitivity[i, j] = 0.0
-        imu.sensitivity[i, i] = 1.0
-    _uncorrelate(f)
-    _keep_bias_covariance(f, imu.rest)
+        imu.rest[i, i], imu.rest[BIASES + i, BIASES + i] = imu.prior[i], 1.0
+        imu.bias_covariance[i, i], imu.sensitivity[i, i] = imu.prior[i], 1.0
 
 
 @compiled
@@ -95,36 +87,16 @@ def begin_imu(record: Record) -> None:
 
 
 @compiled
-def _uncorrelate(f: Record) -> None:
-    for i in range(N):
-        for j in range(COMPANIONS):
-            f.imu.regression[i, j] = 0.0
-
-
-@compiled
-def _keep_bias_covariance(f: Record, joint: Array) -> None:
-    for i in range(BIASES):
-        for j in range(BIASES):
-            f.imu.bias_covariance[i, j] = joint[i, j]
-
-
-@compiled
 def restart_biases(f: Record) -> None:
-    """Keep the biases with their covariance, and let nothing that happens to pose, twist and wrench
-    touch them: after a restart at a new pose, what was wrong before it says nothing of what is
-    wrong after it.
+    """Keep the biases with their covariance, independent of pose, twist and wrench: an error before
+    a restart at a new pose says nothing of the errors after it.
     """
     imu = f.imu
-    for i in range(COMPANIONS):
-        for j in range(COMPANIONS):
-            imu.rest[i, j] = 0.0
+    imu.rest[:], imu.regression[:], imu.mean[BIASES:] = 0.0, 0.0, 0.0
+    imu.rest[:BIASES, :BIASES] = imu.bias_covariance
+    for i in range(BIASES, COMPANIONS):
         imu.rest[i, i] = 1.0
-    for i in range(BIASES):
-        for j in range(BIASES):
-            imu.rest[i, j] = imu.bias_covariance[i, j]
-        imu.mean[BIASES + i] = 0.0
     imu.known = 0
-    _uncorrelate(f)
 
 
 @compiled
@@ -132,38 +104,12 @@ def restore_bias_prior(f: Record, first: int) -> None:
     """Give the bias of the sensor whose first number is ``first`` (0 or 3) its prior variance, and
     no correlation with anything: it was contradicted for too long.
     """
-    imu = f.imu
-    for i in range(first, first + 3):
-        for j in range(COMPANIONS):
-            imu.rest[i, j] = 0.0
-            imu.rest[j, i] = 0.0
-        for j in range(N):
-            imu.regression[j, i] = 0.0
-        imu.rest[i, i] = imu.prior[i]
-        for j in range(BIASES):
-            imu.bias_covariance[i, j] = 0.0
-            imu.bias_covariance[j, i] = 0.0
-        imu.bias_covariance[i, i] = imu.prior[i]
-
-
-@compiled
-def lower_root(A: Array) -> Array:
-    """Return the lower triangular root of a covariance (n, n), with a floor under what rounding
-    leaves of a pivot.
-    """
-    n = len(A)
-    root = np.zeros((n, n))
-    for j in range(n):
-        pivot = A[j, j]
-        for k in range(j):
-            pivot -= root[j, k] * root[j, k]
-        root[j, j] = math.sqrt(max(pivot, 1e-14 * A[j, j] + 1e-300))
-        for i in range(j + 1, n):
-            total = A[i, j]
-            for k in range(j):
-                total -= root[i, k] * root[j, k]
-            root[i, j] = total / root[j, j]
-    return root
+    imu, last = f.imu, first + 3
+    imu.regression[:, first:last] = 0.0
+    imu.rest[first:last], imu.rest[:, first:last] = 0.0, 0.0
+    imu.bias_covariance[first:last], imu.bias_covariance[:, first:last] = 0.0, 0.0
+    for i in range(first, last):
+        imu.rest[i, i], imu.bias_covariance[i, i] = imu.prior[i], imu.prior[i]
 
 
 @compiled
@@ -201,14 +147,8 @@ def divide_transposed(root: Array, rows: Array) -> None:
 @compiled
 def cross_covariance(f: Record, columns: int) -> Array:
     """Return the covariance (18, n) of the error state with the first n companions, P T."""
-    P, T = f.P, f.imu.regression
-    out = np.zeros((N, columns))
-    for i in range(N):
-        for k in range(N):
-            a = P[i, k]
-            for j in range(columns):
-                out[i, j] += a * T[k, j]
-    return out
+    cross: Array = f.P @ np.ascontiguousarray(f.imu.regression[:, :columns])
+    return cross
 
 
 @compiled
@@ -217,55 +157,23 @@ def split(f: Record, cross: Array, joint: Array) -> None:
     covariance with it, ``cross`` (18, 12), and among themselves, ``joint`` (12, 12).
     """
     P, imu = f.P, f.imu
-    _keep_bias_covariance(f, joint)
+    imu.bias_covariance[:] = joint[:BIASES, :BIASES]
     # what the filter has forgotten is correlated with nothing
     for i in range(N):
-        alone = True
-        for j in range(N):
-            alone = alone and (i == j or P[i, j] == 0.0)
-        if alone:
-            for j in range(COMPANIONS):
-                cross[i, j] = 0.0
-    root = lower_root(P)
+        if np.count_nonzero(P[i]) == 1:
+            cross[i] = 0.0
+    root = root_of(P)
     whitened = divide(root, cross)
+    imu.rest[:] = joint - whitened.T @ whitened
+    rest = root_of(imu.rest)
     for i in range(COMPANIONS):
-        for j in range(i + 1):
-            total = joint[i, j]
-            for k in range(N):
-                total -= whitened[k, i] * whitened[k, j]
-            imu.rest[i, j] = total
-            imu.rest[j, i] = total
-    if not _is_positive(imu.rest, joint):
-        # the filter's covariance was bounded since (an attitude that nobody knows), and no longer
-        # belongs to these cross covariances
-        for i in range(COMPANIONS):
-            for j in range(COMPANIONS):
-                imu.rest[i, j] = joint[i, j]
-        _uncorrelate(f)
-        return
+        if not rest[i, i] * rest[i, i] > _BLIND * joint[i, i]:
+            # the filter's covariance was bounded since (an attitude that nobody knows), and no
+            # longer belongs to these cross covariances
+            imu.rest[:], imu.regression[:] = joint, 0.0
+            return
     divide_transposed(root, whitened)
-    for i in range(N):
-        for j in range(COMPANIONS):
-            imu.regression[i, j] = whitened[i, j]
-
-
-@compiled
-def _is_positive(rest: Array, joint: Array) -> bool:
-    n = len(rest)
-    root = np.zeros((n, n))
-    for j in range(n):
-        pivot = rest[j, j]
-        for k in range(j):
-            pivot -= root[j, k] * root[j, k]
-        if not pivot > _BLIND * joint[j, j]:
-            return False
-        root[j, j] = math.sqrt(pivot)
-        for i in range(j + 1, n):
-            total = rest[i, j]
-            for k in range(j):
-                total -= root[i, k] * root[j, k]
-            root[i, j] = total / root[j, j]
-    return True
+    imu.regression[:] = whitened
 
 
 @compiled
@@ -274,31 +182,18 @@ def carry_companions(f: Record, dt: float, cross: Array) -> None:
 
     ``cross`` (18, 6) is the covariance of the error state after the step with the biases before it.
     """
-    imu = f.imu
-    walk = dt / f.period
-    all_cross = np.empty((N, COMPANIONS))
-    joint = np.zeros((COMPANIONS, COMPANIONS))
+    imu, joint = f.imu, np.eye(COMPANIONS)
+    joint[:BIASES, :BIASES] = imu.bias_covariance
     for i in range(BIASES):
-        for j in range(BIASES):
-            joint[i, j] = imu.bias_covariance[i, j]
-        joint[i, i] += walk * imu.walk[i]
-        joint[BIASES + i, BIASES + i] = 1.0
-        imu.mean[BIASES + i] = 0.0
-        for j in range(N):
-            all_cross[j, i] = cross[j, i]
-            # one standard deviation of each input, as ``add_noise`` leaves them
-            all_cross[j, BIASES + i] = f.B[i, j]
-    # the accelerations of the same, in body axes: velocity is rows 9-11
-    R = f.centre_rotation
-    for i in range(3):
-        for n in range(6):
-            total = 0.0
-            for j in range(3):
-                total += R[j, i] * f.B[n, 9 + j]
-            imu.sensitivity[3 + i, BIASES + n] = total / dt
+        joint[i, i] += dt / f.period * imu.walk[i]
+    imu.mean[BIASES:] = 0.0
+    # the accelerations of the noise, in body axes: velocity is rows 9-11
+    turned = f.centre_rotation.T @ np.ascontiguousarray(f.B[:, 9:12].T)
+    imu.sensitivity[3:, BIASES:] = turned / dt
+    for i in range(BIASES):
         imu.sensitivity[i, i] = 1.0
-        imu.sensitivity[3 + i, 3 + i] = 1.0
-    split(f, all_cross, joint)
+    # one standard deviation of each input, as ``add_noise`` leaves them
+    split(f, np.hstack((cross, f.B.T)), joint)
     imu.known = 1
     for s in range(2):
         if imu.doubt[s] >= 0.0:
@@ -314,26 +209,14 @@ def carry_with_points(f: Record, dt: float, cross: Array) -> Array:
     drawn as pairs of points go with half the difference of the pair; the others with the linear
     part of the model.
     """
-    S, H = f.S, f.H
-    pairs = 6 if f.wrench_count == 0 else 12
-    n = cross.shape[1]
-    rows, rest = np.empty((pairs, n)), cross.copy()
+    S, pairs = f.S, 6 if f.wrench_count == 0 else 12
+    rows, rest, out = np.empty((pairs, cross.shape[1])), cross.copy(), np.empty_like(cross)
     for j in range(pairs):
-        for m in range(n):
-            rows[j, m] = rest[j, m] / S[j, j]
-        for i in range(j, N):
-            for m in range(n):
-                rest[i, m] -= S[j, i] * rows[j, m]
-    for i in range(6, pairs):
-        for m in range(n):
-            rest[i, m] = 0.0
-    out = np.empty((N, n))
+        rows[j] = rest[j] / S[j, j]
+        rest[j:] -= np.outer(S[j, j:], rows[j])
+    rest[6:pairs] = 0.0
     carry_rows(f, dt, rest[6:], out)
-    for j in range(pairs):
-        for i in range(N):
-            a = H[j, i]
-            for m in range(n):
-                out[i, m] += a * rows[j, m]
+    out += f.H[:pairs].T @ rows
     return out
 
 
@@ -353,18 +236,9 @@ def correct_companions(f: Record, before: Array) -> None:
     """
     imu, error = f.imu, np.empty(N)
     error_from(f.x, before, error)
-    for j in range(COMPANIONS):
-        total = 0.0
-        for i in range(N):
-            total += imu.regression[i, j] * error[i]
-        imu.mean[j] += total
-    cross = cross_covariance(f, BIASES)
-    for i in range(BIASES):
-        for j in range(BIASES):
-            total = imu.rest[i, j]
-            for k in range(N):
-                total += imu.regression[k, i] * cross[k, j]
-            imu.bias_covariance[i, j] = total
+    imu.mean[:] += imu.regression.T @ error
+    biases = np.ascontiguousarray(imu.regression[:, :BIASES])
+    imu.bias_covariance[:] = imu.rest[:BIASES, :BIASES] + biases.T @ (f.P @ biases)
 
 
 def joint_covariance(f: np.void) -> Array:

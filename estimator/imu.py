@@ -20,7 +20,8 @@ from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.compiled import Record, compiled
-from .bias_states import cross_covariance, divide, lower_root, restore_bias_prior, split
+from .bias_states import cross_covariance, divide, restore_bias_prior, split
+from .covariance import root_of
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
 from .filter_record import AGREEING, COMPANIONS, N
@@ -59,7 +60,7 @@ def take_in_imu(record: Record, z: Array, gyro: bool, accelerometer: bool) -> No
     if first >= last:
         return
     C, T = imu.sensitivity, imu.regression
-    root = lower_root(f.P)
+    root = root_of(f.P)
     covariance, innovation, pairs = _innovation(f, z, root, T.T @ root)
     # of the error state and of the companions with what is measured
     cross = root @ pairs
@@ -115,9 +116,7 @@ def _innovation(f: Record, z: Array, root: Array, turned: Array) -> tuple[Array,
 
 @compiled
 def _nis(covariance: Array, innovation: Array, first: int, last: int) -> float:
-    y = divide(
-        lower_root(covariance[first:last, first:last]), innovation[first:last].reshape(-1, 1)
-    )
+    y = divide(root_of(covariance[first:last, first:last]), innovation[first:last].reshape(-1, 1))
     total = 0.0
     for i in range(last - first):
         total += y[i, 0] * y[i, 0]
@@ -183,7 +182,7 @@ def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
             return False
         for k in range(AGREEING):
             apart[i, k] = imu.unlikely[k, i] - mean
-    whitened = divide(lower_root(covariance[3:6, 3:6]), apart)
+    whitened = divide(root_of(covariance[3:6, 3:6]), apart)
     agreed: bool = np.sum(whitened * whitened) <= imu.gate[2]
     return agreed
 
@@ -200,7 +199,7 @@ def _correct(
 ) -> None:
     """Update error state and companions with rows ``first`` to ``last`` of the innovation."""
     x, P, imu = f.x, f.P, f.imu
-    root = lower_root(covariance[first:last, first:last])
+    root = root_of(covariance[first:last, first:last])
     W = divide(root, np.ascontiguousarray(cross[:, first:last].T))
     V = divide(root, np.ascontiguousarray(companions[:, first:last].T))
     y = divide(root, innovation[first:last].reshape(-1, 1))
