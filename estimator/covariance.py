@@ -236,6 +236,30 @@ def carry_rows(f: Record, dt: float, rows: Array, out: Array) -> None:
     _linear_rows(f, dt, rows, out, rows.shape[1])
 
 
+@compiled
+def carry_by_jacobian(P: Array, A: Array, G: Array) -> None:
+    """Replace P (18, 18) by ``F P F' = P + A P + (A P)' + A P A'``, where ``A`` (12, 18) has the
+    rows of F - 1 that are not zero; many of their numbers are. ``G`` (12, 18) is overwritten.
+    """
+    for i in range(12):
+        for j in range(N):
+            G[i, j] = 0.0
+        for k in range(N):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(N):
+                    G[i, j] += a * P[k, j]
+    for i in range(12):
+        for j in range(N):
+            P[i, j] += G[i, j]
+            P[j, i] += G[i, j]
+        for k in range(N):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(12):
+                    P[j, i] += a * G[j, k]
+
+
 @compiled_inline
 def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
     """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for

@@ -10,19 +10,13 @@ import math
 
 from ..dynamics.motion import effect_wrench
 from ..runtime.compiled import Record, compiled
-from .bias_states import (
-    carry_companions,
-    carry_with_jacobian,
-    cross_covariance,
-    restart_biases,
-)
-from .covariance import add_noise
+from .bias_states import carry_with_jacobian
+from .covariance import add_noise, carry_by_jacobian
 from .error_state import symmetrise
 from .estimate import NIS, Array
-from .filter_record import BIASES, N, drive, propagate
+from .filter_record import N, drive, propagate
 from .recovery import after_prediction
-from .sample import check_sample, undo_sensing
-from .ukf import WrenchUKF, correct_parts, correct_with_biases
+from .ukf import WrenchUKF, step_by, step_with_biases_by
 
 _TURN = 1e-6  # rad, steps of the difference quotients of an effect's wrench
 _STEP = 1e-5  # m, m/s and rad/s
@@ -232,24 +226,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     drive(f, rotor_speeds, dt, voltage)
     propagate(f, x, dt, f.centre)
     model_jacobian(f, dt, A)
-    # F P F' = P + A P + (A P)' + A P A', where A = F - 1 has twelve rows that are not zero
-    for i in range(12):
-        for j in range(N):
-            G[i, j] = 0.0
-        for k in range(N):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(N):
-                    G[i, j] += a * P[k, j]
-    for i in range(12):
-        for j in range(12):
-            total = G[i, j] + G[j, i]
-            for k in range(N):
-                total += G[i, k] * A[j, k]
-            P[i, j] += total
-        for j in range(12, N):
-            P[i, j] += G[i, j]
-            P[j, i] += G[i, j]
+    carry_by_jacobian(P, A, G)
     add_noise(f, f.centre_rotation, dt)
     symmetrise(P)
     for i in range(NIS):
@@ -262,29 +239,12 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
 @compiled
 def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     f = record[0]
-    usable: int = check_sample(f, f.z, parts)
-    if usable >= 0:
-        sample = undo_sensing(f, f.z, usable, dt)
-        if dt > 0.0:
-            predict(f, sample[0:4], dt, voltage)
-        correct_parts(f, sample, usable)
-    return usable
+    return step_by(f, f.z, parts, dt, voltage, predict)
 
 
 @compiled
 def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
-    f = record[0]
-    usable: int = check_sample(f, f.z, parts)
-    if usable >= 0:
-        sample = undo_sensing(f, f.z, usable, dt)
-        if dt > 0.0:
-            cross, restarts = cross_covariance(f, BIASES), f.restarts
-            predict(f, sample[0:4], dt, voltage)
-            carry_companions(f, dt, carry_with_jacobian(f, dt, cross))
-            if f.restarts > restarts:
-                restart_biases(f)
-        correct_with_biases(f, sample, usable)
-    return usable
+    return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_jacobian)
 
 
 class WrenchEKF(WrenchUKF):

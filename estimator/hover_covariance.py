@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..runtime.compiled import Record, compiled, compiled_without_gil
-from .covariance import add_noise
+from .covariance import add_noise, carry_by_jacobian
 from .ekf import acceleration_jacobian
 from .error_state import symmetrise
 from .estimate import Array
@@ -37,24 +37,7 @@ def carry_at_hover(f: Record, dt: float) -> None:
             A[9 + i, j] = dt * J[3 + i, j]
             A[6 + i, j] = 0.5 * dt * A[9 + i, j]
         A[6 + i, 9 + i] += dt
-    # F P F' = P + A P + (A P)' + A P A', where A = F - 1 is sparse
-    for i in range(12):
-        for j in range(N):
-            G[i, j] = 0.0
-        for k in range(N):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(N):
-                    G[i, j] += a * P[k, j]
-    for i in range(12):
-        for j in range(N):
-            P[i, j] += G[i, j]
-            P[j, i] += G[i, j]
-        for k in range(N):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(12):
-                    P[j, i] += a * G[j, k]
+    carry_by_jacobian(P, A, G)
     for i in range(3):
         for j in range(3):
             f.centre_rotation[i, j] = 1.0 if i == j else 0.0

@@ -28,7 +28,7 @@ from ..dynamics.model import reset_model
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.addresses import address_of
-from ..runtime.compiled import Record, compiled, specialised
+from ..runtime.compiled import Record, compiled, compiled_inline, specialised
 from ..runtime.errors import InputError
 from ..runtime.vector_lanes import all_of, any_of, choose, first_below, first_column, lanes_by
 from .bias_states import (
@@ -63,27 +63,6 @@ from .tuning import UKFTuning
 
 
 @compiled
-def _pairs_with_effects(f: Record, dt: float, spread: float, scale: float, weight: float) -> None:
-    """Do what ``sigma_points`` does with six pairs of points with twelve, one point at a time:
-    effects are called so.
-    """
-    x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
-    for i in range(N):
-        mean[i] = 0.0
-    for j in range(12):
-        for sign in range(2):
-            displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
-            propagate(f, f.point, dt, f.next)
-            error_from(f.next, f.centre, error[sign])
-        for i in range(N):
-            H[j, i] = scale * (error[0, i] - error[1, i])
-        for i in range(12):
-            total = error[0, i] + error[1, i]
-            E[j, i] = scale * total
-            mean[i] += weight * total  # (26)
-
-
-@compiled
 def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     """Carry the filter ``dt`` s ahead at rotor speeds (4,) rad/s: (18)-(27)."""
     drive(f, rotor_speeds, dt, voltage)
@@ -98,11 +77,10 @@ def carry_on(f: Record, dt: float) -> None:
         quaternion_to_matrix(f.x[3:7], f.rotation)
         carry(f, dt)
         return
-    spread, weight, scale = _spread_of(f)
     root_of_twelve(f)
     propagate(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
-    _pairs_with_effects(f, dt, spread, scale, weight)
+    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
     add_pairs(f)
     add_more_pairs(f)
     _gather(f, dt)
@@ -121,30 +99,19 @@ def carry(f: Record, dt: float) -> None:
     _gather(f, dt)
 
 
-@compiled
-def _pairs_together(f: Record, dt: float) -> None:
-    """Write what six pairs of sigma points come to, all of them side by side."""
-    spread, weight, scale = _spread_of(f)
-    spread_points(f, spread)
-    propagate_points(f, dt)
-    errors_of_points(f)
-    halve_pairs(f, scale, weight)
-
-
-@compiled
-def _pairs_one_by_one(f: Record, dt: float) -> None:
-    """Do the same where each number is a vector already: one point after the other, so that all of
-    them need no more memory than one.
+@compiled_inline
+def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
+    """Write the scaled half differences and half sums of the first pairs of sigma points, and their
+    mean, one point after the other, each carried ahead by ``moved``.
     """
     spread, weight, scale = _spread_of(f)
     x, H, E, mean, error = f.x, f.H, f.E, f.mean, f.error
     for i in range(N):
         mean[i] = 0.0
-    for j in range(PAIRS):
+    for j in range(pairs):
         for sign in range(2):
             displace(x, f.S[j], spread if sign == 0 else -spread, f.rho, f.q, f.point)
-            quaternion_to_matrix(f.point[3:7], f.rotation)
-            move(f, f.point, dt, f.next)
+            moved(f, f.point, dt, f.next)
             error_from(f.next, f.centre, error[sign])
         for i in range(N):
             H[j, i] = scale * (error[0, i] - error[1, i])
@@ -154,7 +121,31 @@ def _pairs_one_by_one(f: Record, dt: float) -> None:
             mean[i] += weight * total  # (26)
 
 
-_pairs = lanes_by(_pairs_together, _pairs_one_by_one)
+@compiled
+def _move_point(f: Record, x: Array, dt: float, out: Array) -> None:
+    quaternion_to_matrix(x[3:7], f.rotation)
+    move(f, x, dt, out)
+
+
+@compiled
+def _pairs_in_lanes(f: Record, dt: float) -> None:
+    """Do as ``_pairs_together`` where each number is a vector already: one point after the other
+    needs no more memory than one.
+    """
+    _pairs_in_turn(f, dt, PAIRS, _move_point)
+
+
+@compiled
+def _pairs_together(f: Record, dt: float) -> None:
+    """Write the same of six pairs, all of them side by side."""
+    spread, weight, scale = _spread_of(f)
+    spread_points(f, spread)
+    propagate_points(f, dt)
+    errors_of_points(f)
+    halve_pairs(f, scale, weight)
+
+
+_pairs = lanes_by(_pairs_together, _pairs_in_lanes)
 
 
 @compiled
@@ -290,10 +281,10 @@ def correct_parts(f: Record, z: Array, parts: int) -> None:
         correct(f, z[4:7], z[7:11], parts & 1 != 0, parts & 2 != 0)
 
 
-@compiled
-def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
-    """Predict over ``dt`` s if that is positive, then correct with the ``parts`` of ``z`` (11,)
-    that were measured.
+@compiled_inline
+def step_by(f: Record, z: Array, parts: int, dt: float, voltage: float, predict_with: Any) -> int:
+    """Predict over ``dt`` s by ``predict_with`` if that is positive, then correct with the
+    ``parts`` of ``z`` (11,) that were measured.
 
     Returns the parts that could be used, or -1, with the filter as it was, if the quaternion is no
     rotation.
@@ -302,9 +293,15 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if usable >= 0:
         sample = undo_sensing(f, z, usable, dt)
         if dt > 0.0:
-            predict(f, sample[0:4], dt, voltage)
+            predict_with(f, sample[0:4], dt, voltage)
         correct_parts(f, sample, usable)
     return usable
+
+
+@compiled
+def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
+    """Do ``step_by`` the unscented prediction."""
+    return step_by(f, z, parts, dt, voltage, predict)
 
 
 @compiled
@@ -313,31 +310,34 @@ def _step_record(record: Record, parts: int, dt: float, voltage: float) -> int:
     return step(f, f.z, parts, dt, voltage)
 
 
-@compiled
-def correct_with_biases(f: Record, sample: Array, parts: int) -> None:
-    """Correct like ``correct_parts``, and the biases of an IMU with it."""
-    x, restarts = f.x.copy(), f.restarts
-    correct_parts(f, sample, parts)
-    if f.restarts > restarts:
-        restart_biases(f)
-    else:
-        correct_companions(f, x)
-
-
-@compiled
-def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
-    f = record[0]
+@compiled_inline
+def step_with_biases_by(
+    f: Record, parts: int, dt: float, voltage: float, predict_with: Any, carry_with: Any
+) -> int:
+    """Step like ``step_by`` with the sample in ``f.z``, and the biases of an IMU, whose covariance
+    with the error state ``carry_with`` carries over the prediction.
+    """
     usable: int = check_sample(f, f.z, parts)
     if usable >= 0:
         sample = undo_sensing(f, f.z, usable, dt)
         if dt > 0.0:
             cross, restarts = cross_covariance(f, BIASES), f.restarts
-            predict(f, sample[0:4], dt, voltage)
-            carry_companions(f, dt, carry_with_points(f, dt, cross))
+            predict_with(f, sample[0:4], dt, voltage)
+            carry_companions(f, dt, carry_with(f, dt, cross))
             if f.restarts > restarts:
                 restart_biases(f)
-        correct_with_biases(f, sample, usable)
+        x, restarts = f.x.copy(), f.restarts
+        correct_parts(f, sample, usable)
+        if f.restarts > restarts:
+            restart_biases(f)
+        else:
+            correct_companions(f, x)
     return usable
+
+
+@compiled
+def _step_with_biases(record: Record, parts: int, dt: float, voltage: float) -> int:
+    return step_with_biases_by(record[0], parts, dt, voltage, predict, carry_with_points)
 
 
 def _step_at(pointer: Any, parts: int, dt: float, voltage: float) -> int:
