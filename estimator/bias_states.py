@@ -25,7 +25,7 @@ import numpy as np
 
 from ..dynamics.effects.base import STEP
 from ..runtime.compiled import Record, compiled
-from .covariance import carry_rows, root_of
+from .covariance import carry_rows, divide, divide_transposed, root_of
 from .error_state import error_from
 from .estimate import NIS, Array
 from .filter_record import AGREEING, BIASES, COMPANIONS, N
@@ -110,38 +110,6 @@ def restore_bias_prior(f: Record, first: int) -> None:
     imu.bias_covariance[first:last], imu.bias_covariance[:, first:last] = 0.0, 0.0
     for i in range(first, last):
         imu.rest[i, i], imu.bias_covariance[i, i] = imu.prior[i], imu.prior[i]
-
-
-@compiled
-def divide(root: Array, rows: Array) -> Array:
-    """Return ``root^-1 rows`` for a lower triangular root (n, n) and rows (n, m)."""
-    n, m = rows.shape
-    out = np.empty((n, m))
-    for i in range(n):
-        inverse = 1.0 / root[i, i]
-        for j in range(m):
-            out[i, j] = rows[i, j]
-        for k in range(i):
-            a = root[i, k]
-            for j in range(m):
-                out[i, j] -= a * out[k, j]
-        for j in range(m):
-            out[i, j] *= inverse
-    return out
-
-
-@compiled
-def divide_transposed(root: Array, rows: Array) -> None:
-    """Replace rows (n, m) with ``root'^-1 rows`` for a lower triangular root (n, n)."""
-    n, m = rows.shape
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            a = root[k, i]
-            for j in range(m):
-                rows[i, j] -= a * rows[k, j]
-        inverse = 1.0 / root[i, i]
-        for j in range(m):
-            rows[i, j] *= inverse
 
 
 @compiled

@@ -33,6 +33,38 @@ def root_of(P: Array) -> Array:
     return root
 
 
+@compiled
+def divide(root: Array, rows: Array) -> Array:
+    """Return ``root^-1 rows`` for a lower triangular root (n, n) and rows (n, m)."""
+    n, m = rows.shape
+    out = np.empty((n, m))
+    for i in range(n):
+        inverse = 1.0 / root[i, i]
+        for j in range(m):
+            out[i, j] = rows[i, j]
+        for k in range(i):
+            a = root[i, k]
+            for j in range(m):
+                out[i, j] -= a * out[k, j]
+        for j in range(m):
+            out[i, j] *= inverse
+    return out
+
+
+@compiled
+def divide_transposed(root: Array, rows: Array) -> None:
+    """Replace rows (n, m) with ``root'^-1 rows`` for a lower triangular root (n, n)."""
+    n, m = rows.shape
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            a = root[k, i]
+            for j in range(m):
+                rows[i, j] -= a * rows[k, j]
+        inverse = 1.0 / root[i, i]
+        for j in range(m):
+            rows[i, j] *= inverse
+
+
 @compiled_inline
 def _least_pivot(variance: float) -> float:
     """Return the least pivot of a row of the covariance: rounding may eat the smallest pivots, and

@@ -20,8 +20,8 @@ from ..dynamics.model import apply_effects
 from ..dynamics.motion import accelerations
 from ..dynamics.rotation import quaternion_to_matrix
 from ..runtime.compiled import Record, compiled
-from .bias_states import cross_covariance, divide, restore_bias_prior, split
-from .covariance import root_of
+from .bias_states import cross_covariance, restore_bias_prior, split
+from .covariance import divide, root_of
 from .error_state import displace, fold, symmetrise
 from .estimate import NIS, Array
 from .filter_record import AGREEING, COMPANIONS, N

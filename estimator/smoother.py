@@ -25,7 +25,7 @@ from .estimate import (
     WrenchEstimate,
 )
 from .filter_record import N
-from .rauch_tung_striebel import LINK, WORK, step_back, step_with_link
+from .rauch_tung_striebel import LINK, step_back, step_with_link
 from .recovery import Recovery
 from .tuning import UKFTuning
 from .ukf import WrenchUKF, step
@@ -47,13 +47,13 @@ def _forward(record: np.ndarray, events: np.ndarray) -> None:
 
 @compiled
 def _forward_with_links(
-    record: np.ndarray, events: np.ndarray, links: np.ndarray, work: Array, numbers: Array
+    record: np.ndarray, events: np.ndarray, links: np.ndarray, numbers: Array
 ) -> None:
     f = record[0]
     for k in range(len(events)):
         event = events[k]
         f.z[:] = event.z
-        step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k], work)
+        step_with_link(f, f.z, event.parts, event.dt, event.voltage, links[1 + k])
         numbers[k, STATUS], numbers[k, RESTARTS] = f.status, f.restarts
 
 
@@ -70,15 +70,13 @@ def _write(x: Array, P: Array, numbers: Array, std: Array, k: int) -> None:
 
 
 @compiled
-def _backward(
-    links: np.ndarray, x: Array, P: Array, work: Array, numbers: Array, std: Array
-) -> None:
+def _backward(links: np.ndarray, x: Array, P: Array, numbers: Array, std: Array) -> None:
     """Write the smoothed estimates of a block, from the last, which is ``x`` and ``P``; leave in
     these the one before the block, whose link is the first.
     """
     for k in range(len(numbers) - 1, -1, -1):
         _write(x, P, numbers, std, k)
-        step_back(x, P, links[k + 1], links[k].x, work)
+        step_back(x, P, links[k + 1], links[k].x)
 
 
 class RecordingUKF(WrenchUKF):
@@ -167,10 +165,10 @@ class RecordingUKF(WrenchUKF):
             here = slice(first, min(first + _BLOCK, end))
             blocks.append((here, record.copy()))
             _forward(record, events[here])
-        x, P, work = record["x"][0].copy(), record["P"][0].copy(), np.empty(WORK)
+        x, P = record["x"][0].copy(), record["P"][0].copy()
         links = np.zeros(1 + min(_BLOCK, end - begin), dtype=LINK)
         for here, memory in reversed(blocks):
             links["x"][0] = memory["x"][0]
-            _forward_with_links(memory, events[here], links, work, numbers[here])
-            _backward(links, x, P, work, numbers[here], std[here])
+            _forward_with_links(memory, events[here], links, numbers[here])
+            _backward(links, x, P, numbers[here], std[here])
         _write(x, P, numbers, std, begin)
