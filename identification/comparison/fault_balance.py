@@ -41,7 +41,7 @@ class Begin(NamedTuple):
 AT_ONCE = Begin(0.0, False)
 
 
-class Balance:
+class FaultBalance:
     """The four channels' regressions with one lag and one curve of the rotors."""
 
     def __init__(self, samples: Samples, thrust: Array, lag: float) -> None:

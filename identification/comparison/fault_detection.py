@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from .fault_balance import AT_ONCE, Balance, Begin
+from .fault_balance import AT_ONCE, Begin, FaultBalance
 from .fault_channels import STEP, Channels, Samples, sample
 from .fault_noise import Noise
 
@@ -94,20 +94,20 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
     samples = sample(channels)
     search = _Search(samples, _rows(len(samples.t), use), use)
     search.find_curve(channels.thrust_known)
-    event = search.event()
+    likeliest = search.likeliest_jump()
     names = ["1", "2", "3", "4", ALL, OTHER]
-    each, shares, weights = _patterns(event, use)
+    each, shares, weights = _patterns(likeliest, use)
     prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
     logs = np.log(prior) + each
     # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
     # sizes left free, is the search's
     whole = np.array([math.log(use.prior[0]) + search.nothing()])
     shape = logs - logsumexp(logs)
-    happened = event.evidence + math.log(float(prior.sum()))
+    happened = likeliest.evidence + math.log(float(prior.sum()))
     every = np.concatenate([whole, happened + shape])
     chances = np.exp(every - logsumexp(every))
     rotor = 1 + int(np.argmax(logs[:4]))
-    when = _quantiles(event.starts, event.weights, STEP)
+    when = _quantiles(likeliest.starts, likeliest.weights, STEP)
     remaining = _remaining(shares, weights[rotor - 1])
     return RotorFault(
         channels.name,
@@ -118,12 +118,12 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
         use.sure,
         len(samples.t) * STEP,
         samples.ended,
-        event.balance.lag,
+        likeliest.balance.lag,
         channels.motor_names,
     )
 
 
-def _patterns(event: "_Event", use: FaultSettings) -> tuple[Array, Array, Array]:
+def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, Array, Array]:
     """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
     from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
     (4, E).
@@ -131,15 +131,15 @@ def _patterns(event: "_Event", use: FaultSettings) -> tuple[Array, Array, Array]
     shares = np.linspace(*use.losses, use.steps)
     found, weights = [], []
     # only what speaks under every hypothesis, so that all explain the same numbers
-    every = [std for _, std in (*event.losses, event.jumps)]
+    every = [std for _, std in (*likeliest.losses, likeliest.jumps)]
     silent = ~np.isfinite(every).all(axis=0)
     for rotor in range(4):
-        seen, std = event.losses[rotor]
+        seen, std = likeliest.losses[rotor]
         std = np.where(silent, np.inf, std)
         log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
         found.append(float(logsumexp(log)) - math.log(len(shares)))
         weights.append(np.exp(log - logsumexp(log)))
-    seen, std = event.jumps
+    seen, std = likeliest.jumps
     std = np.where(silent, np.inf, std)
     lost = shares[shares <= use.all_lose]
     means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
@@ -178,7 +178,7 @@ def _rows(count: int, use: FaultSettings) -> NDArray[np.int64]:
 class _Tried:
     """One lag and curve: the noise that fits it best, and the likeliest jump with that."""
 
-    balance: Balance
+    balance: FaultBalance
     usual: list[Noise]  # if nothing happened
     noise: list[Noise]  # with the jump
     log: float
@@ -187,10 +187,10 @@ class _Tried:
 
 
 @dataclass(frozen=True, eq=False)
-class _Event:
+class _LikeliestJump:
     """The likeliest jump of a flight."""
 
-    balance: Balance
+    balance: FaultBalance
     evidence: float
     starts: Array  # (T,) s, when it may have begun
     weights: Array  # (T,) how likely each is
@@ -226,7 +226,7 @@ class _Search:
     def _try(self, key: tuple[float, float, float]) -> None:
         if key in self.tried:
             return
-        one = Balance(self.samples, self.samples.thrust(*key), key[0])
+        one = FaultBalance(self.samples, self.samples.thrust(*key), key[0])
         usual = one.noises(one.plain_residuals())
         noise = usual
         for _ in range(self.use.rounds):
@@ -234,7 +234,7 @@ class _Search:
             noise = one.noises(one.step_residuals(row, begin))
         self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
 
-    def _jump(self, one: Balance, noise: list[Noise]) -> tuple[float, int, Begin]:
+    def _jump(self, one: FaultBalance, noise: list[Noise]) -> tuple[float, int, Begin]:
         """Return the log-likelihood, the row and the kind of the likeliest jump."""
         near = self._near(one.steps(noise, self.rows, AT_ONCE))
         logs = np.array([one.steps(noise, near, begin) for begin in self.begins])
@@ -254,7 +254,7 @@ class _Search:
             for one in self.tried.values()
         )
 
-    def event(self) -> _Event:
+    def likeliest_jump(self) -> _LikeliestJump:
         """Return the likeliest jump."""
         one = self.tried[self._likeliest()]
         balance, noise = one.balance, one.noise
@@ -266,7 +266,7 @@ class _Search:
         weights = np.exp(fine - logsumexp(fine))
         evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
         places = len(self.begins) * len(self.samples.t)
-        return _Event(
+        return _LikeliestJump(
             balance,
             evidence - math.log(places),
             starts.ravel(),

@@ -16,7 +16,7 @@ from .drift import Fleet
 from .page import write_page
 from .picture import draw_fleet
 
-Row = Mapping[str, Any]
+FlightRow = Mapping[str, Any]
 _COLUMNS = (
     *("id", "flight", "log", "time", "vehicle", "status", "reason", "verdict", "residual"),
     *("effect", "coefficient", "value", "std", "unit", "tentative", "indistinguishable_from"),
@@ -25,7 +25,7 @@ _COLUMNS = (
 
 
 def write_fleet(
-    fleet: Fleet, rows: Callable[[], Iterable[Row]], folder: Path, command: str
+    fleet: Fleet, rows: Callable[[], Iterable[FlightRow]], folder: Path, command: str
 ) -> list[Path]:
     """Write the results of a fleet, each file whole or not at all; return their paths.
 
@@ -84,7 +84,7 @@ def fleet_data(fleet: Fleet) -> dict[str, Any]:
     return found
 
 
-def _lines(row: Row) -> Iterable[dict[str, Any]]:
+def _lines(row: FlightRow) -> Iterable[dict[str, Any]]:
     """Yield a flight's lines of the table: one a coefficient, or one if there is none."""
     line = {key: row.get(key) for key in _COLUMNS[:8]}
     line["residual"] = row.get("remainder")

@@ -34,7 +34,7 @@ _KEPT = (
 
 
 @dataclass(frozen=True)
-class Job:
+class LogTask:
     """A log that is to be diagnosed."""
 
     log: FleetLog
@@ -96,7 +96,7 @@ def refusal(key: str, kind: str, reason: str) -> dict[str, Any]:
     return {"key": key, "status": "refused", "kind": kind, "reason": text}
 
 
-def diagnose_one(job: Job) -> dict[str, Any]:
+def diagnose_one(job: LogTask) -> dict[str, Any]:
     """Return the outcome of a log: what was found, or why it was refused. Raises nothing."""
     begun, busy = time.perf_counter(), time.process_time()
     try:

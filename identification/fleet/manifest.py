@@ -86,7 +86,7 @@ _Text = Annotated[str | None, BeforeValidator(lambda value: value if value is No
 
 
 @dataclass(frozen=True)
-class Entry:
+class ManifestEntry:
     """What a manifest says of the logs that fit a pattern."""
 
     __pydantic_config__ = STRICT
@@ -104,7 +104,7 @@ class Manifest:
     """What is said of logs below a folder."""
 
     folder: Path
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[ManifestEntry, ...] = ()
     by_modified: bool = False
 
 
@@ -150,10 +150,10 @@ def _csv_entries(path: Path) -> Iterator[tuple[str, dict[str, str]]]:
         raise InputError(f"{path}: cannot be read as a fleet's manifest: {error}") from error
 
 
-def _entry(given: Any, where: str, folder: Path) -> Entry:
+def _entry(given: Any, where: str, folder: Path) -> ManifestEntry:
     if not isinstance(given, Mapping) or "log" not in given:
         raise InputError(f"{where}: expected a mapping with a pattern named log")
-    entry = checked(Entry, given, where)
+    entry = checked(ManifestEntry, given, where)
     entry = replace(entry, vehicle=_beside(folder, entry.vehicle), map=_beside(folder, entry.map))
     if entry.reader is not None:
         find_reader(entry.reader)

@@ -10,7 +10,7 @@ from ...dynamics.vehicle_file import load_vehicle
 from ...runtime.errors import InputError
 from ...runtime.workers import Lost, each
 from ..report.files import printable
-from .flight import Job, diagnose_one, key_of, refusal
+from .flight import LogTask, diagnose_one, key_of, refusal
 from .manifest import FleetLog, natural
 from .outcomes import Outcome, Outcomes
 
@@ -65,7 +65,7 @@ def run_fleet(
         counts[outcome["status"]] += 1
         report(counts)
 
-    def pending() -> Iterator[Job]:
+    def pending() -> Iterator[LogTask]:
         for log in logs:
             try:
                 key = key_of(log, without, texts)
@@ -83,7 +83,7 @@ def run_fleet(
                 counts["kept"] += 1
                 report(counts)
             else:
-                yield Job(log if cluster is None else _absolute(log), key, without)
+                yield LogTask(log if cluster is None else _absolute(log), key, without)
 
     for job, result in each(diagnose_one, pending(), limit_s, jobs, cluster):
         if isinstance(result, Lost):

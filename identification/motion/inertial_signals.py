@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class InertialSettings:
+class InertialSignalSettings:
     """Which logs are read by their IMU, and at which rate."""
 
     # poses a second, from which the pose alone tells the motion; with fewer the IMU is needed
@@ -42,7 +42,7 @@ class InertialSettings:
     drift_time: float = 3.0  # s, over which what the fusion does not know drifts, in a sample of it
 
 
-INERTIAL_SIGNALS = InertialSettings()
+INERTIAL_SIGNALS = InertialSignalSettings()
 
 
 @dataclass(frozen=True, eq=False)

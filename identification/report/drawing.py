@@ -16,7 +16,7 @@ _FEW_DECADES = 2.0  # between an axis's ends: powers of ten are then too few to 
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class DrawnLine:
     """A series of points (n,), joined by a line or drawn as dots."""
 
     style: str  # CSS classes: before, after or ink, and dots
@@ -42,7 +42,7 @@ class Drawing:
 
 
 def draw(
-    lines: Sequence[Line],
+    lines: Sequence[DrawnLine],
     height: int,
     x_range: tuple[float, float] | None = None,
     y_range: tuple[float, float] | None = None,
@@ -75,7 +75,7 @@ def draw(
         level = np.log10(np.maximum(y, low)) if logarithmic else np.asarray(y)
         return np.round(bottom - (level - first) / tall * (bottom - _TOP), 1)
 
-    def path(line: Line) -> str:
+    def path(line: DrawnLine) -> str:
         points = list(zip(across(line.x).tolist(), down(line.y).tolist(), strict=True))
         if "dots" in line.style:
             return "".join(f"M{x:g} {y:g}h0" for x, y in points)

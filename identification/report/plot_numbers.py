@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..findings import CHANNELS, Diagnosis, Signature, Trace
-from .drawing import Drawing, Line, draw
+from .drawing import Drawing, DrawnLine, draw
 from .words import percent, rounded, scale_of
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ _SYMBOLS = ("Fx", "Fy", "Fz", "τx", "τy", "τz")
 
 
 @dataclass(frozen=True)
-class Table:
+class PlotTable:
     """A caption, the heads of the columns, and the rows as texts."""
 
     caption: str
@@ -62,7 +62,7 @@ class Plot:
 
     packed: dict[str, Any]  # its ``key`` is its name in the page
     drawing: Drawing
-    table: Table
+    table: PlotTable
     title: str  # what is drawn, with its unit
     axis: str  # what it is drawn over
     alt: str  # in words, for a reader who does not see it
@@ -111,7 +111,9 @@ def plots_over_time(diagnosis: Diagnosis) -> list[Plot]:
         factor, unit, limit = axis_limits(traces, i)
         symbol = _SYMBOLS[i]
         lines = [
-            Line(side, trace.t[kept] - trace.t[0] + start, factor * getattr(trace, side)[kept, i])
+            DrawnLine(
+                side, trace.t[kept] - trace.t[0] + start, factor * getattr(trace, side)[kept, i]
+            )
             for side in ("before", "after")
             for trace, start, columns in zip(
                 traces, starts, _columns(traces, PLOTS.still_columns), strict=True
@@ -177,13 +179,13 @@ def _plot_of_spectrum(
             "after": _digits(after),
         },
         draw(
-            [Line("before", x, before), Line("after", x, after)],
+            [DrawnLine("before", x, before), DrawnLine("after", x, after)],
             height=200,
             x_range=(0.0, float(x[-1])),
             y_range=(0.8 * min(before.min(), after.min()), 1.2 * max(before.max(), after.max())),
             logarithmic=True,
         ),
-        Table(
+        PlotTable(
             f"Amplitude of the residual {name}",
             ("Frequency (Hz)", "Before", "After"),
             [(rounded(x[i]), rounded(before[i], 2), rounded(after[i], 2)) for i in rows],
@@ -236,9 +238,9 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
         else ""
     )
     lines = [
-        Line("before dots", x[kept], residual[kept]),
-        Line("after dots", x[kept], fitted[kept]),
-        Line("ink", middle, mean),
+        DrawnLine("before dots", x[kept], residual[kept]),
+        DrawnLine("after dots", x[kept], fitted[kept]),
+        DrawnLine("ink", middle, mean),
     ]
     return Plot(
         {
@@ -254,7 +256,7 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
             "mean": _digits(mean),
         },
         draw(lines, height=230),
-        Table(
+        PlotTable(
             f"{signature.effect}: {symbol} ({unit}) over {signature.regressor}, means of "
             f"{len(middle)} groups of equally many points",
             (signature.regressor, "Residual without it", "Effect"),
@@ -416,7 +418,7 @@ def telling_samples(trace: Trace, i: int, columns: int) -> Index:
     return np.unique(np.concatenate([[0, n - 1], *extremes]))
 
 
-def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> Table:
+def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) -> PlotTable:
     """Return the residual's rms before and after in a channel, interval by interval."""
     several, many = len(traces) > 1, len(traces) > PLOTS.most_pieces
     each = max(PLOTS.rows // len(traces), 1)
@@ -433,7 +435,7 @@ def _table_over_time(traces: Sequence[Trace], i: int, factor: float, unit: str) 
                 )
             )
     more = f", the first {PLOTS.most_pieces} of {len(traces)} pieces" if many else ""
-    return Table(
+    return PlotTable(
         f"Residual {_SYMBOLS[i]}, rms ({unit}){more}",
         (*(("Piece",) if several else ()), "Time (s)", "Held out", "Before", "After"),
         rows,

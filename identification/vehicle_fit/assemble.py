@@ -15,7 +15,7 @@ from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .motors import MotorResponse
 from .result import IDENTIFIED, Estimate
-from .solve import Fit
+from .solve import VehicleFit
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ _EFFECTS = {
 
 def vehicle_of(
     name: str,
-    fit: Fit,
+    fit: VehicleFit,
     estimates: Mapping[str, Estimate],
     geometry: Geometry,
     logs: Sequence[FlightLog],
@@ -128,7 +128,7 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     return out
 
 
-def _curve(fit: Fit) -> MotorCurve:
+def _curve(fit: VehicleFit) -> MotorCurve:
     values = fit.values
     thrust = [0.0] * (max(fit.drive.exponents) + 1)
     for j, e in enumerate(fit.drive.exponents):

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ChannelSettings:
+class PieceSettings:
     """How signals are made of a log."""
 
     shortest_piece: float = 3.0  # s; shorter ones have no frequency low enough to tell a bias
@@ -37,11 +37,11 @@ class ChannelSettings:
     few_values: float = 0.2
 
 
-CHANNELS = ChannelSettings()
+CHANNELS = PieceSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class MotionPiece:
     """n evenly spaced samples of one unbroken piece of a log; body axes forward, left, up."""
 
     log: int  # which of the logs
@@ -55,7 +55,7 @@ class Piece:
     command: Array | None  # (n, 4), 0 to 1
     voltage: Array | None  # (n,) V
 
-    def mapped(self, change: Callable[[Array], Array]) -> "Piece":
+    def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
         series = {f.name: getattr(self, f.name) for f in fields(self)}
         changed: dict[str, Any] = {
@@ -122,7 +122,7 @@ def rounding_step(logs: Sequence[FlightLog]) -> float:
 
 def pieces_of(
     logs: Sequence[FlightLog], windows: Sequence[tuple[float, float]], gravity: float
-) -> tuple[list[Piece], Sources]:
+) -> tuple[list[MotionPiece], Sources]:
     """Return all unbroken pieces of the logs in flight, and what they rest on.
 
     Args:
@@ -134,7 +134,7 @@ def pieces_of(
         InputError: a log lacks what is needed, or none of it is long enough in flight.
     """
     sources = sources_of(logs)
-    pieces: list[Piece] = []
+    pieces: list[MotionPiece] = []
     for number, (log, (first, last)) in enumerate(zip(logs, windows, strict=True)):
         posed = "pose" in (sources.rate, sources.force)
         for piece in (_posed if posed else _inertial)(log, number, sources, gravity):
@@ -149,7 +149,7 @@ def pieces_of(
     return pieces, sources
 
 
-def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[Piece]:
+def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[MotionPiece]:
     """Yield pieces whose force, and rate where there is no gyro, are the pose's derivatives."""
     for s in log_signals(log, wide_hz=np.inf):
         inverse = Rotation.from_matrix(s.rotation).inv()
@@ -164,7 +164,9 @@ def _posed(log: FlightLog, number: int, sources: Sources, gravity: float) -> Ite
         yield _piece(log, number, s.t, s.period, force, rate, turning, velocity, sources)
 
 
-def _inertial(log: FlightLog, number: int, sources: Sources, gravity: float) -> Iterator[Piece]:
+def _inertial(
+    log: FlightLog, number: int, sources: Sources, gravity: float
+) -> Iterator[MotionPiece]:
     """Yield pieces whose rate, and force if any, are the IMU's; velocity is the pose's, where there
     is one.
     """
@@ -192,9 +194,9 @@ def _piece(
     turning: Array,
     velocity: Array | None,
     sources: Sources,
-) -> Piece:
+) -> MotionPiece:
     speeds = log.rotor_speeds if sources.rotors == "rotor speeds" else None
-    piece = Piece(
+    piece = MotionPiece(
         number,
         t,
         period,
@@ -242,7 +244,7 @@ def _velocity(log: FlightLog, t: Array) -> Array | None:
     return None if np.isnan(out).any() else out
 
 
-def _flying(piece: Piece) -> NDArray[np.bool_]:
+def _flying(piece: MotionPiece) -> NDArray[np.bool_]:
     """Return where the rotors carry the vehicle, without take-off and landing."""
     drive = piece.rotor_speeds if piece.rotor_speeds is not None else piece.command
     assert drive is not None
@@ -251,7 +253,7 @@ def _flying(piece: Piece) -> NDArray[np.bool_]:
     return np.asarray(load > CHANNELS.flying_share * usual)
 
 
-def _cut(piece: Piece, keep: NDArray[np.bool_]) -> list[Piece]:
+def _cut(piece: MotionPiece, keep: NDArray[np.bool_]) -> list[MotionPiece]:
     """Return the runs of samples that are kept, if they are long enough."""
     if keep.all():
         return [piece]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.smoothing import derivative, lagged, low_pass
-from .channels import Piece
+from .channels import MotionPiece
 from .spectra import SPECTRUM, Complex, Segment, segments_of
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class BalanceSpectra:
     """All pieces' transforms: the measured six first, then the columns, then their derivatives by
     the nonlinear parameters.
     """
@@ -51,8 +51,8 @@ class Balance:
 
 
 def balance(
-    pieces: list[Piece], drive: Drive, nonlinear: tuple[str, ...], rotor_noise: float = 0.0
-) -> Balance:
+    pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...], rotor_noise: float = 0.0
+) -> BalanceSpectra:
     """Return the transforms of all pieces at a drive's lag, delay and exponent.
 
     Args:
@@ -84,19 +84,19 @@ def balance(
     weights = np.array([len(p.t) * p.period for p in pieces])
     mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
     signs = np.sign(np.sum(noise, axis=0))
-    return Balance(
+    return BalanceSpectra(
         names, nonlinear, tuple(segments), float(weights.sum()), drive.band, mean * signs
     )
 
 
-def _measured(piece: Piece) -> list[Array]:
+def _measured(piece: MotionPiece) -> list[Array]:
     force = piece.specific_force
     if force is None:
         force = np.zeros_like(piece.angular_velocity)
     return [*force.T, *piece.angular_acceleration.T]
 
 
-def basis(piece: Piece, drive: Drive) -> Array:
+def basis(piece: MotionPiece, drive: Drive) -> Array:
     """Return the basis functions (n, 4, m) of each rotor's thrust, behind the lag."""
     u = turning(piece, drive)
     out = np.stack([u**e for e in drive.exponents], axis=2)
@@ -105,14 +105,14 @@ def basis(piece: Piece, drive: Drive) -> Array:
     return out
 
 
-def turning(piece: Piece, drive: Drive) -> Array:
+def turning(piece: MotionPiece, drive: Drive) -> Array:
     """Return each rotor's speed (n, 4), behind the lag: as measured, or its command."""
     source = piece.command if drive.commands else piece.rotor_speeds
     assert source is not None
     return lagged(source, drive.lag, piece.period)
 
 
-def rotor_columns(piece: Piece, drive: Drive) -> dict[str, Array]:
+def rotor_columns(piece: MotionPiece, drive: Drive) -> dict[str, Array]:
     """Return the columns (n,) that depend on the rotors."""
     phi, speed = basis(piece, drive), turning(piece, drive)
     x, y = drive.positions[:, 0], drive.positions[:, 1]
@@ -134,7 +134,7 @@ def rotor_columns(piece: Piece, drive: Drive) -> dict[str, Array]:
     return out
 
 
-def air_columns(piece: Piece) -> dict[str, Array]:
+def air_columns(piece: MotionPiece) -> dict[str, Array]:
     """Return the columns (n,) that do not depend on the rotors."""
     w, period = piece.angular_velocity, piece.period
     dw = derivative(w, period)
@@ -172,7 +172,7 @@ def _with_delay(
     return replace(s, columns=np.concatenate([measured, blocks[0], *ordered], axis=2))
 
 
-def _rotor_noise(piece: Piece, drive: Drive, names: tuple[str, ...], noise: float) -> Array:
+def _rotor_noise(piece: MotionPiece, drive: Drive, names: tuple[str, ...], noise: float) -> Array:
     """Return what white noise of each rotor's speed makes in each column (4, c), root of a
     spectrum: its column's standard deviation times the root of the period.
     """

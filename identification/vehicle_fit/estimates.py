@@ -9,11 +9,11 @@ import numpy as np
 from scipy.stats import t as student
 
 from ...dynamics.effects import Role, get
-from .channels import Piece, Sources
+from .channels import MotionPiece, Sources
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .result import ASSUMED, GIVEN, IDENTIFIED, NOTHING, Estimate, told
-from .solve import Fit
+from .solve import VehicleFit
 from .spectra import SPECTRUM
 
 Values = Mapping[str, float]
@@ -26,7 +26,7 @@ UNKNOWN: Interval = (math.nan, math.nan, math.nan)
 class Intervals:
     """Values and 95 % intervals of a fit's parameters, and of what follows from them."""
 
-    def __init__(self, fit: Fit) -> None:
+    def __init__(self, fit: VehicleFit) -> None:
         self.fit = fit
         count = len(fit.balance.segments)
         self.width = float(student.ppf(0.975, max(count - 1, 3)))
@@ -64,10 +64,10 @@ def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
 
 
 def estimates_of(
-    fit: Fit,
+    fit: VehicleFit,
     sources: Sources,
     geometry: Geometry,
-    pieces: Sequence[Piece],
+    pieces: Sequence[MotionPiece],
     not_told: tuple[Mapping[str, str], Mapping[str, float]],
     kept: Sequence[str],
     weight: float,
@@ -101,7 +101,9 @@ def estimates_of(
 class _Estimates:
     """What is said of one vehicle, and the lengths that the rest scales with."""
 
-    def __init__(self, fit: Fit, sources: Sources, geometry: Geometry, kept: Sequence[str]) -> None:
+    def __init__(
+        self, fit: VehicleFit, sources: Sources, geometry: Geometry, kept: Sequence[str]
+    ) -> None:
         self.fit, self.sources, self.geometry, self.kept = fit, sources, geometry, kept
         self.intervals = Intervals(fit)
         self.said: list[Estimate] = []
@@ -127,7 +129,7 @@ class _Estimates:
         corners = [end * share for end in ends for share in self.arm_range]
         return value, min(corners), max(corners)
 
-    def say_curve(self, pieces: Sequence[Piece], weight: float, how: str) -> None:
+    def say_curve(self, pieces: Sequence[MotionPiece], weight: float, how: str) -> None:
         exponents = self.fit.drive.exponents
         for j, e in enumerate(exponents):
             known = self.intervals.of(lambda v, j=j: v[f"a{j}"], False)  # type: ignore[misc]

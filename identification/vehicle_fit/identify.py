@@ -18,7 +18,7 @@ from ...dynamics.effects import Role
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from .assemble import advice_of, vehicle_of
-from .channels import Piece, Sources, pieces_of, rounding_step
+from .channels import MotionPiece, Sources, pieces_of, rounding_step
 from .columns import Drive
 from .effect_settings import effect_of
 from .estimates import Intervals, estimates_of, thrust_of
@@ -26,7 +26,7 @@ from .geometry import SPIN, USUAL, Geometry
 from .motors import MotorResponse, motor_response
 from .parameters import DELAY, FORCE_BIAS, OPTIONAL, POSITIVE, first_model, with_more
 from .result import ESTIMATES, IDENTIFIED, NOTHING, Estimate, Identified, told
-from .solve import Fit, fall_with, solve, step_with
+from .solve import VehicleFit, fall_with, solve, step_with
 from .spectra import SPECTRUM
 
 Array = NDArray[np.float64]
@@ -139,7 +139,7 @@ def _lag_of(motors: MotorResponse) -> Estimate:
     return Estimate(name, motors.lag, motors.low, motors.high, "s", IDENTIFIED, how)
 
 
-def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
+def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
     """Return the lag of a model that has no time offset, which then is in the lag."""
     nonlinear = tuple(name for name in fit.names[len(fit.model.free) :] if name != "delay")
     drive = replace(fit.drive, delay=0.0)
@@ -149,7 +149,7 @@ def _lag_alone(pieces: list[Piece], fit: Fit) -> Estimate:
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
 
 
-def _voltage(pieces: Sequence[Piece]) -> float:
+def _voltage(pieces: Sequence[MotionPiece]) -> float:
     found = [p.voltage for p in pieces if p.voltage is not None]
     if len(found) < len(pieces):
         return 0.0
@@ -160,13 +160,13 @@ def _voltage(pieces: Sequence[Piece]) -> float:
 
 
 def _first_fit(
-    pieces: list[Piece],
+    pieces: list[MotionPiece],
     sources: Sources,
     drive: Drive,
     mass: float,
     gravity: float,
     noise: float,
-) -> tuple[Fit, bool]:
+) -> tuple[VehicleFit, bool]:
     """Return the fit of the basic model, and whether the rotors turn the other way."""
     prior = {"delay": DELAY}
     if not drive.commands:
@@ -183,7 +183,7 @@ def _first_fit(
         sure = other.drive.lag > IDENTIFY.least_lag * other.deviation("lag")
         return (other if sure and plain.loss - other.loss > enough else plain), turned
     nonlinear = ("lag", "delay", *(("gamma",) if drive.voltage_ref > 0.0 else ()))
-    best: tuple[float, Fit, bool] | None = None
+    best: tuple[float, VehicleFit, bool] | None = None
     # from the richest curve down: a fit that starts poor takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
@@ -206,7 +206,9 @@ def _first_fit(
     return best[1], best[2]
 
 
-def _agreeing(pieces: list[Piece], fit: Fit, noise: float, weight: float) -> Fit:
+def _agreeing(
+    pieces: list[MotionPiece], fit: VehicleFit, noise: float, weight: float
+) -> VehicleFit:
     """Return the fit up to the widest frequency at which thrust is what slower motion alone says
     (Hausman's test), and no sensor's bias is beyond belief.
     """
@@ -226,7 +228,7 @@ def _agreeing(pieces: list[Piece], fit: Fit, noise: float, weight: float) -> Fit
     return fit
 
 
-def _hover_thrust(fit: Fit, weight: float) -> tuple[float, float]:
+def _hover_thrust(fit: VehicleFit, weight: float) -> tuple[float, float]:
     """Return the thrust at what a hover takes by the fit's own start, as a share of the weight, and
     its standard deviation.
     """
@@ -241,7 +243,7 @@ def _hover_thrust(fit: Fit, weight: float) -> tuple[float, float]:
     return value, (high - low) / (2.0 * intervals.width * max(abs(value), 1e-9))
 
 
-def _rises(fit: Fit) -> bool:
+def _rises(fit: VehicleFit) -> bool:
     """Does thrust grow with the command, from nothing to full?"""
     u = np.linspace(0.05, 1.0, 20)
     values = fit.values
@@ -249,12 +251,14 @@ def _rises(fit: Fit) -> bool:
     return bool(np.all(np.diff(curve) > 0.0))
 
 
-def _frequencies(fit: Fit) -> float:
+def _frequencies(fit: VehicleFit) -> float:
     """Count of independent numbers that the fit rests on."""
     return float(6.0 * sum(len(s.frequency) for s in fit.balance.segments))
 
 
-def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, list[str]]:
+def _with_optional(
+    pieces: list[MotionPiece], fit: VehicleFit, noise: float
+) -> tuple[VehicleFit, list[str]]:
     """Return a fit with those further effects that make the logs much likelier, and which."""
     kept: list[str] = []
     nonlinear = fit.names[len(fit.model.free) :]
@@ -274,12 +278,12 @@ def _with_optional(pieces: list[Piece], fit: Fit, noise: float) -> tuple[Fit, li
     return fit, kept
 
 
-def _has_columns(fit: Fit, parameters: Sequence[str]) -> bool:
+def _has_columns(fit: VehicleFit, parameters: Sequence[str]) -> bool:
     air = [p for p in parameters if "drag" in p or p == "lift"]
     return all(p in fit.balance.names for p in air)
 
 
-def _not_told(fit: Fit, geometry: Geometry) -> tuple[dict[str, str], dict[str, float]]:
+def _not_told(fit: VehicleFit, geometry: Geometry) -> tuple[dict[str, str], dict[str, float]]:
     """Return the inertias that the flight does not show: why, and what is usual instead.
 
     Raises:

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import t as student
 
 from ..motion.smoothing import lagged
-from .channels import Piece
+from .channels import MotionPiece
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class MotorResponse:
     left: float  # share of the speeds' standard deviation that it does not explain
 
 
-def motor_response(pieces: list[Piece]) -> MotorResponse | None:
+def motor_response(pieces: list[MotionPiece]) -> MotorResponse | None:
     """Return how speeds follow commands; None where one of them is not in every piece, or where
     commands do not move.
     """

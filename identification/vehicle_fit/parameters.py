@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ...runtime.errors import InputError
-from .channels import Piece, Sources
+from .channels import MotionPiece, Sources
 from .columns import Drive, rotor_columns
 from .geometry import USUAL
 from .model import Model
@@ -60,7 +60,7 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
 
 
 def first_model(
-    pieces: list[Piece], sources: Sources, drive: Drive, mass: float, gravity: float
+    pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float, gravity: float
 ) -> tuple[Model, Array, Drive, bool]:
     """Return the model, where it starts, the drive with the turning senses that yaw shows, and
     whether they are the opposite of the drive's.
@@ -122,7 +122,7 @@ def with_more(model: Model, start: Array, names: Sequence[str]) -> tuple[Model, 
     return replace(model, free=(*model.free, *names)), np.concatenate([start, np.zeros(len(names))])
 
 
-def _mean_speed(pieces: list[Piece], drive: Drive) -> float:
+def _mean_speed(pieces: list[MotionPiece], drive: Drive) -> float:
     source = [p.command if drive.commands else p.rotor_speeds for p in pieces]
     return max(float(np.mean(np.concatenate([x for x in source if x is not None]))), 1e-6)
 
@@ -131,7 +131,7 @@ def _rate(gravity: float, arm: float) -> float:
     return float(np.sqrt(gravity / arm))  # 1/s: of a vehicle's own motion
 
 
-def first_thrust(pieces: list[Piece], drive: Drive, weight: float) -> list[float]:
+def first_thrust(pieces: list[MotionPiece], drive: Drive, weight: float) -> list[float]:
     """Return the size of each basis coefficient at which it alone would carry the weight."""
     totals = [rotor_columns(piece, drive) for piece in pieces]
     return [
@@ -140,7 +140,7 @@ def first_thrust(pieces: list[Piece], drive: Drive, weight: float) -> list[float
     ]
 
 
-def first_gains(pieces: list[Piece], drive: Drive, thrust: list[float]) -> Array:
+def first_gains(pieces: list[MotionPiece], drive: Drive, thrust: list[float]) -> Array:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly: about x and y the
     inertia's inverse, about z that times torque over thrust (m).
     """

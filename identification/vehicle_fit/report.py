@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle_file import save_vehicle
 from ...runtime.whole_files import replaced
 from ..motion.smoothing import low_pass
-from .channels import Piece
+from .channels import MotionPiece
 from .columns import air_columns, rotor_columns
 from .model import coefficients
 from .result import ASSUMED, NOTHING, Identified
@@ -82,7 +82,7 @@ def write_identified(found: Identified, path: Path) -> tuple[Path, Path, Path]:
     return path, data, picture
 
 
-def fitted(found: Identified, piece: Piece) -> tuple[Array, Array]:
+def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     """Return measured and fitted specific force (m/s2) and angular acceleration (rad/s2), (n, 6)
     each, of a piece; both through the picture's low-pass.
     """

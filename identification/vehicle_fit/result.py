@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
-from .channels import Piece, Sources
+from .channels import MotionPiece, Sources
 from .geometry import Geometry
-from .solve import Fit
+from .solve import VehicleFit
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,8 @@ class Identified:
     estimates: tuple[Estimate, ...]
     sources: Sources
     geometry: Geometry
-    pieces: tuple[Piece, ...]
-    fit: Fit
+    pieces: tuple[MotionPiece, ...]
+    fit: VehicleFit
     notes: tuple[str, ...]
     advice: tuple[str, ...]
     seconds: float  # of flight

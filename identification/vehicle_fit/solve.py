@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import Piece
-from .columns import Balance, Drive, balance
+from .channels import MotionPiece
+from .columns import BalanceSpectra, Drive, balance
 from .model import Model, jacobian
 from .spectra import SPECTRUM, residual_spectra
 
@@ -37,7 +37,7 @@ SOLVE = SolveSettings()
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class VehicleFit:
     """Parameters that fit best."""
 
     model: Model
@@ -47,7 +47,7 @@ class Fit:
     information: Array  # (p, p), of the model's parameters with priors
     scores: Array  # (s, p): each segment's gradient
     loss: float  # twice the negative log-likelihood, up to a constant
-    balance: Balance
+    balance: BalanceSpectra
     spectra: list[Array]  # of each segment (m, 6)
 
     @property
@@ -91,14 +91,14 @@ class Fit:
 
 
 def solve(
-    pieces: list[Piece],
+    pieces: list[MotionPiece],
     drive: Drive,
     model: Model,
     start: Array,
     nonlinear: tuple[str, ...],
     rotor_noise: float = 0.0,
     nonlinear_prior: dict[str, float] | None = None,
-) -> Fit:
+) -> VehicleFit:
     """Return the fit that Gauss-Newton reaches from ``start`` (p,) and the drive's own lag, delay
     and exponent.
     """
@@ -132,7 +132,7 @@ def solve(
         made, np.sum(grams, axis=0), model, theta, zero, drive, prior
     )
     scores = np.array([np.einsum("iac,acd,ad->i", slopes, g, v, optimize=True) for g in grams])
-    return Fit(
+    return VehicleFit(
         model,
         drive,
         (*model.free, *nonlinear),
@@ -145,7 +145,7 @@ def solve(
     )
 
 
-def fall_with(fit: Fit, model: Model, start: Array) -> float:
+def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
     """Return by how much twice the negative log-likelihood would fall with a model that has further
     parameters than a fit's, by the score test: one step from where they are nothing.
     """
@@ -158,7 +158,7 @@ def fall_with(fit: Fit, model: Model, start: Array) -> float:
 
 
 def step_with(
-    pieces: list[Piece], fit: Fit, nonlinear: tuple[str, ...]
+    pieces: list[MotionPiece], fit: VehicleFit, nonlinear: tuple[str, ...]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return the step that further nonlinear parameters would take from a fit, and its standard
     deviation, by name.
@@ -175,7 +175,7 @@ def step_with(
     )
 
 
-def _grams(made: Balance, spectra: Sequence[Array], i: int) -> Array:
+def _grams(made: BalanceSpectra, spectra: Sequence[Array], i: int) -> Array:
     """Return a segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: of the axis'
     measurement and all columns, without what the rotors' noise adds.
     """
@@ -196,7 +196,7 @@ def _grams(made: Balance, spectra: Sequence[Array], i: int) -> Array:
 
 
 def _newton(
-    made: Balance,
+    made: BalanceSpectra,
     grams: Array,
     model: Model,
     theta: Array,
@@ -252,7 +252,7 @@ def _bounded(shift: Array, drive: Drive, nonlinear: tuple[str, ...]) -> Array:
 
 
 def _powers(
-    made: Balance, spectra: Sequence[Array], model: Model, theta: Array, information: Array
+    made: BalanceSpectra, spectra: Sequence[Array], model: Model, theta: Array, information: Array
 ) -> list[Array]:
     """Return the residual's power (m, 6) in each segment, as it was before the parameters took
     their share: they follow the noise most where they are told from few frequencies.
@@ -277,7 +277,7 @@ def _powers(
     return out
 
 
-def _loss(made: Balance, spectra: Sequence[Array]) -> float:
+def _loss(made: BalanceSpectra, spectra: Sequence[Array]) -> float:
     """Return twice the negative log-likelihood of a noise that has the residual's spectrum."""
     return float(
         sum(

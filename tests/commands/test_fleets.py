@@ -11,7 +11,7 @@ from windwrench.cli import main
 from windwrench.commands.running import plain
 from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.envs.recording import record_flight
-from windwrench.identification.fleet.flight import Job, diagnose_one, key_of
+from windwrench.identification.fleet.flight import LogTask, diagnose_one, key_of
 from windwrench.identification.fleet.manifest import find_logs
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.running import OUTCOMES, run_fleet
@@ -158,7 +158,7 @@ def test_processes_find_what_one_diagnosis_finds(tmp_path, cluster):
     outcomes = Outcomes(tmp_path / OUTCOMES)
     done = run_fleet(logs, outcomes, jobs=1, cluster=cluster)
     for one in done:
-        alone = diagnose_one(Job(one.log, one.key))
+        alone = diagnose_one(LogTask(one.log, one.key))
         there = outcomes[one.key]
         assert there.pop("cost", {}).keys() == alone.pop("cost", {}).keys()
         there["reason"] = there.get("reason", "").rpartition("/")[2]

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.support.data_paths import data_file
 from windwrench.cli import app
-from windwrench.identification.comparison.fault_balance import AT_ONCE, Balance, Begin
+from windwrench.identification.comparison.fault_balance import AT_ONCE, Begin, FaultBalance
 from windwrench.identification.comparison.fault_channels import sample
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
@@ -35,7 +35,7 @@ def test_the_noise_of_an_autoregression_is_whitened():
 def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
     """The sums that run backwards, against one regression a time."""
     samples = sample(draw_flight(1, "fault").channels)
-    balance = Balance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
+    balance = FaultBalance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
     noise = balance.noises(balance.plain_residuals())
     rows = np.array([60, 150, len(samples.t) - 6])
     for begin in (AT_ONCE, Begin(0.25, True)):

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from windwrench.dynamics import InputError
-from windwrench.identification.fleet.flight import Job, diagnose_one, key_of
+from windwrench.identification.fleet.flight import LogTask, diagnose_one, key_of
 from windwrench.identification.fleet.manifest import FleetLog
 from windwrench.identification.fleet.outcomes import Outcomes
 
@@ -77,7 +77,7 @@ def test_the_key_is_of_all_that_an_outcome_depends_on(tmp_path):
 def test_a_bad_log_is_an_outcome(tmp_path, text, kind, words):
     path = tmp_path / "a.csv"
     path.write_text(text)
-    found = diagnose_one(Job(FleetLog(str(path), "a.csv", "ardrone2"), A))
+    found = diagnose_one(LogTask(FleetLog(str(path), "a.csv", "ardrone2"), A))
     assert (found["key"], found["status"], found["kind"]) == (A, "refused", kind)
     assert words in found["reason"]
     assert "\n" not in found["reason"]
@@ -91,7 +91,7 @@ def test_an_error_of_any_kind_is_an_outcome(monkeypatch, error, kind):
         raise error
 
     monkeypatch.setattr("windwrench.identification.fleet.flight.read_log", fails)
-    found = diagnose_one(Job(FleetLog("a.csv", "a.csv"), A))
+    found = diagnose_one(LogTask(FleetLog("a.csv", "a.csv"), A))
     assert (found["status"], found["kind"]) == ("refused", kind)
     assert "\n" not in found["reason"]
     assert kind != "error" or "ZeroDivisionError (test_outcomes.py" in found["reason"]

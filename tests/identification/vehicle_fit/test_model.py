@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.identification.vehicle_fit.channels import Piece
+from windwrench.identification.vehicle_fit.channels import MotionPiece
 from windwrench.identification.vehicle_fit.columns import (
     Drive,
     air_columns,
@@ -22,7 +22,7 @@ def test_coefficients_are_newton_and_euler():
     turning = np.column_stack([3 * np.cos(3 * t + 1), -2 * np.sin(2 * t), 0.5 * np.cos(t)])
     speeds = 400.0 + 60.0 * np.sin(2 * t[:, None] + np.arange(4))
     velocity = np.column_stack([np.sin(t), np.cos(t), 0.3 * np.sin(2 * t)])
-    piece = Piece(0, t, 0.005, velocity, turning, omega, velocity, speeds, None, None)
+    piece = MotionPiece(0, t, 0.005, velocity, turning, omega, velocity, speeds, None, None)
     geometry = parse_geometry("0.11,0.13;-0.12,0.1;-0.1,-0.14;0.12,-0.12")
     drive = Drive(geometry.positions, SPIN)
     columns = {**rotor_columns(piece, drive), **air_columns(piece)}
