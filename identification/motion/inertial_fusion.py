@@ -427,30 +427,24 @@ def _measurements(
     """Return all measurements, sorted by knot: kind, knot, time behind it, vector, matrix and
     variance.
     """
-    rows: list[tuple[int, int, float, Array, Array, float]] = []
-    eye, nothing = np.eye(3), np.zeros(3)
-    T = float(times[1] - times[0])
-
-    def nearest(t: Array) -> Index:
-        found: Index = np.clip(np.rint((t - times[0]) / T), 0, len(times) - 1).astype(np.int64)
-        return found
-
     if positions is None:
         bound = np.arange(times[0], times[-1], FUSION.velocity_every)
-        rows += [(1, int(k), 0.0, nothing, eye, FUSION.velocity_std**2) for k in nearest(bound)]
+        groups = [(1, Readings(bound, np.zeros((len(bound), 3)), FUSION.velocity_std))]
     else:
-        for t, k, x in zip(positions.t, nearest(positions.t), positions.values, strict=True):
-            rows.append((2, int(k), float(t - times[k]), x, eye, positions.std**2))
+        groups = [(2, positions)]
     if attitudes is not None:
-        for t, k, x in zip(attitudes.t, nearest(attitudes.t), attitudes.values, strict=True):
-            rows.append((0, int(k), float(t - times[k]), nothing, x, attitudes.std**2))
-    rows.sort(key=lambda row: row[1])
-    kinds, knots, late, vectors, matrices, variances = zip(*rows, strict=True)
-    return (
-        np.array(kinds, dtype=np.int64),
-        np.array(knots, dtype=np.int64),
-        np.array(late, dtype=np.float64),
-        np.array(vectors, dtype=np.float64),
-        np.array(matrices, dtype=np.float64),
-        np.array(variances, dtype=np.float64),
-    )
+        groups.append((0, attitudes))
+    counts = [len(readings.t) for _, readings in groups]
+    t = np.concatenate([readings.t for _, readings in groups])
+    knots = np.clip(np.rint((t - times[0]) / (times[1] - times[0])), 0, len(times) - 1)
+    knots = knots.astype(np.int64)
+    kinds = np.repeat([kind for kind, _ in groups], counts)
+    variances = np.repeat([readings.std**2 for _, readings in groups], counts)
+    vectors, matrices = np.zeros((len(t), 3)), np.tile(np.eye(3), (len(t), 1, 1))
+    for kind, readings in groups:
+        (vectors if kind else matrices)[kinds == kind] = readings.values
+    order = np.argsort(knots, kind="stable")
+    late = t - times[knots]
+    columns = (kinds, knots, late, vectors, matrices, variances)
+    kinds, knots, late, vectors, matrices, variances = (x[order] for x in columns)
+    return kinds, knots, late, vectors, matrices, variances

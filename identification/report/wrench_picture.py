@@ -4,7 +4,7 @@ shaded.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 
 _SHADES = {GROUND: "#d9d9d9", TAKE_OFF: "#cfe8cf", FLIGHT: "#ffffff", LANDING: "#fbe3c4"}
 _AXES = (("x", "#0072b2"), ("y", "#d55e00"), ("z", "#007f5f"))
-_TRUTH = "#222222"
 _LASTING = 0.1  # s without a pose that is worth hatching
 
 
@@ -57,50 +56,41 @@ def plot_wrench(series: WrenchSeries, log: FlightLog, path: str | Path) -> Path:
     if not known:
         height.set_yticks([])
     backdrop = _draw_thrust(height, series.t, log, vehicle)
-    _draw_vectors(force, series.t, series.force, series.std_force, log.force, "f", "N")
-    force.set_ylabel("external force (N)")
-    if any(phase.name == GROUND for phase in phases):
-        force.axhline(
-            vehicle.weight, color="black", lw=0.8, ls=":", label=f"weight {vehicle.weight:.3g} N"
-        )
     in_milli = float(np.percentile(np.abs(series.torque), 99)) < 0.1
     scale, unit = (1e3, "mNm") if in_milli else (1.0, "Nm")
     truth = None if log.torque is None else scale * log.torque
-    _draw_vectors(
-        torque, series.t, scale * series.torque, scale * series.std_torque, truth, "τ", unit
-    )
+    mean, std = scale * series.torque, scale * series.std_torque
+    _draw_vectors(force, series.t, series.force, series.std_force, log.force, ("f", "N"))
+    _draw_vectors(torque, series.t, mean, std, truth, ("τ", unit))
+    force.set_ylabel("external force (N)")
     torque.set_ylabel(f"external torque ({unit})")
     torque.set_xlabel("time (s)")
+    if any(phase.name == GROUND for phase in phases):
+        weight = f"weight {vehicle.weight:.3g} N"
+        force.axhline(vehicle.weight, color="black", lw=0.8, ls=":", label=weight)
+    columns, room = (4, 0.14) if log.force is None else (3, 0.26)
     for panel in (height, force, torque):
         panel.grid(alpha=0.3)
         panel.margins(x=0.0)
         _shade(backdrop if panel is height else panel, phases, log)
-    for panel in (force, torque):
-        panel.legend(
-            loc="upper center", ncols=4 if log.force is None else 3, fontsize=9, framealpha=0.9
-        )
-        low, high = panel.get_ylim()
-        panel.set_ylim(
-            low, high + (0.14 if log.force is None else 0.26) * (high - low)
-        )  # room for the legend
-    _name_phases(height, phases)
+        if panel is not height:
+            panel.legend(loc="upper center", ncols=columns, fontsize=9, framealpha=0.9)
+            low, high = panel.get_ylim()
+            panel.set_ylim(low, high + room * (high - low))  # for the legend
+    for phase in phases:
+        middle = 0.5 * (phase.start + phase.end)
+        place = height.get_xaxis_transform()
+        height.text(middle, 1.03, phase.name, transform=place, ha="center", fontsize=9)
     with replaced(path) as temporary:
         figure.savefig(temporary, format="png")
     return path
 
 
 def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "Axes":
-    """Draw what the rotors are taken to lift, in weights, behind the height; return the axes
-    behind.
-    """
+    """Draw the rotors' thrust, in weights, behind the height; return the axes behind."""
     thrust = panel.twinx()
-    thrust.plot(
-        t,
-        np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight,
-        color="#a35db5",
-        lw=0.6,
-        alpha=0.6,
-    )
+    weights = np.square(log.rotor_speeds) @ vehicle.k / vehicle.weight
+    thrust.plot(t, weights, color="#a35db5", lw=0.6, alpha=0.6)
     thrust.set_ylabel("rotor thrust / weight", color="#7d3c8c")
     thrust.tick_params(axis="y", labelcolor="#7d3c8c")
     thrust.set_ylim(bottom=0.0)
@@ -110,33 +100,27 @@ def _draw_thrust(panel: "Axes", t: Array, log: FlightLog, vehicle: Vehicle) -> "
 
 
 def _draw_vectors(
-    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, symbol: str, unit: str
+    panel: "Axes", t: Array, mean: Array, std: Array, truth: Array | None, what: tuple[str, str]
 ) -> None:
-    """Draw three components (N, 3) with their 2-sigma bands, and the truth dashed with its RMSE in
-    the legend.
+    """Draw three components (N, 3) of a symbol and unit with their 2-sigma bands, and the truth
+    dashed with its RMSE in the legend.
     """
+    symbol, unit = what
+    low, high = mean - 2 * std, mean + 2 * std
     for i, (axis, colour) in enumerate(_AXES):
         name = f"{symbol}$_{axis}$"
+        panel.fill_between(t, low[:, i], high[:, i], color=colour, alpha=0.18, lw=0)
         if truth is not None:
+            true = f"true {name}"
             rmse = float(np.sqrt(np.mean(np.square(mean[:, i] - truth[:, i]))))
             name += f" (RMSE {rmse:.3g} {unit})"
-        panel.fill_between(
-            t,
-            mean[:, i] - 2 * std[:, i],
-            mean[:, i] + 2 * std[:, i],
-            color=colour,
-            alpha=0.18,
-            lw=0,
-        )
         panel.plot(t, mean[:, i], color=colour, lw=1.1, label=name)
         if truth is not None:
-            panel.plot(
-                t, truth[:, i], color=colour, lw=1.0, ls="--", label=f"true {symbol}$_{axis}$"
-            )
+            panel.plot(t, truth[:, i], color=colour, lw=1.0, ls="--", label=true)
     # the wide band of the filter's first moments must not set the scale
-    low = min(float(np.percentile(mean - 2 * std, 1, axis=0).min()), float(mean.min()))
-    high = max(float(np.percentile(mean + 2 * std, 99, axis=0).max()), float(mean.max()))
-    panel.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    bottom = min(float(np.percentile(low, 1, axis=0).min()), float(mean.min()))
+    top = max(float(np.percentile(high, 99, axis=0).max()), float(mean.max()))
+    panel.set_ylim(bottom - 0.05 * (top - bottom), top + 0.05 * (top - bottom))
 
 
 def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
@@ -146,36 +130,11 @@ def _shade(panel: "Axes", phases: Sequence[Phase], log: FlightLog) -> None:
     for phase in phases:
         if phase.name != FLIGHT:
             panel.axvspan(phase.start, phase.end, color=_SHADES[phase.name], zorder=0, lw=0)
-    seen = np.concatenate([[-np.inf], log.t[log.valid], [np.inf]])
-    gap = (
-        seen[np.searchsorted(seen, log.t, "left")] - seen[np.searchsorted(seen, log.t, "right") - 1]
-    )
-    lost = gap > _LASTING
+    poses = np.concatenate([[-np.inf], log.t[log.valid], [np.inf]])
+    after = poses[np.searchsorted(poses, log.t, "left")]
+    lost = after - poses[np.searchsorted(poses, log.t, "right") - 1] > _LASTING
     if lost.any() and log.has_pose:
         lost[1:] |= lost[:-1]  # up to the next pose
-        panel.fill_between(
-            log.t,
-            0.0,
-            1.0,
-            where=lost,
-            transform=panel.get_xaxis_transform(),
-            facecolor="none",
-            edgecolor="#999999",
-            hatch="///",
-            zorder=0,
-            lw=0,
-        )
-
-
-def _name_phases(panel: "Axes", phases: Sequence[Phase]) -> None:
-    """Write each phase's name above its stretch of the panel."""
-    for phase in phases:
-        panel.text(
-            0.5 * (phase.start + phase.end),
-            1.03,
-            phase.name,
-            transform=panel.get_xaxis_transform(),
-            ha="center",
-            va="bottom",
-            fontsize=9,
-        )
+        look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#999999", "hatch": "///"}
+        place = panel.get_xaxis_transform()
+        panel.fill_between(log.t, 0.0, 1.0, where=lost, transform=place, zorder=0, lw=0, **look)
