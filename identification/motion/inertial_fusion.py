@@ -444,7 +444,9 @@ def _measurements(
     for kind, readings in groups:
         (vectors if kind else matrices)[kinds == kind] = readings.values
     order = np.argsort(knots, kind="stable")
-    late = t - times[knots]
-    columns = (kinds, knots, late, vectors, matrices, variances)
-    kinds, knots, late, vectors, matrices, variances = (x[order] for x in columns)
-    return kinds, knots, late, vectors, matrices, variances
+    late = np.asarray(t - times[knots], dtype=np.float64)
+    numbered: list[Index] = [np.asarray(x[order], dtype=np.int64) for x in (kinds, knots)]
+    measured: list[Array] = [
+        np.asarray(x[order], dtype=np.float64) for x in (late, vectors, matrices, variances)
+    ]
+    return numbered[0], numbered[1], measured[0], measured[1], measured[2], measured[3]
