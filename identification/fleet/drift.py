@@ -11,6 +11,7 @@ effect was named; whether flights name it earlier or later than others do is a s
 """
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -204,43 +205,42 @@ def fleet_of(rows: Iterable[Mapping[str, Any]]) -> Fleet:
         rows: as ``running.rows`` yields them.
     """
     series: dict[tuple[str, str, str], Series] = {}
-    named: dict[tuple[str, str], list[int]] = {}
-    diagnosed: dict[str, list[int]] = {}
+    named: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
+    diagnosed: defaultdict[str, list[int]] = defaultdict(list)
     individuals: dict[str, dict[str, int]] = {}
-    refused: dict[str, int] = {}
-    verdicts: dict[str, int] = {}
+    refused: Counter[str] = Counter()
+    verdicts: Counter[str] = Counter()
     for row in rows:
         who, flight = row["id"], row["flight"]
-        counts = individuals.setdefault(who, {"diagnosed": 0, "refused": 0})
-        counts[row["status"]] += 1
+        individuals.setdefault(who, {"diagnosed": 0, "refused": 0})[row["status"]] += 1
         if row["status"] == "refused":
-            refused[row["kind"]] = refused.get(row["kind"], 0) + 1
+            refused[row["kind"]] += 1
             continue
-        verdicts[row["verdict"]] = verdicts.get(row["verdict"], 0) + 1
-        diagnosed.setdefault(who, []).append(flight)
-        meant: set[str] = set()
+        verdicts[row["verdict"]] += 1
+        diagnosed[who].append(flight)
+        possible: set[str] = set()
         for effect in row["effects"]:
-            meant |= {effect["name"], *effect["indistinguishable_from"]}
-            sure = not effect["tentative"] and not effect["indistinguishable_from"]
+            name, rivals = effect["name"], effect["indistinguishable_from"]
+            possible |= {name, *rivals}
             for coefficient, value in effect["coefficients"].items():
+                unit = effect["units"].get(coefficient, "")
                 one = series.setdefault(
-                    (who, effect["name"], coefficient),
-                    Series(who, effect["name"], coefficient, effect["units"].get(coefficient, "")),
+                    (who, name, coefficient), Series(who, name, coefficient, unit)
                 )
+                std = effect["std"].get(coefficient)
                 one.flights.append(flight)
                 one.values.append(math.nan if value is None else value)
-                std = effect["std"].get(coefficient)
                 one.stds.append(math.nan if std is None else std)
-                one.sure.append(sure)
-        for effect_name in meant:
-            named.setdefault((who, effect_name), []).append(flight)
+                one.sure.append(not effect["tentative"] and not rivals)
+        for name in possible:
+            named[who, name].append(flight)
     trends = [trend_of(one, len(diagnosed[one.id])) for one in series.values()]
     told = {(one.id, one.effect) for one in series.values()}
     appearances = [
-        found
-        for (who, effect_name), flights in named.items()
-        if (who, effect_name) in told
-        and (found := appearance_of(who, effect_name, flights, diagnosed[who])) is not None
+        appearance
+        for (who, name), flights in named.items()
+        if (who, name) in told
+        and (appearance := appearance_of(who, name, flights, diagnosed[who])) is not None
     ]
     return Fleet(*_controlled(trends, appearances), individuals, refused, verdicts)
 
@@ -251,24 +251,17 @@ def _controlled(
     """Return all tests with their p-values adjusted together, and what is told by them; those
     first that are.
     """
-    every: list[Trend | Appearance] = [*trends, *appearances]
-    tested = [i for i, one in enumerate(every) if one.p is not None]
-    adjusted = false_discovery_control([every[i].p for i in tested]) if tested else []
-    for i, p in zip(tested, adjusted, strict=True):
-        one, found = every[i], bool(p < DRIFT.false_discoveries)
-        every[i] = (
-            replace(one, adjusted_p=float(p), drifts=found)
-            if isinstance(one, Trend)
-            else replace(one, adjusted_p=float(p), changed=found)
-        )
+    tested = [one.p for one in (*trends, *appearances) if one.p is not None]
+    adjusted = iter(false_discovery_control(tested) if tested else [])
+    changes: list[dict[str, Any]] = []
+    for one in (*trends, *appearances):
+        told = "drifts" if isinstance(one, Trend) else "changed"
+        p = None if one.p is None else float(next(adjusted))
+        changes.append({"adjusted_p": p, told: p is not None and p < DRIFT.false_discoveries})
+    controlled = [replace(one, **change) for one, change in zip(trends, changes, strict=False)]
+    others = changes[len(trends) :]
+    seen = [replace(one, **change) for one, change in zip(appearances, others, strict=True)]
     return (
-        tuple(
-            sorted((one for one in every if isinstance(one, Trend)), key=lambda one: not one.drifts)
-        ),
-        tuple(
-            sorted(
-                (one for one in every if isinstance(one, Appearance)),
-                key=lambda one: not one.changed,
-            )
-        ),
+        tuple(sorted(controlled, key=lambda one: not one.drifts)),
+        tuple(sorted(seen, key=lambda one: not one.changed)),
     )

@@ -14,7 +14,7 @@ from ..motion.sensor_noise import sensor_noise
 from .effect_settings import effect_of, estimate_name
 from .geometry import USUAL, Geometry
 from .motors import MotorResponse
-from .result import IDENTIFIED, Estimate
+from .result import ASSUMED, IDENTIFIED, NOTHING, Estimate
 from .solve import VehicleFit
 
 Array = NDArray[np.float64]
@@ -138,39 +138,35 @@ def _curve(fit: VehicleFit) -> MotorCurve:
 
 def advice_of(estimates: Mapping[str, Estimate]) -> list[str]:
     """Return what to fly, or to give, where the logs say too little."""
-    out = []
-
-    def unknown(name: str) -> bool:
-        return name in estimates and estimates[name].status != IDENTIFIED
-
-    if estimates["arm_l"].status == "assumed":
-        out.append("Give --geometry, the rotors' distance from the body axes: inertia follows.")
-    else:
-        for name, motion in (("Jxx", "roll"), ("Jyy", "pitch")):
-            if unknown(name):
-                out.append(f"Fly quick {motion} movements for 20 s: they show {name}.")
-        if unknown("Jzz"):
-            out.append(
-                "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
-                "gyroscopic torque shows Jzz, and with it p."
-            )
-    if unknown("(p/k)/Jzz"):
-        out.append("Turn quickly to the left and to the right: it shows p/k over Jzz.")
-    if unknown(effect_of(Role.LAG)):
-        out.append(
-            "Log the motor commands beside the rotor speeds: together they show the lag."
-            if math.isnan(estimates[effect_of(Role.LAG)].value)
-            else "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset."
-        )
-    if unknown("thrust(0.75)") or unknown("thrust(0.25)"):
-        out.append("Climb hard and let the vehicle sink: the thrust curve is known where it flew.")
-    if unknown("com x") or unknown("com y"):
-        out.append("Climb and sink briskly: thrust that changes shows the centre of mass.")
-    drag = estimates.get("drag")
-    if drag is not None:
-        out.append(
-            "Log the position: drag needs a velocity."
-            if drag.low != drag.low and drag.value != drag.value
-            else "Fly to and fro at 2 m/s and more along both body axes: it shows drag."
-        )
-    return out
+    turning = {
+        "Jxx": "Fly quick roll movements for 20 s: they show Jxx.",
+        "Jyy": "Fly quick pitch movements for 20 s: they show Jyy.",
+        "Jzz": "Yaw at 1 to 2 rad/s while moving to and fro in roll and pitch for 20 s: the "
+        "gyroscopic torque shows Jzz, and with it p.",
+    }
+    if estimates["arm_l"].status == ASSUMED:
+        give = "Give --geometry, the rotors' distance from the body axes: inertia follows."
+        turning = {"arm_l": give}
+    lag = effect_of(Role.LAG)
+    climb = "Climb hard and let the vehicle sink: the thrust curve is known where it flew."
+    brisk = "Climb and sink briskly: thrust that changes shows the centre of mass."
+    advice = {
+        **turning,
+        "(p/k)/Jzz": "Turn quickly to the left and to the right: it shows p/k over Jzz.",
+        lag: "Climb, roll and pitch in quick steps: they tell a motor's lag from a time offset.",
+        "thrust(0.75)": climb,
+        "thrust(0.25)": climb,
+        "com x": brisk,
+        "com y": brisk,
+        "drag": "Fly to and fro at 2 m/s and more along both body axes: it shows drag.",
+    }
+    if lag in estimates and math.isnan(estimates[lag].value):
+        advice[lag] = "Log the motor commands beside the rotor speeds: together they show the lag."
+    if "drag" in estimates and math.isnan(estimates["drag"].value):
+        advice["drag"] = "Log the position: drag needs a velocity."
+    needed = [
+        text
+        for name, text in advice.items()
+        if name in estimates and estimates[name].status in (ASSUMED, NOTHING)
+    ]
+    return list(dict.fromkeys(needed))
