@@ -140,7 +140,9 @@ def compare(
 
     nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
     amounts, prior = _amounts(use)
-    found: list[tuple[str, str, float, float, float]] = []  # place, kind, evidence, amount, spread
+    tried_changes: list[
+        tuple[str, str, float, float, float]
+    ] = []  # place, kind, evidence, amount, spread
     for place, kind in _hypotheses():
         means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
         size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
@@ -149,12 +151,12 @@ def compare(
         weights = np.exp(logs - evidence)
         middle = float(amounts @ weights)
         spread = math.sqrt(float(np.square(amounts - middle) @ weights))
-        found.append((place, kind, evidence, middle, spread))
+        tried_changes.append((place, kind, evidence, middle, spread))
     wide = np.repeat(amounts[:, None], 4, axis=1)
     logs = np.logaddexp.reduce(logs_of(np.zeros_like(wide), wide), axis=0) + np.log(prior)
-    found.append((SOMETHING_ELSE, "", float(np.logaddexp.reduce(logs)), 0.0, 0.0))
+    tried_changes.append((SOMETHING_ELSE, "", float(np.logaddexp.reduce(logs)), 0.0, 0.0))
     usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
-    return _weigh(after, before, difference, usual, nothing, found, use)
+    return _weigh(after, before, difference, usual, nothing, tried_changes, use)
 
 
 def _amounts(use: ChangeSettings) -> tuple[Array, Array]:
@@ -209,13 +211,17 @@ def _scatters(
     """
     more = len(a) + len(b) - 2
     freedom = use.prior_flights + more
-    own = np.mean([trim.noise for trim in (*after, *before)], axis=0)  # of a flight's own mean
+    own_noise = np.mean(
+        [trim.noise for trim in (*after, *before)], axis=0
+    )  # of a flight's own mean
     apart = np.zeros((4, 4))
     for group in (a, b):
         off = group - group.mean(axis=0)
         apart = apart + off.T @ off
     factors = np.exp(2.0 * use.scatter_spread * _SCALES)
-    prior = use.prior_flights * (factors[:, None, None] * np.diag(np.square(use.scatter)) + own)
+    prior = use.prior_flights * (
+        factors[:, None, None] * np.diag(np.square(use.scatter)) + own_noise
+    )
     logs = -0.5 * _SCALES**2 + 0.5 * (
         use.prior_flights * np.linalg.slogdet(prior)[1]
         - freedom * np.linalg.slogdet(prior + apart)[1]
@@ -246,12 +252,12 @@ def _weigh(
     difference: Array,
     scale: Array,
     nothing: float,
-    found: list[tuple[str, str, float, float, float]],
+    tried_changes: list[tuple[str, str, float, float, float]],
     use: ChangeSettings,
 ) -> Change:
     """Return the probabilities of places, each place as likely as the other beforehand."""
     names = [*_ROTORS, *_SIDES, "all rotors", SOMETHING_ELSE]
-    kinds = {name: [f for f in found if f[0] == name] for name in names}
+    kinds = {name: [f for f in tried_changes if f[0] == name] for name in names}
     logs = {NOWHERE: nothing + math.log(use.unchanged)}
     for name, group in kinds.items():
         each = (1.0 - use.unchanged) / (len(names) * len(group))

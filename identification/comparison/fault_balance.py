@@ -51,13 +51,15 @@ class FaultBalance:
         self.thrust = thrust  # (N, 4)
         self.lag = lag  # s
         self.y = np.column_stack([samples.angular_acceleration, samples.specific_force])
-        self.others = [
+        self.free_columns = [
             np.column_stack([ones, w[:, [i]], (w[:, (i + 1) % 3] * w[:, (i + 2) % 3])[:, None]])
             for i in range(3)
         ] + [np.zeros((len(w), 0))]
         # a gyro that is mounted askew by a few degrees shows a part of what the strong axes do
         # about the weak one
-        self.others[2] = np.column_stack([self.others[2], samples.angular_acceleration[:, :2]])
+        self.free_columns[2] = np.column_stack(
+            [self.free_columns[2], samples.angular_acceleration[:, :2]]
+        )
         self.moment = thrust @ _SIGNS.T  # (N, 4)
         away = np.abs(thrust - np.median(thrust, axis=0)).mean(axis=1)
         away += _TURNING * np.square(w).sum(axis=1) + samples.between
@@ -100,7 +102,7 @@ class FaultBalance:
 
     def _left(self, c: int, moment: Array, *more: Array) -> Array:
         """Return the residual (N,) of a channel."""
-        rest = [*more, self.others[c]]
+        rest = [*more, self.free_columns[c]]
         x = np.column_stack([moment, *rest])
         beta = np.linalg.lstsq(x, self.y[:, c], rcond=None)[0]
         if beta[0] <= 0.0:
@@ -117,7 +119,7 @@ class FaultBalance:
         """Return the log-likelihood where nothing happens."""
         total = 0.0
         for c, noise in enumerate(noises):
-            fixed = _Fixed(noise, self.others[c], self.y[:, c], self.moment[:, c])
+            fixed = _Fixed(noise, self.free_columns[c], self.y[:, c], self.moment[:, c])
             gain = max(fixed.my, 0.0) ** 2 / fixed.mm
             total += float(_log_likelihood(np.array(fixed.yy - gain), noise))
         return total
@@ -143,7 +145,7 @@ class FaultBalance:
         """
         ratio, std = np.zeros(CHANNELS), np.full(CHANNELS, np.inf)
         for c, noise in enumerate(noises):
-            x = noise.whiten(np.column_stack([self.moment[:, c], columns[c], self.others[c]]))
+            x = noise.whiten(np.column_stack([self.moment[:, c], columns[c], self.free_columns[c]]))
             y = noise.whiten(self.y[:, c])
             beta, *_ = np.linalg.lstsq(x, y, rcond=None)
             left = y - x @ beta
@@ -162,11 +164,11 @@ class FaultBalance:
         """
         total = np.zeros(len(rows))
         for c, noise in enumerate(noises):
-            fixed = _Fixed(noise, self.others[c], self.y[:, c], self.moment[:, c])
+            fixed = _Fixed(noise, self.free_columns[c], self.y[:, c], self.moment[:, c])
             sy, sm, ss = fixed.beginning(np.ones(len(self.y)), rows, self.ramp(begin))
             a = max(fixed.my, 0.0) / fixed.mm
-            own = np.maximum(ss - sm * sm / fixed.mm, 1e-12 * ss + 1e-300)
-            gain = np.square(sy - sm * fixed.my / fixed.mm) / own
+            own_share = np.maximum(ss - sm * sm / fixed.mm, 1e-12 * ss + 1e-300)
+            gain = np.square(sy - sm * fixed.my / fixed.mm) / own_share
             n = int(noise.whole.sum())
             width = np.log(np.maximum(gain / noise.variance, 1.0))
             price = 0.5 * np.maximum(1.0 + width, math.log(n))
@@ -177,9 +179,9 @@ class FaultBalance:
 class _Fixed:
     """Innovations of a channel and of its moment, with the free columns projected out."""
 
-    def __init__(self, noise: Noise, others: Array, y: Array, moment: Array) -> None:
+    def __init__(self, noise: Noise, free_columns: Array, y: Array, moment: Array) -> None:
         self.noise = noise
-        white = noise.whiten(others)
+        white = noise.whiten(free_columns)
         self.basis = np.linalg.qr(white)[0] if white.shape[1] else white
         both = noise.whiten(np.column_stack([y, moment]))
         self.both = both - self.basis @ (self.basis.T @ both)

@@ -253,10 +253,10 @@ def _end(c: Channels, t: Array) -> tuple[float, str]:
     count = max(3, round(CLIPPED_SECONDS / float(np.median(np.diff(c.gyro_times)))))
     for axis in c.gyro.T:
         size = np.abs(axis)
-        near = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE
-        near |= (size > (1.0 - CLIPPED_SHARE) * size.max()) & (size > RANGES[0])
+        at_limit = np.abs(size[:, None] / RANGES - 1.0).min(axis=1) < RANGE_SHARE
+        at_limit |= (size > (1.0 - CLIPPED_SHARE) * size.max()) & (size > RANGES[0])
         spread = maximum_filter1d(axis, count) - minimum_filter1d(axis, count)
-        clipped = near & (spread < CLIPPED_SHARE * size)
+        clipped = at_limit & (spread < CLIPPED_SHARE * size)
         if clipped.any():
             # the filters look half their width to either side
             first = max(0, int(np.argmax(clipped)) - count // 2)

@@ -129,7 +129,7 @@ def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, A
     (4, E).
     """
     shares = np.linspace(*use.losses, use.steps)
-    found, weights = [], []
+    log_evidence, weights = [], []
     # only what speaks under every hypothesis, so that all explain the same numbers
     every = [std for _, std in (*likeliest.losses, likeliest.jumps)]
     silent = ~np.isfinite(every).all(axis=0)
@@ -137,7 +137,7 @@ def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, A
         seen, std = likeliest.losses[rotor]
         std = np.where(silent, np.inf, std)
         log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
-        found.append(float(logsumexp(log)) - math.log(len(shares)))
+        log_evidence.append(float(logsumexp(log)) - math.log(len(shares)))
         weights.append(np.exp(log - logsumexp(log)))
     seen, std = likeliest.jumps
     std = np.where(silent, np.inf, std)
@@ -145,10 +145,10 @@ def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, A
     means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
     spread = use.error * lost[:, None] * np.array([2.0, 2.0, 2.0, 4.0])
     log = _normal(seen[None], means, np.hypot(std, spread))
-    found.append(float(logsumexp(log)) - math.log(len(lost)))
+    log_evidence.append(float(logsumexp(log)) - math.log(len(lost)))
     wide = np.hypot(std, np.array(use.other))
-    found.append(float(_normal(seen[None], np.zeros((1, 4)), wide[None])[0]))
-    return np.array(found), shares, np.array(weights)
+    log_evidence.append(float(_normal(seen[None], np.zeros((1, 4)), wide[None])[0]))
+    return np.array(log_evidence), shares, np.array(weights)
 
 
 def _normal(seen: Array, means: Array, std: Array) -> Array:
@@ -236,12 +236,12 @@ class _Search:
 
     def _jump(self, one: FaultBalance, noise: list[Noise]) -> tuple[float, int, Begin]:
         """Return the log-likelihood, the row and the kind of the likeliest jump."""
-        near = self._near(one.steps(noise, self.rows, AT_ONCE))
-        logs = np.array([one.steps(noise, near, begin) for begin in self.begins])
+        rows_around = self._rows_around(one.steps(noise, self.rows, AT_ONCE))
+        logs = np.array([one.steps(noise, rows_around, begin) for begin in self.begins])
         j, k = np.unravel_index(int(np.argmax(logs)), logs.shape)
-        return float(logs[j, k]), int(near[k]), self.begins[j]
+        return float(logs[j, k]), int(rows_around[k]), self.begins[j]
 
-    def _near(self, log: Array) -> NDArray[np.int64]:
+    def _rows_around(self, log: Array) -> NDArray[np.int64]:
         """Return the rows around the likeliest of ``rows``, also those left out between them."""
         k = int(np.argmax(log))
         low, high = self.rows[max(k - 2, 0)], self.rows[min(k + 2, len(log) - 1)]
@@ -259,10 +259,12 @@ class _Search:
         one = self.tried[self._likeliest()]
         balance, noise = one.balance, one.noise
         logs = np.array([balance.steps(noise, self.rows, begin) for begin in self.begins])
-        near = np.arange(max(one.row - 5, self.use.before), min(one.row + 6, self.rows[-1] + 1))
-        fine = np.array([balance.steps(noise, near, begin) for begin in self.begins])
+        rows_around = np.arange(
+            max(one.row - 5, self.use.before), min(one.row + 6, self.rows[-1] + 1)
+        )
+        fine = np.array([balance.steps(noise, rows_around, begin) for begin in self.begins])
         parts = np.array([begin.part for begin in self.begins])
-        starts = self.samples.t[near][None] + STEP * (parts[:, None] - 0.5)
+        starts = self.samples.t[rows_around][None] + STEP * (parts[:, None] - 0.5)
         weights = np.exp(fine - logsumexp(fine))
         evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
         places = len(self.begins) * len(self.samples.t)

@@ -64,12 +64,12 @@ def fit_noise(residual: Array, activity: Array, follows: Mask) -> Noise:
         scale = np.hypot(1.0, share * activity)
         weighted = residual / scale
         past = weighted[lags[whole]]
-        now = weighted[whole]
+        present = weighted[whole]
         # a ridge keeps the filter tame where a residual is next to nothing
-        gram = past.T @ past + 1e-6 * (now @ now) * np.eye(ORDER)
-        poles = np.linalg.solve(gram, past.T @ now)
-        left = now - past @ poles
-        n = len(now)
+        gram = past.T @ past + 1e-6 * (present @ present) * np.eye(ORDER)
+        poles = np.linalg.solve(gram, past.T @ present)
+        left = present - past @ poles
+        n = len(present)
         score = -0.5 * n * math.log(max(float(left @ left), 1e-300) / n) - float(
             np.log(scale[whole]).sum()
         )

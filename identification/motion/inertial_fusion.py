@@ -384,8 +384,8 @@ def _first_guess(
     level = np.stack([forward, np.cross(up, forward), up])
     _levelled(rates, force, dt, FUSION.levelling, np.ascontiguousarray(level), out)
     if attitudes is not None and len(attitudes.t):
-        near = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
-        turned = attitudes.values[0] @ out[near].T
+        nearest_knot = np.abs(np.subtract.outer(attitudes.t[:1], times)).argmin(axis=1)[0]
+        turned = attitudes.values[0] @ out[nearest_knot].T
         heading = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
     elif positions is not None and len(positions.t) > 20:
         heading = _heading(times, out, force, gravity, noise, gyro, positions)
@@ -414,11 +414,11 @@ def _heading(
         a, b, c = (resampled(at + k * step, t, x[:, :2]) for k in (-1, 0, 1))
         return np.asarray(a - 2.0 * b + c)
 
-    own = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])
+    felt = second_difference(alone.t, alone.position) @ np.array([1.0, 1.0j])
     seen = second_difference(positions.t, positions.values) @ np.array([1.0, 1.0j])
     turned = alone.rotation[0] @ rotation[0].T
     zero = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
-    return float(np.angle(np.sum(np.conj(own) * seen))) + zero
+    return float(np.angle(np.sum(np.conj(felt) * seen))) + zero
 
 
 def _measurements(

@@ -139,18 +139,18 @@ def _piece(
 ) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
-    own = log.t[rows]
-    fine = float(np.median(np.diff(own)))
+    imu_times = log.t[rows]
+    fine = float(np.median(np.diff(imu_times)))
     thin = max(1, int(np.ceil(1.0 / (INERTIAL_SIGNALS.most_hz * fine) - 1e-6)))
     period = thin * fine
-    even = np.arange(own[0], own[-1] + 0.5 * fine, fine)
-    even = even[even <= own[-1]]
+    even = np.arange(imu_times[0], imu_times[-1] + 0.5 * fine, fine)
+    even = even[even <= imu_times[-1]]
 
     def sampled(times: Array, x: Array) -> Array:
         found = resampled(even, times, x)
         return low_pass(found, 0.4 / period, fine)[::thin] if thin > 1 else found
 
-    gyro, force = (sampled(own, x[rows]) for x in (log.gyro, log.accelerometer))
+    gyro, force = (sampled(imu_times, x[rows]) for x in (log.gyro, log.accelerometer))
     speeds = sampled(log.t, log.rotor_speeds)
     t = even[::thin]
     fused = _fused(log, t, gyro, force, gravity, noise, thin)
@@ -197,7 +197,7 @@ def _fused(
     """Return the fused motion, with the noise of positions and attitudes as they themselves show
     it.
     """
-    quieter = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
+    thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
     there: Mask = np.asarray(np.isfinite(log.position).all(axis=1))
     placed = _measured(log, there, t)
     whole: Mask = np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid)
@@ -213,20 +213,20 @@ def _fused(
             Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix(),
             INERTIAL_SIGNALS.first_attitude_std,
         )
-    fused = fuse(t, gyro, force, gravity, quieter, positions, attitudes)
+    fused = fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
     if positions is None:
         return fused
     off = positions.values - resampled(positions.t, fused.t, fused.position)
     found = 1.3 * robust_std(off - np.median(off, axis=0))  # a smoother leaves less than the noise
     std = max(found, INERTIAL_SIGNALS.least_position_std)
-    near = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
-    positions = Readings(positions.t[near], positions.values[near], std)
+    kept = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
+    positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
-        near = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
-        still = np.abs(fused.t[near] - attitudes.t) < 0.004
-        if still.sum() > 20:
+        kept = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
+        at_knot = np.abs(fused.t[kept] - attitudes.t) < 0.004
+        if at_knot.sum() > 20:
             off = Rotation.from_matrix(
-                np.swapaxes(fused.rotation[near[still]], 1, 2) @ attitudes.values[still]
+                np.swapaxes(fused.rotation[kept[at_knot]], 1, 2) @ attitudes.values[at_knot]
             ).as_rotvec()
             attitudes = replace(
                 attitudes,
@@ -235,7 +235,7 @@ def _fused(
                     INERTIAL_SIGNALS.least_attitude_std,
                 ),
             )
-    return fuse(t, gyro, force, gravity, quieter, positions, attitudes)
+    return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
 
 
 def _measured(log: FlightLog, there: Mask, t: Array) -> NDArray[np.intp]:

@@ -163,10 +163,10 @@ def filtering_notes(log: FlightLog) -> tuple[str, ...]:
     """Return, as sentences, which of a log's channels were filtered before it was written, how that
     is known, and what it means.
     """
-    found = [noise for noise in noise_spectra(log) if noise.filtered]
-    pose = [noise for noise in found if noise.channel in POSE_CHANNELS]
-    others = [[noise] for noise in found if noise not in pose]
-    return tuple(_sentence(group) for group in ([pose] if pose else []) + others)
+    filtered = [noise for noise in noise_spectra(log) if noise.filtered]
+    pose = [noise for noise in filtered if noise.channel in POSE_CHANNELS]
+    other_groups = [[noise] for noise in filtered if noise not in pose]
+    return tuple(_sentence(group) for group in ([pose] if pose else []) + other_groups)
 
 
 def _sentence(group: Sequence[ChannelNoise]) -> str:

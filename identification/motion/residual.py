@@ -102,8 +102,8 @@ def acting_wrench(
     Both are as if the vehicle had the mass and inertia of ``body``: the accelerations that the
     model says are right. By default it is the vehicle's own, with its body effects applied.
     """
-    rotors, effects, own = model_wrench(signals, vehicle)
-    body = body or own
+    rotors, effects, model_body = model_wrench(signals, vehicle)
+    body = body or model_body
     out = np.empty_like(effects)
     _balance(
         rotors,
@@ -111,11 +111,11 @@ def acting_wrench(
         np.ascontiguousarray(signals.rotation),
         np.ascontiguousarray(signals.angular_velocity),
         np.ascontiguousarray(signals.angular_acceleration),
-        own.com,
-        own.inertia,
+        model_body.com,
+        model_body.inertia,
         body.mass,
-        body.mass / own.mass,
-        body.inertia @ np.linalg.inv(own.inertia),
+        body.mass / model_body.mass,
+        body.inertia @ np.linalg.inv(model_body.inertia),
         out,
     )
     return out, body

@@ -66,7 +66,7 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
             Rotation.from_quat(log.quaternion[log.valid], scalar_first=True) * turn[log.valid]
         ).as_quat(scalar_first=True)
 
-    def louder(x: Array | None, std: float) -> Array | None:
+    def noisier(x: Array | None, std: float) -> Array | None:
         return x if x is None or std == 0.0 else x + std * rng.standard_normal((n, 3))
 
     return replace(
@@ -75,8 +75,8 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
         quaternion=quaternion,
         rotor_speeds=log.rotor_speeds
         + noise.rotor_speed * np.sqrt(12.0) * (rng.random((n, 4)) - 0.5),
-        gyro=louder(log.gyro, noise.gyro),
-        accelerometer=louder(log.accelerometer, noise.accelerometer),
+        gyro=noisier(log.gyro, noise.gyro),
+        accelerometer=noisier(log.accelerometer, noise.accelerometer),
     )
 
 

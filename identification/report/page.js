@@ -16,7 +16,7 @@
     return x.toFixed(decimals).replace("-", "−");
   };
   const made = [];  // every plot: {key, u, say, idle}
-  const heard = find("heard");
+  const announced = find("announced");
   let byKey = false;  // a screen reader hears the cursor only when a key moved it
 
   /* one plot in place of its drawing */
@@ -76,7 +76,7 @@
       p.at = x;
       p.u.setCursor(x === null ? { left: -10, top: -10 } : { left: p.u.valToPos(x, "x"), top: 5 });
     }
-    if (byKey) heard.textContent = plot.name + ": " + find("readout-" + plot.key).textContent;
+    if (byKey) announced.textContent = plot.name + ": " + find("readout-" + plot.key).textContent;
     byKey = false;
   }
   function zoom(plot, factor, about) {
@@ -89,7 +89,7 @@
   function set_range(plot, low, high) {
     if (high - low < (plot.range[1] - plot.range[0]) * 1e-4) return;
     plot.u.batch(() => plot.u.setScale("x", { min: low, max: high }));
-    heard.textContent = `shown: ${shown(low)} to ${shown(high)}`;
+    announced.textContent = `shown: ${shown(low)} to ${shown(high)}`;
     if (plot.at !== null && plot.at !== undefined) move_cursor(plot, Math.min(Math.max(plot.at, low), high));
   }
 
@@ -191,7 +191,7 @@
     each("effect", (box, i) => {
       effects[i] = box.checked;
       show();
-      heard.textContent = plots.map(p => `${p.name} ${p.idle()}`).join("; ");
+      announced.textContent = plots.map(p => `${p.name} ${p.idle()}`).join("; ");
     });
     each("line", (box, i) => plots.forEach(p => p.u.setSeries(i + 1, { show: box.checked })));
     each("same", box => { sameScale = box.checked; show(); });

@@ -106,8 +106,8 @@ def headline(diagnosis: Diagnosis) -> str:
         return "The model explains these logs: nothing needs to be added to it."
     if diagnosis.verdict == "unexplained" or not diagnosis.effects:
         if diagnosis.remainder == "random":
-            return f"The model's error looks random: no effect {_asked(diagnosis)} explains it."
-        return f"The model's error has structure that no effect {_asked(diagnosis)} explains."
+            return f"The model's error looks random: no effect {_tried(diagnosis)} explains it."
+        return f"The model's error has structure that no effect {_tried(diagnosis)} explains."
     told = [_undecided(diagnosis, undecided)] if undecided else []
     if sure:
         told.append(
@@ -125,7 +125,7 @@ def headline(diagnosis: Diagnosis) -> str:
     return " ".join(f"{sentence}." for sentence in told)
 
 
-def _asked(diagnosis: Diagnosis) -> str:
+def _tried(diagnosis: Diagnosis) -> str:
     """Return of which effects it was asked whether they explain an error."""
     return "that these logs can show" if diagnosis.needs_pose else "in the library"
 
@@ -213,27 +213,27 @@ def remainder_sentence(diagnosis: Diagnosis) -> str:
             "no test found structure in it."
         )
     if not diagnosis.structure:
-        return f"The residual has structure that no effect {_asked(diagnosis)} explains."
+        return f"The residual has structure that no effect {_tried(diagnosis)} explains."
     strongest = diagnosis.structure[0]
     return (
-        f"The residual has structure that no effect {_asked(diagnosis)} explains; the strongest is "
+        f"The residual has structure that no effect {_tried(diagnosis)} explains; the strongest is "
         f"in {strongest.where} ({percent(strongest.gain)} of the residual)."
     )
 
 
 def _disturbances(diagnosis: Diagnosis) -> str:
     """Return the strongest random disturbances, of a force and of a torque, as an insertion."""
-    found = []
+    stated = []
     for unit, channels in (("N", CHANNELS[:3]), ("Nm", CHANNELS[3:])):
         own = [gusts for gusts in diagnosis.gusts if gusts.channel in channels]
         if own:
             largest = max(own, key=lambda gusts: gusts.rms)
             factor, unit = scale_of([largest.rms], unit)
-            found.append(
+            stated.append(
                 f"{rounded(factor * largest.rms, 2)}{_SPACE}{unit} rms (correlation time "
                 f"{rounded(largest.time, 2)}{_SPACE}s)"
             )
-    return f", with disturbances of up to {in_words(found)}" if found else ""
+    return f", with disturbances of up to {in_words(stated)}" if stated else ""
 
 
 def _transient(diagnosis: Diagnosis) -> str:
@@ -317,23 +317,23 @@ def confusion(effect: NamedEffect) -> str:
 
 def probability_sentences(diagnosis: Diagnosis) -> list[str]:
     """Return how probable what was found is, in plain words; nothing where that was not asked."""
-    found = diagnosis.probabilities
-    if found is None:
+    stated = diagnosis.probabilities
+    if stated is None:
         return []
     names = [
-        f"{e.name}: {percent(found.names.get(e.name, 0.0))} that it acts."
+        f"{e.name}: {percent(stated.names.get(e.name, 0.0))} that it acts."
         for e in diagnosis.effects
     ]
     sets = [
         f"{' and '.join(x.effects) or 'Nothing of the library'}, and nothing else: "
         f"{percent(x.probability)}."
-        for x in found.alternatives[:5]
+        for x in stated.alternatives[:5]
     ]
     hidden = "" if diagnosis.ranking else ", or none that these logs can show"
     return [
         *names,
         *sets,
-        f"Something acts that no effect of the library is{hidden}: {percent(found.unknown)}.",
+        f"Something acts that no effect of the library is{hidden}: {percent(stated.unknown)}.",
         "A probability is how often such a finding was right on simulated flights of which the "
         "truth is known, some of them with a cause outside the library.",
     ]

@@ -115,13 +115,13 @@ def _effects(estimates: Mapping[str, Estimate]) -> Sequence[EffectSetting]:
     out = []
     for role, count in _EFFECTS.items():
         effect = effect_of(role)
-        found = {}
+        coefficients = {}
         for i, c in enumerate(get(effect).coefficients[:count]):
             known = estimates.get(estimate_name(role, i))
             if known is not None and ((value := _shown(known)) > 0.0 or c.minimum < 0.0):
-                found[c.name] = value
-        if any(found.values()):
-            out.append(EffectSetting(effect, found))
+                coefficients[c.name] = value
+        if any(coefficients.values()):
+            out.append(EffectSetting(effect, coefficients))
     # a drag at the rotors damps by itself
     if any(get(e.name).role == Role.ROTOR_DRAG for e in out):
         out = [e for e in out if get(e.name).role != Role.RATE_DAMPING]

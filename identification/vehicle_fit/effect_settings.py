@@ -13,10 +13,10 @@ def effect_of(role: Role) -> str:
     Raises:
         InputError: it has none.
     """
-    found = playing(role)
-    if not found:
+    effects = playing(role)
+    if not effects:
         raise InputError(f"the library of effects: expected one of role {role!s}, found none")
-    return found[0]
+    return effects[0]
 
 
 def estimate_name(role: Role, index: int) -> str:
@@ -27,8 +27,8 @@ def estimate_name(role: Role, index: int) -> str:
 
 def coefficient_of(vehicle: Vehicle, role: Role, index: int) -> float:
     """Return a coefficient of a vehicle's effects of a role; 0 where it has none."""
-    own = [e for e in vehicle.effects if get(e.name).role == role]
-    return sum(float(get(e.name).vector(e.coefficients)[index]) for e in own)
+    settings = [e for e in vehicle.effects if get(e.name).role == role]
+    return sum(float(get(e.name).vector(e.coefficients)[index]) for e in settings)
 
 
 def linear_drag(vehicle: Vehicle) -> tuple[float, float, float]:

@@ -83,19 +83,19 @@ def estimates_of(
         kept: names of the further effects that show.
         weight: N.
     """
-    found = _Estimates(fit, sources, geometry, kept)
+    estimates = _Estimates(fit, sources, geometry, kept)
     vertical = f"{sources.force} along body z against {sources.rotors}, with the mass given"
     if fit.drive.commands:
-        found.say_curve(pieces, weight, vertical)
+        estimates.say_curve(pieces, weight, vertical)
     else:
-        found.say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
-    found.say_arm()
-    found.say_inertia(*not_told)
-    found.say_yaw()
-    found.say_lag()
-    found.say_centre()
-    found.say_drag()
-    return found.said
+        estimates.say("k", lambda v: v["a0"], "N/(rad/s)^2", vertical)
+    estimates.say_arm()
+    estimates.say_inertia(*not_told)
+    estimates.say_yaw()
+    estimates.say_lag()
+    estimates.say_centre()
+    estimates.say_drag()
+    return estimates.said
 
 
 class _Estimates:

@@ -150,10 +150,10 @@ def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
 
 
 def _voltage(pieces: Sequence[MotionPiece]) -> float:
-    found = [p.voltage for p in pieces if p.voltage is not None]
-    if len(found) < len(pieces):
+    voltages = [p.voltage for p in pieces if p.voltage is not None]
+    if len(voltages) < len(pieces):
         return 0.0
-    together = np.concatenate(found)
+    together = np.concatenate(voltages)
     middle = float(np.median(together))
     wide = float(np.ptp(np.quantile(together, [0.05, 0.95])))
     return middle if middle > 0.0 and wide > IDENTIFY.least_voltage_range * middle else 0.0
@@ -214,10 +214,12 @@ def _agreeing(
     """
     n = len(fit.model.free)
     nonlinear = fit.names[n:]
-    quiet = 0.0 if fit.drive.lag > 0.0 else noise
+    rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
     for band in IDENTIFY.bands:
         drive = replace(fit.drive, band=band)
-        slow = solve(pieces, drive, fit.model, fit.theta[:n], nonlinear, quiet, {"delay": DELAY})
+        slow = solve(
+            pieces, drive, fit.model, fit.theta[:n], nonlinear, rotor_noise, {"delay": DELAY}
+        )
         wide, narrow = _hover_thrust(fit, weight), _hover_thrust(slow, weight)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         bias = abs(fit.values.get("force bias z", 0.0))
@@ -270,8 +272,10 @@ def _with_optional(
         model, start = with_more(fit.model, fit.theta[: len(fit.model.free)], parameters)
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
         if fall_with(fit, model, start) > least:
-            quiet = 0.0 if fit.drive.lag > 0.0 else noise
-            richer = solve(pieces, fit.drive, model, start, nonlinear, quiet, {"delay": DELAY})
+            rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
+            richer = solve(
+                pieces, fit.drive, model, start, nonlinear, rotor_noise, {"delay": DELAY}
+            )
             if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
                 fit = richer
                 kept.append(name)

@@ -152,9 +152,9 @@ def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
     made, zero = fit.balance, np.zeros(len(fit.balance.nonlinear))
     total = np.sum([_grams(made, fit.spectra, i) for i in range(len(made.segments))], axis=0)
     step, information, *_ = _newton(made, total, model, start, zero, fit.drive, {})
-    now = fit.theta[: len(fit.model.free)]
-    own, known, *_ = _newton(made, total, fit.model, now, zero, fit.drive, {})
-    return float(step @ information @ step - own @ known @ own)
+    current = fit.theta[: len(fit.model.free)]
+    own_step, own_information, *_ = _newton(made, total, fit.model, current, zero, fit.drive, {})
+    return float(step @ information @ step - own_step @ own_information @ own_step)
 
 
 def step_with(
@@ -225,9 +225,9 @@ def _newton(
     gradient = np.einsum("iad,ad->i", weighted, v)
     for i, name in enumerate((*model.free, *made.nonlinear)):
         if name in prior and i >= len(theta):
-            now = getattr(drive, name) + shift[i - len(theta)]
+            current = getattr(drive, name) + shift[i - len(theta)]
             information[i, i] += prior[name] ** -2
-            gradient[i] += now * prior[name] ** -2
+            gradient[i] += current * prior[name] ** -2
         elif i < len(theta) and name in model.prior:
             strength = (model.scale[name] / model.prior[name]) ** 2
             information[i, i] += strength
@@ -241,13 +241,15 @@ def _newton(
 def _bounded(shift: Array, drive: Drive, nonlinear: tuple[str, ...]) -> Array:
     out = shift.copy()
     for i, name in enumerate(nonlinear):
-        now = getattr(drive, name)
+        current = getattr(drive, name)
         low, high = {
             "lag": (0.0, SOLVE.most_lag),
             "delay": (-SOLVE.most_delay, SOLVE.most_delay),
             "gamma": (-SOLVE.most_gamma, SOLVE.most_gamma),
         }[name]
-        out[i] = np.clip(now + out[i], max(low, now - 0.05), min(high, now + 0.05)) - now
+        out[i] = (
+            np.clip(current + out[i], max(low, current - 0.05), min(high, current + 0.05)) - current
+        )
     return out
 
 

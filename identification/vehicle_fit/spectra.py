@@ -73,9 +73,9 @@ def residual_spectra(segments: Sequence[Segment], powers: Sequence[Array]) -> li
     out: list[Array] = []
     by_log: dict[int, tuple[Array, Array]] = {}
     for log in {s.log for s in segments}:
-        own = [(s, p) for s, p in zip(segments, powers, strict=True) if s.log == log]
-        frequency = np.concatenate([s.frequency for s, _ in own])
-        power = np.concatenate([p for _, p in own])
+        of_log = [(s, p) for s, p in zip(segments, powers, strict=True) if s.log == log]
+        frequency = np.concatenate([s.frequency for s, _ in of_log])
+        power = np.concatenate([p for _, p in of_log])
         order = np.argsort(frequency, kind="stable")
         by_log[log] = frequency[order], power[order]
     for s in segments:

@@ -243,7 +243,7 @@ ACT = """
   const out = {idle: all()};
   await key("time-Fx", "ArrowRight");
   out.linked = all();
-  out.heard = page.getElementById("heard").textContent;
+  out.announced = page.getElementById("announced").textContent;
   await key("time-Fx", "+", "+", "Home");
   out.zoomed = all();
   await key("time-Fx", "Escape", "Home");
@@ -291,7 +291,7 @@ def test_keys_zoom_and_switches_in_a_browser(tmp_path, width, dark):
         scale = 1e3 if text.split()[-1].startswith("mN") else 1.0
         truth = [scale * trace.before[i, k], scale * trace.after[i, k]]
         assert values == pytest.approx(truth, rel=6e-3, abs=scale * 1e-5), CHANNELS[k]
-    assert done["heard"].startswith("Fx: t = ")
+    assert done["announced"].startswith("Fx: t = ")
     # zoomed twice about the cursor, all plots begin later; Escape shows the whole flight again
     begins = {float(re.search(r"t = ([\d.]+) s", text)[1]) for text in done["zoomed"]}
     assert len(begins) == 1
