@@ -251,10 +251,11 @@ def _controlled(
     """Return all tests with their p-values adjusted together, and what is told by them; those
     first that are.
     """
-    tested = [one.p for one in (*trends, *appearances) if one.p is not None]
+    every: list[Trend | Appearance] = [*trends, *appearances]
+    tested = [one.p for one in every if one.p is not None]
     adjusted = iter(false_discovery_control(tested) if tested else [])
     changes: list[dict[str, Any]] = []
-    for one in (*trends, *appearances):
+    for one in every:
         told = "drifts" if isinstance(one, Trend) else "changed"
         p = None if one.p is None else float(next(adjusted))
         changes.append({"adjusted_p": p, told: p is not None and p < DRIFT.false_discoveries})

@@ -44,7 +44,7 @@ def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
             share = balance._share(int(row), begin)
             expected = 0.0
             for c, one in enumerate(noise):
-                columns = [balance.moment[:, c], share, balance.others[c]]
+                columns = [balance.moment[:, c], share, balance.free_columns[c]]
                 x = one.whiten(np.column_stack(columns))
                 plain = np.delete(x, 1, axis=1)
                 y = one.whiten(balance.y[:, c])
