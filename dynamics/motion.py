@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runtime.compiled import Record, compiled
+from ..runtime.compiled import Record, compiled, compiled_inline
 from .effects.base import (
     POSITION,
     RATE,
@@ -63,6 +63,59 @@ def rotor_wrench(body: Record, rotor_speeds: Array, out: Array) -> None:
     out[2] += body.com[0] * out[0]
 
 
+@compiled_inline
+def body_numbers(body: Record) -> tuple[float, ...]:
+    """Return inertia (9), inverse inertia (9), the geometric centre from the centre of mass (3),
+    inverse mass and gravity: read ahead of a loop, they stay in registers.
+    """
+    J, K, c = body.inertia, body.inverse_inertia, body.com
+    return (
+        *(J[0, 0], J[0, 1], J[0, 2], J[1, 0], J[1, 1], J[1, 2], J[2, 0], J[2, 1], J[2, 2]),
+        *(K[0, 0], K[0, 1], K[0, 2], K[1, 0], K[1, 1], K[1, 2], K[2, 0], K[2, 1], K[2, 2]),
+        *(-c[0], -c[1], -c[2], 1.0 / body.mass, body.gravity),
+    )
+
+
+@compiled_inline
+def accelerations_of(
+    b: tuple[float, ...],
+    R: tuple[float, ...],
+    omega: tuple[float, float, float],
+    rotors: tuple[float, float, float, float],
+    torque: tuple[float, float, float],
+    force: tuple[float, float, float],
+    effects: tuple[float, ...],
+) -> tuple[float, ...]:
+    """Return the accelerations (6) of ``accelerations`` from numbers: ``body_numbers`` and the rest
+    of its arguments.
+    """
+    wx, wy, wz = omega
+    t0, t1, t2 = torque
+    hx = b[0] * wx + b[1] * wy + b[2] * wz
+    hy = b[3] * wx + b[4] * wy + b[5] * wz
+    hz = b[6] * wx + b[7] * wy + b[8] * wz
+    # (12): the world torque enters as R' tau
+    tx = rotors[1] + effects[3] + R[0] * t0 + R[3] * t1 + R[6] * t2 - (wy * hz - wz * hy)
+    ty = rotors[2] + effects[4] + R[1] * t0 + R[4] * t1 + R[7] * t2 - (wz * hx - wx * hz)
+    tz = rotors[3] + effects[5] + R[2] * t0 + R[5] * t1 + R[8] * t2 - (wx * hy - wy * hx)
+    ax = b[9] * tx + b[10] * ty + b[11] * tz
+    ay = b[12] * tx + b[13] * ty + b[14] * tz
+    az = b[15] * tx + b[16] * ty + b[17] * tz
+    # (4), and the acceleration of the geometric centre about the centre of mass
+    cx, cy, cz, inverse_mass = b[18], b[19], b[20], b[21]
+    nx, ny, nz = wy * cz - wz * cy, wz * cx - wx * cz, wx * cy - wy * cx
+    px = ay * cz - az * cy + wy * nz - wz * ny
+    py = az * cx - ax * cz + wz * nx - wx * nz
+    pz = ax * cy - ay * cx + wx * ny - wy * nx
+    fx = R[2] * rotors[0] + force[0] + effects[0]
+    fy = R[5] * rotors[0] + force[1] + effects[1]
+    fz = R[8] * rotors[0] + force[2] + effects[2]
+    x = fx * inverse_mass + (R[0] * px + R[1] * py + R[2] * pz)
+    y = fy * inverse_mass + (R[3] * px + R[4] * py + R[5] * pz)
+    z = fz * inverse_mass + (R[6] * px + R[7] * py + R[8] * pz) - b[22]
+    return x, y, z, ax, ay, az
+
+
 @compiled
 def accelerations(
     body: Record,
@@ -81,52 +134,16 @@ def accelerations(
     world frame, ``effects`` (6,) the wrench of the declared effects: force in the world, torque in
     the body frame.
     """
-    J = body.inertia
-    wx, wy, wz = omega[0], omega[1], omega[2]
-    hx = J[0, 0] * wx + J[0, 1] * wy + J[0, 2] * wz
-    hy = J[1, 0] * wx + J[1, 1] * wy + J[1, 2] * wz
-    hz = J[2, 0] * wx + J[2, 1] * wy + J[2, 2] * wz
-    # the world torque enters as R' tau
-    tx = (
-        rotors[1]
-        + effects[3]
-        + rotation[0, 0] * torque[0]
-        + rotation[1, 0] * torque[1]
-        + rotation[2, 0] * torque[2]
+    R, e = rotation, effects
+    out[0], out[1], out[2], out[3], out[4], out[5] = accelerations_of(
+        body_numbers(body),
+        (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2]),
+        (omega[0], omega[1], omega[2]),
+        (rotors[0], rotors[1], rotors[2], rotors[3]),
+        (torque[0], torque[1], torque[2]),
+        (force[0], force[1], force[2]),
+        (e[0], e[1], e[2], e[3], e[4], e[5]),
     )
-    ty = (
-        rotors[2]
-        + effects[4]
-        + rotation[0, 1] * torque[0]
-        + rotation[1, 1] * torque[1]
-        + rotation[2, 1] * torque[2]
-    )
-    tz = (
-        rotors[3]
-        + effects[5]
-        + rotation[0, 2] * torque[0]
-        + rotation[1, 2] * torque[1]
-        + rotation[2, 2] * torque[2]
-    )
-    tx -= wy * hz - wz * hy
-    ty -= wz * hx - wx * hz
-    tz -= wx * hy - wy * hx
-    inverse = body.inverse_inertia
-    ax = inverse[0, 0] * tx + inverse[0, 1] * ty + inverse[0, 2] * tz
-    ay = inverse[1, 0] * tx + inverse[1, 1] * ty + inverse[1, 2] * tz
-    az = inverse[2, 0] * tx + inverse[2, 1] * ty + inverse[2, 2] * tz
-    out[3], out[4], out[5] = ax, ay, az
-    # the geometric centre lies at -com from the centre of mass: a rigid-body point's acceleration
-    cx, cy, cz = -body.com[0], -body.com[1], -body.com[2]
-    nx, ny, nz = wy * cz - wz * cy, wz * cx - wx * cz, wx * cy - wy * cx
-    px = ay * cz - az * cy + wy * nz - wz * ny
-    py = az * cx - ax * cz + wz * nx - wx * nz
-    pz = ax * cy - ay * cx + wx * ny - wy * nx
-    inverse_mass = 1.0 / body.mass
-    for i in range(3):
-        out[i] = (rotation[i, 2] * rotors[0] + force[i] + effects[i]) * inverse_mass
-        out[i] += rotation[i, 0] * px + rotation[i, 1] * py + rotation[i, 2] * pz
-    out[2] -= body.gravity
 
 
 # rad: a step that turns the body further carries its angular momentum by the exact rotation

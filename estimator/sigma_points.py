@@ -1,14 +1,21 @@
 """The twelve sigma points of attitude and rate side by side, for a vehicle without wrench effects.
 
 Each loop takes one operation of the model to all points at once, which is what a processor's vector
-unit does well. The arithmetic is, operation by operation, that of ``displace``, ``propagate`` and
-``error_from`` with one point at a time, and so are the results, bit for bit. Arrays here have a row
-for each number and a column for each point.
+unit does well. The formulas are those of ``displace``, ``propagate`` and ``error_from`` with one
+point at a time, and so are the results, bit for bit. Arrays here have a row for each number and a
+column for each point.
 """
 
-import math
-
-from ..dynamics.motion import LONG_TURN, gyroscopic_rest
+from ..dynamics.motion import LONG_TURN, accelerations_of, body_numbers, gyroscopic_rest
+from ..dynamics.rotation import (
+    large_turn_of_step,
+    matrix_of_numbers,
+    mrp_between,
+    product_of,
+    quaternion_of_mrp,
+    turn_of_step,
+    turned_by,
+)
 from ..runtime.compiled import Record, compiled_for_vectors
 from ..runtime.vector_lanes import any_of, choose
 
@@ -29,20 +36,8 @@ def spread_points(f: Record, spread: float) -> None:
             D[i + 1, j], D[i + 1, PAIRS + j] = b, -b
     q0, q1, q2, q3 = x[3], x[4], x[5], x[6]
     for k in range(POINTS):
-        # (17)
-        r0, r1, r2 = D[0, k], D[1, k], D[2, k]
-        square = r0 * r0 + r1 * r1 + r2 * r2
-        scale = 1.0 / (1.0 + square)
-        a0, a1, a2, a3 = (
-            (1.0 - square) * scale,
-            2.0 * r0 * scale,
-            2.0 * r1 * scale,
-            2.0 * r2 * scale,
-        )
-        X[3, k] = a0 * q0 - a1 * q1 - a2 * q2 - a3 * q3
-        X[4, k] = a0 * q1 + a1 * q0 + a2 * q3 - a3 * q2
-        X[5, k] = a0 * q2 - a1 * q3 + a2 * q0 + a3 * q1
-        X[6, k] = a0 * q3 + a1 * q2 - a2 * q1 + a3 * q0
+        a0, a1, a2, a3 = quaternion_of_mrp(D[0, k], D[1, k], D[2, k])
+        X[3, k], X[4, k], X[5, k], X[6, k] = product_of(a0, a1, a2, a3, q0, q1, q2, q3)
     for i in range(3):
         for k in range(POINTS):
             X[10 + i, k] = x[10 + i] + D[3 + i, k]
@@ -58,80 +53,28 @@ def propagate_points(f: Record, dt: float) -> None:
     (11)-(14).
     """
     X, C, A = f.points, f.turns, f.accelerations
-    J, inverse, com = f.body.inertia, f.body.inverse_inertia, f.body.com
-    # read ahead of the loop: a compiler cannot know that the loop does not write there
-    J00, J01, J02, J10, J11, J12, J20, J21, J22 = (
-        J[0, 0],
-        J[0, 1],
-        J[0, 2],
-        J[1, 0],
-        J[1, 1],
-        J[1, 2],
-        J[2, 0],
-        J[2, 1],
-        J[2, 2],
+    J, inverse, w, body = (
+        f.body.inertia,
+        f.body.inverse_inertia,
+        f.rotor_wrench,
+        body_numbers(f.body),
     )
-    I00, I01, I02, I10, I11, I12, I20, I21, I22 = (
-        inverse[0, 0],
-        inverse[0, 1],
-        inverse[0, 2],
-        inverse[1, 0],
-        inverse[1, 1],
-        inverse[1, 2],
-        inverse[2, 0],
-        inverse[2, 1],
-        inverse[2, 2],
-    )
-    thrust, moment_x, moment_y, moment_z = (
-        f.rotor_wrench[0],
-        f.rotor_wrench[1],
-        f.rotor_wrench[2],
-        f.rotor_wrench[3],
-    )
-    cx, cy, cz = -com[0], -com[1], -com[2]
-    inverse_mass, gravity = 1.0 / f.body.mass, f.body.gravity
+    rotors, no_effects = (w[0], w[1], w[2], w[3]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(POINTS):
-        w, x, y, z = X[3, k], X[4, k], X[5, k], X[6, k]
-        wx, wy, wz = X[10, k], X[11, k], X[12, k]
-        t0, t1, t2 = X[13, k], X[14, k], X[15, k]
-        # (7)
-        R00, R01, R02 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        R10, R11, R12 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        R20, R21, R22 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-        # (12)
-        hx = J00 * wx + J01 * wy + J02 * wz
-        hy = J10 * wx + J11 * wy + J12 * wz
-        hz = J20 * wx + J21 * wy + J22 * wz
-        tx = moment_x + R00 * t0 + R10 * t1 + R20 * t2 - (wy * hz - wz * hy)
-        ty = moment_y + R01 * t0 + R11 * t1 + R21 * t2 - (wz * hx - wx * hz)
-        tz = moment_z + R02 * t0 + R12 * t1 + R22 * t2 - (wx * hy - wy * hx)
-        ax = I00 * tx + I01 * ty + I02 * tz
-        ay = I10 * tx + I11 * ty + I12 * tz
-        az = I20 * tx + I21 * ty + I22 * tz
-        A[3, k], A[4, k], A[5, k] = ax, ay, az
-        # (4) and the way from the centre of mass to the geometric centre
-        nx, ny, nz = wy * cz - wz * cy, wz * cx - wx * cz, wx * cy - wy * cx
-        px = ay * cz - az * cy + wy * nz - wz * ny
-        py = az * cx - ax * cz + wz * nx - wx * nz
-        pz = ax * cy - ay * cx + wx * ny - wy * nx
-        A[0, k] = (R02 * thrust + X[16, k]) * inverse_mass + (R00 * px + R01 * py + R02 * pz)
-        A[1, k] = (R12 * thrust + X[17, k]) * inverse_mass + (R10 * px + R11 * py + R12 * pz)
-        A[2, k] = (
-            (R22 * thrust + X[18, k]) * inverse_mass + (R20 * px + R21 * py + R22 * pz) - gravity
+        A[0, k], A[1, k], A[2, k], A[3, k], A[4, k], A[5, k] = accelerations_of(
+            body,
+            matrix_of_numbers(X[3, k], X[4, k], X[5, k], X[6, k]),
+            (X[10, k], X[11, k], X[12, k]),
+            rotors,
+            (X[13, k], X[14, k], X[15, k]),
+            (X[16, k], X[17, k], X[18, k]),
+            no_effects,
         )
     half = 0.5 * dt
     for k in range(POINTS):
-        # (11), (13); the series of ``turn_body``
         wx, wy, wz = X[10, k], X[11, k], X[12, k]
-        square = half * half * (wx * wx + wy * wy + wz * wz)
-        C[0, k] = square
-        C[1, k] = 1.0 - square / 2.0 * (
-            1.0 - square / 12.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0))
-        )
-        C[2, k] = half * (
-            1.0
-            - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)))
-        )
+        C[0, k] = half * half * (wx * wx + wy * wy + wz * wz)
+        C[1, k], C[2, k] = turn_of_step(C[0, k], half)
     for k in range(POINTS):
         wx, wy, wz = X[10, k], X[11, k], X[12, k]
         square = dt * dt * (wx * wx + wy * wy + wz * wz)
@@ -141,18 +84,12 @@ def propagate_points(f: Record, dt: float) -> None:
             for i in range(3):
                 A[3 + i, k] += choose(far, rest[i], 0.0)
     for k in range(POINTS):
-        large = C[0, k] >= 0.01
-        if any_of(large):
-            angle = math.sqrt(C[0, k])
-            C[1, k] = choose(large, math.cos(angle), C[1, k])
-            C[2, k] = choose(large, half * math.sin(angle) / angle, C[2, k])
+        C[1, k], C[2, k] = large_turn_of_step(C[0, k], half, C[1, k], C[2, k])
     for k in range(POINTS):
-        q0, q1, q2, q3, cosine, scale = X[3, k], X[4, k], X[5, k], X[6, k], C[1, k], C[2, k]
-        x, y, z = X[10, k] * scale, X[11, k] * scale, X[12, k] * scale
-        X[3, k] = q0 * cosine - q1 * x - q2 * y - q3 * z
-        X[4, k] = q1 * cosine + q0 * x + q2 * z - q3 * y
-        X[5, k] = q2 * cosine + q0 * y + q3 * x - q1 * z
-        X[6, k] = q3 * cosine + q0 * z + q1 * y - q2 * x
+        x, y, z = X[10, k] * C[2, k], X[11, k] * C[2, k], X[12, k] * C[2, k]
+        X[3, k], X[4, k], X[5, k], X[6, k] = turned_by(
+            X[3, k], X[4, k], X[5, k], X[6, k], C[1, k], x, y, z
+        )
     for i in range(3):
         for k in range(POINTS):
             X[i, k] += dt * (X[7 + i, k] + 0.5 * dt * A[i, k])
@@ -168,13 +105,7 @@ def errors_of_points(f: Record) -> None:
     X, c, D = f.points, f.centre, f.errors
     q0, q1, q2, q3 = c[3], c[4], c[5], c[6]
     for k in range(POINTS):
-        a0, a1, a2, a3 = X[3, k], X[4, k], X[5, k], X[6, k]
-        w = a0 * q0 + a1 * q1 + a2 * q2 + a3 * q3
-        sign = choose(w >= 0.0, 1.0, -1.0)
-        scale = sign / (1.0 + sign * w)
-        D[0, k] = (-a0 * q1 + a1 * q0 - a2 * q3 + a3 * q2) * scale
-        D[1, k] = (-a0 * q2 + a1 * q3 + a2 * q0 - a3 * q1) * scale
-        D[2, k] = (-a0 * q3 - a1 * q2 + a2 * q1 + a3 * q0) * scale
+        D[0, k], D[1, k], D[2, k] = mrp_between(X[3, k], X[4, k], X[5, k], X[6, k], q0, q1, q2, q3)
     for i in range(3):
         for k in range(POINTS):
             D[3 + i, k] = X[10 + i, k] - c[10 + i]
