@@ -8,14 +8,15 @@ innovations, each normal with the covariance S that the filter states, so its lo
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
-from ..runtime.compiled import Record, compiled, compiled_without_gil
+from ..runtime.compiled import Record, compiled_without_gil
 from ..runtime.errors import InputError
 from .estimate import Array
 from .recovery import remember
@@ -30,6 +31,28 @@ _TWIST = 0.03  # s between the poses whose difference starts a piece's velocity
 _MRP_VOLUME = 4.0 * math.pi / 3.0  # of all attitudes: MRPs of at most length 1
 _CONSTANT = -3.0 * math.log(2.0 * math.pi)  # of a normal density of six numbers
 
+# A row of a flight
+ROW = np.dtype(
+    [
+        ("dt", "f8"),  # s since the row before
+        ("sample", "f8", (11,)),  # mean rotor speeds of the way there, position, quaternion
+        ("voltage", "f8"),  # V
+        ("measured", "?"),  # a pose is there
+        ("counted", "?"),  # and the filter's start is over
+    ]
+)
+# What a pass finds at a pose
+INNOVATION = np.dtype(
+    [
+        ("nis", "f8"),
+        ("log_likelihood", "f8"),  # of the pose, given all before it
+        ("outlier", "?"),  # likelier an outlier than a pose of this filter
+        ("innovation", "f8", (6,)),  # of (rho, x), rho an MRP
+        ("root", "f8", (6, 6)),  # of its covariance, lower triangular
+    ]
+)
+Innovations = Any  # a record array of INNOVATION
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -43,22 +66,7 @@ class Piece:
     quaternion: Array  # (4,)
     velocity: Array  # (3,) m/s, world
     angular_velocity: Array  # (3,) rad/s, body
-    dt: Array  # (K,) s, to each further row
-    samples: Array  # (K, 11) mean rotor speeds of the way there, position, quaternion
-    voltage: Array  # (K,) V
-    measured: Mask  # (K,) a pose is there
-    counted: Mask  # (K,) and the filter's start is over
-
-
-@dataclass(frozen=True, eq=False)
-class Innovations:
-    """What a pass found at the M poses that count."""
-
-    nis: Array  # (M,)
-    log_likelihood: Array  # (M,) of each pose, given all before it
-    outlier: Mask  # (M,) likelier an outlier than a pose of this filter
-    innovation: Array  # (M, 6) of (rho, x), rho an MRP
-    root: Array  # (M, 6, 6) of its covariance, lower triangular
+    rows: np.ndarray  # (K,) of ROW, each further row
 
 
 def pieces_of(
@@ -104,21 +112,17 @@ def pieces_of(
         turn, rotation = np.empty(3), np.empty((3, 3))
         attitude_error(pose[second, 3:], pose[first, 3:], turn)  # a quarter of it, world
         quaternion_to_matrix(pose[first, 3:], rotation)
-        pieces.append(
-            Piece(
-                pose[first, :3],
-                pose[first, 3:],
-                (pose[second, :3] - pose[first, :3]) / span,
-                rotation.T @ turn * (4.0 / span),
-                np.diff(t[first : last + 1]),
-                np.column_stack([0.5 * (rotor_speeds[here] + rotor_speeds[steps]), pose[steps]]),
-                np.full(last - first, vehicle.voltage_ref)
-                if voltage is None
-                else 0.5 * (voltage[here] + voltage[steps]),
-                measured[steps],
-                measured[steps] & (t[steps] > t[first] + startup),
-            )
-        )
+        row = np.zeros(last - first, dtype=ROW)
+        row["dt"], row["sample"][:, 4:] = np.diff(t[first : last + 1]), pose[steps]
+        row["sample"][:, :4] = 0.5 * (rotor_speeds[here] + rotor_speeds[steps])
+        row["voltage"] = vehicle.voltage_ref
+        if voltage is not None:
+            row["voltage"] = 0.5 * (voltage[here] + voltage[steps])
+        row["measured"] = measured[steps]
+        row["counted"] = measured[steps] & (t[steps] > t[first] + startup)
+        velocity = (pose[second, :3] - pose[first, :3]) / span
+        rate = rotation.T @ turn * (4.0 / span)
+        pieces.append(Piece(pose[first, :3], pose[first, 3:], velocity, rate, row))
     return pieces
 
 
@@ -130,7 +134,7 @@ def innovations(
     outlier_chance: float,
     outlier_range: float,
 ) -> Innovations:
-    """Return how likely the poses of these pieces are to a filter with this tuning.
+    """Return how likely the poses that count are to a filter with this tuning (M,).
 
     With a chance of ``outlier_chance`` a pose is an outlier, which lies anywhere within
     ``outlier_range`` of the prediction along each axis and has any attitude. A pose that is
@@ -149,82 +153,49 @@ def innovations(
     found = []
     for piece in pieces:
         ukf = WrenchUKF(vehicle, tuning, period)
-        ukf.reset(
-            piece.position,
-            piece.quaternion,
-            velocity=piece.velocity,
-            angular_velocity=piece.angular_velocity,
-        )
-        count = len(piece.dt)
-        out = Innovations(
-            np.empty(count),
-            np.empty(count),
-            np.zeros(count, dtype=np.bool_),
-            np.empty((count, 6)),
-            np.empty((count, 6, 6)),
-        )
-        _pass(
-            ukf.record,
-            piece.dt,
-            piece.samples,
-            piece.voltage,
-            piece.measured,
-            period,
-            math.log1p(-outlier_chance),
-            math.log(density),
-            out.nis,
-            out.log_likelihood,
-            out.outlier,
-            out.innovation,
-            out.root,
-        )
-        found.append([getattr(out, f.name)[piece.counted] for f in fields(out)])
-    return Innovations(*(np.concatenate(part) for part in zip(*found, strict=True)))
+        twist = {"velocity": piece.velocity, "angular_velocity": piece.angular_velocity}
+        ukf.reset(piece.position, piece.quaternion, **twist)
+        out = np.zeros(len(piece.rows), dtype=INNOVATION)
+        _pass(ukf.record, piece.rows, period, math.log1p(-outlier_chance), math.log(density), out)
+        found.append(out[piece.rows["counted"]])
+    return np.concatenate(found).view(np.recarray)
 
 
 @compiled_without_gil
 def _pass(
     record: Record,
-    dt: Array,
-    samples: Array,
-    voltage: Array,
-    measured: Mask,
+    rows: np.ndarray,
     period: float,
     log_inlier: float,
     log_outlier: float,
-    nis: Array,
-    likelihood: Array,
-    outlier: Mask,
-    innovation: Array,
-    root: Array,
+    out: np.ndarray,
 ) -> None:
     f = record[0]
-    for k in range(len(dt)):
-        z = undo_sensing(f, samples[k], 3 if measured[k] else 0, dt[k])
-        steps = max(1, math.ceil(dt[k] / period - _SLACK))
+    for k in range(len(rows)):
+        row, found = rows[k], out[k]
+        z = undo_sensing(f, row.sample, 3 if row.measured else 0, row.dt)
+        steps = max(1, math.ceil(row.dt / period - _SLACK))
         for _ in range(steps):
-            predict(f, z[0:4], dt[k] / steps, voltage[k])
-        if not measured[k]:
+            predict(f, z[0:4], row.dt / steps, row.voltage)
+        if not row.measured:
             continue
         # the filter's own gate and restarts stay out: the likelihood of outliers is stated here
-        nis[k] = innovate(f, z[4:7], z[7:11], True, True)
-        log_normal = log_inlier + _CONSTANT - 0.5 * nis[k]
+        nis = innovate(f, z[4:7], z[7:11], True, True)
+        found.nis = nis
+        log_normal = log_inlier + _CONSTANT - 0.5 * nis
         for i in range(6):
             log_normal -= math.log(f.L[i, i])
-            innovation[k, i] = 0.0
             for j in range(i + 1):
-                root[k, i, j] = f.L[i, j]
-                innovation[k, i] += f.L[i, j] * f.innovation[j]  # which is whitened
-        if log_normal > log_outlier:
-            likelihood[k] = log_normal + math.log1p(math.exp(log_outlier - log_normal))
+                found.root[i, j] = f.L[i, j]
+                found.innovation[i] += f.L[i, j] * f.innovation[j]  # which is whitened
+        found.outlier = not log_normal > log_outlier  # an outlier, or numbers that are none
+        likelier, other = max(log_normal, log_outlier), min(log_normal, log_outlier)
+        found.log_likelihood = log_outlier if math.isnan(log_normal) else likelier
+        if other > likelier - 40.0:
+            found.log_likelihood += math.log1p(math.exp(other - likelier))
+        if not found.outlier:
             take_in(f)
             remember(f, z[4:7], z[7:11], True, True)
-            continue
-        # an outlier, or numbers that are none
-        outlier[k] = True
-        likelihood[k] = log_outlier
-        if log_normal > log_outlier - 40.0:
-            likelihood[k] += math.log1p(math.exp(log_normal - log_outlier))
 
 
 def fisher_information(found: Innovations, moved: Sequence[Innovations], step: float) -> Array:
@@ -234,65 +205,17 @@ def fisher_information(found: Innovations, moved: Sequence[Innovations], step: f
     Of normal innovations it is ``sum(d_i y' S^-1 d_j y + tr(S^-1 d_i S S^-1 d_j S) / 2)``
     (Schweppe 1965); outliers tell nothing.
     """
-    information = np.zeros((len(moved), len(moved)))
-    slopes = np.zeros((len(moved), 42))
     kept = ~np.logical_or.reduce([found.outlier, *(m.outlier for m in moved)])
-    _add_information(
-        found.innovation,
-        found.root,
-        np.stack([m.innovation for m in moved]),
-        np.stack([m.root for m in moved]),
-        kept,
-        slopes,
-        information,
-    )
-    return information / (step * step)
-
-
-@compiled
-def _add_information(
-    innovation: Array,
-    root: Array,
-    moved_innovation: Array,
-    moved_root: Array,
-    kept: Mask,
-    slopes: Array,
-    information: Array,
-) -> None:
-    n = len(slopes)
-    D = np.empty((6, 6))
-    for k in range(len(innovation)):
-        if not kept[k]:
-            continue
-        L = root[k]
-        for p in range(n):
-            slope, M = slopes[p], moved_root[p, k]
-            for i in range(6):
-                total = moved_innovation[p, k, i] - innovation[k, i]
-                for j in range(i):
-                    total -= L[i, j] * slope[j]
-                slope[i] = total / L[i, i]
-            # L^-1 M is near 1: L^-1 (MM' - LL') L^-T = (L^-1 M)(L^-1 M)' - 1
-            for j in range(6):
-                for i in range(6):
-                    total = M[i, j] if j <= i else 0.0
-                    for m in range(i):
-                        total -= L[i, m] * D[m, j]
-                    D[i, j] = total / L[i, i]
-            for i in range(6):
-                for j in range(6):
-                    total = -1.0 if i == j else 0.0
-                    for m in range(6):
-                        total += D[i, m] * D[j, m]
-                    slope[6 + 6 * i + j] = math.sqrt(0.5) * total
-        for p in range(n):
-            for q in range(p + 1):
-                total = 0.0
-                for i in range(42):
-                    total += slopes[p, i] * slopes[q, i]
-                information[p, q] += total
-                if p != q:
-                    information[q, p] += total
+    inverse, mean = np.linalg.inv(found.root[kept]), found.innovation[kept]
+    slopes = []
+    for each in moved:
+        change = inverse @ (each.innovation[kept] - mean)[:, :, np.newaxis]
+        # L^-1 M is near 1: L^-1 (MM' - LL') L^-T = (L^-1 M)(L^-1 M)' - 1
+        D = inverse @ each.root[kept]
+        covariance = math.sqrt(0.5) * (D @ np.swapaxes(D, 1, 2) - np.eye(6))
+        slopes.append(np.concatenate([change.ravel(), covariance.ravel()]))
+    information: Array = np.array(slopes) @ np.array(slopes).T / (step * step)
+    return information
 
 
 def check_flight(

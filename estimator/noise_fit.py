@@ -17,6 +17,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -266,7 +267,7 @@ def fit_noise(
         )
     use, period, given = flight.use, flight.period, flight.given
     pieces = flight.whole if len(flight.columns[0]) <= use.rows else _excerpts(flight)
-    if sum(int(piece.counted.sum()) for piece in pieces) < use.fewest_poses:
+    if sum(int(piece.rows["counted"].sum()) for piece in pieces) < use.fewest_poses:
         pieces = flight.whole
 
     def evaluate(x: Array) -> Innovations:
@@ -304,18 +305,10 @@ def _mean_nis(found: Innovations) -> float:
 
 def _tuning(x: Array, given: UKFTuning) -> UKFTuning:
     """Return the tuning whose fitted numbers have the logarithms ``x`` (8,)."""
-    values: dict[str, Array] = {name: np.empty(3) for name, _ in _PARAMETERS}
+    values: dict[str, Any] = {name: np.empty(3) for name, _ in _PARAMETERS}
     for (name, axes), value in zip(_PARAMETERS, np.exp(x), strict=True):
         values[name][list(axes)] = value
-    return replace(
-        given,
-        force_walk=values["force_walk"],
-        torque_walk=values["torque_walk"],
-        thrust_noise=values["thrust_noise"],
-        motor_torque_noise=values["motor_torque_noise"],
-        position_noise=values["position_noise"],
-        attitude_noise=values["attitude_noise"],
-    )
+    return replace(given, **values)
 
 
 def _numbers(tuning: UKFTuning) -> Array:
@@ -387,7 +380,7 @@ class _Flight:
     @property
     def poses(self) -> int:
         """How many count."""
-        return sum(int(piece.counted.sum()) for piece in self.whole)
+        return sum(int(piece.rows["counted"].sum()) for piece in self.whole)
 
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
