@@ -57,6 +57,7 @@ FILTER = np.dtype(
         ("in_row", "f8"),  # of those refused: how many went on from each other, up to the last
         # of (rho, x): what those from one to the next add up to, and what these may miss by
         ("jumps", "f8", (2, 6)),
+        ("last_speeds", "f8", (4,)),  # rotor speeds that were measured last
         ("gated", "i8"),
         ("alarm", "f8", (2,)),  # largest NIS taken in unseen: of three numbers, of six
         ("restart_at", "f8"),  # NIS beyond which no linear correction is made
@@ -84,7 +85,6 @@ FILTER = np.dtype(
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand
         ("centre_rotation", "f8", (3, 3)),
-        ("last_speeds", "f8", (4,)),
         ("S", "f8", (12, N)),  # columns of the root of P, one a row
         ("M", "f8", (12, 12)),
         ("Y", "f8", (N, 12)),
@@ -92,16 +92,6 @@ FILTER = np.dtype(
         ("H", "f8", (12, N)),  # pairs of sigma points after the step: their scaled half difference,
         ("E", "f8", (12, N)),  # and their scaled half sum, from the central one
         ("error", "f8", (2, N)),
-        # twelve sigma points side by side, one a column
-        ("points", "f8", (19, 12)),
-        ("accelerations", "f8", (6, 12)),
-        (
-            "turns",
-            "f8",
-            (3, 12),
-        ),  # in a step: square of half the angle, its cosine, rate to quaternion
-        ("errors", "f8", (N, 12)),
-        ("rows", "f8", (12, N)),  # the errors, one point a row
         ("B", "f8", (6, N)),  # scaled noise inputs, one a row
         ("mean", "f8", (N,)),
         ("point", "f8", (STATE_SIZE,)),  # the sigma point in hand
@@ -113,6 +103,16 @@ FILTER = np.dtype(
         ("scales", "f8", (6,)),  # inverse diagonal of a root
         ("W", "f8", (6, N)),
         ("innovation", "f8", (6,)),
+        # twelve sigma points side by side, one a column
+        ("points", "f8", (19, 12)),
+        ("accelerations", "f8", (6, 12)),
+        (
+            "turns",
+            "f8",
+            (3, 12),
+        ),  # in a step: square of half the angle, its cosine, rate to quaternion
+        ("errors", "f8", (N, 12)),
+        ("rows", "f8", (12, N)),  # the errors, one point a row
         # of the filter with a constant gain, facing along x: the gain, and the inverse covariance
         # of the innovation
         ("gain", "f8", (N, 6)),
@@ -126,6 +126,12 @@ FILTER = np.dtype(
     ]
 )
 ESTIMATE = int(FILTER.fields["x"][1])  # type: ignore[index]  # bytes from the record's start to the estimate
+
+
+def fields_between(first: str, last: str) -> tuple[str, ...]:
+    """Return the names of a filter's fields from one to another."""
+    names = FILTER.names or ()
+    return names[names.index(first) : names.index(last) + 1]
 
 
 def filter_record(

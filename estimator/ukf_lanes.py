@@ -14,79 +14,27 @@ from numba import types
 
 from ..dynamics.motion import rotor_wrench
 from ..dynamics.rotation import quaternion_to_matrix
-from ..runtime.addresses import address_of, call_at
+from ..runtime.addresses import address_of, call_at, numbers_at
 from ..runtime.compiled import Record, compiled, compiled_without_gil
 from ..runtime.vector_lanes import WIDTH, LaneRecord, choose
 from .estimate import STATE_SIZE, Array
-from .filter_record import FILTER, N
+from .filter_record import FILTER, fields_between
 from .ukf import carry, correct
 
-_KEPT = (  # what a filter must not forget from one step to the next
-    "x",
-    "P",
-    "status",
-    "restarts",
-    "last_speeds",
-    "gap",
-    "seen",
-    "doubted",
-    "refused",
-    "lasting",
-    "in_row",
-    "jumps",
-)
-_SHARED = (
-    "body",
-    "motor_torque",
-    "torque_walk",
-    "thrust",
-    "force_walk",
-    "noise",
-    "kappa",
-    "period",
-    "gated",
-    "alarm",
-    "restart_at",
-    "patience",
-    "prior",
-    "reason",
-    "lost",
-    "push",
-    "response",
-    "effect_wrench",
-)
+# what a filter must not forget from one step to the next; first in both layouts
+_KEPT = fields_between("x", "last_speeds")
 _WORK = LaneRecord(
     FILTER,
-    (
-        *_KEPT,
-        "z",
-        "rotor_wrench",
-        "acceleration",
-        "rotation",
-        "centre_rotation",
-        "S",
-        "M",
-        "Z",
-        "H",
-        "E",
-        "error",
-        "next",
-        "rho",
-        "B",
-        "mean",
-        "point",
-        "centre",
-        "q",
-        "L",
-        "scales",
-        "W",
-        "innovation",
-    ),
-    _SHARED,
+    (*_KEPT, "rotor_wrench", *fields_between("z", "innovation")),
+    ("body", "effect_wrench", *fields_between("gated", "period")),
 )
 _BLOCK = LaneRecord(FILTER, _KEPT)
-_work_at, _block_at = _WORK.at, _BLOCK.at
 BLOCK_SIZE, STATE = _BLOCK.dtype.itemsize, _BLOCK.offset("x")  # bytes; where the estimates lie
+_NUMBERS = BLOCK_SIZE // 8
+
+new_blocks = _BLOCK.zeros  # the memory of blocks between steps
+columns = _BLOCK.columns  # blocks (n,) as numbers (n, m, WIDTH), those of a filter in one column
+in_hand = _WORK.at  # for compiled code: the record of the block in hand at an address
 
 
 @compiled
@@ -103,30 +51,8 @@ def _check(f: Record) -> None:
         last[i] = z[i]
 
 
-@compiled
-def _move_estimate(source: Record, target: Record) -> None:
-    for i in range(STATE_SIZE):
-        target.x[i] = source.x[i]
-    for i in range(N):
-        for j in range(N):
-            target.P[i, j] = source.P[i, j]
-    for i in range(4):
-        target.last_speeds[i] = source.last_speeds[i]
-    for i in range(7):
-        target.seen[i] = source.seen[i]
-        target.doubted[i] = source.doubted[i]
-    for k in range(2):
-        for i in range(6):
-            target.jumps[k, i] = source.jumps[k, i]
-    for i in range(3):
-        target.gap[i] = source.gap[i]
-    target.status, target.restarts = source.status, source.restarts
-    target.refused, target.lasting = source.refused, source.lasting
-    target.in_row = source.in_row
-
-
 def _step_work(address: int) -> None:
-    f = _work_at(address)
+    f = in_hand(address)
     _check(f)
     rotor_wrench(f.body, f.z, f.rotor_wrench)
     quaternion_to_matrix(f.x[3:7], f.rotation)
@@ -151,19 +77,13 @@ def step_address() -> int:
 @compiled
 def take_up(kept: int, work: int) -> None:
     """Take the block whose estimates lie at ``kept`` in hand, in the record at ``work``."""
-    _move_estimate(_block_at(kept), _work_at(work))
+    numbers_at(work, (_NUMBERS,))[:] = numbers_at(kept, (_NUMBERS,))
 
 
 @compiled
 def put_down(kept: int, work: int) -> None:
     """Do the opposite."""
-    _move_estimate(_work_at(work), _block_at(kept))
-
-
-@compiled
-def in_hand(work: int) -> Record:
-    """Return the record of the block in hand at an address."""
-    return _work_at(work)
+    numbers_at(kept, (_NUMBERS,))[:] = numbers_at(work, (_NUMBERS,))
 
 
 @compiled_without_gil
@@ -193,11 +113,6 @@ def _step_blocks(
             out[WIDTH * b + lane, STATE_SIZE + 1] = restarts[b, lane]
 
 
-def new_blocks(count: int) -> np.ndarray:
-    """Return the memory of ``count`` blocks between steps."""
-    return _BLOCK.zeros(count)
-
-
 def new_work(record: np.ndarray) -> np.ndarray:
     """Return the memory (1,) of a block in hand, of filters like the one in ``record`` (1,)."""
     work = _WORK.zeros(1)
@@ -208,11 +123,6 @@ def new_work(record: np.ndarray) -> np.ndarray:
 def write_lanes(blocks: np.ndarray, block: int, lanes: slice, record: np.ndarray) -> None:
     """Let filters in some lanes of a block stand where the one in ``record`` (1,) stands."""
     _BLOCK.write(blocks, block, lanes, record[0])
-
-
-def columns(blocks: np.ndarray) -> np.ndarray:
-    """Return blocks (n,) as numbers (n, m, WIDTH), those of a filter in one column."""
-    return _BLOCK.columns(blocks)
 
 
 def estimates_of(blocks: np.ndarray, count: int) -> Array:
