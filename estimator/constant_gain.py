@@ -1,11 +1,10 @@
 """The wrench filter with the gain that it converges to: less than a tenth of the work, for training
 and for many vehicles.
 
-A Kalman filter in steady flight soon always does the same with a measurement. Here that is worked
-out once, from ``WrenchUKF`` at hover: the mean is carried by the same functions (2)-(5), (11)-(14),
-the covariance not at all. The gain knows world axes and body axes; a vehicle that is yawed sees the
-same problem turned about the vertical, so the innovation is turned into the vehicle's heading and
-the correction back out of it.
+The gain of a Kalman filter in steady flight converges. It is computed once here, from ``WrenchUKF``
+at hover: the same functions carry the mean, (2)-(5), (11)-(14), and nothing the covariance. A yawed
+vehicle sees the same problem turned about the vertical: the innovation is turned into the vehicle's
+heading, and the correction back.
 """
 
 import math

@@ -179,17 +179,9 @@ def _linear_rows(f: Record, dt: float, source: Array, out: Array, columns: int) 
     ``out`` (18, n).
     """
     J, R, com = f.body.inverse_inertia, f.centre_rotation, f.body.com
-    R00, R01, R02, R10, R11, R12, R20, R21, R22 = (
-        R[0, 0],
-        R[0, 1],
-        R[0, 2],
-        R[1, 0],
-        R[1, 1],
-        R[1, 2],
-        R[2, 0],
-        R[2, 1],
-        R[2, 2],
-    )
+    R00, R01, R02 = R[0, 0], R[0, 1], R[0, 2]
+    R10, R11, R12 = R[1, 0], R[1, 1], R[1, 2]
+    R20, R21, R22 = R[2, 0], R[2, 1], R[2, 2]
     a0, a1, a2, b0, b1, b2, c0, c1, c2 = (
         J[0, 0] * R00 + J[0, 1] * R01 + J[0, 2] * R02,
         J[0, 0] * R10 + J[0, 1] * R11 + J[0, 2] * R12,
@@ -293,25 +285,19 @@ def carry_by_jacobian(P: Array, A: Array, G: Array) -> None:
 
 
 @compiled_inline
-def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
-    """Add ``sign r' r`` to P for six rows (18,) of ``rows`` from ``first`` on; six at once for
-    speed.
+def add_squares(P: Array, rows: Array, first: int, sign: float, size: int) -> None:
+    """Add ``sign r' r`` to the first ``size`` rows and columns of P for six rows (18,) of ``rows``
+    from ``first`` on; six at once for speed.
     """
     r0, r1, r2, r3, r4, r5 = first, first + 1, first + 2, first + 3, first + 4, first + 5
-    for i in range(0, N, 2):
+    for i in range(0, size, 2):
         a0, a1, a2 = sign * rows[r0, i], sign * rows[r1, i], sign * rows[r2, i]
         a3, a4, a5 = sign * rows[r3, i], sign * rows[r4, i], sign * rows[r5, i]
         b0, b1, b2 = sign * rows[r0, i + 1], sign * rows[r1, i + 1], sign * rows[r2, i + 1]
         b3, b4, b5 = sign * rows[r3, i + 1], sign * rows[r4, i + 1], sign * rows[r5, i + 1]
-        for j in range(first_column(P, i), N):
-            s0, s1, s2, s3, s4, s5 = (
-                rows[r0, j],
-                rows[r1, j],
-                rows[r2, j],
-                rows[r3, j],
-                rows[r4, j],
-                rows[r5, j],
-            )
+        for j in range(first_column(P, i), size):
+            s0, s1, s2 = rows[r0, j], rows[r1, j], rows[r2, j]
+            s3, s4, s5 = rows[r3, j], rows[r4, j], rows[r5, j]
             a = (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
             b = (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
             P[i, j] += a
@@ -323,47 +309,18 @@ def add_squares(P: Array, rows: Array, first: int, sign: float) -> None:
 
 @compiled_for_vectors
 def add_pairs(f: Record) -> None:
-    """Add ``H' H + E' E`` of the first six pairs of sigma points to P."""
-    _add_pairs(f.P, f.H, f.E, 0)
+    """Add ``H' H + E' E`` of the first six pairs of sigma points to P; only the first 12 rows of
+    the model are nonlinear.
+    """
+    add_squares(f.P, f.H, 0, 1.0, N)
+    add_squares(f.P, f.E, 0, 1.0, 12)
 
 
 @compiled_for_vectors
 def add_more_pairs(f: Record) -> None:
     """Do the same with the next six."""
-    _add_pairs(f.P, f.H, f.E, 6)
-
-
-@compiled_inline
-def _add_pairs(P: Array, H: Array, E: Array, k: int) -> None:
-    add_squares(P, H, k, 1.0)
-    # only the first 12 rows of the model are nonlinear
-    for i in range(0, 12, 2):
-        a0, a1, a2, a3, a4, a5 = (
-            E[k, i],
-            E[k + 1, i],
-            E[k + 2, i],
-            E[k + 3, i],
-            E[k + 4, i],
-            E[k + 5, i],
-        )
-        b0, b1, b2 = E[k, i + 1], E[k + 1, i + 1], E[k + 2, i + 1]
-        b3, b4, b5 = E[k + 3, i + 1], E[k + 4, i + 1], E[k + 5, i + 1]
-        for j in range(first_column(P, i), 12):
-            s0, s1, s2, s3, s4, s5 = (
-                E[k, j],
-                E[k + 1, j],
-                E[k + 2, j],
-                E[k + 3, j],
-                E[k + 4, j],
-                E[k + 5, j],
-            )
-            a = (a0 * s0 + a1 * s1) + (a2 * s2 + a3 * s3) + (a4 * s4 + a5 * s5)
-            b = (b0 * s0 + b1 * s1) + (b2 * s2 + b3 * s3) + (b4 * s4 + b5 * s5)
-            P[i, j] += a
-            P[i + 1, j] += b
-            if j >= first_below(P, i + 1):
-                P[j, i] += a
-                P[j, i + 1] += b
+    add_squares(f.P, f.H, 6, 1.0, N)
+    add_squares(f.P, f.E, 6, 1.0, 12)
 
 
 @compiled_for_vectors
@@ -393,7 +350,7 @@ def add_noise(f: Record, rotation: Array, dt: float) -> None:
                 )
                 B[n, 6 + i] = 0.5 * dt * B[n, 9 + i]
     if offset:
-        add_squares(P, B, 0, 1.0)
+        add_squares(P, B, 0, 1.0, N)
         return
     # else torque and thrust have nothing to do with each other: two blocks
     for i in range(3, 6):
@@ -427,4 +384,4 @@ def whiten(f: Record) -> None:
 @compiled_for_vectors
 def subtract_squares(f: Record) -> None:
     """Take ``W' W`` off P."""
-    add_squares(f.P, f.W, 0, -1.0)
+    add_squares(f.P, f.W, 0, -1.0, N)

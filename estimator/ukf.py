@@ -4,16 +4,14 @@ quadrotor.
 McKinnon and Schoellig, *Unscented External Force and Torque Estimation for Quadrotors*, IROS 2016,
 (15)-(37). The filter is exact to the paper's 61 and 49 sigma points and cheaper:
 
-* The noise enters linearly, and so do those directions of the state that leave attitude and rate
-alone. Their pairs of
-  sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the covariance. What is
-  left are the 13 points of attitude and rate (25 where a declared effect depends on position or
-  velocity).
-* The root of the covariance is lower triangular, so only its first 6 (or 12) columns are needed;
-the others enter
-  through the Schur complement.
-* The measurement is linear in the error state, so the correction by 49 redrawn points is the Kalman
-update.
+* The noise enters linearly, and so do the directions of the state that leave attitude and rate
+  alone. Their pairs of sigma points average out and add exactly ``A S S' A'`` and ``B Q B'`` to the
+  covariance. The 13 points of attitude and rate are left (25 where a declared effect depends on
+  position or velocity).
+* The root of the covariance is lower triangular: only its first 6 (or 12) columns are needed, and
+  the others enter through the Schur complement.
+* The measurement is linear in the error state: the correction by 49 redrawn points is the Kalman
+  update.
 """
 
 import math
@@ -53,7 +51,18 @@ from .covariance import (
     whiten,
 )
 from .error_state import displace, error_from, fold, symmetrise
-from .estimate import ESTIMATE_SIZE, NIS, STATE_SIZE, TRACKING, Array, WrenchEstimate
+from .estimate import (
+    ESTIMATE_SIZE,
+    NIS,
+    POSITION,
+    QUATERNION,
+    RATE,
+    STATE_SIZE,
+    TRACKING,
+    VELOCITY,
+    Array,
+    WrenchEstimate,
+)
 from .filter_record import BIASES, ESTIMATE, FILTER, N, drive, filter_record, move, propagate
 from .imu import take_in_imu
 from .recovery import NOISE, Recovery, after_prediction, judge, remember
@@ -448,17 +457,12 @@ class WrenchUKF:
         """
         x = np.zeros(STATE_SIZE)
         for name, value, where in (
-            ("position", position, slice(0, 3)),
-            ("quaternion", quaternion, slice(3, 7)),
-            ("velocity", velocity, slice(7, 10)),
-            ("angular_velocity", angular_velocity, slice(10, 13)),
+            ("position", position, POSITION),
+            ("quaternion", quaternion, QUATERNION),
+            ("velocity", velocity, VELOCITY),
+            ("angular_velocity", angular_velocity, RATE),
         ):
-            array = np.asarray(value, dtype=np.float64)
-            if array.shape != x[where].shape or not np.all(np.isfinite(array)):
-                raise InputError(
-                    f"reset: {name} must be {x[where].size} finite numbers, got {value!r}"
-                )
-            x[where] = array
+            x[where] = _finite(f"reset: {name}", value, x[where].size)
         length = float(np.linalg.norm(x[3:7]))
         if not 0.9 < length < 1.1:
             raise InputError(f"reset: quaternion must have length 1, got {length:g}")
@@ -612,12 +616,7 @@ class WrenchUKF:
             ("accelerometer", accelerometer, slice(3, 6)),
         ):
             if value is not None:
-                array = np.asarray(value, dtype=np.float64)
-                if array.shape != (3,) or not np.all(np.isfinite(array)):
-                    raise InputError(
-                        f"correct_imu: {name} must be three finite numbers, got {value!r}"
-                    )
-                z[where] = array
+                z[where] = _finite(f"correct_imu: {name}", value, 3)
         if not self.record[0]["imu"]["used"]:
             begin_imu(self.record)
             self._call = None
@@ -633,6 +632,18 @@ class WrenchUKF:
         if call(self.record, parts, dt, self._voltage if voltage is None else voltage) < 0:
             raise self._sample.bad_quaternion()
         return WrenchEstimate(self._now.copy())
+
+
+def _finite(what: str, value: ArrayLike, size: int) -> Array:
+    """Return some finite numbers (size,).
+
+    Raises:
+        InputError: the shape is another, or a number is not finite.
+    """
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != (size,) or not np.all(np.isfinite(array)):
+        raise InputError(f"{what} must be {size} finite numbers, got {value!r}")
+    return array
 
 
 def default_covariance(vehicle: Vehicle, tuning: UKFTuning) -> Array:
