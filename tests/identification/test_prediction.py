@@ -26,16 +26,8 @@ SEGMENTS = [(3.0, 11.0), (15.0, 24.0)]
 
 
 def fly(*effects, trajectory="excite", seconds=25.0, settings=QUIET):
-    c = record_flight(VEHICLE, effects, trajectory, seconds, 3, settings)
     return FlightLog(
-        c["t"],
-        c["position"],
-        c["quaternion"],
-        c["rotor_speeds"],
-        c.get("voltage"),
-        c["force"],
-        c["torque"],
-        name="flight",
+        **record_flight(VEHICLE, effects, trajectory, seconds, 3, settings), name="flight"
     )
 
 

@@ -19,20 +19,15 @@ def imu_flight(
 ) -> FlightLog:
     """A simulated flight: pose, rotor speeds, and an IMU with noise and bias."""
     settings = background(vehicle, turbulence)
-    c = record_flight(vehicle, effects, trajectory, seconds, seed, settings, imu=True)
-    rng = np.random.default_rng(seed)
-    noise = rng.standard_normal((2, len(c["t"]), 3))
-    return FlightLog(
-        c["t"],
-        c["position"],
-        c["quaternion"],
-        c["rotor_speeds"],
-        c.get("voltage"),
-        c["force"],
-        c["torque"],
-        accelerometer=c["accelerometer"] + 0.1 * noise[0] + [0.05, -0.1, 0.08],
-        gyro=c["gyro"] + 0.005 * noise[1] + [0.01, -0.005, 0.008],
+    log = FlightLog(
+        **record_flight(vehicle, effects, trajectory, seconds, seed, settings, imu=True),
         name="imu_flight",
+    )
+    noise = np.random.default_rng(seed).standard_normal((2, len(log.t), 3))
+    return replace(
+        log,
+        accelerometer=log.accelerometer + 0.1 * noise[0] + [0.05, -0.1, 0.08],
+        gyro=log.gyro + 0.005 * noise[1] + [0.01, -0.005, 0.008],
     )
 
 

@@ -19,16 +19,8 @@ CUTOFF = 4.0
 
 
 def fly(*effects, trajectory="excite", seconds=15.0, settings=QUIET, vehicle=VEHICLE):
-    c = record_flight(vehicle, effects, trajectory, seconds, 3, settings)
     return FlightLog(
-        c["t"],
-        c["position"],
-        c["quaternion"],
-        c["rotor_speeds"],
-        c.get("voltage"),
-        c["force"],
-        c["torque"],
-        name="flight",
+        **record_flight(vehicle, effects, trajectory, seconds, 3, settings), name="flight"
     )
 
 
