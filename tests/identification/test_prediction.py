@@ -266,11 +266,3 @@ def test_the_nis_is_that_of_the_filter_over_a_log_with_its_wrench_held():
     assert nis_without_wrench_state(log, VEHICLE, [(6.0, 11.0)]) == pytest.approx(
         float(np.mean(series.nis[rows])), rel=0.01
     )
-
-
-def test_the_wrench_filters_freedom_is_off():
-    """What a filter with a wrench state explains away stays in the innovations of one without."""
-    log = fly(typical("mass"), seconds=12.0)
-    rows = (log.t >= 4.0) & (log.t <= 11.0)
-    free = float(np.mean(estimate_log(log, VEHICLE).nis[rows]))
-    assert nis_without_wrench_state(log, VEHICLE, [(4.0, 11.0)]) > 1.15 * free

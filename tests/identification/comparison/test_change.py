@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 from typer.testing import CliRunner
 
-from tests.support.data_paths import DATA, SOURCES, excerpt
+from tests.support.data_paths import excerpt
 from windwrench.cli import app
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs.recording import record_flight
@@ -21,7 +21,6 @@ from windwrench.identification.comparison.change import (
 from windwrench.identification.comparison.trim import Trim, carrying, trim_of, trim_of_log
 from windwrench.identification.comparison.words import change_headline, write_change
 from windwrench.identification.logs.flight_log import FlightLog
-from windwrench.identification.logs.reading import read_log
 
 ROTORS = (
     "rotor 1 (front-left)",
@@ -202,36 +201,3 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
     result = CliRunner().invoke(app, ["diagnose", normal[0], "--against", normal[1], *options])
     assert result.exit_code == 0, result.output
     assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE
-
-
-@pytest.mark.measured
-def test_measured_weights_and_cut_propellers():
-    """CrazyPAD: each flight against the normal ones of the same vehicle."""
-    folder = DATA / "crazypad"
-    if not folder.is_dir():
-        pytest.skip(f"needs {folder}: {SOURCES['crazypad']}")
-    vehicle = load_vehicle("crazyflie")
-    trims = {
-        path.name: trim_of_log(read_log(path, "crazypad"), vehicle)
-        for path in sorted(folder.glob("*.csv.gz"))
-    }
-    near = {"M1": ROTORS[3], "M2": ROTORS[2], "M3": ROTORS[1], "M4": ROTORS[0], "M3_M4": "left"}
-    right, count = 0, 0
-    for name, trim in trims.items():
-        vehicle = "E8" if "E8" in name else "E9"
-        normal = [
-            other
-            for key, other in trims.items()
-            if "normal" in key and vehicle in key and key != name
-        ]
-        change = compare([trim], normal)
-        if "normal" in name:
-            assert change.place == NOWHERE, name
-            continue
-        what = name.split("__")[0].removesuffix("_3mm").split("near_")[-1]
-        place = near[what.removeprefix("cut_propeller_")]
-        likeliest = max((p for p in change.places if p != NOWHERE), key=change.places.__getitem__)
-        right += likeliest == place
-        count += 1
-        assert not (change.sure and change.place != place), name
-    assert right >= 0.8 * count
