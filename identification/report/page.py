@@ -17,13 +17,7 @@ from ... import __version__
 from ...runtime.page_files import page_template
 from ..findings import Diagnosis
 from . import words
-from .plot_numbers import (
-    candidate_bars,
-    plot_data,
-    plots_of_signatures,
-    plots_over_frequency,
-    plots_over_time,
-)
+from .plot_numbers import candidate_bars, page_plots
 
 _TONES = {
     "explained": "good",
@@ -37,9 +31,8 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
     """Return the page (HTML); ``command`` is what made it. Every text is escaped: names of files
     come from users.
     """
-    time, frequency = plots_over_time(diagnosis), plots_over_frequency(diagnosis)
-    signatures, bars = plots_of_signatures(diagnosis), candidate_bars(diagnosis)
-    data = plot_data(diagnosis, time, frequency, signatures)
+    plots, bars = page_plots(diagnosis), candidate_bars(diagnosis)
+    data = plots.data
     library, script = _library(), _file("page.js")
     shown = {bar.name for bar in bars}
     return page_template(__package__, "page.html.j2").render(
@@ -51,9 +44,7 @@ def report_page(diagnosis: Diagnosis, command: str) -> str:
         missing=words.MISSING,
         alike=[words.confusion(e) for e in diagnosis.effects if e.indistinguishable_from],
         held_out=_held_out(diagnosis),
-        over_time=time,
-        over_frequency=frequency,
-        signatures=signatures,
+        plots=plots,
         bars=bars,
         more_candidates=[c for c in diagnosis.candidates if c.name not in shown],
         policy=_policy((library, script) if data else ()),

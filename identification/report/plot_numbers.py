@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ..findings import CHANNELS, Diagnosis, Signature, Trace
+from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
 from .drawing import Drawing, DrawnLine, draw
 from .words import percent, rounded, scale_of
 
@@ -70,93 +70,138 @@ class Plot:
     readout: str = ""
 
 
-def plot_data(
-    diagnosis: Diagnosis, time: list[Plot], frequency: list[Plot], signatures: list[Plot]
-) -> dict[str, Any]:
-    """Return what the page's script draws, as plain data; empty where nothing can be drawn."""
-    groups = (("frequency", frequency), ("signatures", signatures))
-    data: dict[str, Any] = {name: [p.packed for p in plots] for name, plots in groups if plots}
-    if time:
-        traces = diagnosis.traces
-        starts = first_times(traces)
+class _Joined:
+    """The residual of all pieces of flight, one after the other on a common axis (n samples)."""
+
+    def __init__(self, traces: Sequence[Trace], effects: Sequence[NamedEffect] = ()) -> None:
+        self.traces = traces
+        # where each piece begins: its own time if there is one, side by side if there are several
+        lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
+        gap = 0.01 * sum(lengths)
+        self.starts = [sum(lengths[:k]) + gap * k for k in range(len(traces))]
+        if len(traces) == 1:
+            self.starts = [float(traces[0].t[0])]
+        self.end = self.starts[-1] + lengths[-1]
+        self.before, self.after, self.x = (
+            np.concatenate(each)
+            for each in (
+                [trace.before for trace in traces],
+                [trace.after for trace in traces],
+                [t.t - t.t[0] + start for t, start in zip(traces, self.starts, strict=True)],
+            )
+        )
+        self.parts = {
+            effect.name: np.concatenate([trace.parts[effect.name] for trace in traces])
+            for effect in effects
+            if all(effect.name in trace.parts for trace in traces)
+        }
+        self.first_rows = np.cumsum([0, *(len(trace.t) for trace in traces)])[:-1]
+        # the channels that were compared: force, torque or both. The torque is zero throughout
+        # where the logs cannot tell it, as where rotor speeds are commands
+        self.channels = [
+            i
+            for _, group, _ in _GROUPS
+            if self.before[:, group].any() or self.after[:, group].any()
+            for i in range(group.start, group.stop)
+        ]
+
+    def kept(self, i: int, columns: int) -> list[Index]:
+        """Return the samples of each piece that stand for channel ``i`` in a window's columns."""
+        share = columns / len(self.x)
+        return [
+            first + telling_samples(trace, i, max(round(share * len(trace.t)), 1))
+            for first, trace in zip(self.first_rows, self.traces, strict=True)
+        ]
+
+    def held_out(self) -> list[tuple[float, float]]:
+        """Return from when to when samples were held out."""
+        runs = []
+        for trace, start in zip(self.traces, self.starts, strict=True):
+            t = trace.t - trace.t[0] + start
+            held = np.concatenate([[False], trace.held_out, [False]]).astype(int)
+            for a, b in np.flatnonzero(np.diff(held)).reshape(-1, 2):
+                runs.append((float(t[a]), float(t[min(b, len(t) - 1)])))
+        return runs
+
+
+@dataclass(frozen=True, eq=False)
+class PagePlots:
+    """The plots of a page, and what its script draws, as plain data; empty where nothing can be."""
+
+    time: list[Plot]  # one a channel
+    frequency: list[Plot]  # force and torque
+    signatures: list[Plot]  # one a named effect
+    data: dict[str, Any]
+
+
+def page_plots(diagnosis: Diagnosis) -> PagePlots:
+    """Return all plots of a diagnosis's page.
+
+    Over time the residual before and after, with held-out blocks shaded and pieces of flight side
+    by side; their amplitude spectra (root of the sum over three axes, mean removed); and the
+    residual against what drives each named effect, with the effect's own share of it.
+    """
+    time, frequency = [], []
+    data: dict[str, Any] = {}
+    if diagnosis.traces:
+        joined = _Joined(diagnosis.traces, diagnosis.effects)
+        time = [_plot_over_time(joined, i) for i in joined.channels]
         data["time"] = {
-            "effects": _drawn_effects(diagnosis),
+            "effects": list(joined.parts),
             "pieces": [
                 {"log": trace.log, "x": start, "t": float(trace.t[0])}
-                for trace, start in zip(traces, starts, strict=True)
+                for trace, start in zip(joined.traces, joined.starts, strict=True)
             ],
-            "end": _end_of(traces, starts),
-            "held": [[_digit(a, 9), _digit(b, 9)] for a, b in _held_out(traces, starts)],
+            "end": joined.end,
+            "held": [[_digit(a, 9), _digit(b, 9)] for a, b in joined.held_out()],
             "channels": [plot.packed for plot in time],
         }
-    return data
-
-
-def plots_over_time(diagnosis: Diagnosis) -> list[Plot]:
-    """Return a plot a channel of the residual before and after; held-out blocks are shaded.
-
-    Pieces of flight stand side by side, with their numbers above where there are several.
-    """
-    traces = diagnosis.traces
-    if not traces:
-        return []
-    starts = first_times(traces)
-    marks = [
-        (start, str(number) if len(traces) <= 12 else "")
-        for number, start in enumerate(starts, 1)
-        if len(traces) > 1
-    ]
-    plots = []
-    for i in drawn_channels(traces):
-        factor, unit, limit = axis_limits(traces, i)
-        symbol = _SYMBOLS[i]
-        lines = [
-            DrawnLine(
-                side, trace.t[kept] - trace.t[0] + start, factor * getattr(trace, side)[kept, i]
-            )
-            for side in ("before", "after")
-            for trace, start, columns in zip(
-                traces, starts, _columns(traces, PLOTS.still_columns), strict=True
-            )
-            for kept in [telling_samples(trace, i, columns)]
+    if long := [trace for trace in diagnosis.traces if len(trace.t) >= 16]:
+        channels = _Joined(long).channels
+        frequency = [
+            _plot_of_spectrum(long, what, group, unit, diagnosis.cutoff_hz)
+            for what, group, unit in _GROUPS
+            if group.start in channels
         ]
-        packed = _packed_channel(traces, i, _drawn_effects(diagnosis), factor, unit, limit)
-        after = factor * _rms(np.concatenate([trace.after[:, i] for trace in traces]))
-        change = f"rms {rounded(packed['rms'], 2)} → {rounded(after, 2)}"
-        drawing = draw(
-            lines,
-            height=170,
-            x_range=(starts[0], _end_of(traces, starts)),
-            y_range=(-factor * limit, factor * limit),
-            blocks=_held_out(traces, starts),
-            marks=marks,
-        )
-        alt = f"Residual {symbol} in {unit} over time, before and after: {change}. "
-        plots.append(
-            Plot(
-                packed,
-                drawing,
-                _table_over_time(traces, i, factor, unit),
-                f"{symbol} ({unit})",
-                "time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)",
-                alt + "Held-out blocks are shaded.",
-                readout=f"{change} {unit}",
-            )
-        )
-    return plots
+    signatures = [_plot_of_signature(s, number) for number, s in enumerate(diagnosis.signatures)]
+    for name, plots in (("frequency", frequency), ("signatures", signatures)):
+        if plots:
+            data[name] = [plot.packed for plot in plots]
+    return PagePlots(time, frequency, signatures, data)
 
 
-def plots_over_frequency(diagnosis: Diagnosis) -> list[Plot]:
-    """Return plots of the amplitude spectra of force and torque (root of the sum over three axes,
-    mean removed), before and after; none where flights are too short.
-    """
-    traces = [trace for trace in diagnosis.traces if len(trace.t) >= 16]
-    drawn = drawn_channels(traces)
-    return [
-        _plot_of_spectrum(traces, what, group, unit, diagnosis.cutoff_hz)
-        for what, group, unit in _GROUPS
-        if group.start in drawn
-    ]
+def _plot_over_time(joined: _Joined, i: int) -> Plot:
+    traces = joined.traces
+    group = slice(0, 3) if i < 3 else slice(3, 6)  # with the same axis
+    sides = {"before": joined.before, "after": joined.after}
+    largest = max(float(np.abs(x[:, group]).max(initial=0.0)) for x in sides.values())
+    factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
+    limit = factor * (1.08 * largest or 1.0 / factor)
+    before, after = (rounded(factor * _rms(x[:, i]), 2) for x in sides.values())
+    change = f"rms {before} → {after}"
+    still = joined.kept(i, PLOTS.still_columns)
+    drawing = draw(
+        [DrawnLine(n, joined.x[k], factor * x[k, i]) for n, x in sides.items() for k in still],
+        height=170,
+        x_range=(joined.starts[0], joined.end),
+        y_range=(-limit, limit),
+        blocks=joined.held_out(),
+        marks=[
+            (start, str(number) if len(traces) <= 12 else "")
+            for number, start in enumerate(joined.starts, 1)
+            if len(traces) > 1
+        ],
+    )
+    return Plot(
+        _packed_channel(joined, i, factor, unit, limit),
+        drawing,
+        _table_over_time(traces, i, factor, unit),
+        f"{_SYMBOLS[i]} ({unit})",
+        "time (s)" if len(traces) == 1 else "pieces of flight, side by side (s)",
+        f"Residual {_SYMBOLS[i]} in {unit} over time, before and after: {change}. Held-out blocks "
+        "are shaded.",
+        readout=f"{change} {unit}",
+    )
 
 
 def _plot_of_spectrum(
@@ -215,13 +260,6 @@ def _spectrum(traces: Sequence[Trace], side: str, group: slice, grid: Array) -> 
     return np.asarray(np.sqrt(total / weight), dtype=np.float64)
 
 
-def plots_of_signatures(diagnosis: Diagnosis) -> list[Plot]:
-    """Return plots of the residual against what drives each named effect, with the effect's own
-    share of it.
-    """
-    return [_plot_of_signature(s, number) for number, s in enumerate(diagnosis.signatures)]
-
-
 def _plot_of_signature(signature: Signature, number: int) -> Plot:
     columns = np.column_stack([signature.x, signature.residual, signature.fitted])
     columns = columns[np.isfinite(columns).all(axis=1)]
@@ -273,50 +311,6 @@ def _plot_of_signature(signature: Signature, number: int) -> Plot:
     )
 
 
-def first_times(traces: Sequence[Trace]) -> list[float]:
-    """Return where each piece begins on a common axis: its own time if there is one, side by side
-    if there are several.
-    """
-    if len(traces) == 1:
-        return [float(traces[0].t[0])]
-    lengths = [float(trace.t[-1] - trace.t[0]) for trace in traces]
-    gap = 0.01 * sum(lengths)
-    return [sum(lengths[:i]) + gap * i for i in range(len(traces))]
-
-
-def axis_limits(traces: Sequence[Trace], i: int) -> tuple[float, str, float]:
-    """Return the factor and unit of a channel's plot over time, and where its axis ends (N or Nm):
-    the same for all three axes.
-    """
-    group = slice(0, 3) if i < 3 else slice(3, 6)
-    largest = max(
-        float(np.abs(x[:, group]).max(initial=0.0))
-        for trace in traces
-        for x in (trace.before, trace.after)
-    )
-    factor, unit = scale_of([largest], "N" if i < 3 else "Nm")
-    return factor, unit, 1.08 * largest or 1.0 / factor
-
-
-def drawn_channels(traces: Sequence[Trace]) -> list[int]:
-    """Return the channels that were compared: force, torque or both.
-
-    The torque is zero throughout where the logs cannot tell it, as where rotor speeds are commands.
-    """
-    return [
-        i
-        for group in (range(3), range(3, 6))
-        if any(x[:, group].any() for trace in traces for x in (trace.before, trace.after))
-        for i in group
-    ]
-
-
-def held_out_runs(trace: Trace, t: Array) -> list[tuple[float, float]]:
-    """Return from when to when samples were held out, on an axis ``t`` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], trace.held_out, [False]]).astype(int)))
-    return [(t[a], t[min(b, len(t) - 1)]) for a, b in edges.reshape(-1, 2)]
-
-
 def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
     """Return the mean of ``y`` over ``x`` (n,) in bins with as many points each."""
     if len(x) < 4 * count:
@@ -325,78 +319,41 @@ def binned(x: Array, y: Array, count: int = 14) -> tuple[Array, Array]:
     return np.array([x[p].mean() for p in parts]), np.array([y[p].mean() for p in parts])
 
 
-def _drawn_effects(diagnosis: Diagnosis) -> list[str]:
-    """Return the named effects of which every trace has the part."""
-    names = [effect.name for effect in diagnosis.effects]
-    return [name for name in names if all(name in trace.parts for trace in diagnosis.traces)]
-
-
-def _end_of(traces: Sequence[Trace], starts: Sequence[float]) -> float:
-    return float(starts[-1] + traces[-1].t[-1] - traces[-1].t[0])
-
-
-def _held_out(traces: Sequence[Trace], starts: Sequence[float]) -> list[tuple[float, float]]:
-    """Return the held-out blocks of all pieces, on the common axis."""
-    return [
-        (float(a), float(b))
-        for trace, start in zip(traces, starts, strict=True)
-        for a, b in held_out_runs(trace, trace.t - trace.t[0] + start)
-    ]
-
-
-def _columns(traces: Sequence[Trace], columns: int) -> list[int]:
-    """Return how many of a window's columns each piece of flight gets."""
-    total = sum(len(trace.t) for trace in traces)
-    return [max(round(columns * len(trace.t) / total), 1) for trace in traces]
-
-
 def _packed_channel(
-    traces: Sequence[Trace], i: int, names: Sequence[str], factor: float, unit: str, limit: float
+    joined: _Joined, i: int, factor: float, unit: str, limit: float
 ) -> dict[str, Any]:
     """Return a channel's series over time as ``page.js`` unpacks them.
 
     ``products`` are mean products of ``after`` and the effects' parts: the mean square of
     ``after`` with any choice of parts added is a sum of them.
     """
-    a_sample = _BASE64 * 2.0 * (3 + len(names)) * len(CHANNELS)
+    a_sample = _BASE64 * 2.0 * (3 + len(joined.parts)) * len(CHANNELS)
     columns = max(int(PLOTS.most_bytes / a_sample / 4), PLOTS.least_columns)
-    kept = [
-        telling_samples(*each)
-        for each in zip(traces, len(traces) * [i], _columns(traces, columns), strict=True)
-    ]
-    series = {
-        "before": [trace.before for trace in traces],
-        "after": [trace.after for trace in traces],
-        **{name: [trace.parts[name] for trace in traces] for name in names},
-    }
-    whole = {
-        name: factor * np.concatenate([x[:, i] for x in each]) for name, each in series.items()
-    }
-    packed = {
-        name: packed_series(
-            factor * np.concatenate([x[k, i] for x, k in zip(each, kept, strict=True)])
-        )
-        for name, each in series.items()
-    }
-    times = [trace.t[k] - trace.t[0] for trace, k in zip(traces, kept, strict=True)]
+    kept = joined.kept(i, columns)
+    before, after, *parts = (
+        factor * x[:, i] for x in (joined.before, joined.after, *joined.parts.values())
+    )
+    rows = np.concatenate(kept)
+    times = [joined.x[k] - joined.x[k[0]] for k in kept]
     longest = max(float(np.diff(t, prepend=0.0).max()) for t in times)
     tick = max(PLOTS.tick, longest / PLOTS.steps)
-    summed = [whole[name] for name in ("after", *names)]
     return {
         "key": f"time-{CHANNELS[i]}",
         "symbol": _SYMBOLS[i],
         "unit": unit,
-        "limit": factor * limit,
+        "limit": limit,
         "counts": [len(k) for k in kept],
         "tick": tick,
         "steps": _base64(
             np.concatenate([np.diff(np.rint(t / tick), prepend=0.0) for t in times]), "<u2"
         ),
-        "before": packed["before"],
-        "after": packed["after"],
-        "parts": [packed[name] for name in names],
-        "products": [[_digit(float(np.mean(x * y))) for y in summed] for x in summed],
-        "rms": _digit(_rms(whole["before"])),
+        "before": packed_series(before[rows]),
+        "after": packed_series(after[rows]),
+        "parts": [packed_series(part[rows]) for part in parts],
+        "products": [
+            [_digit(float(np.mean(x * y))) for y in (after, *parts)] for x in (after, *parts)
+        ],
+        "rms": _digit(_rms(before)),
     }
 
 

@@ -18,13 +18,7 @@ from tests.support.diagnoses import made_diagnosis, made_trace
 from windwrench.identification.findings import CHANNELS, Probabilities
 from windwrench.identification.report.files import write_report
 from windwrench.identification.report.page import error_table, report_page
-from windwrench.identification.report.plot_numbers import (
-    plot_data,
-    plots_of_signatures,
-    plots_over_frequency,
-    plots_over_time,
-    telling_samples,
-)
+from windwrench.identification.report.plot_numbers import page_plots, telling_samples
 from windwrench.identification.report.words import next_step, rounded, sureness_sentences
 
 UPLOT = {
@@ -32,11 +26,6 @@ UPLOT = {
     "uPlot.min.css": "df630c6a8d6f8eeaff264b50f73ce5b114f646ffd9a0bb74f049b0a00135fa04",
     "LICENSE": "8f989229699b4fe2f1a0432d0e9edc338a8a911e250e2d1b01ecd770a5f5b1bd",
 }
-
-
-def packed(made):
-    plots = (plots_over_time(made), plots_over_frequency(made), plots_of_signatures(made))
-    return plot_data(made, *plots)
 
 
 def unpacked(series):
@@ -54,7 +43,7 @@ def times(channel, pieces):
 
 def test_a_flight_of_a_minute_is_carried_whole():
     trace = made_trace(effects=("rotor_drag", "wind"))
-    time = packed(made_diagnosis(trace))["time"]
+    time = page_plots(made_diagnosis(trace)).data["time"]
     assert time["effects"] == ["rotor_drag", "wind"]
     for i, channel in enumerate(time["channels"]):
         factor = {"N": 1.0, "Nm": 1.0, "mN": 1e3, "mNm": 1e3}[channel["unit"]]
@@ -73,7 +62,7 @@ def test_a_spike_of_any_channel_stays():
     before, after = trace.before.copy(), trace.after.copy()
     before[12_345, 0], before[100_001, 4], after[170_000, 2] = 7.0, -8.0, 9.0
     trace = replace(trace, before=before, after=after)
-    plots = plots_over_time(made_diagnosis(trace))
+    plots = page_plots(made_diagnosis(trace)).time
     channels = [plot.packed for plot in plots]
     assert unpacked(channels[0]["before"]).max() == pytest.approx(7.0, rel=1e-4)
     assert unpacked(channels[4]["before"]).min() * {"Nm": 1, "mNm": 1e-3}[
@@ -94,7 +83,7 @@ def test_a_spike_of_any_channel_stays():
 
 def test_the_rms_of_any_choice_of_effects_is_exact():
     trace = made_trace(effects=("rotor_drag", "wind", "mass"))
-    channel = packed(made_diagnosis(trace))["time"]["channels"][1]
+    channel = page_plots(made_diagnosis(trace)).data["time"]["channels"][1]
     for chosen in ((), ("wind",), ("rotor_drag", "mass"), ("rotor_drag", "wind", "mass")):
         weight = np.array([1.0, *(name in chosen for name in trace.parts)])
         rms = np.sqrt(weight @ np.array(channel["products"]) @ weight)
@@ -111,20 +100,20 @@ def test_a_page_of_a_minute_is_below_600_kb(effects, tmp_path):
 
 def test_pieces_of_several_logs_stand_side_by_side():
     traces = [made_trace(20.0, seed=i, log=f"log {i}") for i in range(3)]
-    time = packed(made_diagnosis(*traces))["time"]
+    time = page_plots(made_diagnosis(*traces)).data["time"]
     assert [p["log"] for p in time["pieces"]] == ["log 0", "log 1", "log 2"]
     x = times(time["channels"][0], time["pieces"])
     assert np.all(np.diff(x) > 0)
     assert x[-1] == pytest.approx(time["end"], abs=1e-3)
     assert len(time["held"]) == 2 * 3
-    (plot, *_) = plots_over_time(made_diagnosis(*traces))
+    (plot, *_) = page_plots(made_diagnosis(*traces)).time
     assert [text for _, text in plot.drawing.marks] == ["1", "2", "3"]
     assert plot.table.head == ("Piece", "Time (s)", "Held out", "Before", "After")
 
 
 def test_the_table_behind_a_plot_has_its_numbers():
     trace = made_trace()
-    table = plots_over_time(made_diagnosis(trace))[0].table
+    table = page_plots(made_diagnosis(trace)).time[0].table
     assert len(table.rows) == 16
     rows = np.array_split(np.arange(len(trace.t)), 16)[5]
     rms = [rounded(np.sqrt(np.mean(x[rows, 0] ** 2)), 2) for x in (trace.before, trace.after)]
@@ -202,7 +191,7 @@ def test_a_torque_that_the_logs_do_not_tell_is_not_drawn():
     for x in silent.values():
         x[:, 3:] = 0.0
     made = made_diagnosis(replace(trace, **silent))
-    drawn = packed(made)
+    drawn = page_plots(made).data
     assert [channel["key"] for channel in drawn["time"]["channels"]] == [
         "time-Fx",
         "time-Fy",
@@ -222,7 +211,7 @@ def test_an_axis_of_powers_of_ten_has_plain_numbers(decades):
     sine = np.tile(np.sin(2.0 * np.pi * trace.t)[:, None], (1, 6))
     noise = 10.0**-decades * np.random.default_rng(0).standard_normal((len(trace.t), 6))
     made = made_diagnosis(replace(trace, before=sine + noise, after=noise))
-    for plot in plots_over_frequency(made):
+    for plot in page_plots(made).frequency:
         assert len(plot.drawing.x_ticks) >= 4
         assert len(plot.drawing.y_ticks) >= 2
         for place, text in plot.drawing.y_ticks:
