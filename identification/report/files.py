@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -44,9 +44,9 @@ def write_report(
         InputError: a file cannot be written.
     """
     folder = Path(folder)
-    command = printable(command or _command(diagnosis, folder))
+    command = command or _command(diagnosis, folder)
     data = json.dumps(report_data(diagnosis), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    page = report_page(_printable_names(diagnosis), command)
+    page = printable(report_page(diagnosis, command))
     numbers, html, vehicle = folder / "report.json", folder / "report.html", folder / "vehicle.yaml"
     save_vehicle(diagnosis.amended, vehicle)
     for path, text in ((html, page), (numbers, data)):
@@ -144,22 +144,6 @@ def plain(value: Any) -> Any:
 def printable(text: str) -> str:
     """Return a text with a question mark for each byte of a file's name that is no text."""
     return text.encode("utf-8", "replace").decode()
-
-
-def _printable_names(diagnosis: Diagnosis) -> Diagnosis:
-    """Return a diagnosis whose names of files can all be written."""
-    return replace(
-        diagnosis,
-        declared=replace(diagnosis.declared, name=printable(diagnosis.declared.name)),
-        logs=tuple(map(printable, diagnosis.logs)),
-        test_logs=tuple(map(printable, diagnosis.test_logs)),
-        notes=tuple(map(printable, diagnosis.notes)),
-        traces=tuple(replace(trace, log=printable(trace.log)) for trace in diagnosis.traces),
-        pushes=tuple(replace(push, log=printable(push.log)) for push in diagnosis.pushes),
-        held_out_segments=tuple(
-            (printable(log), start, end) for log, start, end in diagnosis.held_out_segments
-        ),
-    )
 
 
 def _command(diagnosis: Diagnosis, folder: Path) -> str:

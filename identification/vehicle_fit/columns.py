@@ -17,7 +17,6 @@ from .spectra import SPECTRUM, Complex, Segment, segments_of
 
 Array = NDArray[np.float64]
 
-MEASURED = ("fx", "fy", "fz", "ax", "ay", "az")
 _STEP = {"lag": 1e-3, "gamma": 0.05}  # of finite differences
 
 

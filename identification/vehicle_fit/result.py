@@ -66,10 +66,7 @@ class Identified:
 
     def __getitem__(self, name: str) -> Estimate:
         """Return an estimate by its name."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
-        raise KeyError(name)
+        return self.by_name[name]
 
     @property
     def by_name(self) -> Mapping[str, Estimate]:

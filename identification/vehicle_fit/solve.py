@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
-from .model import Model, jacobian
+from .model import LOGARITHMIC, Model, jacobian
 from .spectra import SPECTRUM, residual_spectra
 
 Array = NDArray[np.float64]
@@ -82,12 +82,8 @@ class VehicleFit:
         """
         i = self.names.index(name)
         size = float(np.sqrt(self.covariance[i, i]))
-        return size if i >= len(self.model.free) else size * self._unit(name)
-
-    def _unit(self, name: str) -> float:
-        from .model import LOGARITHMIC
-
-        return 1.0 if name in LOGARITHMIC else self.model.scale[name]
+        free = i < len(self.model.free) and name not in LOGARITHMIC
+        return size * self.model.scale[name] if free else size
 
 
 def solve(
@@ -109,7 +105,7 @@ def solve(
     spectra = residual_spectra(made.segments, powers)
     zero = np.zeros(len(nonlinear))
     for number in range(SOLVE.rounds):
-        total = np.sum([_grams(made, spectra, i) for i in range(len(made.segments))], axis=0)
+        total = np.sum(_grams(made, spectra), axis=0)
         shift, moved = zero.copy(), 0.0
         for _ in range(SOLVE.steps):
             step, information, *_ = _newton(made, total, model, theta, shift, drive, prior)
@@ -127,7 +123,7 @@ def solve(
             break
         powers = _powers(made, spectra, model, theta, information)
         spectra = residual_spectra(made.segments, powers)
-    grams = [_grams(made, spectra, i) for i in range(len(made.segments))]
+    grams = _grams(made, spectra)
     _, information, slopes, v = _newton(
         made, np.sum(grams, axis=0), model, theta, zero, drive, prior
     )
@@ -150,7 +146,7 @@ def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
     parameters than a fit's, by the score test: one step from where they are nothing.
     """
     made, zero = fit.balance, np.zeros(len(fit.balance.nonlinear))
-    total = np.sum([_grams(made, fit.spectra, i) for i in range(len(made.segments))], axis=0)
+    total = np.sum(_grams(made, fit.spectra), axis=0)
     step, information, *_ = _newton(made, total, model, start, zero, fit.drive, {})
     current = fit.theta[: len(fit.model.free)]
     own_step, own_information, *_ = _newton(made, total, fit.model, current, zero, fit.drive, {})
@@ -164,7 +160,7 @@ def step_with(
     deviation, by name.
     """
     made = balance(pieces, fit.drive, nonlinear)
-    total = np.sum([_grams(made, fit.spectra, i) for i in range(len(made.segments))], axis=0)
+    total = np.sum(_grams(made, fit.spectra), axis=0)
     n = len(fit.model.free)
     zero = np.zeros(len(nonlinear))
     step, information, *_ = _newton(made, total, fit.model, fit.theta[:n], zero, fit.drive, {})
@@ -175,24 +171,26 @@ def step_with(
     )
 
 
-def _grams(made: BalanceSpectra, spectra: Sequence[Array], i: int) -> Array:
-    """Return a segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: of the axis'
+def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
+    """Return each segment's weighted Gram matrices (6, 1 + c + nc, ...), axis by axis: of the axis'
     measurement and all columns, without what the rotors' noise adds.
     """
-    s, spectrum = made.segments[i], spectra[i]
-    columns = s.columns[:, :, 6:]
-    out = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
-    noise = made.noise.T @ made.noise
-    gain = 1.0 / (1.0 + (s.frequency / made.band) ** 4) ** 2
-    for axis in range(6):
-        weight = s.weight / spectrum[:, axis]
-        both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
-        scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
-        parts = np.concatenate([scaled.real, scaled.imag])
-        out[axis] = parts.T @ parts
-        c = len(made.names)
-        out[axis, 1 : 1 + c, 1 : 1 + c] -= noise * float(np.sum(weight * gain)) * SPECTRUM.tapers
-    return out
+    noise, c = made.noise.T @ made.noise, len(made.names)
+    grams = []
+    for s, spectrum in zip(made.segments, spectra, strict=True):
+        columns = s.columns[:, :, 6:]
+        gram = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
+        gain = 1.0 / (1.0 + (s.frequency / made.band) ** 4) ** 2
+        for axis in range(6):
+            weight = s.weight / spectrum[:, axis]
+            both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
+            scaled = (both * np.sqrt(weight)[None, :, None]).reshape(-1, both.shape[2])
+            parts = np.concatenate([scaled.real, scaled.imag])
+            gram[axis] = parts.T @ parts
+            added = noise * float(np.sum(weight * gain)) * SPECTRUM.tapers
+            gram[axis, 1 : 1 + c, 1 : 1 + c] -= added
+        grams.append(gram)
+    return grams
 
 
 def _newton(
@@ -281,12 +279,8 @@ def _powers(
 
 def _loss(made: BalanceSpectra, spectra: Sequence[Array]) -> float:
     """Return twice the negative log-likelihood of a noise that has the residual's spectrum."""
-    return float(
-        sum(
-            np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
-            * SPECTRUM.tapers
-            / 2.0
-            for s, p in zip(made.segments, spectra, strict=True)
-        )
-        * 2.0
+    logs = (
+        np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
+        for s, p in zip(made.segments, spectra, strict=True)
     )
+    return float(SPECTRUM.tapers * sum(logs))
