@@ -128,7 +128,10 @@ def split(f: Record, cross: Array, joint: Array) -> None:
     imu.bias_covariance[:] = joint[:BIASES, :BIASES]
     # what the filter has forgotten is correlated with nothing
     for i in range(N):
-        if np.count_nonzero(P[i]) == 1:
+        alone = True
+        for j in range(N):
+            alone = alone and (i == j or P[i, j] == 0.0)
+        if alone:
             cross[i] = 0.0
     root = root_of(P)
     whitened = divide(root, cross)
@@ -161,7 +164,9 @@ def carry_companions(f: Record, dt: float, cross: Array) -> None:
     for i in range(BIASES):
         imu.sensitivity[i, i] = 1.0
     # one standard deviation of each input, as ``add_noise`` leaves them
-    split(f, np.hstack((cross, f.B.T)), joint)
+    all_cross = np.empty((N, COMPANIONS))
+    all_cross[:, :BIASES], all_cross[:, BIASES:] = cross, f.B.T
+    split(f, all_cross, joint)
     imu.known = 1
     for s in range(2):
         if imu.doubt[s] >= 0.0:
@@ -180,8 +185,10 @@ def carry_with_points(f: Record, dt: float, cross: Array) -> Array:
     S, pairs = f.S, 6 if f.wrench_count == 0 else 12
     rows, rest, out = np.empty((pairs, cross.shape[1])), cross.copy(), np.empty_like(cross)
     for j in range(pairs):
-        rows[j] = rest[j] / S[j, j]
-        rest[j:] -= np.outer(S[j, j:], rows[j])
+        for m in range(rows.shape[1]):
+            rows[j, m] = rest[j, m] / S[j, j]
+            for i in range(j, N):
+                rest[i, m] -= S[j, i] * rows[j, m]
     rest[6:pairs] = 0.0
     carry_rows(f, dt, rest[6:], out)
     out += f.H[:pairs].T @ rows

@@ -8,7 +8,7 @@ rho]x) R for small errors.
 
 import math
 
-from ..dynamics.motion import effect_wrench
+from ..dynamics.model import apply_effects
 from ..runtime.compiled import Record, compiled
 from .bias_states import carry_with_jacobian
 from .covariance import add_noise, carry_by_jacobian
@@ -36,31 +36,9 @@ def _cross_into(
 
 
 @compiled
-def _effects_at(
-    f: Record, position: Array, rotation: Array, velocity: Array, omega: Array, out: Array
-) -> None:
-    effect_wrench(
-        f.wrench_models[: f.wrench_count],
-        f.wrench_coefficients,
-        f.constants,
-        f.body,
-        position,
-        rotation,
-        velocity,
-        omega,
-        f.rotors,
-        f.wind,
-        f.voltage,
-        f.time,
-        f.effect_state,
-        out,
-    )
-
-
-@compiled
 def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
     """Write the derivatives of the declared effects' wrench (6,) by (4 rho, omega, x, v) into
-    ``out`` (12, 6).
+    ``out`` (12, 6); ``f.effect_wrench`` is overwritten.
 
     By central differences: an effect model is a black box behind an address.
     """
@@ -83,14 +61,10 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
             else:
                 where = axis + (10 if kind == 1 else 0 if kind == 2 else 7)
                 point[where] = x[where] + sign * size
-            _effects_at(
-                f,
-                point[0:3],
-                turned,
-                point[7:10],
-                point[10:13],
-                out[n] if sign > 0.0 else minus[0:6],
-            )
+            apply_effects(f, point[0:3], turned, point[7:10], point[10:13])
+            values = out[n] if sign > 0.0 else minus
+            for i in range(6):
+                values[i] = f.effect_wrench[i]
             if kind > 0:
                 point[where] = x[where]
         for i in range(6):

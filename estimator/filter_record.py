@@ -22,11 +22,8 @@ IMU = np.dtype(
         ("used", "i8"),  # whether ``correct_imu`` was ever called
         ("known", "i8"),  # whether the last step's noise is: there was one
         ("refused", "i8"),
-        (
-            "gate",
-            "f8",
-            (3,),
-        ),  # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
+        # largest NIS of three numbers, of six, and of ``AGREEING`` that agree
+        ("gate", "f8", (3,)),
         ("in_row", "i8"),  # accelerometer samples that the gate would refuse
         ("unlikely", "f8", (AGREEING, 3)),  # innovations (m/s2) of the last of them
         ("doubt", "f8", (2,)),  # s for which a sensor was refused; negative: it was not
@@ -77,11 +74,8 @@ FILTER = np.dtype(
         ("kappa", "f8"),
         ("period", "f8"),
         # the step in progress
-        (
-            "z",
-            "f8",
-            (11,),
-        ),  # rotor speeds, position and quaternion, for a step that is called from elsewhere
+        # rotor speeds, position and quaternion, for a step that is called from elsewhere
+        ("z", "f8", (11,)),
         ("acceleration", "f8", (6,)),
         ("rotation", "f8", (3, 3)),  # of the sigma point in hand
         ("centre_rotation", "f8", (3, 3)),
@@ -106,11 +100,8 @@ FILTER = np.dtype(
         # twelve sigma points side by side, one a column
         ("points", "f8", (19, 12)),
         ("accelerations", "f8", (6, 12)),
-        (
-            "turns",
-            "f8",
-            (3, 12),
-        ),  # in a step: square of half the angle, its cosine, rate to quaternion
+        # in a step: square of half the angle, its cosine, rate to quaternion
+        ("turns", "f8", (3, 12)),
         ("errors", "f8", (N, 12)),
         ("rows", "f8", (12, N)),  # the errors, one point a row
         # of the filter with a constant gain, facing along x: the gain, and the inverse covariance

@@ -84,43 +84,28 @@ def _innovation(f: Record, z: Array, root: Array, turned: Array) -> tuple[Array,
     """
     x, C = f.x, f.imu.sensitivity
     spread, weight = math.sqrt(N + f.kappa), 0.5 / (N + f.kappa)  # (28)
-    centre, plus, minus = np.empty(6), np.empty(6), np.empty(6)
+    centre, plus, minus = np.empty(6), np.empty((N, 6)), np.empty((N, 6))
     expected_imu(f, x, centre)
-    pairs, mean, S = np.empty((N, 6)), np.zeros(6), np.zeros((6, 6))
-    column = np.empty(N)
+    columns = root.T.copy()
     for j in range(N):
-        for i in range(N):
-            column[i] = root[i, j]
-        displace(x, column, spread, f.rho, f.q, f.point)
-        expected_imu(f, f.point, plus)
-        displace(x, column, -spread, f.rho, f.q, f.point)
-        expected_imu(f, f.point, minus)
-        for a in range(6):
-            pairs[j, a] = 0.5 * (plus[a] - minus[a]) / spread
-            for k in range(COMPANIONS):
-                pairs[j, a] += C[a, k] * turned[k, j]
-            plus[a] = plus[a] + minus[a] - 2.0 * centre[a]
-            mean[a] += weight * plus[a]
-        # with a pair of deviations p and m: pp' + mm' = ((p - m)(p - m)' + (p + m)(p + m)') / 2,
-        # and 2 weight spread^2 = 1
-        for a in range(6):
-            for b in range(6):
-                S[a, b] += pairs[j, a] * pairs[j, b] + 0.5 * weight * plus[a] * plus[b]
-    innovation = np.empty(6)
-    for a in range(6):
-        innovation[a] = z[a] - centre[a] - mean[a]
-        for b in range(6):
-            S[a, b] -= mean[a] * mean[b]
-    return S, innovation, pairs
+        displace(x, columns[j], spread, f.rho, f.q, f.point)
+        expected_imu(f, f.point, plus[j])
+        displace(x, columns[j], -spread, f.rho, f.q, f.point)
+        expected_imu(f, f.point, minus[j])
+    half, second = 0.5 * (plus - minus) / spread, plus + minus - 2.0 * centre
+    pairs = half + turned.T @ C.T
+    mean = weight * np.sum(second, axis=0)
+    # with a pair of deviations p and m: pp' + mm' = ((p - m)(p - m)' + (p + m)(p + m)') / 2, and
+    # 2 weight spread^2 = 1
+    S = pairs.T @ pairs + 0.5 * weight * (second.T @ second) - np.outer(mean, mean)
+    return S, z - centre - mean, pairs
 
 
 @compiled
 def _nis(covariance: Array, innovation: Array, first: int, last: int) -> float:
     y = divide(root_of(covariance[first:last, first:last]), innovation[first:last].reshape(-1, 1))
-    total = 0.0
-    for i in range(last - first):
-        total += y[i, 0] * y[i, 0]
-    return total
+    nis: float = np.sum(y * y)
+    return nis
 
 
 @compiled
@@ -168,20 +153,14 @@ def _is_push(f: Record, covariance: Array, innovation: Array) -> bool:
     alone makes them. Vibration does not agree with itself, and a saturated sensor is too far.
     """
     imu = f.imu
-    for i in range(3):
-        imu.unlikely[imu.in_row % AGREEING, i] = innovation[3 + i]
+    imu.unlikely[imu.in_row % AGREEING] = innovation[3:]
     imu.in_row += 1
     if imu.in_row < AGREEING:
         return False
-    apart = np.zeros((3, AGREEING))
-    for i in range(3):
-        mean = 0.0
-        for k in range(AGREEING):
-            mean += imu.unlikely[k, i] / AGREEING
-        if abs(mean) > 2.0 * f.body.gravity:
-            return False
-        for k in range(AGREEING):
-            apart[i, k] = imu.unlikely[k, i] - mean
+    mean = np.sum(imu.unlikely, axis=0) / AGREEING
+    if np.any(np.abs(mean) > 2.0 * f.body.gravity):
+        return False
+    apart = (imu.unlikely - mean).T
     whitened = divide(root_of(covariance[3:6, 3:6]), apart)
     agreed: bool = np.sum(whitened * whitened) <= imu.gate[2]
     return agreed

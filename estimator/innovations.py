@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..dynamics.rotation import attitude_error, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import Record, compiled_without_gil
-from ..runtime.errors import InputError
 from .estimate import Array
 from .recovery import remember
 from .sample import undo_sensing
@@ -216,33 +215,3 @@ def fisher_information(found: Innovations, moved: Sequence[Innovations], step: f
         slopes.append(np.concatenate([change.ravel(), covariance.ravel()]))
     information: Array = np.array(slopes) @ np.array(slopes).T / (step * step)
     return information
-
-
-def check_flight(
-    t: Array,
-    rotor_speeds: Array,
-    position: Array,
-    quaternion: Array,
-    voltage: Array | None,
-) -> None:
-    """Raise InputError where shapes differ, times do not increase or a rotor speed or voltage is
-    not finite; see ``pieces_of``.
-    """
-    count = len(t)
-    for name, value, shape in (
-        ("t", t, (count,)),
-        ("rotor_speeds", rotor_speeds, (count, 4)),
-        ("position", position, (count, 3)),
-        ("quaternion", quaternion, (count, 4)),
-        ("voltage", voltage, (count,)),
-    ):
-        if value is None:
-            continue
-        if value.shape != shape:
-            raise InputError(f"fit_noise: {name} must have shape {shape}, got {value.shape}")
-        if name in ("t", "rotor_speeds", "voltage") and not np.all(np.isfinite(value)):
-            raise InputError(f"fit_noise: {name} must be finite in every row")
-    if count < 2 or not np.all(np.diff(t) > 0):
-        raise InputError(
-            "fit_noise: expected two rows or more whose times t increase strictly, in s"
-        )

@@ -13,6 +13,7 @@ latency remember, and what the filter keeps count of (refusals and restarts of i
 
 import math
 from bisect import bisect_right
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,21 +28,16 @@ _SNAPSHOTS = 16  # of the filter's memory in a horizon: a replay is longer by a 
 Snapshot = list[NDArray[np.uint8]]
 
 
+@dataclass(slots=True, eq=False)
 class _Event:
-    """What happened up to a time: a prediction to there, then perhaps a measurement."""
+    """A prediction up to a time, then perhaps a measurement."""
 
-    __slots__ = ("before", "inputs", "measured", "t")
-
-    def __init__(
-        self,
-        t: float,
-        inputs: tuple[Array, float | None] | None,
-        measured: tuple[str, tuple[Array | None, Array | None]] | None,
-    ) -> None:
-        self.t = t  # s
-        self.inputs = inputs  # rotor speeds and voltage of the time since the event before
-        self.measured = measured  # the filter's method, and its arguments
-        self.before: Snapshot | None = None  # the filter's memory before this event
+    t: float  # s
+    # rotor speeds and voltage of the time since the event before
+    inputs: tuple[Array, float | None] | None
+    # the filter's method, and its arguments
+    measured: tuple[str, tuple[Array | None, Array | None]] | None
+    before: Snapshot | None = None  # the filter's memory before this event
 
 
 class TimedFilter:
@@ -52,14 +48,13 @@ class TimedFilter:
     ``horizon`` in the past. Stamps are times in s on one clock, rounded to nanoseconds.
     Measurements with equal stamps count in the order in which they came.
 
-    The cost: a late measurement replays what came after its stamp. The worst, 0.3 s late among
-    rotor speeds at 200 Hz and poses at 100 Hz, takes 0.5 ms with ``WrenchUKF`` on one core. One
-    that is 5 ms late takes 0.04 ms, and one of now 5 us.
-    Snapshots take 0.8 MB.
+    A late measurement costs a replay of all after its stamp. The worst, 0.3 s late among rotor
+    speeds at 200 Hz and poses at 100 Hz, takes 0.5 ms with ``WrenchUKF`` on one core; a measurement
+    of now takes 5 us. Snapshots take 0.8 MB.
 
     Args:
-        ukf: a ``WrenchUKF``, ``WrenchEKF`` or ``ConstantGainFilter``; this
-            object's from now on: only read from it.
+        ukf: a ``WrenchUKF``, ``WrenchEKF`` or ``ConstantGainFilter``; only read from it from now
+            on.
         horizon: how far in the past a stamp may lie, s. Longer costs memory, and time where
             measurements are that late.
 
@@ -176,13 +171,8 @@ class TimedFilter:
         if t < max(now - self.horizon, self._start):
             self.too_late += 1
             return None
-        measured = (
-            method,
-            (
-                None if first is None else _numbers(first),
-                None if second is None else _numbers(second),
-            ),
-        )
+        one, other = (None if value is None else _numbers(value) for value in (first, second))
+        measured = method, (one, other)
         where = bisect_right(self._events, t, key=lambda event: event.t)
         if where == len(self._events):
             self.fused = self._append(_Event(t, None, measured), now)

@@ -26,7 +26,7 @@ from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
 from .consistency import MEASURED, chi2_band
 from .estimate import Array
-from .innovations import Innovations, Piece, check_flight, innovations, pieces_of
+from .innovations import Innovations, Piece, innovations, pieces_of
 from .likelihood_search import climb
 from .rise_time import rise_times
 from .tuning import UKFTuning
@@ -410,7 +410,23 @@ def _prepare(
         np.asarray(value, dtype=np.float64) for value in (t, rotor_speeds, position, quaternion)
     )
     volts = None if voltage is None else np.asarray(voltage, dtype=np.float64)
-    check_flight(times, speeds, x, q, volts)
+    count = len(times)
+    for name, array, shape in (
+        ("t", times, (count,)),
+        ("rotor_speeds", speeds, (count, 4)),
+        ("position", x, (count, 3)),
+        ("quaternion", q, (count, 4)),
+        ("voltage", volts, (count,)),
+    ):
+        if array is not None and array.shape != shape:
+            raise InputError(f"fit_noise: {name} must have shape {shape}, got {array.shape}")
+        whole = name in ("position", "quaternion") or array is None or np.isfinite(array).all()
+        if not whole:
+            raise InputError(f"fit_noise: {name} must be finite in every row")
+    if count < 2 or not np.all(np.diff(times) > 0):
+        raise InputError(
+            "fit_noise: expected two rows or more whose times t increase strictly, in s"
+        )
     period = float(np.median(np.diff(times)))
     given = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
     use = NoiseFitSettings() if settings is None else settings

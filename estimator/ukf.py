@@ -89,7 +89,7 @@ def carry_on(f: Record, dt: float) -> None:
     root_of_twelve(f)
     propagate(f, f.x, dt, f.centre)
     _carry_linear(f, dt)
-    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
+    _pairs_with_effects(f, dt)
     add_pairs(f)
     add_more_pairs(f)
     _gather(f, dt)
@@ -128,6 +128,11 @@ def _pairs_in_turn(f: Record, dt: float, pairs: int, moved: Any) -> None:
             total = error[0, i] + error[1, i]
             E[j, i] = scale * total
             mean[i] += weight * total  # (26)
+
+
+@compiled
+def _pairs_with_effects(f: Record, dt: float) -> None:
+    _pairs_in_turn(f, dt, 2 * PAIRS, propagate)
 
 
 @compiled

@@ -152,24 +152,22 @@ class WrenchUKFBatch:
             InputError: a shape is wrong, or what ``WrenchUKF.reset`` refuses; the filters stay as
                 they were.
         """
-        names = ("position", "quaternion", "velocity", "angular_velocity")
-        rows = [
-            _rows(name, value, shape, self.count)
-            for name, value, shape in zip(
-                names,
-                (position, quaternion, velocity, angular_velocity),
-                ((3,), (4,), (3,), (3,)),
-                strict=True,
-            )
+        given = (
+            ("position", position, (3,)),
+            ("quaternion", quaternion, (4,)),
+            ("covariance", covariance, (N, N)),
+            ("velocity", velocity, (3,)),
+            ("angular_velocity", angular_velocity, (3,)),
+        )
+        starts = [
+            [None] * self.count if value is None else _rows(name, value, shape, self.count)
+            for name, value, shape in given
         ]
-        P = None if covariance is None else _rows("covariance", covariance, (N, N), self.count)
         memory = self._new_memory()
-        for n in range(self.count):
+        for n, start in enumerate(zip(*starts, strict=True)):
             ukf = self._of(n)
             try:
-                ukf.reset(
-                    rows[0][n], rows[1][n], None if P is None else P[n], rows[2][n], rows[3][n]
-                )
+                ukf.reset(*start)
             except InputError as error:
                 raise InputError(f"{error} (filter {n})") from None
             memory.put(n, ukf.record)
