@@ -14,12 +14,12 @@ __version__ = "1.0.0"
 _TASKS = {  # pytest imports this file a second time, as a folder's
     "FanTracking": (
         "fan_tracking:FanTrackingEnv",
-        "fan_tracking_vector:make_fan_tracking_vector",
+        "lanes.vector:make_fan_tracking_vector",
         250,
     ),
     "FanTracking2D": ("fan_tracking_2d:FanTracking2DEnv", None, 250),
-    "WindHover": ("wind_hover:WindHoverEnv", None, 500),
-    "WindTrajectory": ("wind_trajectory:WindTrajectoryEnv", None, 500),
+    "WindHover": ("wind_tasks:WindHoverEnv", None, 500),
+    "WindTrajectory": ("wind_tasks:WindTrajectoryEnv", None, 500),
 }
 for _name, (_single, _vector, _steps) in _TASKS.items():
     if f"windwrench/{_name}-v0" not in gymnasium.registry:

@@ -1,9 +1,18 @@
-"""Worlds: the plant in MuJoCo, the fan and its jet, and the fan-tracking environment."""
+"""Worlds: the plant in MuJoCo, the fan and its jet, winds, and the four tasks."""
 
 from . import headless  # noqa: F401  before anything that imports MuJoCo
+from .closed_loop import ClosedLoop, Stage
 from .copies import Copyable
 from .fan import Fan
 from .fan_tracking import FanTrackingEnv
 from .scenarios import SCENARIOS, Scenario
 
-__all__ = ["SCENARIOS", "Copyable", "Fan", "FanTrackingEnv", "Scenario"]
+__all__ = [
+    "SCENARIOS",
+    "ClosedLoop",
+    "Copyable",
+    "Fan",
+    "FanTrackingEnv",
+    "Scenario",
+    "Stage",
+]

@@ -1,15 +1,26 @@
-"""Plant, wrench filter and flight loop together: a vehicle that flies to a set point and feels the
-wind.
+"""Plant, wrench filter and flight loop together: a vehicle that flies along a reference in wind.
+
+A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
+
+| stage      | reads                                  | writes                                     |
+| ---------- | -------------------------------------- | ------------------------------------------ |
+| `wind`     | `position`, `time`                     | `air`: every second tick, where winds blow |
+| `sense`    | `position`, `quaternion`               | `sample`: pose and logged rotor speeds     |
+| `estimate` | `sample`                               | `state`: pose, twist and external wrench   |
+| `steer`    | `state`, `setpoint`, `action`          | `command`: rotor speeds                    |
+| `actuate`  | `command`, `air`, `applied`            | `external`, and the wrench that MuJoCo has |
+| `move`     | that wrench                            | `position`, `quaternion`, `velocity`       |
+
+A user's own ``Stage`` stands before one of them.
 """
 
 import math
-from contextlib import nullcontext
-from functools import cache
-from typing import NoReturn
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, NoReturn
 
 import mujoco
 import numpy as np
-from numba import carray, types
 
 from ..controllers.flight import (
     FLIGHT,
@@ -19,26 +30,20 @@ from ..controllers.flight import (
     move_setpoint,
     reset_flight,
 )
+from ..controllers.model_inverse import foresee, through_the_rotors
 from ..dynamics.effects import compile_effects
 from ..dynamics.mean_jet import COUNT_R, COUNT_X
 from ..dynamics.motion import Array
-from ..dynamics.rotation import quaternion_of_yaw
+from ..dynamics.rotation import quaternion_of_yaw, quaternion_to_matrix
 from ..dynamics.vehicle import Vehicle
 from ..estimator.constant_gain import ConstantGainFilter
 from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
-from ..estimator.ukf import WrenchUKF, correct_parts
-from ..runtime.addresses import address_of, call_at, call_step, numbers_at, pointer_to
-from ..runtime.compiled import (
-    Record,
-    compiled,
-    compiled_meanwhile,
-    compiled_without_gil,
-    specialised,
-)
+from ..estimator.ukf import WrenchUKF
+from ..runtime.addresses import call_step
+from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
-from .fan import FAN, Fan, fan_record, jet_table
-from .plain_steps import step_of
+from .fan import FAN, STATIONS, Fan, fan_record, jet_table
 from .plant import (
     NOISE,
     PLANT,
@@ -52,34 +57,29 @@ from .plant import (
     sense,
 )
 from .suspended_load import SuspendedLoad, hang, pull, set_down
+from .wind.field import Wind, add_wind, check_wind
 
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
-_AT_REST = np.zeros(1)
-_STILL_AIR = (np.zeros((COUNT_X, COUNT_R)),) * 2
+WIND_EVERY = 2  # ticks over which the winds at the stations are held
+REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
+ACCELEROMETER_NOISE = 3  # unit normals of a tick with an accelerometer, behind the plant's
+
 LOOP = np.dtype(
     [
         ("plant", PLANT),
         ("filter", FILTER),
-        ("step", "i8"),
+        ("step", "i8"),  # address of the filter's compiled step
         ("flight", FLIGHT),
         ("fan", FAN),
-        ("ticks", "i8"),  # since the reset
-        # addresses: of the jet's tables, of MuJoCo's step and its arguments, and of arrays in its
-        # data; ``counted`` is its user's array, in which the ticks are counted once more
-        *[
-            (name, "i8")
-            for name in (
-                "axial",
-                "radial",
-                "mj_step",
-                "model",
-                "data",
-                "qpos",
-                "qvel",
-                "xfrc",
-                "counted",
-            )
-        ],
+        ("ticks", "i8"),  # since the start of the episode; below zero while the filter settles
+        ("action", "f8", (3,)),  # m/s2, beside the flight loop's own
+        ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
+        ("accelerometer_sigma", "f8"),  # m/s2, a tick
+        ("accelerometer_bias", "f8", (3,)),  # m/s2, body axes
+        # m/s2, world, mean over the last run: specific force as the accelerometer has it, and that
+        # of the rotors by the declared model
+        ("specific", "f8", (3,)),
+        ("thrust", "f8", (3,)),
     ]
 )
 
@@ -87,88 +87,178 @@ LOOP = np.dtype(
 ESTIMATORS: dict[str, type[WrenchUKF]] = {"ukf": WrenchUKF, "constant-gain": ConstantGainFilter}
 
 
-@compiled
-def tick(
-    loop: Record, axial: Array, radial: Array, qpos: Array, qvel: Array, xfrc: Array, noise: Array
-) -> None:
-    """Sense, estimate, steer and actuate once; MuJoCo's ``xfrc`` (6,) then holds the wrench of this
-    tick.
+class World(NamedTuple):
+    """Arrays that a tick reads and writes beside the loop's record."""
 
-    ``noise`` (NOISE,) are unit normals. Everything that changes lies in ``loop`` and the arrays
-    given.
+    jet: Array  # (2, COUNT_X, COUNT_R) axial and radial speed of the jet's table
+    qpos: Array  # (7,) MuJoCo's position m and quaternion of the vehicle
+    qvel: Array  # (6,) MuJoCo's velocity m/s, world, and angular velocity rad/s, body
+    xfrc: Array  # (6,) force N and torque Nm, world, that MuJoCo applies
+    reference: Array  # (n, REFERENCE_SIZE), a row a tick; (0, REFERENCE_SIZE): none
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A user's own stage of the pipeline: a sensor, an actuator or a wind.
+
+    ``run`` takes the ``ClosedLoop`` at each tick and changes the loop's arrays in place. A pose
+    that the filter gets 2 cm off, and a rotor that loses a tenth of its speed from 5 s on:
+
+    ```python
+    def offset(loop):
+        loop.sample[4] += 0.02
+
+    def weaken(loop):
+        if loop.time > 5.0:
+            loop.command[0] *= 0.9
+
+    stages = [Stage("offset", offset, before="estimate"), Stage("weaken", weaken, before="actuate")]
+    env = gym.make("windwrench/FanTracking-v0", stages=stages)
+    ```
+
+    A force of one's own is added to ``loop.applied`` (6,) before ``actuate``.
+
+    Raises:
+        InputError: ``run`` cannot be called, or no stage of the kit has the name ``before``.
     """
-    plant, ukf, flight = loop.plant, loop.filter, loop.flight
-    plant.seen = sense(plant, qpos, noise)
+
+    name: str
+    run: Callable[["ClosedLoop"], object]
+    before: str
+
+    def __post_init__(self) -> None:
+        if not callable(self.run):
+            raise InputError(f"stage {self.name!r}: run must be a function of the loop")
+        if self.before not in STAGES:
+            raise unknown_name("stage", self.before, STAGES, f"stage {self.name!r}: before")
+
+
+@compiled
+def _sense(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    plant = record[0].plant
+    plant.seen = sense(plant, world.qpos, noise[k])
+
+
+@compiled
+def _estimate(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    loop = record[0]
+    plant, ukf = loop.plant, loop.filter
     for i in range(len(ukf.z)):
         ukf.z[i] = plant.z[i]
     call_step(loop.step, ukf, plant.seen, TICK, plant.battery)
-    move_setpoint(flight, ukf.x, TICK)
-    fly(flight, ukf.x, TICK)
-    actuate(plant, flight.command, loop.fan, axial, radial, qpos, qvel, noise, xfrc)
-
-
-def _run(address: int, noise: int, count: int, fan_y: int, fan_count: int, first: int) -> None:
-    """Run ``count`` ticks of the loop whose record lies at ``address``.
-
-    ``noise`` and ``fan_y`` are the addresses of normals (count, NOISE) and of the fan's path
-    (fan_count,) in m, of which ``first`` is this first tick's place; after its end the fan stands
-    still.
-    """
-    loop = carray(pointer_to(address), 1, LOOP)[0]
-    # first of all: a run that does not come to its end lags behind it, as one that MuJoCo reset
-    # does
-    loop.ticks += count
-    axial, radial = (
-        numbers_at(loop.axial, (COUNT_X, COUNT_R)),
-        numbers_at(loop.radial, (COUNT_X, COUNT_R)),
-    )
-    qpos, qvel, xfrc = (
-        numbers_at(loop.qpos, (7,)),
-        numbers_at(loop.qvel, (6,)),
-        numbers_at(loop.xfrc, (6,)),
-    )
-    counted = numbers_at(loop.counted, (1,))
-    normals, path = numbers_at(noise, (count, NOISE)), numbers_at(fan_y, (fan_count,))
-    for k in range(count):
-        loop.fan.y = path[min(first + k, fan_count - 1)]
-        tick(loop, axial, radial, qpos, qvel, xfrc, normals[k])
-        counted[0] += 1.0
-        for _ in range(SUBSTEPS):
-            call_at(loop.mj_step, loop.model, loop.data)
-
-
-_RUN = types.void(*[types.int64] * 6)
-
-
-@cache
-def run_address() -> int:
-    """Return the address of ``_run``, compiled now if it was not: one machine code for all that run
-    loops.
-    """
-    return address_of(_run, _RUN)
-
-
-@compiled_without_gil
-def _run_rows(run: int, loop: int, noise: Array, fan_y: Array, first: int) -> None:
-    """Run one tick for each row of ``noise``."""
-    call_at(run, loop, noise.ctypes.data, len(noise), fan_y.ctypes.data, len(fan_y), first)
-
-
-def compile_run() -> None:
-    """Compile the correction, which the filter's step compiles last, and the loop: half of what a
-    first flight needs.
-    """
-    specialised(correct_parts, np.zeros(1, dtype=FILTER)[0], np.zeros(1), 3)
-    run_address()
 
 
 @compiled
-def has_been_reset(loop: Record) -> bool:
-    """Return whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a
-    state is not finite, and sets the ticks that its data count to zero with everything else.
+def _steer(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    """Write the rotor speeds that fly to the reference, or to the set point where there is none."""
+    loop = record[0]
+    flight, ukf, reference = loop.flight, loop.filter, world.reference
+    if len(reference) > 0:
+        row = min(max(loop.ticks, 0), len(reference) - 1)
+        for i in range(REFERENCE_SIZE):
+            flight.setpoint[i] = reference[row, i]
+    else:
+        move_setpoint(flight, ukf.x, TICK)
+    for i in range(3):
+        flight.setpoint[6 + i] += loop.action[i]
+    if loop.model_in_loop > 0:
+        foresee(flight, ukf, ukf.x)
+    fly(flight, ukf.x, TICK)
+    if loop.model_in_loop > 0:
+        through_the_rotors(flight, ukf)
+    for i in range(3):
+        flight.setpoint[6 + i] -= loop.action[i]
+
+
+@compiled
+def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    """Write the wrench of this tick for MuJoCo; an accelerometer feels the tick's wrench."""
+    loop = record[0]
+    plant, xfrc = loop.plant, world.xfrc
+    row = min(k, len(path) - 1)
+    loop.fan.y, loop.fan.height = path[row, 0], path[row, 1]
+    actuate(
+        plant,
+        loop.flight.command,
+        loop.fan,
+        world.jet[0],
+        world.jet[1],
+        world.qpos,
+        world.qvel,
+        noise[k],
+        xfrc,
+    )
+    loop.ticks += 1
+    if noise.shape[1] > NOISE:
+        _accelerate(loop, xfrc, noise[k])
+
+
+@compiled
+def _accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
+    """Add what an accelerometer in the centre of mass measures, turned into the world by the
+    estimated attitude, and what the rotors make by the declared model.
     """
-    late: bool = numbers_at(loop.counted, (1,))[0] < loop.ticks
-    return late
+    plant, body = loop.plant, loop.flight.body
+    R, E = plant.rotation, loop.flight.rotation
+    thrust = 0.0
+    for i in range(4):
+        thrust += body.k[i] * plant.z[i] * plant.z[i]
+    for j in range(3):
+        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
+        for i in range(3):
+            felt += R[i, j] * xfrc[i] / plant.body.mass
+        for i in range(3):
+            loop.specific[i] += E[i, j] * felt
+        loop.thrust[j] += E[j, 2] * thrust / body.mass
+
+
+@compiled
+def tick(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    """Run the compiled stages of a tick in one call: what flies without stages of a user's own."""
+    _sense(record, world, path, noise, k)
+    _estimate(record, world, path, noise, k)
+    _steer(record, world, path, noise, k)
+    _actuate(record, world, path, noise, k)
+
+
+@compiled
+def is_healthy(state: Array, qvel: Array) -> bool:
+    """Return whether an estimate (20,) is finite, and no velocity (6,) larger than a vehicle's."""
+    healthy = math.isfinite(state[:19].sum())
+    for velocity in qvel:
+        healthy = healthy and abs(velocity) < FASTEST
+    return healthy
+
+
+@compiled
+def _place_stations(record: Record, qpos: Array, R: Array, points: Array, air: Array) -> None:
+    """Write the places (3, STATIONS) m of the vehicle's stations in the world and the vehicle's
+    attitude (3, 3), and still air (3, STATIONS).
+    """
+    s = record[0].fan.stations
+    quaternion_to_matrix(qpos[3:7], R)
+    for i in range(STATIONS):
+        for a in range(3):
+            air[a, i] = 0.0
+            points[a, i] = qpos[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+
+
+def _compiled_stage(function: Callable[..., None]) -> Callable[["ClosedLoop"], None]:
+    def run(loop: "ClosedLoop") -> None:
+        function(loop.record, loop.world, loop.fan_path, loop.noise, loop.row)
+
+    return run
+
+
+# the kit's own stages, in their order
+STAGES: dict[str, Callable[["ClosedLoop"], object]] = {
+    "wind": lambda loop: loop.blow(),
+    "sense": _compiled_stage(_sense),
+    "estimate": _compiled_stage(_estimate),
+    "steer": _compiled_stage(_steer),
+    "actuate": _compiled_stage(_actuate),
+    "move": lambda loop: loop.move(),
+}
 
 
 class ClosedLoop:
@@ -178,12 +268,31 @@ class ClosedLoop:
         declared: the vehicle as filter and flight loop know it.
         true: the vehicle as it is, with the effects that nobody declared; default: as declared.
         tuning: of the filter; default ``UKFTuning.for_vehicle(declared)``.
-        fan: the jet it flies in, or None for still air without drag.
+        fan: the jet, and the drag of the vehicle; None: still air without drag.
         settings: of the plant.
         gains: of the flight loop.
         load: a body that ``hang_load`` hangs on; default: none.
         drawn: whether the world has what is there for the eye alone.
         estimator: one of ``ESTIMATORS``.
+        accelerometer: standard deviation in m/s2 of its noise, a tick, and of its bias. None: there
+            is no accelerometer, and a tick uses ``NOISE`` unit normals instead of three more.
+        model_in_loop: whether the flight loop counters the effects that ``declared`` has.
+        stages: of a user's own, in the pipeline of a tick.
+
+    Attributes:
+        state: (20,) estimated state, laid out as in ``estimator.estimate``.
+        covariance: (18, 18) of the estimate.
+        setpoint: (11,) position, velocity, acceleration, yaw and yaw rate to fly to.
+        action: (3,) m/s2, world, beside the flight loop's own acceleration.
+        command: (4,) rad/s, of the rotors.
+        sample: (11,) rotor speeds, position and quaternion as they were measured last.
+        unrounded: (4,) rad/s, these rotor speeds before they are rounded.
+        air: (STATIONS, 3) m/s, world, of the winds at the stations.
+        external: (6,) true external force N and torque Nm, world; of it ``jet`` is the jet's part,
+            ``disturbance`` that of the actuators, and ``applied`` what a user applies.
+        specific: (3,) m/s2, world, specific force by the accelerometer, mean of the last run.
+        thrust: (3,) m/s2, likewise that of the rotors by the declared model.
+        ticks: since the start of the episode; below zero while the filter settles.
 
     Raises:
         InputError: no estimator has this name.
@@ -200,6 +309,9 @@ class ClosedLoop:
         load: SuspendedLoad | None = None,
         drawn: bool = False,
         estimator: str = "ukf",
+        accelerometer: tuple[float, float] | None = None,
+        model_in_loop: bool = False,
+        stages: Sequence[Stage] = (),
     ) -> None:
         if estimator not in ESTIMATORS:
             raise unknown_name("estimator", estimator, ESTIMATORS)
@@ -207,61 +319,75 @@ class ClosedLoop:
             declared if true is None else true, settings or PlantSettings()
         )
         self.model, self.data = load_world(self._body, load, drawn)
-        self._step = step_of(self.model, self.data)
-        self.jet_table = jet_table(fan.radius, fan.hub_radius) if fan else _STILL_AIR
+        self.load = load
         self.record = np.zeros(1, dtype=LOOP)
-        self.address = int(
-            self.record.ctypes.data
-        )  # of the record, for compiled code; good for as long as this loop lives
         loop = self.record[0]
         loop["plant"] = plant[0]
         # the flight loop's model has no effects but those of the body: mass, inertia and its centre
         loop["flight"] = flight_record(compile_effects(declared).vehicle, gains)[0]
+        loop["model_in_loop"] = model_in_loop
+        self.jet_table: Array = np.zeros((2, COUNT_X, COUNT_R))  # axial and radial
         if fan is not None:
             loop["fan"] = fan_record(fan, self._body.positions, TICK)[0]
-        self._load = load
-        self._body_id = self.model.body("vehicle").id
-        first = run_address.cache_info().currsize == 0
-        with compiled_meanwhile(tick, compile_run) if first else nullcontext():
-            self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
-            loop["step"] = self.ukf.step_address
-        self._run = run_address()
-        self._call = specialised(_run_rows, self._run, 0, np.empty((0, NOISE)), _AT_REST, 0)
-        loop["filter"] = self.ukf.record[0]
-        self._views()
-
-    def _views(self) -> None:
-        self._qpos: Array = self.data.qpos
-        self._qvel: Array = self.data.qvel
-        self._xfrc: Array = self.data.xfrc_applied[self._body_id]
-        loop = self.record[0]
-        self.state: Array = loop["filter"][
-            "x"
-        ]  # (20,) estimated state, laid out as in estimator.estimate
+            loop["fan"]["blown"] = 1  # drag, in still air too
+            self.jet_table = np.stack(jet_table(fan.radius, fan.hub_radius))
+        self.accelerometer = accelerometer
+        self.noise_size = NOISE + (0 if accelerometer is None else ACCELEROMETER_NOISE)
+        self.ukf = ESTIMATORS[estimator](declared, tuning, TICK)
+        loop["step"], loop["filter"] = self.ukf.step_address, self.ukf.record[0]
+        self.state: Array = loop["filter"]["x"]
         self.covariance: Array = loop["filter"]["P"]
         self.setpoint: Array = loop["flight"]["setpoint"]
-        self.external: Array = loop["plant"]["external"]  # (6,) true external wrench, world
-        self.jet: Array = loop["plant"]["jet"]  # (6,) parts of it: of the jet,
-        self.disturbance: Array = loop["plant"][
-            "disturbance"
-        ]  # (6,) of the actuators' unmodelled disturbance,
-        self.applied: Array = loop["plant"][
-            "applied"
-        ]  # (6,) and that a user applies; zero after a reset
-        self.sample: Array = loop["plant"]["z"]  # (11,) rotor speeds, position, quaternion
-        self.unrounded: Array = loop["plant"]["sample"][
-            :4
-        ]  # (4,) these rotor speeds before they are rounded
-        loop["mj_step"], loop["model"], loop["data"] = self._step[:3]
-        for name, array in (
-            ("qpos", self._qpos),
-            ("qvel", self._qvel),
-            ("xfrc", self._xfrc),
-            ("counted", self.data.userdata),
-            ("axial", self.jet_table[0]),
-            ("radial", self.jet_table[1]),
-        ):
-            loop[name] = array.ctypes.data
+        self.command: Array = loop["flight"]["command"]
+        self.action: Array = loop["action"]
+        self.sample: Array = loop["plant"]["z"]
+        self.unrounded: Array = loop["plant"]["sample"][:4]
+        self.air: Array = loop["fan"]["air"]
+        self.external: Array = loop["plant"]["external"]
+        self.jet: Array = loop["plant"]["jet"]
+        self.disturbance: Array = loop["plant"]["disturbance"]
+        self.applied: Array = loop["plant"]["applied"]
+        self.specific: Array = loop["specific"]
+        self.thrust: Array = loop["thrust"]
+        self.points, self._air = np.zeros((3, STATIONS)), np.zeros((3, STATIONS))
+        self.winds: list[Wind] = []
+        self.attitude_of_points = np.eye(3)
+        self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
+        self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
+        self.ticks = self._ticks_since_reset = 0
+        self.stages = self._pipeline(stages)
+        self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
+        given = self.record, self.world, self.fan_path, self.noise, 0
+        self._tick = specialised(tick, *given) if not stages else None
+        self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
+        self._place = specialised(
+            _place_stations,
+            self.record,
+            self.world.qpos,
+            self.attitude_of_points,
+            self.points,
+            self._air,
+        )
+
+    @staticmethod
+    def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[["ClosedLoop"], object]]:
+        """Return the stages of a tick by their names, in the order in which they run."""
+        stages = {}
+        for name, run in STAGES.items():
+            for stage in own:
+                if stage.before == name:
+                    if stage.name in STAGES or stage.name in stages:
+                        raise InputError(f"stage {stage.name!r}: there is one of this name")
+                    stages[stage.name] = stage.run
+            stages[name] = run
+        return stages
+
+    def _look_at_world(self, reference: Array) -> None:
+        """Take the arrays of MuJoCo's data, which a reset of it may move."""
+        self._qpos: Array = self.data.qpos
+        self._qvel: Array = self.data.qvel
+        xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
+        self.world = World(self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, reference)
 
     @property
     def motion(self) -> tuple[Array, Array]:
@@ -295,32 +421,71 @@ class ClosedLoop:
 
     @property
     def time(self) -> float:
-        """Time since the reset, s."""
-        return int(self.record["ticks"][0]) * TICK
+        """Time since the start of the episode, s."""
+        return self.ticks * TICK
 
-    def reset(self, rng: np.random.Generator, position: Array, yaw: float = 0.0) -> None:
+    def reset(
+        self,
+        rng: np.random.Generator,
+        position: Array,
+        yaw: float = 0.0,
+        winds: Sequence[Wind] = (),
+        reference: Array | None = None,
+        fan_path: Array | None = None,
+        settle: int = 0,
+    ) -> None:
         """Hover at ``position`` (3,) m and ``yaw`` rad, with the filter started from one measured
         pose.
+
+        Args:
+            rng: what the start is drawn from.
+            position: of the geometric centre.
+            yaw: rad.
+            winds: what blows, at its time 0 until the episode begins.
+            reference: (n, REFERENCE_SIZE), a row a tick; default: the set point stays where it is,
+                and moves with the velocity that it is given.
+            fan_path: where the fan stands while the filter settles, as ``run`` takes it.
+            settle: ticks before the episode begins; even, so that the winds blow from the first.
+
+        Raises:
+            InputError: something that is no wind, or another shape.
         """
+        for wind in winds:
+            check_wind(wind, "ClosedLoop")
+        rows = np.zeros((0, REFERENCE_SIZE))
+        if reference is not None:
+            rows = np.ascontiguousarray(reference, dtype=np.float64)
+            if rows.shape[1:] != (REFERENCE_SIZE,) or not np.all(np.isfinite(rows)):
+                raise InputError(
+                    f"ClosedLoop: reference must be finite numbers, shape (n, {REFERENCE_SIZE}), "
+                    f"got shape {rows.shape}"
+                )
         mujoco.mj_resetData(self.model, self.data)
-        self._views()
+        self._look_at_world(rows)
+        self.winds = list(winds)
         loop = self.record[0]
-        loop["ticks"] = 0
+        self.action[:] = 0.0
+        if self.accelerometer is not None:
+            loop["accelerometer_sigma"], sigma = self.accelerometer
+            loop["accelerometer_bias"] = sigma * rng.standard_normal(3)
+        loop["ticks"] = self.ticks = -settle
+        self._ticks_since_reset = 0
         reset_plant(loop["plant"], self._body)
         self._qpos[:3], self._qpos[3:7] = position, quaternion_of_yaw(yaw)
         self.setpoint[:] = 0.0
         self.setpoint[:3], self.setpoint[9] = position, yaw
         reset_flight(loop["flight"])
-        loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal(
-            (len(loop["fan"]["gusts"]), 3)
-        )
+        self.air[:] = 0.0
+        loop["fan"]["gusts"] = loop["fan"]["mixing"] @ rng.standard_normal((STATIONS, 3))
         noise = rng.standard_normal(NOISE)
         sense(self.record[0:1]["plant"][0], self._qpos, noise)
         self.ukf.reset(self.sample[4:7], self.sample[7:11])
         loop["filter"] = self.ukf.record[0]
-        if self._load is not None:
-            set_down(self.model, self.data, self._load)
+        if self.load is not None:
+            set_down(self.model, self.data, self.load)
         mujoco.mj_forward(self.model, self.data)
+        if settle > 0:
+            self.run(rng.standard_normal((settle, self.noise_size)), fan_path)
 
     def hang_load(self) -> None:
         """Hang the load on: at rest below its anchor on the taut thread.
@@ -328,11 +493,11 @@ class ClosedLoop:
         Raises:
             InputError: this loop was made without a load.
         """
-        if self._load is None:
+        if self.load is None:
             raise InputError(
                 "ClosedLoop: there is no load to hang on; give one with load=SuspendedLoad(...)"
             )
-        hang(self.model, self.data, self._load)
+        hang(self.model, self.data, self.load)
 
     def load_pull(self) -> Array:
         """Return the true force (N) and torque (Nm) about the centre of mass, (6,) world, of a load
@@ -340,45 +505,80 @@ class ClosedLoop:
         """
         return pull(self.data, self._body.com)
 
-    def run(self, noise: Array, fan_y: Array | None = None, first: int = 0) -> None:
-        """Run one tick for each row of ``noise`` (n, NOISE), all of them in one compiled call that
-        lets other threads run.
+    def run(self, noise: Array, fan_path: Array | None = None) -> None:
+        """Run one tick for each row of ``noise``.
 
         Args:
-            noise: unit normals.
-            fan_y: (m,) m, where the fan is tick by tick; after the last it stands still. Default:
-                at 0.
-            first: the first tick's place in ``fan_y``.
+            noise: (n, ``noise_size``) unit normals.
+            fan_path: (m,) the fan's y in m, or (m, 2) its y and height, tick by tick from the first
+                of this run; after the last the fan stands still. Default: y = 0.
 
         Raises:
             InputError: a shape is wrong.
         """
         noise = np.ascontiguousarray(noise, dtype=np.float64)
-        fan_y = _AT_REST if fan_y is None else np.ascontiguousarray(fan_y, dtype=np.float64)
-        if (
-            noise.ndim != 2
-            or noise.shape[1] != NOISE
-            or fan_y.ndim != 1
-            or len(fan_y) == 0
-            or first < 0
-        ):
+        path = self._fan_at_rest if fan_path is None else np.asarray(fan_path, dtype=np.float64)
+        if path.ndim == 1:
+            path = np.column_stack([path, np.full(len(path), self._fan_at_rest[0, 1])])
+        count, last = len(noise), len(path) - 1
+        if noise.shape != (count, self.noise_size) or path.shape != (last + 1, 2) or last < 0:
             raise InputError(
-                f"ClosedLoop: expected noise (n, {NOISE}), fan_y (m,) and first from 0 on; got "
-                f"shapes "
-                f"{noise.shape}, {fan_y.shape} and first = {first}"
+                f"ClosedLoop: expected noise (n, {self.noise_size}) and fan_path (m,) or (m, 2); "
+                f"got shapes {noise.shape} and {path.shape}"
             )
-        self._call(self._run, self.address, noise, fan_y, first)
+        self.noise, self.fan_path = noise, path
+        if self.accelerometer is not None:
+            self.specific[:] = self.thrust[:] = 0.0
+        if self._tick is None:
+            for k in range(count):
+                self.row = k
+                for stage in self.stages.values():
+                    stage(self)
+        else:
+            self._run_compiled(self._tick, path, noise)
+        if self.accelerometer is not None:
+            self.specific /= count
+            self.thrust /= count
+
+    def _run_compiled(self, run_tick: Callable[..., None], path: Array, noise: Array) -> None:
+        """Do what the stages do, those between ``wind`` and ``move`` in one call."""
+        record, world, winds = self.record, self.world, self.winds
+        move, model, data = mujoco.mj_step, self.model, self.data
+        for k in range(len(noise)):
+            if winds:
+                self.blow()
+                self.ticks += 1
+            run_tick(record, world, path, noise, k)
+            move(model, data, SUBSTEPS)
+        self.ticks = int(self.record["ticks"][0])
+        self._ticks_since_reset += len(noise)
+
+    def blow(self) -> None:
+        """Write the winds at the vehicle's stations into ``air``, every second tick."""
+        if not self.winds or self.ticks % WIND_EVERY:
+            return
+        points, air, time = self.points, self._air, max(self.ticks, 0) * TICK
+        self._place(self.record, self.world.qpos, self.attitude_of_points, points, air)
+        for wind in self.winds:
+            add_wind(wind, time, points, air)
+        self.air[:] = air.T
+
+    def move(self) -> None:
+        """Let MuJoCo integrate the rigid body over the tick."""
+        mujoco.mj_step(self.model, self.data, SUBSTEPS)
+        self.ticks += 1
+        self._ticks_since_reset += 1
 
     @property
     def was_reset(self) -> bool:
         """Whether MuJoCo reset the vehicle on its own: it does so, silently in code, where a state
-        is not finite.
+        is not finite. Its time then is zero.
         """
-        return bool(has_been_reset(self.record[0]))
+        return bool(self.data.time < (self._ticks_since_reset - 0.5) * TICK)
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to be copied or pickled: compiled code knows its arrays by address, and the copy
-        would fly this one's.
+        """Refuse to be copied or pickled: the loop's arrays are views of its record and of MuJoCo's
+        data, and those of a copy would not be.
 
         Raises:
             InputError: always.
@@ -393,8 +593,10 @@ class ClosedLoop:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than
         a vehicle can be.
         """
+        speeds = self._qvel.tolist()
         return (
-            math.isfinite(sum(self.state.tolist()[:19]))
-            and all(abs(v) < FASTEST for v in self._qvel.tolist())
-            and not self.was_reset
+            not self.was_reset
+            and math.isfinite(sum(self.state.tolist()[:19]) + sum(speeds))
+            and min(speeds) > -FASTEST
+            and max(speeds) < FASTEST
         )

@@ -7,36 +7,24 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
-from ..dynamics.effects import check_setting
-from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
-from ..dynamics.vehicle_file import load_vehicle
-from ..estimator.tuning import UKFTuning
-from ..runtime.errors import InputError, unknown_name
-from .closed_loop import ESTIMATORS
-from .display import modes_shown, need_display
+from ..dynamics.motion import Array
+from ..dynamics.vehicle import EffectSetting, Vehicle
+from .closed_loop import Stage
 from .fan import Fan
-from .fan_tracking import DECISION_TICKS, DISTANCE, EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS
+from .fan_tracking import AWAY, CHANGE_COST, DECISION_TICKS, DISTANCE, FAN_TIMES, TRACKING_WIDTH
 from .plant import TICK, PlantSettings
-from .scenarios import Scenario, draw_fan_path, get_scenario
-from .windy_flight import WINDY_NOISE, WindyFlight
-
-Array = NDArray[np.float64]
+from .scenarios import SCENARIOS, Scenario, draw_fan_path
+from .task import LOST_OFFSET, SETTLE_TICKS, Frame, Task, limited
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
 _VERTICAL = 0.5  # of the scenario's speeds and travels that the fan moves up and down with
-_LIMITS_2D = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0)
-_BOUND = np.array(_LIMITS_2D)
+_LIMITS = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, 5.0, 1.0, 1.0])
 SCALES_2D = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 0.5, 1.0, 1.0)
-_TRACKING_WIDTH = 0.3  # m
-_CHANGE_COST = 0.05  # per (m/s)^2
-_AWAY = 1.0  # m, off its distance
-_UPRIGHT = 0.34  # cosine of 70 degrees
 
 
-class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class FanTracking2DEnv(Task):
     """A quadrotor in a spherical cage must stay on the axis of a fan that moves in y and z.
 
     ## Description
@@ -109,6 +97,7 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `settings`    | `None`       | a `PlantSettings`: motor lag, unmodelled disturbance, dropouts     |
     | `estimator`   | `"ukf"`      | `"ukf"`, or `"constant-gain"`: the filter's converged gain          |
     | `normalize`   | `False`      | whether observations are divided by the scales above               |
+    | `stages`      | `()`         | stages of your own in a tick: ``windwrench.envs.Stage``             |
     | `render_mode` | `None`       | `"human"` (needs a display) or `"rgb_array"`                       |
 
     ``reset`` knows no ``options`` and refuses any.
@@ -118,7 +107,10 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     * v0: initial version.
     """  # noqa: E501
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}  # noqa: RUF012
+    name = "FanTracking2D"
+    scenarios = SCENARIOS
+    decision_ticks = DECISION_TICKS
+    action_size = 2
 
     def __init__(
         self,
@@ -133,203 +125,73 @@ class FanTracking2DEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         normalize: bool = False,
         width: int = 640,
         height: int = 480,
+        stages: Sequence[Stage] = (),
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(
-                f"FanTracking2D: render_mode must be human, rgb_array or None, got {render_mode!r}"
-            )
-        if render_mode == "human":
-            need_display()
-        if not isinstance(normalize, bool | np.bool_):
-            raise InputError(f"FanTracking2D: normalize must be True or False, got {normalize!r}")
-        if estimator not in ESTIMATORS:
-            raise unknown_name("estimator", estimator, ESTIMATORS)
-        self.scenario = scenario if isinstance(scenario, Scenario) else get_scenario(scenario)
-        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
-        self.truth = (
-            self.vehicle
-            if truth is None
-            else truth
-            if isinstance(truth, Vehicle)
-            else load_vehicle(truth)
-        )
-        self.effects = tuple(check_setting(e, "FanTracking2D: effects") for e in effects)
-        self.fan = replace(
-            fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE),
-            turbulence=self.scenario.turbulence,
-        )
-        self.settings, self.estimator = settings, estimator
-        self.render_mode, self.width, self.height = render_mode, width, height
-        self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
+        super().__init__(
+            scenario, render_mode, vehicle, effects, truth, settings, estimator, normalize,
+            width, height, stages,
+        )  # fmt: skip
+        fan = fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
+        self.fan = replace(fan, turbulence=self.scenario.turbulence)
         self._scales = np.array(SCALES_2D if normalize else np.ones(10), dtype=np.float32)
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
-        bound = np.array(_LIMITS_2D, dtype=np.float32) / self._scales
+        bound = _LIMITS.astype(np.float32) / self._scales
         self.observation_space = gym.spaces.Box(-bound, bound, (10,), np.float32)
-        self.flight: WindyFlight | None = None
-        self.motions = ("", "")
-        self._path: Array = np.zeros((1, 2))
-        self._command, self._distance = np.zeros(2), DISTANCE
-        self.viewer: Any = None
+        self.fan_motion = ""
 
-    def _make_flight(self, vehicle: Vehicle, fan: Fan) -> WindyFlight:
-        scenario = self.scenario
-        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        declared = replace(self.vehicle, mocap=mocap)
-        return WindyFlight(
-            declared,
-            replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
-            fan,
-            UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
-            self.settings or PlantSettings.for_vehicle(self.truth),
-            drawn=self.render_mode is not None,
-            estimator=self.estimator,
-        )
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode; the same seed gives the same episode, bit for bit.
-
-        Raises:
-            InputError: ``options`` that are not empty: there are none.
+    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:
+        """Return the closed loop; its accelerometer, which nobody reads, uses three more normals of
+        a tick, of which the episodes of this version are made.
         """
-        if options:
-            raise InputError(
-                f"FanTracking2D: reset: unknown option(s) {', '.join(map(repr, options))}; "
-                f"expected none: scenario and all else are arguments of the environment"
-            )
-        super().reset(seed=seed)
+        return super().make_loop(vehicle, fan, accelerometer=(0.0, 0.0), **given)
+
+    def _begin(self) -> None:
         rng, scenario = self.np_random, self.scenario
-        self._distance = DISTANCE
-        if scenario.varied:
-            drawn = scenario.variation.draw(rng)
-            self._distance = drawn["distance"]
-            fan = replace(
-                self.fan,
-                speed=self.fan.speed * drawn["fan_speed"],
-                rotor_drag=self.fan.rotor_drag * drawn["rotor_drag"],
-                hull_area=self.fan.hull_area * drawn["hull_area"],
-            )
-            vehicle = replace(
-                self.truth,
-                mass=self.truth.mass * drawn["mass"],
-                inertia=self.truth.inertia * drawn["inertia"],
-            )
-            self.flight = self._make_flight(vehicle, fan)
-        elif self.flight is None:
-            self.flight = self._make_flight(self.truth, self.fan)
-        t = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
-        sideways, _, y = draw_fan_path(scenario, rng, t)
-        upwards, _, z = draw_fan_path(scenario, rng, t)
-        self.motions = sideways, upwards
+        self._distance = self._draw_loop(self.fan).get("distance", DISTANCE)
+        sideways, _, y = draw_fan_path(scenario, rng, FAN_TIMES)
+        upwards, _, z = draw_fan_path(scenario, rng, FAN_TIMES)
+        self.fan_motion = f"{sideways} and {upwards}"
         self._path = np.column_stack([y, self.fan.height + _VERTICAL * z])
         offset, side = float(rng.uniform(*scenario.offset)), float(rng.uniform(-math.pi, math.pi))
         start = self._path[0] + offset * np.array([math.cos(side), 0.5 * math.sin(side)])
-        self.flight.reset(
-            rng,
-            np.array([self._distance, *start]),
-            math.pi,
-            path=self._path,
-            settle=SETTLE_TICKS,
-        )
-        self._command[:] = 0.0
-        info = self._info(np.zeros(2))
-        info["reward_tracking"] = info["reward_change"] = 0.0
-        if self.render_mode == "human":
-            self.render()
-        return self._observation(), info
+        at = np.array([self._distance, *start])
+        self.loop.reset(rng, at, math.pi, fan_path=self._path[:1], settle=SETTLE_TICKS)
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Fly 80 ms with commanded velocities (2,) m/s along y and z."""
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != (2,) or not math.isfinite(given.sum()):
-            raise InputError(
-                f"FanTracking2D: action must be two finite numbers in m/s, shape (2,), got "
-                f"{action!r}"
-            )
-        if self.flight is None:
-            raise InputError("FanTracking2D: call reset before step")
-        command = np.minimum(np.maximum(given, -1.0), 1.0)
-        change = command - self._command
-        self._command[:] = command
-        self.flight.loop.setpoint[4:6] = command
-        self.flight.run(self.np_random.standard_normal((DECISION_TICKS, WINDY_NOISE)))
-        if self.render_mode == "human":
-            self.render()
-        info = self._info(change)
-        reward = info["reward_tracking"] + info["reward_change"]
-        return self._observation(), reward, info["lost"], False, info
+    def _fly(self, noise: Array) -> None:
+        loop = self.loop
+        loop.setpoint[4:6] = self.command
+        loop.run(noise, self._path[min(loop.ticks, len(self._path) - 1) :])
 
-    def _observation(self) -> NDArray[np.float32]:
-        assert self.flight is not None
-        x = self.flight.loop.state
-        seen = np.empty(10)
-        seen[:3], seen[3:6], seen[6:8], seen[8:] = x[16:19], x[13:16], x[8:10], self._command
-        if not math.isfinite(seen.sum()):
-            seen = np.nan_to_num(seen, posinf=0.0, neginf=0.0)
-        limited: NDArray[np.float32] = np.minimum(np.maximum(seen, -_BOUND), _BOUND).astype(
-            np.float32
-        )
-        return limited / self._scales
+    def _get_obs(self) -> Frame:
+        x = self.loop.state
+        seen = np.concatenate([x[16:19], x[13:16], x[8:10], self.command])
+        return limited(seen, _LIMITS) / self._scales
 
-    def _info(self, change: Array) -> dict[str, Any]:
-        """Return the reward's terms and the truth that the agent does not see."""
-        flight = self.flight
-        assert flight is not None
-        loop, path = flight.loop, self._path
-        ticks = flight.ticks
-        k = min(ticks, len(path) - 1)
+    def _get_info(self) -> dict[str, Any]:
+        loop, path = self.loop, self._path
+        k = min(loop.ticks, len(path) - 1)
         fan = path[max(k - 1, 0)]
-        velocity = (path[k] - fan) / TICK if k > 0 else np.zeros(2)
-        at, q = loop.position.tolist(), loop.quaternion.tolist()
-        offset = math.hypot(at[1] - fan[0], at[2] - fan[1])
+        x, y, z = loop.position.tolist()
+        offset = math.hypot(y - fan[0], z - fan[1])
         flying = (
-            flight.healthy()
-            and 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2) >= _UPRIGHT
+            self.is_flying()
             and offset <= LOST_OFFSET
-            and abs(at[0] - self._distance) <= _AWAY
-            and at[2] > 0.0
+            and abs(x - self._distance) <= AWAY
+            and z > 0.0
         )
         return {
-            "reward_tracking": 1.0 / (1.0 + (offset / _TRACKING_WIDTH) ** 2),
-            "reward_change": -_CHANGE_COST * float(change @ change),
             "fan": fan.copy(),
-            "fan_velocity": velocity,
-            "position": np.array(at[1:]),
+            "fan_velocity": (path[k] - fan) / TICK if k > 0 else np.zeros(2),
+            "position": np.array([y, z]),
             "error": offset,
             "force": loop.external[:3].copy(),
             "torque": loop.external[3:].copy(),
-            "time": ticks * TICK,
+            "time": loop.time,
             "lost": not flying,
-            "fan_motion": " and ".join(self.motions),
+            "fan_motion": self.fan_motion,
         }
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture (height, width, 3) of fan, jet, vehicle and wrench, or show it in a
-        window.
-
-        Raises:
-            InputError: not reset yet, or this machine cannot draw.
-        """
-        if self.render_mode is None or self.flight is None:
-            raise InputError(
-                "FanTracking2D: render needs a render_mode ('human' or 'rgb_array') and a reset "
-                "before it"
-            )
-        if self.viewer is None:
-            from .drawing import Viewer
-
-            self.viewer = Viewer(self.render_mode, self.width, self.height)
-        k = min(max(self.flight.ticks - 1, 0), len(self._path) - 1)
-        picture: NDArray[np.uint8] | None = self.viewer.draw(
-            self.flight.loop, float(self._path[k, 0])
-        )
-        return picture
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self.viewer is not None:
-            self.viewer.close()
-            self.viewer = None
+    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
+        return {
+            "reward_tracking": 1.0 / (1.0 + (info["error"] / TRACKING_WIDTH) ** 2),
+            "reward_change": -CHANGE_COST * float(change @ change),
+        }

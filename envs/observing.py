@@ -7,15 +7,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controllers.observation import FORCE_X, LAST_COMMAND, MAX_COMMAND, OBSERVATION_SIZE
+from ..controllers.observation import (
+    DECISION_PERIOD,
+    FORCE_X,
+    LAST_COMMAND,
+    MAX_COMMAND,
+    OBSERVATION_SIZE,
+)
 from ..controllers.observation import VELOCITY_Y as _VELOCITY_Y
 from ..runtime.errors import InputError, unknown_name
-from .decision import DECISION_TICKS, LIMITS
+from .plant import TICK
 
 Frame = NDArray[np.float32]
 Array = NDArray[np.float64]
 
 FRAMES = 25  # decisions of a history, 2 s
+_TICKS = round(DECISION_PERIOD / TICK)  # of a decision
+# largest size of a frame's numbers: N, Nm, m/s and m/s
+LIMITS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 5.0, MAX_COMMAND)
 # sizes that become 1: N, Nm, m/s and m/s; what the jet does to the standard vehicle
 SCALES = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.5, 1.0)
 # of the pose: position (m), velocity (m/s), tilt, yaw (rad), command (m/s)
@@ -97,7 +106,7 @@ class View:
         if self._seen < 0 or ticks < self._seen:
             self._past[:] = one
         elif ticks > self._seen:
-            steps = min(-(-(ticks - self._seen) // DECISION_TICKS), FRAMES)
+            steps = min(-(-(ticks - self._seen) // _TICKS), FRAMES)
             self._past[:-steps] = self._past[steps:]
             self._past[-steps:] = one
         self._seen = ticks

@@ -182,7 +182,6 @@ def load_world(
     body.mass, body.inertia, body.ipos, body.iquat = vehicle.mass, moments, vehicle.com, quaternion
     if load is not None:
         add_load(spec, load)
-    spec.nuserdata = 1  # the ticks of a flight, which MuJoCo forgets when it resets on its own
     spec.compiler.discardvisual = not drawn
     if not drawn:
         for part in (*spec.cameras, *spec.lights, spec.body("fan")):

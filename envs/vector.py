@@ -1,8 +1,7 @@
-"""Many fan-tracking environments in one process."""
+"""Many fan-tracking environments in one process, on MuJoCo or in the lanes of a vector unit."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from functools import partial
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import gymnasium as gym
@@ -10,18 +9,30 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from ..runtime.compiled import specialised
 from ..runtime.errors import InputError, unknown_name
-from ..runtime.work_sharing import PATIENCE, all_done, open_tasks
-from .decision import DECISION_TICKS, EPISODE, INFO, decide
 from .fan_tracking import FanTrackingEnv
+from .task import Frame
 
-Frames = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
 
+# entries of ``infos``: shape behind the environments, and type
+_ENTRIES: dict[str, tuple[tuple[int, ...], Any]] = {
+    "reward_tracking": ((), np.float64),
+    "reward_change": ((), np.float64),
+    "fan_y": ((), np.float64),
+    "fan_velocity": ((), np.float64),
+    "y": ((), np.float64),
+    "offset": ((), np.float64),
+    "force": ((3,), np.float64),
+    "torque": ((3,), np.float64),
+    "time": ((), np.float64),
+    "lost": ((), np.bool_),
+    "fan_motion": ((), object),
+}
 
-class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
+
+class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
     """``num_envs`` environments side by side, each bit for bit the single one with its seed.
 
     ``reset(seed=s)`` seeds them with s, s + 1, ...; a list gives each its own. An environment whose
@@ -34,7 +45,8 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
     Args:
         num_envs: how many.
         max_episode_steps: decisions after which an episode is truncated.
-        threads: over which the environments are spread; the results do not depend on it.
+        threads: over which the environments are spread; the results do not depend on it. MuJoCo
+            gains little by threads: most of a step is Python's.
         autoreset_mode: ``NEXT_STEP`` or ``SAME_STEP``, of ``gymnasium.vector.AutoresetMode`` or its
             value as text.
         **kwargs: of ``FanTrackingEnv``.
@@ -60,34 +72,25 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
             if value < 1:
                 raise InputError(f"FanTracking: {name} must be at least 1, got {value}")
         self.autoreset_mode = _mode(autoreset_mode)
-        self.num_envs, self.max_episode_steps, self.threads = (
-            num_envs,
-            max_episode_steps,
-            min(threads, num_envs),
-        )
-        self._episodes = np.zeros(num_envs, dtype=EPISODE)
+        self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
+        self.threads = min(threads, num_envs)
         self.envs = self._make_envs(kwargs)
         first = self.envs[0]
         self.metadata = {**first.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = first.render_mode
-        self.single_action_space, self.single_observation_space = (
-            first.action_space,
-            first.observation_space,
-        )
+        self.single_action_space = first.action_space
+        self.single_observation_space = first.observation_space
         self.action_space = gym.vector.utils.batch_space(first.action_space, num_envs)
         self.observation_space = gym.vector.utils.batch_space(first.observation_space, num_envs)
         self._decisions = np.zeros(num_envs, dtype=np.int64)  # of the episode in hand
+        self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
-        self._outcomes = self._episodes["outcome"]
-        self._motions = np.full(num_envs, "", dtype=object)
+        self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
+        self._values = {
+            name: np.zeros((num_envs, *shape), dtype=kind)
+            for name, (shape, kind) in _ENTRIES.items()
+        }
         self._all = np.ones(num_envs, dtype=np.bool_)
-        # what threads read; one that comes late works for the step that it finds
-        self._commands, self._resting = np.zeros(num_envs), np.zeros(num_envs, dtype=np.bool_)
-        self._tasks = np.array([0, 0, self.threads])  # all of them have left
-        self._parts = num_envs  # tasks of a decision
-        self._call: Callable[[], None] | None = None
-        self._help: Callable[[], None] | None = None  # the same, and to look for more
-        self._helpers: list[Future[None]] = []
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
@@ -95,7 +98,7 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
         *,
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
-    ) -> tuple[Frames, Infos]:
+    ) -> tuple[Frame, Infos]:
         """Start an episode in every environment, or in those of ``options["reset_mask"]``
         (num_envs,), booleans.
 
@@ -115,143 +118,114 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frames, Frames, NDArray[Any]]):
                 f"FanTracking: reset: expected {self.num_envs} seeds, and booleans in reset_mask; "
                 f"got {len(seeds)} and {mask!r}"
             )
+        self._start(mask, seeds)
+        self._over[mask] = False
+        return self._frames.copy(), self._infos()
 
-        self._start_all(mask, seeds)
-        self._decisions[mask], self._over[mask] = 0, False
-        return self._frames(), self._infos()
-
-    def step(self, actions: Frames) -> tuple[Frames, NDArray[np.float64], Flags, Flags, Infos]:
+    def step(self, actions: Frame) -> tuple[Frame, NDArray[np.float64], Flags, Flags, Infos]:
         """Fly 80 ms in every environment with commanded velocities (num_envs, 1) m/s along y.
 
         Raises:
             InputError: another shape, or a number that is not finite; nothing has flown then.
         """
-        actions = np.asarray(actions, dtype=np.float64)
-        if actions.shape != (self.num_envs, 1) or not np.all(np.isfinite(actions)):
+        commands = np.asarray(actions, dtype=np.float64)
+        if commands.shape != (self.num_envs, 1) or not np.all(np.isfinite(commands)):
             raise InputError(
                 f"FanTracking: actions must be finite numbers in m/s, shape ({self.num_envs}, 1), "
-                f"got {actions!r}"
+                f"got {commands!r}"
             )
-        if not self._episodes["loop"].all():
+        if not self._begun.all():
             raise InputError("FanTracking: call reset before step")
-        self._commands[:], self._resting[:] = actions[:, 0], self._over
-        self._fly()
+        self._fly(commands, ~self._over)
+        self._decisions += 1
         if self._over.any():
-            self._start_all(self._resting)
-        self._decisions = np.where(self._over, 0, self._decisions + 1)
-        out, truncated = self._outcomes, self._decisions >= self.max_episode_steps
-        lost, rewards = out["lost"].copy(), out["reward_tracking"] + out["reward_change"]
+            self._start(self._over)
+        values, truncated = self._values, self._decisions >= self.max_episode_steps
+        lost, rewards = values["lost"].copy(), values["reward_tracking"] + values["reward_change"]
         over = lost | truncated
         if self.autoreset_mode is AutoresetMode.NEXT_STEP or not over.any():
             self._over = over
-            return self._frames(), rewards, lost, truncated, self._infos()
-        ended, last = self._final_infos(over), self._frames()
-        final = np.full(self.num_envs, None, dtype=object)
+            return self._frames.copy(), rewards, lost, truncated, self._infos()
+        ended, final = self._final_infos(over), np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(over):
-            final[i] = last[i]
-        self._start_all(over)
-        self._decisions[over] = 0
+            final[i] = self._frames[i].copy()
+        self._start(over)
         masks = {"_final_obs": over.copy(), "_final_info": over.copy()}
         infos = self._infos() | {"final_obs": final, "final_info": ended} | masks
-        return self._frames(), rewards, lost, truncated, infos
+        return self._frames.copy(), rewards, lost, truncated, infos
+
+    def _start(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
+        """Start an episode in all environments that ``which`` (num_envs,) names."""
+        self._begun[which] = False
+        self._begin(np.flatnonzero(which).tolist(), seeds)
+        self._begun[which], self._decisions[which] = True, 0
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
-        """Return the environments, whose episodes are those of ``_episodes``."""
-        envs = [FanTrackingEnv(**kwargs) for _ in range(self.num_envs)]
-        for i, env in enumerate(envs):
-            env.episode = self._episodes[i : i + 1]
-        return envs
+        """Return the environments."""
+        return [FanTrackingEnv(**kwargs) for _ in range(self.num_envs)]
 
-    def _calls(self) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Return what flies a decision, and the same for a thread that helps."""
-        given = self._episodes, self._commands, self._resting, DECISION_TICKS, self._tasks
-        entry = specialised(decide, *given, PATIENCE)
-        return partial(entry, *given, 0), partial(entry, *given, PATIENCE)
+    def _begin(self, which: list[int], seeds: Sequence[int | None] | None) -> None:
+        """Start an episode in some environments; write frames and values."""
 
-    def _fly(self) -> None:
-        """Fly a decision of all environments that do not rest."""
-        if self._call is None or self._help is None:
-            self._call, self._help = self._calls()
-        left = open_tasks(self._tasks) - 1  # without this thread
-        if left:
-            self._helpers = [
-                *(h for h in self._helpers if not h.done()),
-                *self._call_others(self._help, left),
-            ]
-        try:
-            self._call()
-            while not all_done(self._tasks, self._parts):
-                for helper in self._helpers:
-                    if helper.done():
-                        helper.result()
-        except BaseException:
-            wait(self._helpers)  # what they have in hand must not be flown by two
-            self._tasks[2] = self.threads
-            raise
+        def begin(n: int) -> None:
+            i = which[n]
+            self._note(i, *self.envs[i].reset(seed=None if seeds is None else seeds[i]))
 
-    def _call_others(self, work: Callable[[], None], count: int) -> list[Future[None]]:
-        """Have ``count`` threads beside this one call ``work``."""
-        if count and self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads - 1)
-        return [self._pool.submit(work) for _ in range(count)] if self._pool else []
+        self._spread(begin, len(which))
 
-    def _start_all(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
-        """Start an episode in all environments that ``which`` (num_envs,) names."""
+    def _fly(self, commands: NDArray[np.float64], which: Flags) -> None:
+        """Fly a decision in some environments; write frames and values."""
+        flying = np.flatnonzero(which).tolist()
 
-        def start(i: int) -> None:
-            if which[i]:
-                self.envs[i].reset(seed=None if seeds is None else seeds[i])
-                self._motions[i] = self.envs[i].fan_motion
+        def fly(n: int) -> None:
+            i = flying[n]
+            frame, _, _, _, info = self.envs[i].step(commands[i])
+            self._note(i, frame, info)
 
-        self._spread(start, self.num_envs)
+        self._spread(fly, len(flying))
+
+    def _note(self, i: int, frame: Frame, info: dict[str, Any]) -> None:
+        self._frames[i] = frame
+        for name, value in info.items():
+            self._values[name][i] = value
 
     def _spread(self, work: Callable[[int], None], count: int) -> None:
         """Call ``work`` with 0 to ``count - 1``, once each; this thread works, too.
 
-        Whoever is done takes the next, so that nobody waits for a thread that the machine held up.
+        A thread that is done takes the next number, so that no thread waits for a slow one.
         """
         numbers = iter(range(count))
 
-        def take_tasks() -> None:
+        def take_numbers() -> None:
             for n in numbers:
                 work(n)
 
-        others = self._call_others(take_tasks, self.threads - 1)
+        helpers = min(self.threads, count) - 1
+        if helpers > 0 and self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads - 1)
+        others = [self._pool.submit(take_numbers) for _ in range(helpers)] if self._pool else []
         try:
-            take_tasks()
+            take_numbers()
         finally:
-            others = [
-                other for other in others if not other.cancel()
-            ]  # the rest came too late to find any
+            others = [other for other in others if not other.cancel()]  # the rest came too late
             wait(others)
         for other in others:
             other.result()
-
-    def _frames(self) -> Frames:
-        view = self.envs[0].view
-        if view.is_plain:
-            frames: Frames = self._outcomes["observation"].copy()
-            return frames
-        if view.is_of_a_frame:
-            return view.of_frames(self._outcomes["observation"])
-        return np.stack([env.observation() for env in self.envs])
 
     def _infos(self) -> Infos:
         """Return what the environments say as Gymnasium's vector environments do: an array and a
         mask for each entry.
         """
-        infos: Infos = {name: self._outcomes[name].copy() for name in INFO}
-        infos["fan_motion"] = self._motions.copy()
+        infos: Infos = {name: values.copy() for name, values in self._values.items()}
         return infos | {f"_{name}": self._all.copy() for name in infos}
 
     def _final_infos(self, over: Flags) -> Infos:
         """Return the infos of the episodes that ended: zeros, and a mask, where none did."""
         infos: Infos = {}
-        for name, values in self._infos().items():
-            if not name.startswith("_"):
-                kept = values.copy()
-                kept[~over] = None if kept.dtype == object else 0
-                infos[name], infos[f"_{name}"] = kept, over.copy()
+        for name, values in self._values.items():
+            kept = values.copy()
+            kept[~over] = None if kept.dtype == object else 0
+            infos[name], infos[f"_{name}"] = kept, over.copy()
         return infos
 
     def render(self) -> tuple[Any, ...]:

@@ -15,10 +15,9 @@ class SensingFanTracking(FanTrackingEnv):
     ``std_force``, ``std_torque``: the filter's standard deviations (3,) N and Nm.
     """
 
-    def _info(self) -> dict[str, Any]:
-        info, loop = super()._info(), self.loop
-        assert loop is not None
-        std = np.sqrt(np.diagonal(loop.covariance)[12:18])
+    def _get_info(self) -> dict[str, Any]:
+        info = super()._get_info()
+        std = np.sqrt(np.diagonal(self.loop.covariance)[12:18])
         info["std_torque"], info["std_force"] = std[:3].copy(), std[3:].copy()
         return info
 

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from .closed_loop import ClosedLoop
 from .drawing import Viewer
 from .scene_shapes import add_path, add_shadow, add_shape, add_wrench
-from .wind import CompiledWind, FanWall, Sum
-from .windy_flight import WindyFlight
+from .wind import FanWall, Sum, Wind
 
 _DROPS = 300
 _LOW, _HIGH = np.array([0.2, -1.6, 0.2]), np.array([4.4, 1.6, 2.8])  # m, where drops are
@@ -33,8 +33,8 @@ class WindViewer(Viewer):
 
     def draw_winds(
         self,
-        flight: WindyFlight,
-        winds: Sequence[CompiledWind],
+        loop: ClosedLoop,
+        winds: Sequence[Wind],
         walls: Sequence[FanWall],
         reference: NDArray[np.float64],
         time: float,
@@ -42,7 +42,6 @@ class WindViewer(Viewer):
         """Draw the flight as it is now; return the picture (height, width, 3) unless it went to a
         window.
         """
-        loop = flight.loop
         self.open_world(loop.model, loop.data)
         self.begin_frame(loop)
         loop.data.mocap_pos[0] = _AWAY

@@ -6,7 +6,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..dynamics.motion import Array
-from ..runtime.errors import unknown_name
 from .references import figure_of_eight, hold, random_spline
 from .wind import (
     CompiledWind,
@@ -100,17 +99,6 @@ WIND_SCENARIOS: dict[str, WindScenario] = {
 HEIGHT = 1.5  # m, of the vehicle
 DISTANCE = 2.3  # m, from the wall of fans
 START = np.array([DISTANCE, 0.0, HEIGHT])
-
-
-def get_wind_scenario(name: str) -> WindScenario:
-    """Return a scenario by its name.
-
-    Raises:
-        InputError: no scenario has this name.
-    """
-    if name not in WIND_SCENARIOS:
-        raise unknown_name("scenario", name, WIND_SCENARIOS)
-    return WIND_SCENARIOS[name]
 
 
 def draw_winds(

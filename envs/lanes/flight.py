@@ -5,15 +5,25 @@ MuJoCo is not called here. What it does with a free rigid body, one semi-implici
 ``fly_freely``, whose equations of motion are those of the filter's prediction.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ...controllers.flight import FLIGHT, FlightGains, fly, move_setpoint
 from ...dynamics.motion import BODY, Array, accelerations, rotor_wrench
 from ...dynamics.rotation import normalise, quaternion_to_matrix, turn_body
-from ...estimator.ukf_lanes import in_hand
+from ...estimator.ukf_lanes import (
+    columns,
+    in_hand,
+    new_blocks,
+    put_down,
+    take_up,
+    write_lanes,
+)
 from ...runtime.addresses import call_at
-from ...runtime.compiled import Record, compiled
-from ...runtime.vector_lanes import LaneRecord
+from ...runtime.compiled import Record, compiled, compiled_without_gil
+from ...runtime.vector_lanes import WIDTH, LaneRecord
+from ..closed_loop import ClosedLoop
 from ..fan import FAN
 from ..plant import (
     NOISE,
@@ -148,4 +158,110 @@ def tick_lanes(address: int, work: int, step: int, axial: Array, radial: Array) 
         fly_freely(loop, TICK / SUBSTEPS)
 
 
-__all__ = ["LOOPS", "fly_freely", "tick_lanes"]
+@compiled_without_gil
+def fly_block(
+    loops: int,
+    kept: int,
+    work: int,
+    step: int,
+    axial: Array,
+    radial: Array,
+    noise: Array,
+    fan_y: Array,
+    generators: Any,
+    flying: np.ndarray,
+    paths: Array,
+    first: np.ndarray,
+    ticks: int,
+) -> None:
+    """Fly one block of loops side by side.
+
+    Args:
+        loops: address of the block's record, of ``LOOPS``.
+        kept: address of its filters', of ``ukf_lanes``.
+        work: address of a record for a block of filters in hand, this thread's own.
+        step: address of the step of a block of filters.
+        axial: of the jet's table.
+        radial: likewise.
+        noise: (NOISE, WIDTH) of the block's record.
+        fan_y: (WIDTH,) likewise.
+        generators: (n,) of the lanes that fly, from the first on; a typed list.
+        flying: (n or more,) booleans; a lane that does not fly draws nothing.
+        paths: (n or more, m) m, the fan's y.
+        first: (n or more,) columns of ``paths`` at the first tick.
+        ticks: of ``TICK`` s.
+    """
+    last = paths.shape[1] - 1
+    take_up(kept, work)
+    for k in range(ticks):
+        for n in range(len(generators)):
+            if flying[n]:
+                fan_y[n] = paths[n, min(first[n] + k, last)]
+                generator = generators[n]
+                for i in range(NOISE):
+                    noise[i, n] = generator.standard_normal()
+        tick_lanes(loops, work, step, axial, radial)
+    put_down(kept, work)
+
+
+class Blocks:
+    """Memory of closed loops side by side, as many to a block as there are lanes.
+
+    All stand where ``like`` stands, whose settings are those of all but for what can vary from
+    episode to episode.
+    """
+
+    def __init__(self, count: int, like: ClosedLoop) -> None:
+        self.loops, self.filters = LOOPS.zeros(count), new_blocks(count)
+        LOOPS.share(self.loops, _single(like))
+        for block in range(count):
+            self.put(block, slice(None), like)
+
+    def __len__(self) -> int:
+        """Return how many blocks there are."""
+        return len(self.loops)
+
+    def put(self, block: int, lanes: slice, loop: ClosedLoop) -> None:
+        """Let some lanes of a block stand where a closed loop stands."""
+        LOOPS.write(self.loops, block, lanes, _single(loop))
+        write_lanes(self.filters, block, lanes, loop.ukf.record)
+
+    def take(self, block: int, lane: int, other: "Blocks", source: int) -> None:
+        """Let a lane of a block stand where the same lane of another's block stands."""
+        for mine, theirs in (
+            (LOOPS.columns(self.loops), LOOPS.columns(other.loops)),
+            (columns(self.filters), columns(other.filters)),
+        ):
+            mine[block, :, lane] = theirs[source, :, lane]
+
+    @staticmethod
+    def each(field: np.ndarray) -> np.ndarray:
+        """Return a field (blocks, n, WIDTH) as a copy (blocks * WIDTH, n), a row a lane."""
+        return np.moveaxis(field, -1, 1).reshape(-1, field.shape[1]).copy()
+
+    @staticmethod
+    def write_lanes(field: np.ndarray, values: np.ndarray) -> None:
+        """Write values (n,) into the first lanes of a field (blocks, WIDTH)."""
+        for block in range(len(field)):
+            part = values[WIDTH * block : WIDTH * (block + 1)]
+            field[block, : len(part)] = part
+
+
+def _single(loop: ClosedLoop) -> dict[str, Any]:
+    """Return what a closed loop's record and MuJoCo hold, by the names of ``LOOPS``."""
+    qpos, qvel = loop.motion
+    record = loop.record[0]
+    return {
+        "plant": record["plant"],
+        "flight": record["flight"],
+        "fan": record["fan"],
+        "qpos": qpos[:7],
+        "qvel": qvel[:6],
+        "xfrc": np.zeros(6),
+        "acceleration": np.zeros(6),
+        "noise": np.zeros(NOISE),
+        "none": np.zeros(6),
+    }
+
+
+__all__ = ["LOOPS", "Blocks", "fly_block", "fly_freely", "tick_lanes"]

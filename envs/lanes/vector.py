@@ -1,28 +1,32 @@
 """Many fan-tracking environments in the lanes of a vector unit."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
+from numba import typed, typeof
 
-from ...estimator.ukf_lanes import estimates_of, new_work
-from ...runtime.compiled import specialised
-from ...runtime.errors import InputError
-from ...runtime.pcg_normals import pcg_state
+from ...estimator.ukf_lanes import estimates_of, new_work, step_address
+from ...runtime.errors import InputError, unknown_name
 from ...runtime.vector_lanes import WIDTH
-from ...runtime.work_sharing import PATIENCE
-from ..closed_loop import ClosedLoop
-from ..decision import DECISION_TICKS, EPISODE
-from ..fan_tracking import SETTLE_TICKS, FanTrackingEnv
+from ..closed_loop import FASTEST, ClosedLoop
+from ..fan_tracking import (
+    AWAY,
+    DECISION_TICKS,
+    FAN_TIMES,
+    FanTrackingEnv,
+    observe,
+    reward_terms,
+)
 from ..observing import View
-from ..plain_steps import normals_of
-from ..plant import NOISE
-from ..vector import FanTrackingVectorEnv, Flags, Frames
-from .decision import fly_blocks
-from .memory import Blocks
+from ..plant import TICK
+from ..task import LOST_OFFSET, SETTLE_TICKS, UPRIGHT
+from ..vector import FanTrackingVectorEnv, Flags
+from .flight import Blocks, fly_block
+
+_LARGEST = 1e10  # of a number that MuJoCo goes on with
 
 
 class FanTrackingLanes(FanTrackingVectorEnv):
@@ -36,7 +40,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
 
     All scenarios fly, with any ``vehicle``, ``truth``, ``fan``, ``settings``, ``fan_path`` and
     view. What does not, and is refused: effects other than those of the rigid body (mass, inertia,
-    com_offset), declared or not; ``estimator="constant-gain"``; ``render_mode``.
+    com_offset), declared or not; ``estimator="constant-gain"``; ``render_mode``; ``stages``.
 
     Args:
         num_envs: how many.
@@ -49,130 +53,182 @@ class FanTrackingLanes(FanTrackingVectorEnv):
 
     def __init__(self, num_envs: int = 1, *args: Any, **kwargs: Any) -> None:
         super().__init__(num_envs, *args, **kwargs)
-        first = self.envs[0]
-        like = first.flight()
-        _refuse(first, like)
-        self._parts = -(-num_envs // WIDTH)
-        self._flying = Blocks(self._parts, like)
-        self._settling = Blocks(0, like)
-        self._like = like
-        self._compiled: Callable[..., None] | None = None
+        self._env = self.envs[0]
+        self._like = self._env.make_loop(self._env.truth, self._env.fan)
+        _refuse(self._env, self._like)
+        blocks = -(-num_envs // WIDTH)
+        self._flying, self._settling = Blocks(blocks, self._like), Blocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
+        kind = typeof(np_random(0)[0])
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._states = np.zeros(num_envs, np.int64)  # addresses of the generators'
-        self._kept: list[Any] = [None] * num_envs  # what the episodes have the addresses of
-        self._views = [View(first.view.observe, first.view.normalize) for _ in range(num_envs)]
-        self._alone = np.zeros(3, dtype=np.int64)  # tasks of this thread alone
+        self._drawn = [typed.List.empty_list(kind) for _ in range(blocks)]  # the same, by block
+        view = self._env.view
+        self._views = [View(view.observe, view.normalize) for _ in range(num_envs)]
+        self._ticks = np.zeros(num_envs, dtype=np.int64)  # since the start of the episode
+        self._paths = np.zeros((num_envs, FAN_TIMES.size))  # m, the fan's y, a column a tick
+        self._distance, self._commands = np.zeros(num_envs), np.zeros((num_envs, 1))
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
         """Return one environment: it says what all are, and never flies."""
         return [FanTrackingEnv(**kwargs)]
 
-    def _entry(self, given: tuple[Any, ...], patience: int) -> None:
-        """Call ``fly_blocks`` with a record for the block in hand that no other thread has."""
+    def _fly_block(
+        self,
+        blocks: Blocks,
+        block: int,
+        generators: Any,
+        flying: Flags,
+        paths: np.ndarray,
+        first: np.ndarray,
+        ticks: int,
+    ) -> None:
+        """Fly one block with a record for its filters in hand that no other thread has."""
         try:
             work = self._works.pop()
         except IndexError:
             work = new_work(self._like.ukf.record)
         try:
-            arguments = *given, work.ctypes.data, patience
-            if self._compiled is None:
-                self._compiled = specialised(fly_blocks, *arguments)
-            self._compiled(*arguments)
+            loops = blocks.loops[block]
+            fly_block(
+                blocks.loops[block:].ctypes.data,
+                blocks.filters[block:].ctypes.data,
+                work.ctypes.data,
+                step_address(),
+                *self._like.jet_table,
+                loops["noise"],
+                loops["fan"]["y"],
+                generators,
+                flying,
+                paths,
+                first,
+                ticks,
+            )
         finally:
             self._works.append(work)
 
-    def _calls(self) -> tuple[Callable[[], None], Callable[[], None]]:
-        given = (
-            *self._flying.given(),
-            self._episodes,
-            self._states,
-            self._commands,
-            self._resting,
-            DECISION_TICKS,
-            self._tasks,
-        )
-        return partial(self._entry, given, 0), partial(self._entry, given, PATIENCE)
+    def _fly(self, commands: np.ndarray, which: Flags) -> None:
+        blocks, limit = self._flying, self.single_action_space.high[0]
+        change = -self._commands
+        self._commands[which] = np.clip(commands[which], -limit, limit)
+        change += self._commands
+        blocks.write_lanes(blocks.loops["flight"]["setpoint"][:, 4], self._commands[:, 0])
 
-    def _start_all(self, which: Flags, seeds: Sequence[int | None] | None = None) -> None:
-        places = self._places(which)
-        blocks = 1 + max((block for block, _ in places.values()), default=-1)
-        if blocks > len(self._settling):
-            self._settling = Blocks(blocks, self._like)
-        settling, resting = np.zeros(blocks * WIDTH, EPISODE), np.ones(blocks * WIDTH, np.bool_)
-        states = np.zeros(blocks * WIDTH, np.int64)
+        def fly(block: int) -> None:
+            part = slice(WIDTH * block, WIDTH * (block + 1))
+            if which[part].any():
+                given = which[part], self._paths[part], self._ticks[part]
+                self._fly_block(blocks, block, self._drawn[block], *given, DECISION_TICKS)
+
+        self._spread(fly, len(blocks))
+        self._ticks[which] += DECISION_TICKS
+        self._look(which, change[:, 0])
+
+    def _begin(self, which: list[int], seeds: Sequence[int | None] | None) -> None:
+        places = _places(which)
+        count = 1 + max((block for block, _ in places.values()), default=-1)
+        if count > len(self._settling):
+            self._settling = Blocks(count, self._like)
+        settling = self._settling
+        kind = typeof(np_random(0)[0])
+        generators = [typed.List.empty_list(kind) for _ in range(count)]
+        flying = np.zeros((count, WIDTH), dtype=np.bool_)
+        still = np.zeros((count, WIDTH, 1))
         for i, (block, lane) in places.items():
-            n = block * WIDTH + lane
-            self._hover(i, None if seeds is None else seeds[i], block, lane)
-            settling[n], states[n] = self._episodes[i], self._states[i]
-            settling[n]["path_count"], resting[n] = 1, False  # the fan stands still
-        still = np.zeros(blocks * WIDTH)
+            generator = self._hover(i, None if seeds is None else seeds[i], block, lane)
+            while len(generators[block]) <= lane:  # lanes that nobody settles in draw nothing
+                generators[block].append(generator)
+            generators[block][lane], flying[block, lane] = generator, True
+            still[block, lane] = self._paths[i, 0]
 
         def settle(block: int) -> None:
-            part = slice(block * WIDTH, (block + 1) * WIDTH)
-            given = settling[part], states[part], still[part], resting[part], SETTLE_TICKS
-            self._entry((*self._settling.given(block), *given, np.zeros(3, np.int64)), 0)
+            given = flying[block], still[block], np.zeros(WIDTH, np.int64)
+            self._fly_block(settling, block, generators[block], *given, SETTLE_TICKS)
 
-        self._spread(settle, blocks)
+        self._spread(settle, count)
         for i, (block, lane) in places.items():
-            self._flying.take(i // WIDTH, lane, self._settling, block)
-        self._look(which)
+            self._flying.take(i // WIDTH, lane, settling, block)
+        started = np.zeros(self.num_envs, dtype=np.bool_)
+        started[which] = True
+        self._ticks[which], self._commands[which] = 0, 0.0
+        states = estimates_of(self._flying.filters, self.num_envs)
+        for i in which:
+            self._views[i].restart(states[i])
+        self._look(started, np.zeros(self.num_envs))
+        for name in ("reward_tracking", "reward_change", "lost"):
+            self._values[name][which] = 0
 
-    def _places(self, which: Flags) -> dict[int, tuple[int, int]]:
-        """Return where each environment settles: in its own lane, of the first block that has it
-        free.
-        """
-        taken = [0] * WIDTH
-        places = {}
-        for i in np.flatnonzero(which).tolist():
-            places[i] = taken[i % WIDTH], i % WIDTH
-            taken[i % WIDTH] += 1
-        return places
-
-    def _hover(self, i: int, seed: int | None, block: int, lane: int) -> None:
+    def _hover(self, i: int, seed: int | None, block: int, lane: int) -> np.random.Generator:
         """Draw an episode and let its vehicle hover at the start, in a lane of the blocks that
-        settle.
+        settle; return the generator.
         """
         generator = self._generators[i]
         if generator is None or seed is not None:
             generator = self._generators[i] = np_random(seed)[0]
-        first, e = self.envs[0], self._episodes[i]
-        distance, loop, path = first.hover(generator)
+            drawn = self._drawn[i // WIDTH]
+            while len(drawn) <= i % WIDTH:
+                drawn.append(generator)
+            drawn[i % WIDTH] = generator
+        self._env.np_random = generator
+        self._distance[i], loop, self._paths[i] = self._env.hover()
         self._settling.put(block, slice(lane, lane + 1), loop)
-        normals = normals_of(generator, NOISE)
-        self._kept[i] = path, normals
-        self._motions[i] = first.fan_motion
-        e["loop"] = self._flying.loops[i // WIDTH :].ctypes.data
-        e["normals"], e["bits"], e["drawn"] = normals[:3]
-        self._states[i] = 0 if normals.fixed else pcg_state(generator)
-        e["path"], e["path_count"] = path.ctypes.data, len(path)
-        e["ticks"], e["distance"], e["height"] = 0, distance, first.fan.height
-        e["command"], e["power"] = 0.0, 2.0
+        self._values["fan_motion"][i] = self._env.fan_motion
+        return generator
 
-    def _look(self, which: Flags) -> None:
-        """Write what there is to see at the start of these episodes."""
-        still = np.zeros(self.num_envs)
-        given = self._episodes, self._states, still, ~which, 0, self._alone
-        self._alone[:] = 0
-        self._entry((*self._flying.given(), *given), 0)
-        for name in ("reward_tracking", "reward_change", "lost"):
-            self._outcomes[name][which] = 0
-        if not self._views[0].is_of_a_frame:
-            states = estimates_of(self._flying.filters, self.num_envs)
-            for i in np.flatnonzero(which).tolist():
-                self._views[i].restart(states[i])
-
-    def _frames(self) -> Frames:
-        if self._views[0].is_of_a_frame:
-            return super()._frames()
-        states = estimates_of(self._flying.filters, self.num_envs)
-        e = self._episodes
-        return np.stack(
-            [
-                view.of(e["outcome"]["observation"][i], states[i], int(e["ticks"][i]))
-                for i, view in enumerate(self._views)
-            ]
+    def _look(self, which: Flags, change: np.ndarray) -> None:
+        """Write frames and values of some environments, as ``FanTrackingEnv`` has them."""
+        count, loops, values = self.num_envs, self._flying.loops, self._values
+        qpos, qvel, external = (
+            self._flying.each(field)[:count]
+            for field in (loops["qpos"], loops["qvel"], loops["plant"]["external"])
         )
+        broken = which & ~(np.abs(np.column_stack([qpos, qvel])) <= _LARGEST).all(axis=1)
+        for i in np.flatnonzero(broken).tolist():  # MuJoCo starts over
+            loops["qpos"][i // WIDTH, :, i % WIDTH] = qpos[i] = [0, 0, 0, 1, 0, 0, 0]
+            loops["qvel"][i // WIDTH, :, i % WIDTH] = qvel[i] = 0.0
+        states, rows = estimates_of(self._flying.filters, count), np.arange(count)
+        k = np.minimum(self._ticks, self._paths.shape[1] - 1)
+        fan_y = self._paths[rows, np.maximum(k - 1, 0)]
+        offset = qpos[:, 1] - fan_y
+        # written such that a number that is not finite counts as lost
+        flying = (
+            np.isfinite(states[:, :19].sum(axis=1))
+            & (1.0 - 2.0 * (qpos[:, 4] ** 2 + qpos[:, 5] ** 2) >= UPRIGHT)
+            & (np.abs(qvel) < FASTEST).all(axis=1)
+            & (np.abs(offset) <= LOST_OFFSET)
+            & (np.abs(qpos[:, 0] - self._distance) <= AWAY)
+            & (np.abs(qpos[:, 2] - self._env.fan.height) <= AWAY)
+        )
+        now = {
+            **reward_terms(offset, change),
+            "fan_y": fan_y,
+            "fan_velocity": (self._paths[rows, k] - fan_y) / TICK,
+            "y": qpos[:, 1],
+            "offset": offset,
+            "force": external[:, :3],
+            "torque": external[:, 3:],
+            "time": self._ticks * TICK,
+            "lost": broken | ~flying,
+        }
+        for name, value in now.items():
+            values[name][which] = value[which]
+        frames = observe(states, self._commands)
+        if self._env.view.is_of_a_frame:
+            self._frames[which] = self._env.view.of_frames(frames)[which]
+            return
+        for i in np.flatnonzero(which).tolist():
+            self._frames[i] = self._views[i].of(frames[i], states[i], int(self._ticks[i]))
+
+
+def _places(which: list[int]) -> dict[int, tuple[int, int]]:
+    """Return block and lane in which each environment settles: in its own lane, of the first block
+    that has the lane free.
+    """
+    taken = [0] * WIDTH
+    places = {}
+    for i in which:
+        places[i] = taken[i % WIDTH], i % WIDTH
+        taken[i % WIDTH] += 1
+    return places
 
 
 def _refuse(env: FanTrackingEnv, loop: ClosedLoop) -> None:
@@ -187,6 +243,35 @@ def _refuse(env: FanTrackingEnv, loop: ClosedLoop) -> None:
         (env.render_mode is not None, f"is not drawn, got render_mode={env.render_mode!r}"),
         (env.estimator != "ukf", f"flies the full filter 'ukf', got estimator={env.estimator!r}"),
         (called, "flies no effects but mass, inertia and com_offset, and the vehicle has others"),
+        (env.stages, "runs no stages of your own"),
     ):
         if wrong:
             raise InputError(f"FanTracking: plant='lanes' {what}; plant='mujoco' does it")
+
+
+PLANTS: dict[str, type[FanTrackingVectorEnv]] = {
+    "mujoco": FanTrackingVectorEnv,
+    "lanes": FanTrackingLanes,
+}
+
+
+def make_fan_tracking_vector(
+    num_envs: int = 1, plant: str = "mujoco", **kwargs: Any
+) -> FanTrackingVectorEnv:
+    """Return ``num_envs`` fan-tracking environments side by side.
+
+    Args:
+        num_envs: how many.
+        plant: ``"mujoco"``, the reference (``FanTrackingVectorEnv``), or ``"lanes"``, the same
+            flight in the lanes of a vector unit (``FanTrackingLanes``): several times as fast.
+        **kwargs: of the class.
+
+    Raises:
+        InputError: an unknown plant, or what the class refuses.
+    """
+    if plant not in PLANTS:
+        raise unknown_name("plant", str(plant), PLANTS, "FanTracking: plant")
+    return PLANTS[plant](num_envs, **kwargs)
+
+
+__all__ = ["PLANTS", "FanTrackingLanes", "make_fan_tracking_vector"]

@@ -1,8 +1,9 @@
 """Winds: velocity fields of the air, evaluated at points of the world and in time.
 
 A wind is anything with ``velocity(points (n, 3) m, time s) -> (n, 3) m/s``, world frame. The winds
-of this room are compiled, so that a flight evaluates them at the stations of a vehicle 200 times a
-second; they add up with ``+``. Any other wind flies as a grid that it was sampled on (``on_grid``).
+of this room are compiled, which a flight needs that evaluates them at the stations of a vehicle 100
+times a second; they add up with ``+``. Any other wind flies as it is, and faster as a grid that it
+was sampled on (``on_grid``).
 """
 
 from .adapters import PyFlytWind, RotorPyWind, pyflyt_wind_type

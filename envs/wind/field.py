@@ -1,23 +1,16 @@
-"""What a wind is, and how compiled code calls one by its address."""
+"""What a wind is, and how a flight evaluates one."""
 
-import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.addresses import address_of
+from ...runtime.compiled import specialised
 from ...runtime.errors import InputError
 
 Array = NDArray[np.float64]
-
-# void wind(record, count, time, points, velocities): addresses, but for the count. ``time`` is that
-# of one number (s), ``points`` and ``velocities`` those of arrays (3, count); it adds to the latter
-SIGNATURE = types.void(*[types.int64] * 5)
-_CALL = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
 
 
 @runtime_checkable
@@ -32,19 +25,22 @@ class Wind(Protocol):
 
 
 class CompiledWind:
-    """A wind that compiled code evaluates.
+    """A wind of this room: a compiled function adds the air's velocity at many points.
 
     Args:
-        function: a plain function of ``SIGNATURE``, which is compiled at its first use.
-        record: an array (1,) of a structured type that the function reads; it may hold addresses of
-            arrays in ``kept``.
-        kept: what must live as long as the record.
+        function: compiled; takes ``given``, a time in s, points (3, n) m and velocities (3, n) m/s,
+            to which it adds.
+        *given: arrays, and records in arrays (1,).
     """
 
-    def __init__(
-        self, function: Callable[..., None], record: np.ndarray, kept: Sequence[Any] = ()
-    ) -> None:
-        self.function, self.record, self.kept = function, record, tuple(kept)
+    def __init__(self, function: Callable[..., None], *given: np.ndarray) -> None:
+        columns = np.zeros((3, 1))
+        self._given = given
+        self._function = specialised(function, *given, 0.0, columns, columns)
+
+    def add(self, time: float, points: Array, velocities: Array) -> None:
+        """Add the air's velocity at points (3, n) m to velocities (3, n) m/s."""
+        self._function(*self._given, time, points, velocities)
 
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """Return the air's velocity (n, 3) m/s, world, at points (n, 3) m of the world and a time
@@ -53,25 +49,16 @@ class CompiledWind:
         Raises:
             InputError: points of another shape, or numbers that are not finite.
         """
-        rows, now = check_points(points, time)
+        rows = check_points(points, time)
         out = np.zeros_like(rows)
-        for one in winds_of(self):
-            _CALL(one.address)(
-                one.record.ctypes.data, rows.shape[1], now.ctypes.data, rows.ctypes.data,
-                out.ctypes.data,
-            )  # fmt: skip
+        self.add(float(time), rows, out)
         return np.ascontiguousarray(out.T)
 
-    @property
-    def address(self) -> int:
-        """The address of the compiled function."""
-        return address_of(self.function, SIGNATURE)
-
-    def __add__(self, other: "CompiledWind") -> "Sum":
+    def __add__(self, other: Wind) -> "Sum":
         return Sum(self, other)
 
     def __reduce__(self) -> Any:
-        """Refuse to be copied or pickled: compiled code knows its arrays by address.
+        """Refuse to be copied or pickled: compiled code cannot be.
 
         Raises:
             InputError: always.
@@ -86,35 +73,48 @@ class Sum(CompiledWind):
     """The sum of winds.
 
     Raises:
-        InputError: one of them is not compiled.
+        InputError: one of them is no wind.
     """
 
-    def __init__(self, *winds: CompiledWind) -> None:
+    def __init__(self, *winds: Wind) -> None:
         for wind in winds:
-            check_compiled(wind, "Sum")
+            check_wind(wind, "Sum")
         self.winds = [part for wind in winds for part in winds_of(wind)]
 
+    def add(self, time: float, points: Array, velocities: Array) -> None:
+        """Add the air's velocity at points (3, n) m to velocities (3, n) m/s."""
+        for wind in self.winds:
+            add_wind(wind, time, points, velocities)
 
-def winds_of(wind: CompiledWind) -> list[CompiledWind]:
-    """Return the parts of a wind that compiled code calls one by one."""
+
+def winds_of(wind: Wind) -> list[Wind]:
+    """Return the parts of a sum, or the wind itself."""
     return wind.winds if isinstance(wind, Sum) else [wind]
 
 
-def check_compiled(wind: object, where: str) -> None:
+def add_wind(wind: Wind, time: float, points: Array, velocities: Array) -> None:
+    """Add any wind at points (3, n) m to velocities (3, n) m/s."""
+    if isinstance(wind, CompiledWind):
+        wind.add(time, points, velocities)
+    else:
+        velocities += np.asarray(wind.velocity(points.T, time), dtype=np.float64).T
+
+
+def check_wind(wind: object, where: str) -> None:
     """Check that a wind can fly.
 
     Raises:
-        InputError: it cannot.
+        InputError: the object has no ``velocity``.
     """
-    if not isinstance(wind, CompiledWind):
+    if not isinstance(wind, Wind):
         raise InputError(
-            f"{where}: expected a wind of windwrench.envs.wind, got {type(wind).__name__}; a wind "
-            f"of your own flies as on_grid(wind, ...), which samples it"
+            f"{where}: expected a wind of windwrench.envs.wind, or an object with "
+            f"velocity(points (n, 3), time), got {type(wind).__name__}"
         )
 
 
-def check_points(points: ArrayLike, time: float) -> tuple[Array, Array]:
-    """Return points (n, 3) as rows (3, n), and the time as an array (1,).
+def check_points(points: ArrayLike, time: float) -> Array:
+    """Return points (n, 3) as rows (3, n).
 
     Raises:
         InputError: another shape, or numbers that are not finite.
@@ -126,7 +126,7 @@ def check_points(points: ArrayLike, time: float) -> tuple[Array, Array]:
         )
     if not math.isfinite(time):
         raise InputError(f"wind: time must be a finite number of seconds, got {time!r}")
-    return np.ascontiguousarray(given.T), np.array([float(time)])
+    return np.ascontiguousarray(given.T)
 
 
 def vector(value: ArrayLike, name: str) -> Array:

@@ -11,40 +11,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike
 
-from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.archives import check_archive
+from ...runtime.compiled import compiled
 from ...runtime.errors import InputError
 from ...runtime.regular_files import read_bytes
 from ...runtime.whole_files import replaced
-from .field import CompiledWind, Wind
+from .field import Array, CompiledWind, Wind
 
 AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory
 
-GRID = np.dtype(
-    [
-        ("wind", "i8"),  # address of (t, x, y, z, 3) m/s
-        ("count", "i8", (4,)),
-        ("first", "f8", (4,)),  # s and m
-        ("step", "f8", (4,)),
-    ]
-)
 
-
-def _grid(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w = carray(pointer_to(record), 1, GRID)[0]
-    field = numbers_at(w.wind, (w.count[0], w.count[1], w.count[2], w.count[3], 3))
-    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
-    now = numbers_at(time, (1,))[0]
+@compiled
+def _grid(first: Array, step: Array, field: Array, now: float, p: Array, out: Array) -> None:
     low, part = np.zeros(4, dtype=np.int64), np.zeros(4)
-    for j in range(count):
+    for j in range(p.shape[1]):
         for a in range(4):
             value = now if a == 0 else p[a - 1, j]
-            at = min(max((value - w.first[a]) / w.step[a], 0.0), float(w.count[a] - 1))
-            low[a] = min(int(at), max(w.count[a] - 2, 0))
+            at = min(max((value - first[a]) / step[a], 0.0), float(field.shape[a] - 1))
+            low[a] = min(int(at), max(field.shape[a] - 2, 0))
             part[a] = at - low[a]
         for corner in range(16):
             weight, i0, i1, i2, i3 = 1.0, low[0], low[1], low[2], low[3]
@@ -94,13 +81,11 @@ class GridWind(CompiledWind):
             )
         if not np.all(np.isfinite(self.wind)):
             raise InputError(f"{where}: wind must be finite numbers in m/s")
-        record = np.zeros(1, dtype=GRID)
-        w = record[0]
-        w["wind"] = self.wind.ctypes.data
-        for a, axis in enumerate(self.axes):
-            w["count"][a], w["first"][a] = len(axis), axis[0]
-            w["step"][a] = (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0
-        super().__init__(_grid, record, (self.wind,))
+        first = np.array([axis[0] for axis in self.axes])
+        step = [
+            (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes
+        ]
+        super().__init__(_grid, first, np.array(step), self.wind)
 
 
 def on_grid(

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike
 
 from ...dynamics.mean_jet import (
@@ -21,7 +20,7 @@ from ...dynamics.mean_jet import (
     STEP_X,
     jet_table,
 )
-from ...runtime.addresses import numbers_at, pointer_to
+from ...runtime.compiled import compiled
 from ...runtime.errors import InputError
 from .field import Array, CompiledWind, number, vector
 from .turbulence import add_modes, waves
@@ -29,36 +28,45 @@ from .turbulence import add_modes, waves
 _PERIOD = 0.02  # s, of the tables of places and speeds
 _SLOWEST = 1e-3  # m/s, at which a jet counts as off
 
-JETS = np.dtype(
-    [
-        # addresses of the jet's tables, of the places (steps, jets, 3) m, of the speeds (steps,
-        # jets) m/s, and of plane waves (waves, 7)
-        *[(name, "i8") for name in ("axial", "radial", "places", "speeds", "waves")],
-        *[(name, "i8") for name in ("jets", "place_steps", "steps", "wave_count")],
-        ("rotation", "f8", (3, 3)),  # rows: the jet's axes, along it first, in the world
-        ("advection", "f8", (3,)),  # m/s, of the gusts
-    ]
-)
 
+@compiled
+def _jets(
+    axial: Array,
+    radial: Array,
+    places: Array,
+    speeds: Array,
+    modes: Array,
+    R: Array,
+    advection: Array,
+    now: float,
+    p: Array,
+    out: Array,
+) -> None:
+    """Add jets to velocities.
 
-def _jets(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w = carray(pointer_to(record), 1, JETS)[0]
-    axial = numbers_at(w.axial, (COUNT_X, COUNT_R))
-    radial = numbers_at(w.radial, (COUNT_X, COUNT_R))
-    places = numbers_at(w.places, (w.place_steps, w.jets, 3))
-    speeds = numbers_at(w.speeds, (w.steps, w.jets))
-    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
-    now, R = numbers_at(time, (1,))[0], w.rotation
+    Args:
+        axial: (COUNT_X, COUNT_R) of the jet's table.
+        radial: likewise.
+        places: (steps, jets, 3) m, of the rotors.
+        speeds: (steps, jets) m/s.
+        modes: (waves, 7), of the gusts.
+        R: (3, 3) rows: the jets' axes in the world, the one along the jets first.
+        advection: (3,) m/s, of the gusts.
+        now: s.
+        p: (3, n) m, points.
+        out: (3, n) m/s, velocities.
+    """
+    count = p.shape[1]
     gusts = np.zeros((3, count))
-    if w.wave_count > 0:
-        add_modes(numbers_at(w.waves, (w.wave_count, 7)), w.advection, now, p, gusts)
+    if len(modes) > 0:
+        add_modes(modes, advection, now, p, gusts)
     at = min(max(now / _PERIOD, 0.0), 1e9)
     share = at - int(at)
-    k, kp = min(int(at), w.steps - 1), min(int(at), w.place_steps - 1)
-    after, after_p = min(k + 1, w.steps - 1), min(kp + 1, w.place_steps - 1)
+    k, kp = min(int(at), len(speeds) - 1), min(int(at), len(places) - 1)
+    after, after_p = min(k + 1, len(speeds) - 1), min(kp + 1, len(places) - 1)
     for j in range(count):
         momentum, in_y, in_z = 0.0, 0.0, 0.0
-        for n in range(w.jets):
+        for n in range(speeds.shape[1]):
             speed = (1.0 - share) * speeds[k, n] + share * speeds[after, n]
             if speed < _SLOWEST:
                 continue
@@ -110,28 +118,25 @@ class _Jets(CompiledWind):
         gust_length: float,
         seed: int | np.random.Generator,
     ) -> None:
-        axial, radial = jet_table(radius, hub_radius)
-        record = np.zeros(1, dtype=JETS)
-        w = record[0]
-        w["rotation"] = _axes(direction)
         table = np.zeros((0, 7))
         if turbulence > 0.0:
             rng = seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed)
             sizes = np.full(3, turbulence), np.full(3, gust_length)
             table = waves(rng, "dryden", *sizes, 24, 0.4 * gust_length)
-        places, speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
-        arrays = {
-            "axial": axial, "radial": radial, "places": places, "speeds": speeds, "waves": table,
-        }  # fmt: skip
-        for name, array in arrays.items():
-            w[name] = array.ctypes.data
-        w["jets"], w["place_steps"], w["steps"] = speeds.shape[1], len(places), len(speeds)
-        w["wave_count"] = len(table)
+        self.axes = _axes(direction)  # rows: along the jet, and two across
+        self.places, self.speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
+        self.radius = radius
         # gusts travel with the shear layer's eddies, at half the speed of the jet
-        w["advection"] = 0.5 * float(speeds.max()) * w["rotation"][0]
-        self.places, self.speeds, self.radius = places, speeds, radius
-        self.axes: Array = w["rotation"]  # rows: along the jet, and two across
-        super().__init__(_jets, record, tuple(arrays.values()))
+        advection = 0.5 * float(self.speeds.max()) * self.axes[0]
+        super().__init__(
+            _jets,
+            *jet_table(radius, hub_radius),
+            self.places,
+            self.speeds,
+            table,
+            self.axes,
+            advection,
+        )
 
 
 class FanWall(_Jets):

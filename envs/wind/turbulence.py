@@ -14,10 +14,8 @@ one. It is frozen (Taylor's hypothesis): a point sees ``u(x - U t)``.
 import math
 
 import numpy as np
-from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.compiled import compiled_for_vectors
 from ...runtime.errors import InputError, unknown_name
 from .field import Array, CompiledWind, number, vector
@@ -27,18 +25,18 @@ _KARMAN = 1.339
 # cos(2 pi s) of -1/2 <= s <= 1/2 by powers of s^2, right to 1e-10
 _COS = tuple((-1.0) ** n * (2.0 * math.pi) ** (2 * n) / math.factorial(2 * n) for n in range(12))
 
-MODES = np.dtype(
-    [
-        ("table", "i8"),  # address of (count, 7): wave number (3) 1/m, phase (turns), amplitude (3)
-        ("count", "i8"),
-        ("advection", "f8", (3,)),  # m/s
-    ]
-)
-
 
 @compiled_for_vectors
 def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array) -> None:
-    """Add a field of plane waves at points (3, n) m to velocities (3, n) m/s."""
+    """Add a field of plane waves at points (3, n) m to velocities (3, n) m/s.
+
+    Args:
+        table: (count, 7) wave number (3) in turns per m, phase in turns, amplitude (3) in m/s.
+        advection: (3,) m/s, which carries the waves along.
+        time: s.
+        p: points.
+        out: velocities.
+    """
     for m in range(len(table)):
         kx, ky, kz = table[m, 0], table[m, 1], table[m, 2]
         begin = table[m, 3] - time * (kx * advection[0] + ky * advection[1] + kz * advection[2])
@@ -63,17 +61,6 @@ def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array)
             out[0, j] += ax * c
             out[1, j] += ay * c
             out[2, j] += az * c
-
-
-def _modes(record: int, count: int, time: int, points: int, velocities: int) -> None:
-    w = carray(pointer_to(record), 1, MODES)[0]
-    add_modes(
-        numbers_at(w.table, (w.count, 7)),
-        w.advection,
-        numbers_at(time, (1,))[0],
-        numbers_at(points, (3, count)),
-        numbers_at(velocities, (3, count)),
-    )
 
 
 def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
@@ -201,10 +188,7 @@ class Turbulence(CompiledWind):
         c, s = math.cos(heading), math.sin(heading)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
-        record = np.zeros(1, dtype=MODES)
-        record["table"], record["count"] = table.ctypes.data, len(table)
-        record["advection"] = carried
-        super().__init__(_modes, record, (table,))
+        super().__init__(add_modes, table, carried)
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:

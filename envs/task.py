@@ -1,0 +1,291 @@
+"""What the tasks share: one environment around one flight loop.
+
+A task states its spaces, its scenarios and its decision as data, and writes ``_begin`` (draw an
+episode and hover), ``_get_obs``, ``_get_info`` and ``_get_reward``.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.effects import check_setting
+from ..dynamics.motion import Array
+from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
+from ..dynamics.vehicle_file import load_vehicle
+from ..estimator.tuning import UKFTuning
+from ..runtime.compiled import specialised
+from ..runtime.errors import InputError, unknown_name
+from .closed_loop import ESTIMATORS, ClosedLoop, Stage
+from .display import modes_shown, need_display
+from .fan import Fan
+from .normals import draw_normals, generator_list
+from .plant import TICK, PlantSettings
+
+Frame = NDArray[np.float32]
+
+EPISODE_SECONDS = 20.0
+SETTLE_TICKS = 300  # the filter settles before an episode starts
+LOST_OFFSET = 2.5  # m, of the vehicle from where it should be
+UPRIGHT = 0.34  # cosine of 70 degrees
+_NUMBERS = {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}
+
+
+def limited(values: Array, limits: Array) -> Frame:
+    """Return values (..., n) between ``-limits`` and ``limits`` (n,); not finite: 0."""
+    if not math.isfinite(values.sum()):
+        values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
+    return np.minimum(np.maximum(values, -limits), limits).astype(np.float32)
+
+
+class Task(gym.Env[Frame, Frame], ABC):
+    """A quadrotor in closed loop, whose agent commands the flight loop.
+
+    Args:
+        scenario: a name, or a scenario of the task's kind.
+        render_mode: ``"human"``, ``"rgb_array"`` or None.
+        vehicle: what filter and flight loop know: preset, YAML path or ``Vehicle``.
+        effects: of the true vehicle, which nobody declared.
+        truth: the true vehicle, before ``effects``; default: as declared.
+        settings: of the plant.
+        estimator: one of ``closed_loop.ESTIMATORS``.
+        normalize: whether observations are divided by their scales.
+        width: of a picture, in pixels.
+        height: likewise.
+        stages: of a user's own, in the pipeline of a tick.
+
+    Raises:
+        InputError: an argument that names what does not exist.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 13}  # noqa: RUF012
+    name: ClassVar[str]
+    scenarios: ClassVar[dict[str, Any]]
+    decision_ticks: ClassVar[int]
+    action_size: ClassVar[int]
+    largest_action: ClassVar[float] = 1.0
+    action_unit: ClassVar[str] = "m/s"
+
+    def __init__(
+        self,
+        scenario: Any,
+        render_mode: str | None,
+        vehicle: str | Vehicle,
+        effects: Sequence[EffectSetting],
+        truth: str | Vehicle | None,
+        settings: PlantSettings | None,
+        estimator: str,
+        normalize: bool,
+        width: int,
+        height: int,
+        stages: Sequence[Stage],
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(
+                f"{self.name}: render_mode must be human, rgb_array or None, got {render_mode!r}"
+            )
+        if render_mode == "human":
+            need_display()
+        if not isinstance(normalize, bool | np.bool_):
+            raise InputError(f"{self.name}: normalize must be True or False, got {normalize!r}")
+        if estimator not in ESTIMATORS:
+            raise unknown_name("estimator", estimator, ESTIMATORS)
+        if isinstance(scenario, str):
+            if scenario not in self.scenarios:
+                raise unknown_name("scenario", scenario, self.scenarios)
+            scenario = self.scenarios[scenario]
+        self.scenario = scenario
+        self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
+        # a declared vehicle whose model was amended must not bring its effects into the world a
+        # second time
+        true = self.vehicle if truth is None else truth
+        self.truth = true if isinstance(true, Vehicle) else load_vehicle(true)
+        self.effects = tuple(check_setting(e, f"{self.name}: effects") for e in effects)
+        self.settings, self.estimator, self.normalize = settings, estimator, bool(normalize)
+        self.stages = tuple(stages)
+        self.render_mode, self.width, self.height = render_mode, width, height
+        self.metadata = {**self.metadata, "render_modes": modes_shown(self.metadata)}
+        largest = self.largest_action if self.action_unit == "m/s" or not normalize else 1.0
+        self._action_scale = self.largest_action / largest
+        self.action_space = gym.spaces.Box(-largest, largest, (self.action_size,), np.float32)
+        self.viewer: Any = None
+        self._loop: ClosedLoop | None = None
+        self._in_flight = False
+        self._generator: np.random.Generator | None = None
+        self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The vehicle in flight.
+
+        Raises:
+            InputError: there has been no reset.
+        """
+        if self._loop is None:
+            raise InputError(f"{self.name}: call reset before step")
+        return self._loop
+
+    def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
+        """Return the closed loop of a true vehicle, before the undeclared effects; the filter knows
+        the declared one.
+        """
+        scenario = self.scenario
+        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
+        declared = replace(self.vehicle, mocap=mocap)
+        return ClosedLoop(
+            declared,
+            replace(vehicle, mocap=mocap, effects=(*vehicle.effects, *self.effects)),
+            UKFTuning.for_vehicle(declared, TICK, scenario.rise_time),
+            fan,
+            self.settings or PlantSettings.for_vehicle(self.truth),
+            drawn=self.render_mode is not None,
+            estimator=self.estimator,
+            stages=self.stages,
+            **given,
+        )
+
+    def _draw_loop(self, fan: Fan) -> dict[str, float]:
+        """Make the closed loop of an episode; return what was drawn where the scenario varies."""
+        if not self.scenario.varied:
+            if self._loop is None:
+                self._loop = self.make_loop(self.truth, fan)
+            return {}
+        drawn: dict[str, float] = self.scenario.variation.draw(self.np_random)
+        fan = replace(
+            fan,
+            speed=fan.speed * drawn.get("fan_speed", 1.0),
+            rotor_drag=fan.rotor_drag * drawn["rotor_drag"],
+            hull_area=fan.hull_area * drawn["hull_area"],
+        )
+        vehicle = replace(
+            self.truth,
+            mass=self.truth.mass * drawn["mass"],
+            inertia=self.truth.inertia * drawn["inertia"],
+        )
+        self._loop = self.make_loop(vehicle, fan)
+        return drawn
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Draw an episode, hover at its start, and let the filter settle."""
+
+    @abstractmethod
+    def _fly(self, noise: Array) -> None:
+        """Fly a decision at ``command`` with unit normals, a row a tick."""
+
+    @abstractmethod
+    def _get_obs(self) -> Frame:
+        """Return what the agent sees now."""
+
+    @abstractmethod
+    def _get_info(self) -> dict[str, Any]:
+        """Return the truth that the agent does not see, and whether the vehicle is lost."""
+
+    @abstractmethod
+    def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
+        """Return the terms of the reward; ``change`` is that of the command."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Frame, dict[str, Any]]:
+        """Start an episode; the same seed gives the same episode, bit for bit.
+
+        Raises:
+            InputError: ``options`` that are not empty: there are none.
+        """
+        if options:
+            raise InputError(
+                f"{self.name}: reset: unknown option(s) {', '.join(map(repr, options))}; expected "
+                f"none: scenario and all else are arguments of the environment"
+            )
+        super().reset(seed=seed)
+        self._in_flight = False
+        self._begin()
+        self._in_flight = True
+        self.command = np.zeros(self.action_size)
+        if self.render_mode == "human":
+            self.render()
+        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._get_info()}
+        return self._get_obs(), info
+
+    def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
+        """Fly a decision with an action as ``action_space`` has it; one out of range is clipped.
+
+        Raises:
+            InputError: the action has another shape or is not finite, or there was no reset.
+        """
+        given = np.asarray(action, dtype=np.float64)
+        numbers = given.ravel().tolist()
+        if given.shape != (self.action_size,) or not math.isfinite(sum(numbers)):
+            unit = "units of the largest" if self._action_scale != 1.0 else self.action_unit
+            raise InputError(
+                f"{self.name}: action must be {_NUMBERS[self.action_size]} in {unit}, shape "
+                f"({self.action_size},), got {action!r}"
+            )
+        if not self._in_flight:
+            raise InputError(f"{self.name}: call reset before step")
+        loop, last, largest = self.loop, self.command, self.largest_action
+        wanted = [self._action_scale * number for number in numbers]
+        self.command = np.array([min(max(value, -largest), largest) for value in wanted])
+        self._fly(self._draw_normals(loop.noise_size))
+        if self.render_mode == "human":
+            self.render()
+        info = self._get_info()
+        terms = self._get_reward(info, self.command - last)
+        reward = sum(terms.values())
+        return self._get_obs(), reward, info["lost"], False, {**terms, **info}
+
+    def _draw_normals(self, columns: int) -> Array:
+        """Return the normals of a decision, a row a tick: those of ``np_random.standard_normal``."""
+        generator = self.np_random
+        if generator is not self._generator:
+            self._generator, self._generators = generator, generator_list([generator])
+            self._normals = np.empty((self.decision_ticks, columns))
+            self._draw_normals_into = specialised(draw_normals, self._generators, 0, self._normals)
+        self._draw_normals_into(self._generators, 0, self._normals)
+        return self._normals
+
+    def is_flying(self) -> bool:
+        """Whether the vehicle still flies: finite, no faster than a vehicle can be, and upright."""
+        loop = self.loop
+        _, x, y, _ = loop.quaternion.tolist()
+        return loop.healthy() and 1.0 - 2.0 * (x * x + y * y) >= UPRIGHT
+
+    def _make_viewer(self) -> Any:
+        from .drawing import Viewer
+
+        return Viewer(self.render_mode or "", self.width, self.height)
+
+    def _picture(self) -> NDArray[np.uint8] | None:
+        """Draw the world as it is now."""
+        loop = self.loop
+        picture: NDArray[np.uint8] | None = self.viewer.draw(
+            loop, float(loop.record["fan"]["y"][0])
+        )
+        return picture
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return a picture (height, width, 3) of vehicle, wind and wrench, or show it in a window.
+
+        Raises:
+            InputError: not reset yet, or this machine cannot draw.
+        """
+        if self.render_mode is None or not self._in_flight:
+            raise InputError(
+                f"{self.name}: render needs a render_mode ('human' or 'rgb_array') and a reset "
+                f"before it"
+            )
+        if self.viewer is None:
+            self.viewer = self._make_viewer()
+        return self._picture()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self.viewer is not None:
+            self.viewer.close()
+            self.viewer = None
