@@ -210,7 +210,8 @@ class Task(gym.Env[Frame, Frame], ABC):
         self.command = np.zeros(self.action_size)
         if self.render_mode == "human":
             self.render()
-        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._get_info()}
+        # whether the vehicle is lost is decided by steps
+        info = {"reward_tracking": 0.0, "reward_change": 0.0, **self._get_info(), "lost": False}
         return self._get_obs(), info
 
     def step(self, action: Frame) -> tuple[Frame, float, bool, bool, dict[str, Any]]:
@@ -241,7 +242,7 @@ class Task(gym.Env[Frame, Frame], ABC):
         return self._get_obs(), reward, info["lost"], False, {**terms, **info}
 
     def _draw_normals(self, columns: int) -> Array:
-        """Return the normals of a decision, a row a tick: those of ``np_random.standard_normal``."""
+        """Return a decision's normals, a row a tick: those of ``np_random.standard_normal``."""
         generator = self.np_random
         if generator is not self._generator:
             self._generator, self._generators = generator, generator_list([generator])

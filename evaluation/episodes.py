@@ -71,7 +71,7 @@ class Episode:
 def loop_of(env: Any) -> Any:
     """Return the closed loop that flies in an environment that has been reset."""
     inner = getattr(env.unwrapped, "current", env.unwrapped)  # of a mixture of scenarios
-    return inner.loop if hasattr(inner, "loop") else inner.flight.loop
+    return inner.loop
 
 
 def fly_episode(

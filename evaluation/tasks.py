@@ -16,9 +16,8 @@ from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.scenarios import SCENARIOS
 from ..envs.watched_fan_tracking import scenario_env
-from ..envs.wind_hover import WindHoverEnv
 from ..envs.wind_scenarios import WIND_SCENARIOS
-from ..envs.wind_trajectory import WindTrajectoryEnv
+from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from .statistics import hierarchical_bootstrap, stratified_bootstrap
 

@@ -5,59 +5,19 @@ So one compiled call works for environments that each have their own arrays, and
 once, not once for each of its callers.
 """
 
-import ctypes
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import cfunc, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from .compiled import compiled
-
 Array = NDArray[np.float64]
 STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
-_WITHOUT_ARGUMENTS = ctypes.CFUNCTYPE(None)
-
-
-class MissingFunctionError(LookupError):
-    """A library does not hold a function where it always did; the message says what is missing."""
-
-
-def library_function(library: Path, name: str) -> int:
-    """Return the address of a C function in a shared library.
-
-    Raises:
-        MissingFunctionError: it is not there, or the library cannot be loaded.
-    """
-    try:
-        function = getattr(ctypes.CDLL(str(library)), name)
-    except (OSError, AttributeError):
-        raise MissingFunctionError(f"{name} in {library.name}") from None
-    return _address(function)
-
-
-def as_c_function(function: Callable[[], object]) -> tuple[int, object]:
-    """Return the address of a C function that calls a Python one, and what must live as long as
-    the address is used.
-
-    Compiled code may call it with arguments, which are ignored, and without the interpreter's lock.
-    ``function`` should be a built-in one (or a ``partial`` of it): while Python's own code runs,
-    an interrupt could raise its exception, and no exception gets through compiled code.
-    """
-    kept = _WITHOUT_ARGUMENTS(function)
-    return _address(kept), kept
-
-
-def _address(function: Any) -> int:
-    address = ctypes.cast(function, ctypes.c_void_p).value
-    assert address is not None
-    return address
 
 
 @cache
@@ -106,21 +66,3 @@ def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
         return context.get_dummy_value()
 
     return signature, generate
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def pointer_to(_typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer, for ``carray``."""
-
-    def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        return builder.inttoptr(given[0], ir.IntType(8).as_pointer())
-
-    return types.voidptr(types.int64), generate
-
-
-@compiled
-def numbers_at(address: int, shape: Any) -> Array:
-    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns
-    it keeps it alive.
-    """
-    return carray(pointer_to(address), shape, np.float64)  # type: ignore[no-any-return]

@@ -17,8 +17,8 @@ from ..fan_tracking import (
     DECISION_TICKS,
     FAN_TIMES,
     FanTrackingEnv,
-    observe,
     reward_terms,
+    seen_of,
 )
 from ..observing import View
 from ..plant import TICK
@@ -94,7 +94,8 @@ class FanTrackingLanes(FanTrackingVectorEnv):
                 blocks.filters[block:].ctypes.data,
                 work.ctypes.data,
                 step_address(),
-                *self._like.jet_table,
+                self._like.jet_table[0],
+                self._like.jet_table[1],
                 loops["noise"],
                 loops["fan"]["y"],
                 generators,
@@ -107,7 +108,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             self._works.append(work)
 
     def _fly(self, commands: np.ndarray, which: Flags) -> None:
-        blocks, limit = self._flying, self.single_action_space.high[0]
+        blocks, limit = self._flying, self._env.largest_action
         change = -self._commands
         self._commands[which] = np.clip(commands[which], -limit, limit)
         change += self._commands
@@ -211,7 +212,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         }
         for name, value in now.items():
             values[name][which] = value[which]
-        frames = observe(states, self._commands)
+        frames = seen_of(states, self._commands)
         if self._env.view.is_of_a_frame:
             self._frames[which] = self._env.view.of_frames(frames)[which]
             return

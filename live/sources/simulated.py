@@ -14,11 +14,11 @@ import numpy as np
 from ...controllers import make_controller
 from ...dynamics.vehicle import Mocap, Vehicle
 from ...envs.closed_loop import ClosedLoop
-from ...envs.decision import DECISION_TICKS
 from ...envs.fan import Fan
-from ...envs.fan_tracking import DISTANCE, SETTLE_TICKS
+from ...envs.fan_tracking import DECISION_TICKS, DISTANCE
 from ...envs.plant import NOISE, TICK, PlantSettings
 from ...envs.scenarios import draw_fan_path, get_scenario
+from ...envs.task import SETTLE_TICKS
 from ...estimator import UKFTuning
 from ...runtime.errors import InputError
 from ..filtering import Output

@@ -14,8 +14,7 @@ from windwrench.dynamics.effects import get, names, parse_setting
 from windwrench.dynamics.effects.call import deliver
 from windwrench.dynamics.model import MODEL_FIELDS, drive, load_model
 from windwrench.dynamics.rotation import quaternion_of_yaw
-from windwrench.envs.wind_hover import WindHoverEnv
-from windwrench.envs.wind_trajectory import WindTrajectoryEnv
+from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 
 VEHICLE = load_vehicle("ardrone2")
 _SPEEDS = np.array([380.0, 370.0, 390.0, 375.0])

@@ -13,8 +13,7 @@ import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.envs.closed_loop import ClosedLoop
-from windwrench.envs.lanes.flight import LOOPS, fly_freely
-from windwrench.envs.lanes.memory import Blocks
+from windwrench.envs.lanes.flight import LOOPS, Blocks, fly_freely
 from windwrench.envs.plant import SUBSTEPS, TICK, PlantSettings, load_world
 from windwrench.envs.scenarios import SCENARIOS
 from windwrench.runtime.vector_lanes import WIDTH

@@ -13,13 +13,12 @@ import windwrench  # noqa: F401  registers the environments
 from tests.support.golden_tasks import GOLDEN, SEED, trajectory
 from windwrench.controllers import wind_observation as seen
 from windwrench.dynamics import InputError
+from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
 from windwrench.envs.references import figure_of_eight, hold, random_spline
 from windwrench.envs.wind import GridWind, Uniform
-from windwrench.envs.wind_hover import WindHoverEnv
 from windwrench.envs.wind_scenarios import START, WIND_SCENARIOS
-from windwrench.envs.wind_trajectory import WindTrajectoryEnv
-from windwrench.envs.windy_flight import WindyFlight
+from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from windwrench.evaluation.tasks import TASKS
 
 NAMES = ("FanTracking2D", "WindHover", "WindTrajectory")
@@ -55,7 +54,7 @@ def test_trajectories_are_those_of_the_version(name, part):
             )
 
 
-@pytest.mark.parametrize("cls", [WindHoverEnv, WindTrajectoryEnv, FanTracking2DEnv])
+@pytest.mark.parametrize("cls", [WindHoverEnv, FanTracking2DEnv])
 def test_the_docstring_s_tables_are_the_spaces(cls):
     rows = re.findall(r"^\s+\| (\d+)(?:-(\d+))? +\|.*?\| (\d+(?:\.\d+)?) +\|", cls.__doc__, re.M)
     env = cls()
@@ -171,13 +170,16 @@ def test_a_wind_that_differs_across_the_vehicle_turns_it():
     assert np.mean(torques) > 0.02  # the faster side at negative y is pushed along x
 
 
-def test_winds_of_one_s_own_must_be_sampled_first():
+def test_a_wind_of_one_s_own_blows_as_the_kit_s_own_does():
     class Breeze:
         def velocity(self, points, time):
-            return 0 * np.asarray(points)
+            return np.tile([1.0, -0.5, 0.2], (len(points), 1))
 
-    with pytest.raises(InputError, match="on_grid"):
-        WindHoverEnv(winds=[Breeze()])
+    for winds in ([Breeze()], [Uniform((1.0, -0.5, 0.2))]):
+        env = WindHoverEnv("calm", winds=winds)
+        env.reset(seed=0)
+        *_, info = env.step(np.zeros(3))
+        np.testing.assert_allclose(info["wind"], [1.0, -0.5, 0.2])
 
 
 def test_references_are_smooth_and_begin_at_rest():
@@ -229,7 +231,7 @@ def test_the_cage_feels_a_vertical_offset_and_the_ring_does_not():
         fan = Fan(height=1.5, hull_elevation=elevation)
         env = FanTracking2DEnv(still, fan=fan, settings=exact)
         env.reset(seed=0)
-        env.flight.loop.setpoint[2] += 0.45  # above the axis
+        env.loop.setpoint[2] += 0.45  # above the axis
         values = []
         for k in range(60):
             *_, info = env.step(np.zeros(2))
@@ -260,8 +262,8 @@ def test_every_scenario_of_the_wind_is_said():
 def test_a_flight_in_wind_refuses_tables_of_another_shape():
     from windwrench.dynamics import load_vehicle
 
-    flight = WindyFlight(load_vehicle("ardrone2"))
+    flight = ClosedLoop(load_vehicle("ardrone2"))
     with pytest.raises(InputError, match=r"reference must be finite numbers, shape \(n, 10\)"):
         flight.reset(np.random.default_rng(0), START, reference=np.zeros((5, 3)))
-    with pytest.raises(InputError, match="on_grid"):
+    with pytest.raises(InputError, match="expected a wind"):
         flight.reset(np.random.default_rng(0), START, winds=["breeze"])

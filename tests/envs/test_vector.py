@@ -1,23 +1,11 @@
 """Many environments in one process are as many single ones."""
 
-import time
-from concurrent.futures import ThreadPoolExecutor
-
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import windwrench  # noqa: F401  registers the environment
 from windwrench.dynamics import InputError
-from windwrench.runtime.compiled import compiled_without_gil
-from windwrench.runtime.work_sharing import (
-    all_done,
-    next_task,
-    open_tasks,
-    stop_looking,
-    task_done,
-    tasks_open,
-)
 
 NAME = "windwrench/FanTracking-v0"
 
@@ -167,96 +155,3 @@ def test_threads_must_be_positive():
 def test_too_few_are_refused(count):
     with pytest.raises(InputError, match="num_envs"):
         make(count)
-
-
-def test_tasks_are_taken_once_each_by_however_many_threads():
-    tasks, taken = np.zeros(3, dtype=np.int64), np.zeros(20_000, dtype=np.int64)
-    for _ in range(3):
-        taken[:] = 0
-        open_tasks(tasks)
-        assert not all_done(tasks, len(taken))
-        with ThreadPoolExecutor(4) as pool:
-            for done in [pool.submit(take_all, tasks, taken) for _ in range(4)]:
-                done.result()
-        assert (taken == 1).all()
-        assert all_done(tasks, len(taken))
-
-
-@compiled_without_gil
-def take_all(tasks, taken):
-    while True:
-        n = next_task(tasks)
-        if n >= len(taken):
-            break
-        taken[n] += 1
-        task_done(tasks)
-
-
-def test_tasks_open_for_a_thread_that_looks_and_say_who_has_left():
-    tasks = np.zeros(3, dtype=np.int64)
-    assert open_tasks(tasks) == 0
-    assert look(tasks, 1, 1)
-    tasks[0] = 1
-    assert not look(tasks, 1, 1000)
-    go(tasks)
-    go(tasks)
-    assert open_tasks(tasks) == 2
-    assert tasks.tolist() == [0, 0, 0]
-
-
-@compiled_without_gil
-def look(tasks, count, patience):
-    return tasks_open(tasks, count, patience)
-
-
-@compiled_without_gil
-def go(tasks):
-    stop_looking(tasks)
-
-
-def test_helpers_sleep_and_are_called_back_and_the_bits_stay(monkeypatch):
-    """Steps come about as long after each other as a helper's patience lasts, so that they meet it
-    in every state.
-    """
-    monkeypatch.setattr("windwrench.envs.vector.PATIENCE", 2000)
-    alone, spread = make(4, scenario="base"), make(4, threads=3, scenario="base")
-    alone.reset(seed=0)
-    spread.reset(seed=0)
-    called = []
-    call_others = spread._call_others
-    spread._call_others = lambda work, count: called.append(count) or call_others(work, count)
-    pauses = np.random.default_rng(0).uniform(0.0, 3e-5, 200)
-    for pause in pauses:
-        if pause > 1e-5:
-            time.sleep(pause)
-        frames = spread.step(np.zeros((4, 1)))[0]
-        np.testing.assert_array_equal(frames, alone.step(np.zeros((4, 1)))[0])
-    assert called[0] == 2
-    assert len(called) > 1
-    assert max(called) <= 2
-    spread.close()
-    alone.close()
-
-
-def test_a_thread_that_fails_with_a_turn_in_hand_is_not_waited_for():
-    envs = make(3, threads=2)
-    envs.reset(seed=0)
-    envs.step(np.zeros((3, 1)))
-    envs._pool.submit(int).result()  # by then the helper has left
-    decide, help_on = envs._call, envs._help
-
-    def wait_and_decide():
-        while envs._tasks[0] == 0:
-            time.sleep(0.001)
-        decide()
-
-    def fail():
-        next_task(envs._tasks)
-        raise RuntimeError("a thread's own fault")
-
-    envs._call, envs._help = wait_and_decide, fail
-    with pytest.raises(RuntimeError, match="own fault"):
-        envs.step(np.zeros((3, 1)))
-    envs._call, envs._help = decide, help_on
-    assert len(envs.step(np.zeros((3, 1)))[0]) == 3
-    envs.close()
