@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, types
+from numba import carray, cfunc, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from .compiled import compiled
 
 Array = NDArray[np.float64]
 STEP = types.int64(types.voidptr, types.int64, types.float64, types.float64)
@@ -66,3 +68,21 @@ def call_at(_typing_context: Any, address: Any, *arguments: Any) -> Any:
         return context.get_dummy_value()
 
     return signature, generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def pointer_to(_typing_context: Any, address: Any) -> Any:
+    """Return an address as a pointer, for ``carray``."""
+
+    def generate(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        return builder.inttoptr(given[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.int64), generate
+
+
+@compiled
+def numbers_at(address: int, shape: Any) -> Array:
+    """Return the array of 64-bit floats of a shape, a tuple, that lies at ``address``; whoever owns
+    it keeps it alive.
+    """
+    return carray(pointer_to(address), shape, np.float64)  # type: ignore[no-any-return]

@@ -18,7 +18,7 @@ from windwrench.envs.fan_tracking_2d import FanTracking2DEnv
 from windwrench.envs.references import figure_of_eight, hold, random_spline
 from windwrench.envs.wind import GridWind, Uniform
 from windwrench.envs.wind_scenarios import START, WIND_SCENARIOS
-from windwrench.envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
+from windwrench.envs.wind_tasks import WindHoverEnv
 from windwrench.evaluation.tasks import TASKS
 
 NAMES = ("FanTracking2D", "WindHover", "WindTrajectory")
