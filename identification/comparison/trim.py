@@ -22,6 +22,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..logs.flight_phases import FLIGHT, flight_phases
+from ..motion.smoothing import runs_of
 
 Array = NDArray[np.float64]
 
@@ -165,9 +166,8 @@ def carrying(t: Array, total: Array) -> NDArray[np.bool_]:
         return np.zeros(len(t), dtype=np.bool_)
     smooth = _smooth(total, t)
     flying = smooth > HIGH * high  # a single low sample is no landing
-    edges = np.flatnonzero(np.diff(flying.astype(np.int8), prepend=0, append=0))
     steady = np.zeros(len(t), dtype=np.bool_)
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
+    for first, end in runs_of(flying):
         # a log may begin and end in flight
         start = t[first] + (EDGE if first > 0 else 0.0)
         stop = t[end - 1] - (EDGE if end < len(t) else 0.0)

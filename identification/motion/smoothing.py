@@ -98,6 +98,12 @@ def unbroken(t: Array, rows: NDArray[np.intp], gap: float) -> list[NDArray[np.in
     return np.split(rows, np.flatnonzero(np.diff(t[rows]) > gap) + 1)
 
 
+def runs_of(rows: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first row, and the one after the last, of each run of rows (n,) that are true."""
+    edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
+    return [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
+
+
 def derivative(x: Array, period: float, order: int = 1) -> Array:
     """Return a derivative of ``x`` (n, k) along its first axis, true to the fourth power of the
     period.

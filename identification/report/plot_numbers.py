@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..findings import CHANNELS, Diagnosis, NamedEffect, Signature, Trace
+from ..motion.smoothing import runs_of
 from .drawing import Drawing, DrawnLine, draw
 from .words import percent, rounded, scale_of
 
@@ -115,13 +116,11 @@ class _Joined:
 
     def held_out(self) -> list[tuple[float, float]]:
         """Return from when to when samples were held out."""
-        runs = []
-        for trace, start in zip(self.traces, self.starts, strict=True):
-            t = trace.t - trace.t[0] + start
-            held = np.concatenate([[False], trace.held_out, [False]]).astype(int)
-            for a, b in np.flatnonzero(np.diff(held)).reshape(-1, 2):
-                runs.append((float(t[a]), float(t[min(b, len(t) - 1)])))
-        return runs
+        return [
+            (float(self.x[first + a]), float(self.x[first + min(b, len(trace.t) - 1)]))
+            for first, trace in zip(self.first_rows, self.traces, strict=True)
+            for a, b in runs_of(trace.held_out)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

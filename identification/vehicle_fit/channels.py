@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from ...runtime.errors import InputError
 from ..logs.flight_log import FlightLog
 from ..motion.signals import log_signals
-from ..motion.smoothing import derivative, low_pass, resampled, unbroken
+from ..motion.smoothing import derivative, low_pass, resampled, runs_of, unbroken
 
 Array = NDArray[np.float64]
 
@@ -257,9 +257,8 @@ def _cut(piece: MotionPiece, keep: NDArray[np.bool_]) -> list[MotionPiece]:
     """Return the runs of samples that are kept, if they are long enough."""
     if keep.all():
         return [piece]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], keep, [False]]).astype(int)))
     return [
         piece.mapped(lambda x, a=a, b=b: x[a:b])  # type: ignore[misc]
-        for a, b in edges.reshape(-1, 2).tolist()
+        for a, b in runs_of(keep)
         if (b - a) * piece.period >= CHANNELS.shortest_piece
     ]
