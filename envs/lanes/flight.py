@@ -216,6 +216,12 @@ class Blocks:
         LOOPS.share(self.loops, _single(like))
         for block in range(count):
             self.put(block, slice(None), like)
+        # of each block: the addresses of loops and filters, and where noise and fan's y are drawn
+        self.places = [
+            (self.loops[block:].ctypes.data, self.filters[block:].ctypes.data)
+            for block in range(count)
+        ]
+        self.drawn = [(loops["noise"], loops["fan"]["y"]) for loops in self.loops]
 
     def __len__(self) -> int:
         """Return how many blocks there are."""

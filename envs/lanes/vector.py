@@ -56,6 +56,7 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._env = self.envs[0]
         self._like = self._env.make_loop(self._env.truth, self._env.fan)
         _refuse(self._env, self._like)
+        self._step, (self._axial, self._radial) = step_address(), self._like.jet_table
         blocks = -(-num_envs // WIDTH)
         self._flying, self._settling = Blocks(blocks, self._like), Blocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
@@ -88,16 +89,13 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         except IndexError:
             work = new_work(self._like.ukf.record)
         try:
-            loops = blocks.loops[block]
             fly_block(
-                blocks.loops[block:].ctypes.data,
-                blocks.filters[block:].ctypes.data,
+                *blocks.places[block],
                 work.ctypes.data,
-                step_address(),
-                self._like.jet_table[0],
-                self._like.jet_table[1],
-                loops["noise"],
-                loops["fan"]["y"],
+                self._step,
+                self._axial,
+                self._radial,
+                *blocks.drawn[block],
                 generators,
                 flying,
                 paths,
