@@ -81,16 +81,10 @@ class FaultBalance:
         share: Array = np.diff(area) / STEP
         return share
 
-    def plain_residuals(self) -> Array:
-        """Return residuals (N, 4) where nothing happens."""
-        return np.column_stack([self._left(c, self.moment[:, c]) for c in range(CHANNELS)])
-
-    def step_residuals(self, row: int, begin: Begin = AT_ONCE) -> Array:
-        """Return residuals (N, 4) with a step in each channel."""
-        step = self._share(row, begin)
-        return np.column_stack(
-            [self._left(c, self.moment[:, c], step[:, None]) for c in range(CHANNELS)]
-        )
+    def residuals(self, row: int | None = None, begin: Begin = AT_ONCE) -> Array:
+        """Return residuals (N, 4) where nothing happens, or with a step in each channel."""
+        step = [] if row is None else [self._share(row, begin)[:, None]]
+        return np.column_stack([self._left(c, *step) for c in range(CHANNELS)])
 
     def _share(self, row: int, begin: Begin) -> Array:
         """Return the share (N,) of something that begins at a row that has come."""
@@ -100,16 +94,15 @@ class FaultBalance:
         share[row : row + len(ramp)] = ramp[: len(share) - row]
         return share
 
-    def _left(self, c: int, moment: Array, *more: Array) -> Array:
-        """Return the residual (N,) of a channel."""
+    def _left(self, c: int, *more: Array) -> Array:
+        """Return the residual (N,) of a channel; a moment with a negative factor is left out."""
         rest = [*more, self.free_columns[c]]
-        x = np.column_stack([moment, *rest])
-        beta = np.linalg.lstsq(x, self.y[:, c], rcond=None)[0]
-        if beta[0] <= 0.0:
-            x = np.column_stack(rest)
+        for columns in ([self.moment[:, c], *rest], rest):
+            x = np.column_stack(columns)
             beta = np.linalg.lstsq(x, self.y[:, c], rcond=None)[0]
-        left: Array = self.y[:, c] - x @ beta
-        return left
+            if beta[0] > 0.0:
+                break
+        return np.asarray(self.y[:, c] - x @ beta)
 
     def noises(self, residuals: Array) -> list[Noise]:
         """Return each channel's noise, fitted to residuals (N, 4)."""

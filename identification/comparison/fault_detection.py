@@ -94,20 +94,21 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
     samples = sample(channels)
     search = _Search(samples, _rows(len(samples.t), use), use)
     search.find_curve(channels.thrust_known)
-    likeliest = search.likeliest_jump()
+    best = search.tried[search.likeliest()]
+    evidence, starts, start_weights = search.onsets(best)
     names = ["1", "2", "3", "4", ALL, OTHER]
-    each, shares, weights = _patterns(likeliest, use)
+    each, shares, weights = _patterns(best, use)
     prior = np.array([*[use.prior[1] / 4] * 4, use.prior[2], use.prior[3]])
     logs = np.log(prior) + each
     # the prior of an event of some kind is in ``prior``; how likely it is that there was one, with
     # sizes left free, is the search's
     whole = np.array([math.log(use.prior[0]) + search.nothing()])
     shape = logs - logsumexp(logs)
-    happened = likeliest.evidence + math.log(float(prior.sum()))
+    happened = evidence + math.log(float(prior.sum()))
     every = np.concatenate([whole, happened + shape])
     chances = np.exp(every - logsumexp(every))
     rotor = 1 + int(np.argmax(logs[:4]))
-    when = _quantiles(likeliest.starts, likeliest.weights, STEP)
+    when = _quantiles(starts, start_weights, STEP)
     remaining = _remaining(shares, weights[rotor - 1])
     return RotorFault(
         channels.name,
@@ -118,12 +119,12 @@ def find_fault(channels: Channels, settings: FaultSettings | None = None) -> Rot
         use.sure,
         len(samples.t) * STEP,
         samples.ended,
-        likeliest.balance.lag,
+        best.balance.lag,
         channels.motor_names,
     )
 
 
-def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, Array, Array]:
+def _patterns(best: "_Tried", use: FaultSettings) -> tuple[Array, Array, Array]:
     """Return the log-evidence (6,) of rotors 1 to 4, of all rotors and of another force and torque
     from what the channels say; shares (E,) that may be lost, and how likely each is by each rotor
     (4, E).
@@ -131,15 +132,16 @@ def _patterns(likeliest: "_LikeliestJump", use: FaultSettings) -> tuple[Array, A
     shares = np.linspace(*use.losses, use.steps)
     log_evidence, weights = [], []
     # only what speaks under every hypothesis, so that all explain the same numbers
-    every = [std for _, std in (*likeliest.losses, likeliest.jumps)]
+    losses = [best.balance.losses(best.noise, r, best.row, best.begin) for r in range(4)]
+    jumps = best.balance.jumps(best.noise, best.row, best.begin)
+    every = [std for _, std in (*losses, jumps)]
     silent = ~np.isfinite(every).all(axis=0)
-    for rotor in range(4):
-        seen, std = likeliest.losses[rotor]
+    for seen, std in losses:
         std = np.where(silent, np.inf, std)
         log = _normal(seen[None], shares[:, None], np.hypot(std, use.error * shares[:, None]))
         log_evidence.append(float(logsumexp(log)) - math.log(len(shares)))
         weights.append(np.exp(log - logsumexp(log)))
-    seen, std = likeliest.jumps
+    seen, std = jumps
     std = np.where(silent, np.inf, std)
     lost = shares[shares <= use.all_lose]
     means = lost[:, None] * np.array([0.0, 0.0, 0.0, 4.0])
@@ -186,18 +188,6 @@ class _Tried:
     begin: Begin
 
 
-@dataclass(frozen=True, eq=False)
-class _LikeliestJump:
-    """The likeliest jump of a flight."""
-
-    balance: FaultBalance
-    evidence: float
-    starts: Array  # (T,) s, when it may have begun
-    weights: Array  # (T,) how likely each is
-    losses: list[tuple[Array, Array]]  # of each rotor, by channel, and their standard deviations
-    jumps: tuple[Array, Array]  # of each channel, in parts of one rotor's
-
-
 class _Search:
     """The likeliest jump, with the lags and curves that were tried."""
 
@@ -213,25 +203,26 @@ class _Search:
         curves = use.curves[:1] if thrust_known else use.curves
         for curve in curves:
             self._try((middle, *curve))
-        _, bend, dead = self._likeliest()
+        _, bend, dead = self.likeliest()
         for lag in use.lags:
             self._try((lag, bend, dead))
-        lag = self._likeliest()[0]
+        lag = self.likeliest()[0]
         for curve in curves:
             self._try((lag, *curve))
 
-    def _likeliest(self) -> tuple[float, float, float]:
+    def likeliest(self) -> tuple[float, float, float]:
+        """Return the lag and the curve with the likeliest jump."""
         return max(self.tried, key=lambda key: self.tried[key].log)
 
     def _try(self, key: tuple[float, float, float]) -> None:
         if key in self.tried:
             return
         one = FaultBalance(self.samples, self.samples.thrust(*key), key[0])
-        usual = one.noises(one.plain_residuals())
+        usual = one.noises(one.residuals())
         noise = usual
         for _ in range(self.use.rounds):
             _, row, begin = self._jump(one, noise)
-            noise = one.noises(one.step_residuals(row, begin))
+            noise = one.noises(one.residuals(row, begin))
         self.tried[key] = _Tried(one, usual, noise, *self._jump(one, noise))
 
     def _jump(self, one: FaultBalance, noise: list[Noise]) -> tuple[float, int, Begin]:
@@ -254,28 +245,19 @@ class _Search:
             for one in self.tried.values()
         )
 
-    def likeliest_jump(self) -> _LikeliestJump:
-        """Return the likeliest jump."""
-        one = self.tried[self._likeliest()]
-        balance, noise = one.balance, one.noise
-        logs = np.array([balance.steps(noise, self.rows, begin) for begin in self.begins])
-        rows_around = np.arange(
-            max(one.row - 5, self.use.before), min(one.row + 6, self.rows[-1] + 1)
-        )
-        fine = np.array([balance.steps(noise, rows_around, begin) for begin in self.begins])
+    def onsets(self, best: _Tried) -> tuple[float, Array, Array]:
+        """Return the log-evidence of a jump, when it may have begun (T,) in s, and how likely each
+        time is (T,).
+        """
+        logs = np.array([best.balance.steps(best.noise, self.rows, b) for b in self.begins])
+        rows = np.arange(max(best.row - 5, self.use.before), min(best.row + 6, self.rows[-1] + 1))
+        fine = np.array([best.balance.steps(best.noise, rows, begin) for begin in self.begins])
         parts = np.array([begin.part for begin in self.begins])
-        starts = self.samples.t[rows_around][None] + STEP * (parts[:, None] - 0.5)
-        weights = np.exp(fine - logsumexp(fine))
+        starts = self.samples.t[rows][None] + STEP * (parts[:, None] - 0.5)
         evidence = max(float(logsumexp(logs)), float(logsumexp(fine)))
         places = len(self.begins) * len(self.samples.t)
-        return _LikeliestJump(
-            balance,
-            evidence - math.log(places),
-            starts.ravel(),
-            weights.ravel(),
-            [balance.losses(noise, rotor, one.row, one.begin) for rotor in range(4)],
-            balance.jumps(noise, one.row, one.begin),
-        )
+        weights = np.exp(fine - logsumexp(fine))
+        return evidence - math.log(places), starts.ravel(), weights.ravel()
 
 
 def _remaining(shares: Array, weight: Array) -> tuple[float, float, float]:

@@ -36,7 +36,7 @@ def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
     """The sums that run backwards, against one regression a time."""
     samples = sample(draw_flight(1, "fault").channels)
     balance = FaultBalance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
-    noise = balance.noises(balance.plain_residuals())
+    noise = balance.noises(balance.residuals())
     rows = np.array([60, 150, len(samples.t) - 6])
     for begin in (AT_ONCE, Begin(0.25, True)):
         found = balance.steps(noise, rows, begin)
