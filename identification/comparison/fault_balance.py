@@ -96,13 +96,12 @@ class FaultBalance:
 
     def _left(self, c: int, *more: Array) -> Array:
         """Return the residual (N,) of a channel; a moment with a negative factor is left out."""
-        rest = [*more, self.free_columns[c]]
-        for columns in ([self.moment[:, c], *rest], rest):
-            x = np.column_stack(columns)
-            beta = np.linalg.lstsq(x, self.y[:, c], rcond=None)[0]
-            if beta[0] > 0.0:
-                break
-        return np.asarray(self.y[:, c] - x @ beta)
+        x, y = np.column_stack([self.moment[:, c], *more, self.free_columns[c]]), self.y[:, c]
+        beta = np.linalg.lstsq(x, y, rcond=None)[0]
+        if beta[0] <= 0.0:
+            x = x[:, 1:]
+            beta = np.linalg.lstsq(x, y, rcond=None)[0]
+        return np.asarray(y - x @ beta)
 
     def noises(self, residuals: Array) -> list[Noise]:
         """Return each channel's noise, fitted to residuals (N, 4)."""
