@@ -30,6 +30,7 @@ summed over the kinds.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,9 +141,7 @@ def compare(
 
     nothing = float(np.logaddexp.reduce(logs_of(np.zeros((1, 4)), np.zeros((1, 4))), axis=None))
     amounts, prior = _amounts(use)
-    tried_changes: list[
-        tuple[str, str, float, float, float]
-    ] = []  # place, kind, evidence, amount, spread
+    tried: dict[str, list[_KindOfChange]] = {}
     for place, kind in _hypotheses():
         means = np.array([_moved(place, kind, amount, shares) for amount in amounts])
         size = np.linalg.norm(means, axis=1)[:, None] * np.array(use.bend)
@@ -151,12 +150,44 @@ def compare(
         weights = np.exp(logs - evidence)
         middle = float(amounts @ weights)
         spread = math.sqrt(float(np.square(amounts - middle) @ weights))
-        tried_changes.append((place, kind, evidence, middle, spread))
+        tried.setdefault(place, []).append(_KindOfChange(kind, evidence, middle, spread))
     wide = np.repeat(amounts[:, None], 4, axis=1)
     logs = np.logaddexp.reduce(logs_of(np.zeros_like(wide), wide), axis=0) + np.log(prior)
-    tried_changes.append((SOMETHING_ELSE, "", float(np.logaddexp.reduce(logs)), 0.0, 0.0))
+    tried[SOMETHING_ELSE] = [_KindOfChange("", float(np.logaddexp.reduce(logs)), 0.0, 0.0)]
+
+    # each place is as likely as the other beforehand
+    chances = {NOWHERE: nothing + math.log(use.unchanged)}
+    for place, kinds in tried.items():
+        each = (1.0 - use.unchanged) / (len(tried) * len(kinds))
+        chances[place] = float(np.logaddexp.reduce([k.evidence + math.log(each) for k in kinds]))
+    whole = np.logaddexp.reduce(list(chances.values()))
+    places = {place: math.exp(log - whole) for place, log in chances.items()}
+    kinds = tried.get(max(places, key=places.__getitem__), [])
+    best = max(kinds, key=lambda k: k.evidence, default=_KindOfChange("", 0.0, 0.0, 0.0))
+    total = np.logaddexp.reduce([k.evidence for k in kinds]) if kinds else 0.0
+    by_kind = {k.kind: math.exp(k.evidence - total) for k in kinds}
     usual = np.tensordot(np.exp(scale_logs), unchanged, 1)
-    return _weigh(after, before, difference, usual, nothing, tried_changes, use)
+    return Change(
+        tuple(before),
+        tuple(after),
+        difference,
+        np.sqrt(np.diagonal(usual)),
+        places,
+        by_kind.get("weaker", 0.0),
+        by_kind.get("carries more", 0.0),
+        best.amount,
+        best.spread,
+        use.sure,
+    )
+
+
+class _KindOfChange(NamedTuple):
+    """A kind of change at one place."""
+
+    kind: str
+    evidence: float  # logarithm
+    amount: float  # mean, if this changed
+    spread: float  # standard deviation of the amount
 
 
 def _amounts(use: ChangeSettings) -> tuple[Array, Array]:
@@ -244,44 +275,3 @@ def _log_t(x: Array, means: Array, scales: Array, freedom: float) -> Array:
     log_size = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
     bent = np.log1p(np.square(whitened).sum(axis=-1) / freedom)
     return np.asarray(constant - log_size - 0.5 * (freedom + dof) * bent)
-
-
-def _weigh(
-    after: Sequence[Trim],
-    before: Sequence[Trim],
-    difference: Array,
-    scale: Array,
-    nothing: float,
-    tried_changes: list[tuple[str, str, float, float, float]],
-    use: ChangeSettings,
-) -> Change:
-    """Return the probabilities of places, each place as likely as the other beforehand."""
-    names = [*_ROTORS, *_SIDES, "all rotors", SOMETHING_ELSE]
-    kinds = {name: [f for f in tried_changes if f[0] == name] for name in names}
-    logs = {NOWHERE: nothing + math.log(use.unchanged)}
-    for name, group in kinds.items():
-        each = (1.0 - use.unchanged) / (len(names) * len(group))
-        logs[name] = float(np.logaddexp.reduce([f[2] + math.log(each) for f in group]))
-    whole = np.logaddexp.reduce(list(logs.values()))
-    places = {name: math.exp(log - whole) for name, log in logs.items()}
-    likeliest = max(places, key=places.__getitem__)
-    chances = {"weaker": 0.0, "carries more": 0.0}
-    amount, spread = 0.0, 0.0
-    if likeliest not in (NOWHERE, SOMETHING_ELSE):
-        group = kinds[likeliest]
-        best = max(group, key=lambda f: f[2])
-        amount, spread = best[3], best[4]
-        total = np.logaddexp.reduce([f[2] for f in group])
-        chances |= {f[1]: math.exp(f[2] - total) for f in group}
-    return Change(
-        tuple(before),
-        tuple(after),
-        difference,
-        np.sqrt(np.diagonal(scale)),
-        places,
-        chances["weaker"],
-        chances["carries more"],
-        amount,
-        spread,
-        use.sure,
-    )
