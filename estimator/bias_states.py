@@ -220,10 +220,6 @@ def joint_covariance(f: np.void) -> Array:
     """Return the covariance (24, 24) of the error state and the biases of gyro and
     accelerometer.
     """
-    imu = f["imu"]
-    T, out = imu["regression"][:, :BIASES], np.empty((N + BIASES, N + BIASES))
-    out[:N, :N] = f["P"]
-    out[:N, N:] = f["P"] @ T
-    out[N:, :N] = out[:N, N:].T
-    out[N:, N:] = T.T @ out[:N, N:] + imu["rest"][:BIASES, :BIASES]
-    return out
+    imu, cross = f["imu"], cross_covariance(f, BIASES)
+    biases = imu["regression"][:, :BIASES].T @ cross + imu["rest"][:BIASES, :BIASES]
+    return np.block([[f["P"], cross], [cross.T, biases]])

@@ -63,8 +63,7 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
         return usable
     sample = undo_sensing(f, z, usable, dt)
     x, centre, y = f.x, f.centre, f.innovation
-    for i in range(NIS):
-        centre[i] = x[i]
+    centre[:NIS] = x[:NIS]
     if dt > 0.0:
         drive(f, sample[0:4], dt, voltage)
         propagate(f, x, dt, centre)
@@ -72,11 +71,9 @@ def step(f: Record, z: Array, parts: int, dt: float, voltage: float) -> int:
     if f.steady == 0:
         _step_with_covariance(f, sample, usable, dt)
         return usable
-    for i in range(3):
-        f.gap[i] += dt
+    f.gap[:] += dt
     f.status = COASTING
-    for i in range(6):
-        y[i] = 0.0
+    y[:] = 0.0
     if usable & 2 != 0:
         attitude_error(sample[7:11], centre[3:7], y[0:3])
     if usable & 1 != 0:
@@ -121,9 +118,7 @@ def _leave_steady_state(f: Record) -> None:
     """
     x = f.x
     f.steady, f.near = 0, 0.0
-    for i in range(NIS):
-        x[i] = f.centre[i]
-    x[NIS] = math.nan
+    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
     catch_up(f)
     after_prediction(f, 0.0)
 
@@ -132,9 +127,7 @@ def _leave_steady_state(f: Record) -> None:
 def _step_with_covariance(f: Record, sample: Array, usable: int, dt: float) -> None:
     """Go on from the predicted state, ``f.centre``, with the covariance."""
     x = f.x
-    for i in range(NIS):
-        x[i] = f.centre[i]
-    x[NIS] = math.nan
+    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
     if dt > 0.0:
         f.near += dt
         carry_at_hover(f, dt)
@@ -165,10 +158,7 @@ def _look_for_steady_state(f: Record) -> None:
         f.near = 0.0
     if f.near <= f.settle:
         return
-    f.steady = 1
-    for i in range(N):
-        for j in range(N):
-            f.P[i, j] = f.converged[i, j]
+    f.steady, f.P[:] = 1, f.converged
 
 
 @compiled

@@ -43,15 +43,12 @@ def _effect_jacobian(f: Record, rotation: Array, out: Array) -> None:
     By central differences: an effect model is a black box behind an address.
     """
     x, point, turned, minus = f.x, f.point, f.L[0:3, 0:3], f.W[0]
-    for i in range(NIS):
-        point[i] = x[i]
+    point[:NIS] = x[:NIS]
     for n in range(12):
         kind, axis = n // 3, n % 3
         size = _TURN if kind == 0 else _STEP
         for sign in (1.0, -1.0):
-            for i in range(3):
-                for j in range(3):
-                    turned[i, j] = rotation[i, j]
+            turned[:] = rotation
             if kind == 0:
                 a, b = (axis + 1) % 3, (axis + 2) % 3
                 c, s = math.cos(size), sign * math.sin(size)
@@ -83,14 +80,10 @@ def acceleration_jacobian(f: Record, A: Array) -> None:
     body, R, x, B = f.body, f.centre_rotation, f.x, f.Z
     J, inverse = body.inertia, body.inverse_inertia
     tau, omega = x[13:16], x[10:13]
-    for i in range(3):
-        for j in range(3):
-            R[i, j] = f.rotation[i, j]
+    R[:] = f.rotation
     # B, rows 0-2: derivatives of the torque in the body frame; rows 3-5: of the force in the world
     # frame
-    for i in range(6):
-        for j in range(N):
-            B[i, j] = 0.0
+    B[:6] = 0.0
     for i in range(3):
         # R' tau at an attitude turned by 4 rho: R' (tau + tau x 4 rho)
         t0, t1, t2 = R[0, i], R[1, i], R[2, i]
@@ -165,9 +158,7 @@ def model_jacobian(f: Record, dt: float, A: Array) -> None:
     F is the derivative of the error state after ``dt`` s by that before, at the estimate ``f.x``.
     Expects what ``drive`` and ``propagate`` leave behind.
     """
-    for i in range(12):
-        for j in range(N):
-            A[i, j] = 0.0
+    A[:] = 0.0
     acceleration_jacobian(f, A)
     R = f.centre_rotation
     # the turn of this step is at the old rate: 4 d(rho) = R Jl(omega dt) dt d(omega), Jl the left
@@ -203,9 +194,7 @@ def predict(f: Record, rotor_speeds: Array, dt: float, voltage: float) -> None:
     carry_by_jacobian(P, A, G)
     add_noise(f, f.centre_rotation, dt)
     symmetrise(P)
-    for i in range(NIS):
-        x[i] = f.centre[i]
-    x[NIS] = math.nan
+    x[:NIS], x[NIS] = f.centre[:NIS], math.nan
     after_prediction(f, dt)
     f.time += dt
 

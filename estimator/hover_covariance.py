@@ -27,9 +27,7 @@ _NO_HEADING = 1e-6  # of a quaternion squared: thrust points down, and there is 
 def carry_at_hover(f: Record, dt: float) -> None:
     """Carry the covariance ``dt`` s ahead by the model at hover."""
     P, A, G, J = f.P, f.S, f.H, f.hover
-    for i in range(12):
-        for j in range(N):
-            A[i, j] = 0.0
+    A[:] = 0.0
     for i in range(3):
         A[i, 3 + i] = 0.25 * dt  # an MRP is a quarter of an angle
         for j in range(N):
@@ -38,9 +36,7 @@ def carry_at_hover(f: Record, dt: float) -> None:
             A[6 + i, j] = 0.5 * dt * A[9 + i, j]
         A[6 + i, 9 + i] += dt
     carry_by_jacobian(P, A, G)
-    for i in range(3):
-        for j in range(3):
-            f.centre_rotation[i, j] = 1.0 if i == j else 0.0
+    f.centre_rotation[:] = np.eye(3)
     add_noise(f, f.centre_rotation, dt)
     symmetrise(P)
 
@@ -93,10 +89,7 @@ def _jacobian_at(record: np.ndarray, voltage: float, out: Array) -> None:
     drive(f, f.last_speeds, f.period, voltage)
     propagate(f, f.x, f.period, f.centre)
     acceleration_jacobian(f, f.S)
-    for i in range(3):
-        for j in range(N):
-            out[i, j] = f.S[3 + i, j]
-            out[3 + i, j] = f.S[9 + i, j]
+    out[:3], out[3:] = f.S[3:6], f.S[9:12]
 
 
 def jacobian_at_hover(record: np.ndarray, voltage: float, deviations: Array) -> Array:

@@ -215,7 +215,8 @@ def tuning_note(
 
     Arguments and errors are those of ``fit_noise``.
     """
-    flight = _prepare(vehicle, t, rotor_speeds, position, quaternion, voltage, tuning, settings)
+    columns = t, rotor_speeds, position, quaternion, voltage
+    flight = _prepare(vehicle, columns, tuning, settings)
     if flight.poses < flight.use.fewest_poses:
         return None
     passes = [flight.evaluate(made, flight.whole) for made in _starts(flight)]
@@ -258,7 +259,8 @@ def fit_noise(
         InputError: shapes differ, times do not increase, or fewer than 100 poses are left once
             held poses and start-ups are taken out.
     """
-    flight = _prepare(vehicle, t, rotor_speeds, position, quaternion, voltage, tuning, settings)
+    columns = t, rotor_speeds, position, quaternion, voltage
+    flight = _prepare(vehicle, columns, tuning, settings)
     if flight.poses < flight.use.fewest_poses:
         raise InputError(
             f"fit_noise: {flight.poses} of {len(flight.columns[0])} rows have a pose that does not "
@@ -371,7 +373,7 @@ class _Flight:
     """One flight, checked, as the fit and the note look at it."""
 
     vehicle: Vehicle
-    columns: tuple[Array, Array, Array, Array, Array | None]  # t, rotor speeds, pose, voltage
+    columns: list[Any]  # t, rotor speeds, position, quaternion, voltage or None
     period: float
     given: UKFTuning
     use: NoiseFitSettings
@@ -384,11 +386,10 @@ class _Flight:
 
     def pieces(self, rows: slice) -> list[Piece]:
         """Return the pieces of some rows."""
-        *columns, voltage = self.columns
-        t, speeds, position, quaternion = (x[rows] for x in columns if x is not None)
-        volts = None if voltage is None else voltage[rows]
+        t, speeds, x, q = (column[rows] for column in self.columns[:4])
+        volts = None if self.columns[4] is None else self.columns[4][rows]
         gap, startup = self.use.longest_gap, self.use.startup
-        return pieces_of(self.vehicle, t, speeds, position, quaternion, volts, gap, startup)
+        return pieces_of(self.vehicle, t, speeds, x, q, volts, gap, startup)
 
     def evaluate(self, tuning: UKFTuning, pieces: Sequence[Piece]) -> Innovations:
         """Return what a pass of the filter with this tuning finds."""
@@ -398,38 +399,30 @@ class _Flight:
 
 def _prepare(
     vehicle: Vehicle,
-    t: ArrayLike,
-    rotor_speeds: ArrayLike,
-    position: ArrayLike,
-    quaternion: ArrayLike,
-    voltage: ArrayLike | None,
+    given: Sequence[ArrayLike | None],
     tuning: UKFTuning | None,
     settings: NoiseFitSettings | None,
 ) -> _Flight:
-    times, speeds, x, q = (
-        np.asarray(value, dtype=np.float64) for value in (t, rotor_speeds, position, quaternion)
-    )
-    volts = None if voltage is None else np.asarray(voltage, dtype=np.float64)
-    count = len(times)
-    for name, array, shape in (
-        ("t", times, (count,)),
-        ("rotor_speeds", speeds, (count, 4)),
-        ("position", x, (count, 3)),
-        ("quaternion", q, (count, 4)),
-        ("voltage", volts, (count,)),
-    ):
-        if array is not None and array.shape != shape:
+    """Check the columns of a flight: t, rotor speeds, position, quaternion and voltage."""
+    columns = [None if c is None else np.asarray(c, dtype=np.float64) for c in given]
+    times = columns[0]
+    assert times is not None
+    names = ("t", "rotor_speeds", "position", "quaternion", "voltage")
+    for name, array, width in zip(names, columns, ((), (4,), (3,), (4,), ()), strict=True):
+        if array is None:
+            continue
+        shape = (len(times), *width)
+        if array.shape != shape:
             raise InputError(f"fit_noise: {name} must have shape {shape}, got {array.shape}")
-        whole = name in ("position", "quaternion") or array is None or np.isfinite(array).all()
-        if not whole:
+        if name not in ("position", "quaternion") and not np.isfinite(array).all():
             raise InputError(f"fit_noise: {name} must be finite in every row")
-    if count < 2 or not np.all(np.diff(times) > 0):
+    if len(times) < 2 or not np.all(np.diff(times) > 0):
         raise InputError(
             "fit_noise: expected two rows or more whose times t increase strictly, in s"
         )
     period = float(np.median(np.diff(times)))
-    given = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
+    made = UKFTuning.for_vehicle(vehicle, period) if tuning is None else tuning
     use = NoiseFitSettings() if settings is None else settings
-    flight = _Flight(vehicle, (times, speeds, x, q, volts), period, given, use)
+    flight = _Flight(vehicle, columns, period, made, use)
     flight.whole.extend(flight.pieces(slice(None)))
     return flight

@@ -1,28 +1,23 @@
 """What a filter does after a gap, and with a measurement that it cannot believe.
 
-Three things happen to a vehicle's poses that a Kalman filter's model does not know: they stay away,
-they are wrong for a while, and their frame jumps for good. A fourth looks alike and is none of
-these: the vehicle is pushed harder than the random walk of the wrench expects. They are told apart
-by what each of them breaks:
+A Kalman filter's model knows none of four events. Each breaks something else:
 
-* A *gap* makes the covariance grow. What is not known better than nothing is *lost*: pose and twist
-  are then held, with a prior's covariance, and the next measurement restarts them.
-* An *outlier* is a pose that jumps: it is far from what the filter expects and from the pose just
-  before it, by more than a vehicle can move in the time. A gate refuses it, and what goes on from
-  it: a filter that has not seen for a while would else take those for likely. Poses are believed
-  again once the jumps cancel: then they are back from where they jumped to, however far the vehicle
-  has moved meanwhile and however wrong the filter's wrench is. Or once the innovation says that
-  they never were away: what just exceeds a vehicle's motion may be the motion that a clock blurs,
-  and what does not follow from where it jumped to has not jumped.
-* A *push* is far from what the filter expects, yet goes on where the pose before it was: the motion
-  is continuous, and the wrench is wrong. It is taken in, gate or not.
-* A *jump for good* is an outlier whose successors all agree with it. After ``Recovery.patience`` of
-  that the filter restarts there; without a gate it does so at once.
+* A *gap* makes the covariance grow. A part that is known no better than a prior is *lost*: pose and
+  twist are held with the prior's covariance, and the next measurement restarts them.
+* An *outlier* is a pose that jumps: far from the filter's expectation and, by more than a vehicle
+  can move, from the pose just before. A gate refuses the pose and its successors, which a filter
+  that has not seen for a while would take for likely. Poses are believed again once the jumps
+  cancel, however wrong the wrench is. Or once the innovation says that there was no jump: a clock's
+  blur also exceeds a vehicle's motion by a little.
+* A *push* is harder than the random walk of the wrench expects. The pose is far from the
+  expectation, yet goes on from the pose before. The filter takes the pose in, gate or not.
+* A *jump for good* is an outlier whose successors all agree with it. The filter restarts there
+  after ``Recovery.patience``, without a gate at once.
 
-A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates
-and are doubted, their variances widened so far that there may be no wrench at all: a wrench that
-the model took for impossible explains a contradiction as well as a pose that jumped, and after a
-gap nothing says that the wrench of before still acts.
+A restart sets pose and twist anew with a prior's covariance. Force and torque keep their estimates,
+with variances so wide that there may be no wrench at all. A wrench that the model took for
+impossible explains a contradiction as well as a pose that jumped, and after a gap nothing says that
+the wrench still acts.
 """
 
 import math
@@ -52,26 +47,23 @@ class Recovery:
     to a few kg.
 
     Attributes:
-        patience: s: measurements that are refused in a row, and agree with each other, are believed
-            after this time; longer than the bursts that motion capture is known for (0.1 to 0.5 s)
+        patience: s, after which refused poses in a row that agree with each other are believed;
+            longer than the bursts of motion capture (0.1 to 0.5 s)
         jump_at: standard deviations of an innovation beyond which a filter without a gate asks
-            whether the pose jumped, and restarts there if so; a consistent filter never sees them.
-        restart_at: standard deviations beyond which no push is followed by linear corrections: the
-            filter restarts. One of a weight makes 70 on a filter that rises in 1 s.
-        attitude_std: rad: standard deviation of the attitude beyond which a vehicle that is not
-            seen, or of which positions alone are, is no longer predicted: where its thrust points
-            has become a guess, and sigma points reach half a turn.
-        velocity_std: m/s and rad/s: standard deviations of velocity and angular velocity of a
-            vehicle of which only the pose is known; a small multirotor in brisk flight. At long
-            periods the latter, and that of the torque, are less: no more than attitudes a period
-            apart can tell.
-        angular_velocity_std: rad/s: see ``velocity_std``.
-        position_std: m: standard deviation beyond which a position means nothing; a flight hall.
-        force_std: of the weight, and of weight times arm: standard deviations of a force and a
-            torque about which a contradiction has left nothing known.
-        torque_std: of weight times arm: see ``force_std``.
-        response: s: time in which the filter follows a push, which is at most two weights and the
-            same about the arm; how far two poses in a row may lie apart follows from it.
+            whether the pose jumped; a consistent filter never sees them.
+        restart_at: standard deviations beyond which the filter restarts instead of following a
+            push. A push of one weight makes 70 on a filter that rises in 1 s.
+        attitude_std: rad, of the attitude, beyond which a vehicle without a measured attitude is no
+            longer predicted: its thrust's direction is a guess, and sigma points reach half a turn.
+        velocity_std: m/s, of a vehicle of which only the pose is known; a small multirotor in brisk
+            flight.
+        angular_velocity_std: rad/s, likewise. At long periods this and the torque's are less: no
+            more than attitudes a period apart can tell.
+        position_std: m, beyond which a position means nothing; a flight hall.
+        force_std: share of the weight, of a force of which a contradiction has left nothing known.
+        torque_std: share of weight times arm, likewise.
+        response: s, in which the filter follows a push of at most two weights, and the same about
+            the arm; how far two poses in a row may lie apart follows.
     """
 
     patience: float = 0.6

@@ -1,32 +1,20 @@
-"""From one row of measurements to the next: in which steps a filter is carried over the time
-between them, offline and on the vehicle alike.
-"""
+"""In which steps a filter is carried from one row of measurements to the next, offline and live."""
 
 import math
-from dataclasses import dataclass
+
+_FORGETS = 20.0  # s without a row after which the filter holds its pose: steps of any length do
+_REST = 1000  # steps, at most, of the time beyond
+_SLACK = 0.1  # of a period: a step so little too long is still one step
 
 
-@dataclass(frozen=True)
-class RowSteps:
-    """How the time between two rows is divided."""
-
-    # s without a row after which the filter holds its pose: from there on steps of any length do
-    forgets: float = 20.0
-    rest: int = 1000  # steps of what lies beyond, at most
-    slack: float = 0.1  # of a period: a step so little too long is still one step
-
-
-ROW_STEPS = RowSteps()
-
-
-def steps_between(dt: float, period: float, settings: RowSteps = ROW_STEPS) -> list[float]:
+def steps_between(dt: float, period: float) -> list[float]:
     """Return the steps, s, in which a filter of a ``period``, s, is carried over ``dt`` s: equal
     ones of at most one period, but for a time so long that the filter has forgotten by then.
     """
-    near = min(dt, settings.forgets)
-    count = max(1, math.ceil(near / period - settings.slack))
+    near = min(dt, _FORGETS)
+    count = max(1, math.ceil(near / period - _SLACK))
     steps = [near / count] * count
-    if dt > settings.forgets:
-        count = min(math.ceil((dt - near) / period), settings.rest)
+    if dt > _FORGETS:
+        count = min(math.ceil((dt - near) / period), _REST)
         steps += [(dt - near) / count] * count
     return steps

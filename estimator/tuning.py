@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.vehicle import Vehicle
+from ..runtime.arguments import real_numbers
 from ..runtime.errors import InputError
 
 Array = NDArray[np.float64]
@@ -26,10 +27,9 @@ class UKFTuning:
     given. A ``motor_torque_noise`` far below the model's real error makes the filter lose the
     attitude when the torque steps, which shows as a wrong lateral force.
 
-    The biases of an IMU begin with the switch-on deviations that PX4's EKF2 assumes (``GBIAS_INIT``
-    0.1 rad/s, ``ABIAS_INIT`` 0.2 m/s2) and walk as its process noise has it to within a factor of
-    five (``GYR_B_NOISE`` 1e-3 rad/s2, ``ACC_B_NOISE`` 3e-3 m/s3, at its 10 ms per update 7e-6 rad/s
-    and 2e-5 m/s2 in 5 ms); of the accelerometer the walk is faster, for temperature and vibration.
+    The biases of an IMU begin with the deviations of PX4's EKF2 (``GBIAS_INIT`` 0.1 rad/s,
+    ``ABIAS_INIT`` 0.2 m/s2). They walk within a factor of five of its process noise, 7e-6 rad/s and
+    2e-5 m/s2 in 5 ms; the accelerometer's faster, for temperature and vibration.
 
     Attributes:
         motor_torque_noise: Nm, body frame: torque that the rotor model misses, new each step.
@@ -64,20 +64,10 @@ class UKFTuning:
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            try:
-                array = np.asarray(value)
-                if array.dtype.kind not in "iuf":
-                    raise TypeError
-                array = array.astype(np.float64)
-            except (TypeError, ValueError) as error:
-                raise InputError(
-                    f"UKFTuning: {f.name} must be a number or three, got {value!r}"
-                ) from error
-            if (
-                array.shape not in ((), (3,))
-                or not np.all(np.isfinite(array))
-                or np.any(array <= 0)
-            ):
+            array = real_numbers(value)
+            if array is None:
+                raise InputError(f"UKFTuning: {f.name} must be a number or three, got {value!r}")
+            if array.shape not in ((), (3,)) or not np.all(np.isfinite(array) & (array > 0)):
                 raise InputError(
                     f"UKFTuning: {f.name} must be positive and finite, a number or three, got "
                     f"{value!r}"
