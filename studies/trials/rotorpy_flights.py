@@ -57,9 +57,7 @@ def _parameters() -> dict[str, Any]:
         InputError: RotorPy is not installed.
     """
     if not available():
-        raise InputError(
-            "RotorPy is not installed; expected pip install rotorpy, or windwrench[compare]"
-        )
+        raise InputError("RotorPy is not installed; expected pip install rotorpy")
     from rotorpy.vehicles.hummingbird_params import quad_params
 
     return dict(quad_params)
