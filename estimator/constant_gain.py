@@ -21,13 +21,7 @@ from ..runtime.errors import InputError
 from .error_state import fold
 from .estimate import COASTING, NIS, TRACKING, Array
 from .filter_record import FILTER, N, drive, propagate
-from .hover_covariance import (
-    carry_at_hover,
-    catch_up,
-    heading,
-    jacobian_at_hover,
-    turn_world,
-)
+from .hover_covariance import carry_at_hover, catch_up, heading, jacobian_at_hover, turn_world
 from .recovery import Recovery, after_prediction, remember
 from .sample import check_sample, undo_sensing
 from .tuning import UKFTuning

@@ -121,10 +121,7 @@ def load_recovery(record: np.void, vehicle: Vehicle, gate: float | None, given: 
     record["prior"] = np.repeat(np.square(deviations), 3)
     # accelerations of a push of two weights, and of the same about the arm
     push = 2.0 * weight
-    record["push"] = (
-        push * vehicle.arm_l / inertia,
-        push / vehicle.mass,
-    )
+    record["push"] = push * vehicle.arm_l / inertia, push / vehicle.mass
     record["response"] = given.response
 
 
@@ -279,13 +276,7 @@ def judge(
     restarted = taken & (lost | contradicted)
     f.refused = choose(refused > 0.5, f.refused + 1.0, f.refused)
     f.status = choose(refused > 0.5, REJECTED, f.status)
-    _restart(
-        f,
-        position,
-        quaternion,
-        restarted & with_position,
-        restarted & with_attitude,
-    )
+    _restart(f, position, quaternion, restarted & with_position, restarted & with_attitude)
     f.restarts = choose(restarted, f.restarts + 1.0, f.restarts)
     f.status = choose(restarted, RESTARTED, f.status)
     remember(f, position, quaternion, restarted & with_position, restarted & with_attitude)

@@ -129,21 +129,6 @@ def test_whatever_is_late_comes_out_as_if_it_had_not_been(name, drawn, kind, gat
     assert_same(timed, batch(make(kind, vehicle, gate), flight, measurements))
 
 
-@pytest.mark.parametrize("kind", FILTERS)
-def test_a_stream_of_poses_that_are_all_late_is_the_batch_answer(kind):
-    """On the grid of the rotor speeds, and off it; the horizon is as long as the longest delay."""
-    rng, vehicle = np.random.default_rng(1), VEHICLES["effects that remember"]
-    flight = fly(vehicle, 400, seed=5)
-    stamps = np.sort(rng.uniform(0.0, 1.7, 170))
-    stamps[::3] = PERIOD * np.round(stamps[::3] / PERIOD)
-    stamps = np.unique(np.round(stamps, 9))
-    measurements = poses(flight, stamps, rng.choice([1, 2, 3, 3], len(stamps)))
-    timed = TimedFilter(make(kind, vehicle), horizon=0.3)
-    stream(timed, flight, measurements, rng.uniform(0.0, 0.29, len(stamps)))
-    assert (timed.too_late, timed.late > 150) == (0, True)
-    assert_same(timed, batch(make(kind, vehicle), flight, measurements))
-
-
 @pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
 def test_inertial_measurements_may_be_late_too(kind):
     rng, flight = np.random.default_rng(2), FLIGHTS["plain"]

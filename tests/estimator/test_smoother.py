@@ -14,7 +14,6 @@ from windwrench.estimator import UKFTuning, WrenchUKF, rauch_tung_striebel, smoo
 from windwrench.estimator.consistency import chi2_band, state_error
 from windwrench.estimator.row_steps import steps_between
 from windwrench.estimator.smoother import RecordingUKF
-from windwrench.estimator.ukf import default_covariance
 
 VEHICLE = load_vehicle("ardrone2")
 YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0, 3.0)}
@@ -117,117 +116,6 @@ def test_equals_the_literal_smoother_over_a_yawing_flight(effects):
         np.testing.assert_allclose(as_reference(e, state), state, rtol=0, atol=1e-8)
         size = np.sqrt(np.diag(P))
         assert np.allclose(e.covariance / np.outer(size, size), P / np.outer(size, size), atol=1e-7)
-
-
-def hover_model(dt, period, tuning):
-    """Return the matrix and noise of the model linearised at a level hover, (18, 18) each."""
-    m, g, inverse = VEHICLE.mass, VEHICLE.gravity, np.linalg.inv(VEHICLE.inertia)
-    F = np.eye(18)
-    F[0:3, 3:6] = dt / 4 * np.eye(3)
-    F[3:6, 12:15] = dt * inverse
-    # thrust m g along the body's z axis, which an MRP turns by four times its size
-    acceleration = np.zeros((3, 18))
-    acceleration[:, 0:3] = 4 * g * np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 0]])
-    acceleration[:, 15:18] = np.eye(3) / m
-    F[6:9] += dt**2 / 2 * acceleration
-    F[6:9, 9:12] += dt * np.eye(3)
-    F[9:12] += dt * acceleration
-    white, walk = period / dt, dt / period
-    B = np.zeros((18, 12))
-    B[3:6, 0:3] = dt * inverse * tuning.motor_torque_noise * np.sqrt(white)
-    B[6:9, 3:6] = dt**2 / 2 / m * np.eye(3) * tuning.thrust_noise * np.sqrt(white)
-    B[9:12, 3:6] = dt / m * np.eye(3) * tuning.thrust_noise * np.sqrt(white)
-    B[12:15, 6:9] = np.eye(3) * tuning.torque_walk * np.sqrt(walk)
-    B[15:18, 9:12] = np.eye(3) * tuning.force_walk * np.sqrt(walk)
-    return F, B @ B.T
-
-
-def test_equals_a_dense_batch_solution_near_hover():
-    """All states and measurements of a hover as one Gaussian vector, conditioned in one go.
-
-    Noise and start are a thousandth of what is usual, so the model is linear to six digits. Rows
-    without a pose, with a position or an attitude alone, and unequal times are among them.
-    """
-    small = 1e-3
-    usual = UKFTuning()
-    tuning = UKFTuning(
-        **{
-            name: small * getattr(usual, name)
-            for name in (
-                "motor_torque_noise",
-                "torque_walk",
-                "thrust_noise",
-                "force_walk",
-                "position_noise",
-                "attitude_noise",
-            )
-        }
-    )
-    rng = np.random.default_rng(0)
-    rows, level = 36, np.array([1.0, 0, 0, 0])
-    gaps = np.full(rows - 1, PERIOD)
-    gaps[[7, 20]] = 3 * PERIOD, 0.6 * PERIOD
-    speeds = np.full((rows, 4), VEHICLE.hover_rate)
-    rho = small * 0.005 / 4 * rng.standard_normal((rows, 3))
-    x = small * 0.001 * rng.standard_normal((rows, 3))
-    q = np.column_stack([np.ones(rows), 2 * rho])
-    q /= np.linalg.norm(q, axis=1)[:, None]
-    q[0], x[0] = level, 0.0
-    x[12:18] = np.nan
-    q[15:22] = np.nan
-    # the start: pose as measured, the rest as ``reset`` takes it
-    P0 = default_covariance(VEHICLE, tuning)
-    wide = P0 * small**2
-    wide[:3, :3], wide[6:9, 6:9] = P0[:3, :3], P0[6:9, 6:9]
-    ukf = RecordingUKF(VEHICLE, tuning, PERIOD)
-    ukf.reset(x[0], q[0], wide)
-    models, ends = [], [0]
-    for k in range(1, rows):
-        steps = round(gaps[k - 1] / PERIOD + 0.4)
-        for _ in range(steps):
-            ukf.predict(speeds[k], gaps[k - 1] / steps)
-            models.append((*hover_model(gaps[k - 1] / steps, PERIOD, tuning), k))
-        ukf.correct(x[k] if np.isfinite(x[k, 0]) else None, q[k] if np.isfinite(q[k, 0]) else None)
-        ends.append(ukf.events - 1)
-    found = ukf.smooth(ends, covariance=True)
-
-    size = 18 * (len(models) + 1)
-    joint = np.zeros((size, size))
-    joint[:18, :18] = wide
-    for n, (F, Q, _) in enumerate(models):
-        a, b = slice(18 * n, 18 * n + 18), slice(18 * n + 18, 18 * n + 36)
-        joint[b, : a.stop] = F @ joint[a, : a.stop]
-        joint[: a.stop, b] = joint[b, : a.stop].T
-        joint[b, b] = F @ joint[a, a] @ F.T + Q
-    last = {k: n + 1 for n, (_, _, k) in enumerate(models)}  # the state's number at a row
-    picked, z, R = [], [], []
-    for k in range(1, rows):
-        for value, first, noise in ((rho[k], 0, small * 0.005 / 4), (x[k], 6, small * 0.001)):
-            if not np.isfinite((q if first == 0 else x)[k, 0]):
-                continue
-            picked += [18 * last[k] + first + i for i in range(3)]
-            z, R = [*z, *value], [*R, *[noise**2] * 3]
-    scale = np.sqrt(np.diag(joint))
-    S = joint[np.ix_(picked, picked)] + np.diag(R)
-    gain = np.linalg.solve(S, joint[picked]).T
-    mean, covariance = gain @ np.array(z), joint - gain @ joint[picked]
-    assert np.all(scale > 0)
-    for k in range(rows):
-        at = slice(18 * last[k], 18 * last[k] + 18) if k else slice(0, 18)
-        deviation = np.sqrt(np.diag(covariance[at, at]))
-        ours = np.concatenate(
-            [
-                found.quaternion[k, 1:] / 2,
-                found.angular_velocity[k],
-                found.position[k],
-                found.velocity[k],
-                found.torque[k],
-                found.force[k],
-            ]
-        )
-        assert np.allclose((ours - mean[at]) / deviation, 0.0, atol=2e-3)
-        outer = np.outer(deviation, deviation)
-        assert np.allclose(found.covariance[k] / outer, covariance[at, at] / outer, atol=1e-3)
 
 
 def smoothed_nees(runs, steps, vehicle=VEHICLE, tuning=None, missing=()):

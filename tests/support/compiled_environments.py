@@ -6,11 +6,10 @@ import numpy as np
 import windwrench  # noqa: F401  registers the environments
 from windwrench.dynamics import load_vehicle
 from windwrench.estimator import WrenchEKF, ukf_lanes
-from windwrench.paper import NonlinearObserver
 
 
 def compile_environments():
-    """Step filters in lanes, the filters that are not the wrench filter, single environments and
+    """Step filters in lanes, the linearised filter, single environments and
     vectors of them; compiled code is kept, so that a second call takes no time.
 
     What shares no code with ``compile_estimates``, which another process compiles meanwhile, comes
@@ -18,10 +17,9 @@ def compile_environments():
     """
     ukf_lanes.step_address()
     pose = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    for kind in (NonlinearObserver, WrenchEKF):
-        estimator = kind(load_vehicle("ardrone2"))
-        estimator.reset(*pose)
-        estimator.step(np.full(4, 300.0), *pose)
+    estimator = WrenchEKF(load_vehicle("ardrone2"))
+    estimator.reset(*pose)
+    estimator.step(np.full(4, 300.0), *pose)
     for name in ("FanTracking", "FanTracking2D", "WindHover"):
         step_one(name)
     for estimator in ("constant-gain", "ukf"):
