@@ -14,9 +14,11 @@ A tick takes 5 ms and is a pipeline of named stages, ``STAGES``:
 A user's own ``Stage`` stands before one of them.
 """
 
+import ctypes
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, NoReturn
 
 import mujoco
@@ -40,7 +42,7 @@ from ..estimator.constant_gain import ConstantGainFilter
 from ..estimator.filter_record import FILTER
 from ..estimator.tuning import UKFTuning
 from ..estimator.ukf import WrenchUKF
-from ..runtime.addresses import call_step
+from ..runtime.addresses import call_at, call_step
 from ..runtime.compiled import Record, compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .fan import FAN, STATIONS, Fan, fan_record, jet_table
@@ -59,6 +61,7 @@ from .plant import (
 from .suspended_load import SuspendedLoad, hang, pull, set_down
 from .wind.field import Wind, add_wind, check_wind
 
+_C_FUNCTION = ctypes.CFUNCTYPE(None)
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
 WIND_EVERY = 2  # ticks over which the winds at the stations are held
 REFERENCE_SIZE = 10  # position, velocity, acceleration, yaw
@@ -190,35 +193,49 @@ def _actuate(record: Record, world: World, path: Array, noise: Array, k: int) ->
     )
     loop.ticks += 1
     if noise.shape[1] > NOISE:
-        _accelerate(loop, xfrc, noise[k])
+        _accelerate(loop, xfrc, noise, k)
 
 
 @compiled
-def _accelerate(loop: Record, xfrc: Array, noise: Array) -> None:
+def _accelerate(loop: Record, xfrc: Array, noise: Array, k: int) -> None:
     """Add what an accelerometer in the centre of mass measures, turned into the world by the
     estimated attitude, and what the rotors make by the declared model.
     """
     plant, body = loop.plant, loop.flight.body
     R, E = plant.rotation, loop.flight.rotation
+    if k == 0:
+        for j in range(3):
+            loop.specific[j] = loop.thrust[j] = 0.0
     thrust = 0.0
     for i in range(4):
         thrust += body.k[i] * plant.z[i] * plant.z[i]
     for j in range(3):
-        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[NOISE + j]
+        felt = loop.accelerometer_bias[j] + loop.accelerometer_sigma * noise[k, NOISE + j]
         for i in range(3):
             felt += R[i, j] * xfrc[i] / plant.body.mass
         for i in range(3):
             loop.specific[i] += E[i, j] * felt
         loop.thrust[j] += E[j, 2] * thrust / body.mass
+    if k == len(noise) - 1:
+        for j in range(3):
+            loop.specific[j] /= len(noise)
+            loop.thrust[j] /= len(noise)
 
 
 @compiled
-def tick(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
-    """Run the compiled stages of a tick in one call: what flies without stages of a user's own."""
-    _sense(record, world, path, noise, k)
-    _estimate(record, world, path, noise, k)
-    _steer(record, world, path, noise, k)
-    _actuate(record, world, path, noise, k)
+def run_ticks(
+    record: Record, world: World, path: Array, noise: Array, first: int, last: int, move: int
+) -> None:
+    """Run ticks ``first`` to ``last - 1`` in one call: what flies without a user's own stages.
+
+    ``move`` is the address of a C function that calls MuJoCo's step.
+    """
+    for k in range(first, last):
+        _sense(record, world, path, noise, k)
+        _estimate(record, world, path, noise, k)
+        _steer(record, world, path, noise, k)
+        _actuate(record, world, path, noise, k)
+        call_at(move, 0)
 
 
 @compiled
@@ -358,7 +375,10 @@ class ClosedLoop:
         self.stages = self._pipeline(stages)
         self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
         given = self.record, self.world, self.fan_path, self.noise, 0
-        self._tick = specialised(tick, *given) if not stages else None
+        self._own_stages = bool(stages)
+        self._move = _C_FUNCTION(partial(mujoco.mj_step, self.model, self.data, SUBSTEPS))
+        self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
+        self._run_ticks = specialised(run_ticks, *given, 0, 0)
         self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
         self._place = specialised(
             _place_stations,
@@ -527,31 +547,26 @@ class ClosedLoop:
                 f"got shapes {noise.shape} and {path.shape}"
             )
         self.noise, self.fan_path = noise, path
-        if self.accelerometer is not None:
-            self.specific[:] = self.thrust[:] = 0.0
-        if self._tick is None:
+        if self._own_stages:
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
                     stage(self)
         else:
-            self._run_compiled(self._tick, path, noise)
-        if self.accelerometer is not None:
-            self.specific /= count
-            self.thrust /= count
+            self._run_compiled(path, noise)
 
-    def _run_compiled(self, run_tick: Callable[..., None], path: Array, noise: Array) -> None:
-        """Do what the stages do, those between ``wind`` and ``move`` in one call."""
-        record, world, winds = self.record, self.world, self.winds
-        move, model, data = mujoco.mj_step, self.model, self.data
-        for k in range(len(noise)):
-            if winds:
+    def _run_compiled(self, path: Array, noise: Array) -> None:
+        """Do what the stages do, as many ticks in one call as the winds stay the same."""
+        count, first = len(noise), 0
+        while first < count:
+            last = count
+            if self.winds:
                 self.blow()
-                self.ticks += 1
-            run_tick(record, world, path, noise, k)
-            move(model, data, SUBSTEPS)
-        self.ticks = int(self.record["ticks"][0])
-        self._ticks_since_reset += len(noise)
+                last = min(first + WIND_EVERY - self.ticks % WIND_EVERY, count)
+            self._run_ticks(self.record, self.world, path, noise, first, last, self._move_address)
+            self.ticks += last - first
+            first = last
+        self._ticks_since_reset += count
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""
@@ -593,10 +608,4 @@ class ClosedLoop:
         """Whether it still flies: every number of plant and filter finite, and nothing faster than
         a vehicle can be.
         """
-        speeds = self._qvel.tolist()
-        return (
-            not self.was_reset
-            and math.isfinite(sum(self.state.tolist()[:19]) + sum(speeds))
-            and min(speeds) > -FASTEST
-            and max(speeds) < FASTEST
-        )
+        return bool(self._is_healthy(self.state, self.world.qvel)) and not self.was_reset

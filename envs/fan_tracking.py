@@ -8,31 +8,37 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from ..controllers.observation import OBSERVATION_SIZE
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop, Stage
 from .fan import Fan
 from .observing import LIMITS, View
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS, Scenario, draw_fan_path
-from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, limited
+from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task
 
 DECISION_TICKS = 16  # 12.5 Hz
 DISTANCE = 2.3  # m, from the fan
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
 CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
-_LIMITS = np.array(LIMITS)
 AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
 FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
 
 
-def seen_of(states: Array, commands: Array) -> Frame:
-    """Return the frames (..., 8) of estimated states (..., 20) and last commands (..., 1) in m/s:
-    force, torque, velocity along y and command, within their limits.
+@compiled
+def see(state: Array, command: float, frame: Frame) -> None:
+    """Write the frame (8,) of an estimated state (20,) and the last command in m/s: force, torque,
+    velocity along y and command, within their limits.
     """
-    parts = states[..., 16:19], states[..., 13:16], states[..., 8:9], commands
-    return limited(np.concatenate(parts, axis=-1), _LIMITS)
+    for i in range(3):
+        frame[i], frame[3 + i] = state[16 + i], state[13 + i]
+    frame[6], frame[7] = state[8], command
+    for i in range(OBSERVATION_SIZE):
+        seen = frame[i]
+        frame[i] = min(max(seen, -LIMITS[i]), LIMITS[i]) if math.isfinite(seen) else 0.0
 
 
 def reward_terms(offset: Any, change: Any) -> dict[str, Any]:
@@ -168,6 +174,8 @@ class FanTrackingEnv(Task):
         bound = self.view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
         self.fan_motion = ""
+        frame = np.empty(OBSERVATION_SIZE, dtype=np.float32)
+        self._see = specialised(see, np.empty(20), 0.0, frame)
 
     def hover(self, settle: int = 0) -> tuple[float, ClosedLoop, Array]:
         """Draw an episode and let the vehicle hover at its start for ``settle`` ticks.
@@ -201,8 +209,8 @@ class FanTrackingEnv(Task):
         loop.run(noise, self._path[min(loop.ticks, len(self._path) - 1) :])
 
     def _get_obs(self) -> Frame:
-        loop = self.loop
-        frame = seen_of(loop.state, self.command)
+        loop, frame = self.loop, np.empty(OBSERVATION_SIZE, dtype=np.float32)
+        self._see(loop.state, self.command.item(), frame)
         return frame if self.view.is_plain else self.view.of(frame, loop.state, loop.ticks)
 
     def _get_info(self) -> dict[str, Any]:

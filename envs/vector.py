@@ -201,9 +201,12 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
                 work(n)
 
         helpers = min(self.threads, count) - 1
-        if helpers > 0 and self._pool is None:
+        if helpers < 1:
+            take_numbers()
+            return
+        if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads - 1)
-        others = [self._pool.submit(take_numbers) for _ in range(helpers)] if self._pool else []
+        others = [self._pool.submit(take_numbers) for _ in range(helpers)]
         try:
             take_numbers()
         finally:

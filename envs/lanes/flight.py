@@ -159,13 +159,14 @@ def tick_lanes(address: int, work: int, step: int, axial: Array, radial: Array) 
 
 
 @compiled_without_gil
-def fly_block(
-    loops: int,
-    kept: int,
+def fly_blocks(
+    begin: int,
+    end: int,
+    loops: tuple[int, int],
+    kept: tuple[int, int],
     work: int,
     step: int,
-    axial: Array,
-    radial: Array,
+    jet: Array,
     noise: Array,
     fan_y: Array,
     generators: Any,
@@ -174,34 +175,41 @@ def fly_block(
     first: np.ndarray,
     ticks: int,
 ) -> None:
-    """Fly one block of loops side by side.
+    """Fly blocks ``begin`` to ``end - 1`` of loops side by side.
 
     Args:
-        loops: address of the block's record, of ``LOOPS``.
-        kept: address of its filters', of ``ukf_lanes``.
+        begin: a block.
+        end: likewise.
+        loops: address of the first block's record, of ``LOOPS``, and a record's bytes.
+        kept: the same of the blocks' filters, of ``ukf_lanes``.
         work: address of a record for a block of filters in hand, this thread's own.
         step: address of the step of a block of filters.
-        axial: of the jet's table.
-        radial: likewise.
-        noise: (NOISE, WIDTH) of the block's record.
-        fan_y: (WIDTH,) likewise.
-        generators: (n,) of the lanes that fly, from the first on; a typed list.
-        flying: (n or more,) booleans; a lane that does not fly draws nothing.
-        paths: (n or more, m) m, the fan's y.
-        first: (n or more,) columns of ``paths`` at the first tick.
+        jet: (2, COUNT_X, COUNT_R) of the jet's table.
+        noise: (blocks, NOISE, WIDTH) of the records.
+        fan_y: (blocks, WIDTH) likewise.
+        generators: (n,) of the loops; a typed list.
+        flying: (n,) booleans; a loop that does not fly draws nothing.
+        paths: (n, m) m, the fan's y.
+        first: (n,) columns of ``paths`` at the first tick.
         ticks: of ``TICK`` s.
     """
     last = paths.shape[1] - 1
-    take_up(kept, work)
-    for k in range(ticks):
-        for n in range(len(generators)):
-            if flying[n]:
-                fan_y[n] = paths[n, min(first[n] + k, last)]
-                generator = generators[n]
-                for i in range(NOISE):
-                    noise[i, n] = generator.standard_normal()
-        tick_lanes(loops, work, step, axial, radial)
-    put_down(kept, work)
+    for b in range(begin, end):
+        members = range(WIDTH * b, min(WIDTH * (b + 1), len(flying)))
+        if not flying[members.start : members.stop].any():
+            continue
+        loop, block = loops[0] + b * loops[1], kept[0] + b * kept[1]
+        take_up(block, work)
+        for k in range(ticks):
+            for n in members:
+                if flying[n]:
+                    lane = n - members.start
+                    fan_y[b, lane] = paths[n, min(first[n] + k, last)]
+                    generator = generators[n]
+                    for i in range(NOISE):
+                        noise[b, i, lane] = generator.standard_normal()
+            tick_lanes(loop, work, step, jet[0], jet[1])
+        put_down(block, work)
 
 
 class Blocks:
@@ -216,12 +224,20 @@ class Blocks:
         LOOPS.share(self.loops, _single(like))
         for block in range(count):
             self.put(block, slice(None), like)
-        # of each block: the addresses of loops and filters, and where noise and fan's y are drawn
-        self.places = [
-            (self.loops[block:].ctypes.data, self.filters[block:].ctypes.data)
-            for block in range(count)
-        ]
-        self.drawn = [(loops["noise"], loops["fan"]["y"]) for loops in self.loops]
+        # what ``fly_blocks`` takes: addresses and bytes of the records of loops and filters
+        self.addresses = tuple(
+            (int(records.ctypes.data), records.itemsize) for records in (self.loops, self.filters)
+        )
+        # of all blocks, (blocks, n, WIDTH): position and quaternion, velocities, external wrench,
+        # estimated states
+        loops = self.loops
+        self.seen = (
+            loops["qpos"],
+            loops["qvel"],
+            loops["plant"]["external"],
+            self.filters["x"],
+        )
+        self.drawn = self.loops["noise"], self.loops["fan"]["y"]
 
     def __len__(self) -> int:
         """Return how many blocks there are."""
@@ -239,11 +255,6 @@ class Blocks:
             (columns(self.filters), columns(other.filters)),
         ):
             mine[block, :, lane] = theirs[source, :, lane]
-
-    @staticmethod
-    def each(field: np.ndarray) -> np.ndarray:
-        """Return a field (blocks, n, WIDTH) as a copy (blocks * WIDTH, n), a row a lane."""
-        return np.moveaxis(field, -1, 1).reshape(-1, field.shape[1]).copy()
 
     @staticmethod
     def write_lanes(field: np.ndarray, values: np.ndarray) -> None:
@@ -270,4 +281,4 @@ def _single(loop: ClosedLoop) -> dict[str, Any]:
     }
 
 
-__all__ = ["LOOPS", "Blocks", "fly_block", "fly_freely", "tick_lanes"]
+__all__ = ["LOOPS", "Blocks", "fly_blocks", "fly_freely", "tick_lanes"]

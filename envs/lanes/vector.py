@@ -1,30 +1,33 @@
 """Many fan-tracking environments in the lanes of a vector unit."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
-from numba import typed, typeof
 
+from ...controllers.observation import OBSERVATION_SIZE
+from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import estimates_of, new_work, step_address
+from ...runtime.compiled import compiled_without_gil, specialised
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.vector_lanes import WIDTH
-from ..closed_loop import FASTEST, ClosedLoop
+from ..closed_loop import ClosedLoop, is_healthy
 from ..fan_tracking import (
     AWAY,
     DECISION_TICKS,
     FAN_TIMES,
     FanTrackingEnv,
     reward_terms,
-    seen_of,
+    see,
 )
+from ..normals import generator_list
 from ..observing import View
 from ..plant import TICK
-from ..task import LOST_OFFSET, SETTLE_TICKS, UPRIGHT
+from ..task import LOST_OFFSET, SETTLE_TICKS, UPRIGHT, Frame
 from ..vector import FanTrackingVectorEnv, Flags
-from .flight import Blocks, fly_block
+from .flight import Blocks, fly_blocks
 
 _LARGEST = 1e10  # of a number that MuJoCo goes on with
 
@@ -56,69 +59,56 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._env = self.envs[0]
         self._like = self._env.make_loop(self._env.truth, self._env.fan)
         _refuse(self._env, self._like)
-        self._step, (self._axial, self._radial) = step_address(), self._like.jet_table
+        self._step = step_address()
         blocks = -(-num_envs // WIDTH)
         self._flying, self._settling = Blocks(blocks, self._like), Blocks(0, self._like)
         self._works: deque[np.ndarray] = deque()
-        kind = typeof(np_random(0)[0])
-        self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._drawn = [typed.List.empty_list(kind) for _ in range(blocks)]  # the same, by block
+        # each environment's own; one that was not reset yet has another's
+        self._generators = generator_list([np_random(0)[0]] * num_envs)
+        self._seeded = np.zeros(num_envs, dtype=np.bool_)
         view = self._env.view
         self._views = [View(view.observe, view.normalize) for _ in range(num_envs)]
         self._ticks = np.zeros(num_envs, dtype=np.int64)  # since the start of the episode
         self._paths = np.zeros((num_envs, FAN_TIMES.size))  # m, the fan's y, a column a tick
         self._distance, self._commands = np.zeros(num_envs), np.zeros((num_envs, 1))
+        self._seen = np.zeros((num_envs, OBSERVATION_SIZE), dtype=np.float32)
+        self._compiled: Callable[..., None] | None = None
+        self._compiled_look: Callable[..., None] | None = None
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
         """Return one environment: it says what all are, and never flies."""
         return [FanTrackingEnv(**kwargs)]
 
-    def _fly_block(
-        self,
-        blocks: Blocks,
-        block: int,
-        generators: Any,
-        flying: Flags,
-        paths: np.ndarray,
-        first: np.ndarray,
-        ticks: int,
-    ) -> None:
-        """Fly one block with a record for its filters in hand that no other thread has."""
-        try:
-            work = self._works.pop()
-        except IndexError:
-            work = new_work(self._like.ukf.record)
-        try:
-            fly_block(
-                *blocks.places[block],
-                work.ctypes.data,
-                self._step,
-                self._axial,
-                self._radial,
-                *blocks.drawn[block],
-                generators,
-                flying,
-                paths,
-                first,
-                ticks,
-            )
-        finally:
-            self._works.append(work)
+    def _fly_blocks(self, blocks: Blocks, count: int, *given: Any) -> None:
+        """Fly blocks; each thread has a record of its own for the filters in hand."""
+        parts = 1 if self.threads == 1 else count
+
+        def fly(part: int) -> None:
+            try:
+                work = self._works.pop()
+            except IndexError:
+                work = new_work(self._like.ukf.record)
+            try:
+                first, last = part * count // parts, (part + 1) * count // parts
+                memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
+                arguments = first, last, *memory, *blocks.drawn, *given
+                if self._compiled is None:
+                    self._compiled = specialised(fly_blocks, *arguments)
+                self._compiled(*arguments)
+            finally:
+                self._works.append(work)
+
+        self._spread(fly, parts)
 
     def _fly(self, commands: np.ndarray, which: Flags) -> None:
         blocks, limit = self._flying, self._env.largest_action
         change = -self._commands
-        self._commands[which] = np.clip(commands[which], -limit, limit)
+        self._commands[which] = np.minimum(np.maximum(commands[which], -limit), limit)
         change += self._commands
         blocks.write_lanes(blocks.loops["flight"]["setpoint"][:, 4], self._commands[:, 0])
 
-        def fly(block: int) -> None:
-            part = slice(WIDTH * block, WIDTH * (block + 1))
-            if which[part].any():
-                given = which[part], self._paths[part], self._ticks[part]
-                self._fly_block(blocks, block, self._drawn[block], *given, DECISION_TICKS)
-
-        self._spread(fly, len(blocks))
+        given = self._generators, which, self._paths, self._ticks, DECISION_TICKS
+        self._fly_blocks(blocks, len(blocks), *given)
         self._ticks[which] += DECISION_TICKS
         self._look(which, change[:, 0])
 
@@ -128,22 +118,15 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         if count > len(self._settling):
             self._settling = Blocks(count, self._like)
         settling = self._settling
-        kind = typeof(np_random(0)[0])
-        generators = [typed.List.empty_list(kind) for _ in range(count)]
-        flying = np.zeros((count, WIDTH), dtype=np.bool_)
-        still = np.zeros((count, WIDTH, 1))
+        generators = generator_list([np_random(0)[0]] * (count * WIDTH))
+        flying = np.zeros(count * WIDTH, dtype=np.bool_)
+        still = np.zeros((count * WIDTH, 1))
         for i, (block, lane) in places.items():
-            generator = self._hover(i, None if seeds is None else seeds[i], block, lane)
-            while len(generators[block]) <= lane:  # lanes that nobody settles in draw nothing
-                generators[block].append(generator)
-            generators[block][lane], flying[block, lane] = generator, True
-            still[block, lane] = self._paths[i, 0]
-
-        def settle(block: int) -> None:
-            given = flying[block], still[block], np.zeros(WIDTH, np.int64)
-            self._fly_block(settling, block, generators[block], *given, SETTLE_TICKS)
-
-        self._spread(settle, count)
+            n = WIDTH * block + lane
+            generators[n] = self._hover(i, None if seeds is None else seeds[i], block, lane)
+            flying[n], still[n] = True, self._paths[i, 0]
+        given = generators, flying, still, np.zeros(len(flying), np.int64), SETTLE_TICKS
+        self._fly_blocks(settling, count, *given)
         for i, (block, lane) in places.items():
             self._flying.take(i // WIDTH, lane, settling, block)
         started = np.zeros(self.num_envs, dtype=np.bool_)
@@ -160,13 +143,9 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         """Draw an episode and let its vehicle hover at the start, in a lane of the blocks that
         settle; return the generator.
         """
-        generator = self._generators[i]
-        if generator is None or seed is not None:
-            generator = self._generators[i] = np_random(seed)[0]
-            drawn = self._drawn[i // WIDTH]
-            while len(drawn) <= i % WIDTH:
-                drawn.append(generator)
-            drawn[i % WIDTH] = generator
+        if not self._seeded[i] or seed is not None:
+            self._generators[i], self._seeded[i] = np_random(seed)[0], True
+        generator: np.random.Generator = self._generators[i]
         self._env.np_random = generator
         self._distance[i], loop, self._paths[i] = self._env.hover()
         self._settling.put(block, slice(lane, lane + 1), loop)
@@ -175,47 +154,78 @@ class FanTrackingLanes(FanTrackingVectorEnv):
 
     def _look(self, which: Flags, change: np.ndarray) -> None:
         """Write frames and values of some environments, as ``FanTrackingEnv`` has them."""
-        count, loops, values = self.num_envs, self._flying.loops, self._values
-        qpos, qvel, external = (
-            self._flying.each(field)[:count]
-            for field in (loops["qpos"], loops["qvel"], loops["plant"]["external"])
+        values, blocks, view = self._values, self._flying, self._env.view
+        names = "fan_y", "fan_velocity", "y", "offset", "force", "torque", "lost"
+        given = (
+            which,
+            self._ticks,
+            self._paths,
+            self._distance,
+            self._env.fan.height,
+            self._commands,
+            *blocks.seen,
+            self._seen,
+            *(values[name] for name in names),
         )
-        broken = which & ~(np.abs(np.column_stack([qpos, qvel])) <= _LARGEST).all(axis=1)
-        for i in np.flatnonzero(broken).tolist():  # MuJoCo starts over
-            loops["qpos"][i // WIDTH, :, i % WIDTH] = qpos[i] = [0, 0, 0, 1, 0, 0, 0]
-            loops["qvel"][i // WIDTH, :, i % WIDTH] = qvel[i] = 0.0
-        states, rows = estimates_of(self._flying.filters, count), np.arange(count)
-        k = np.minimum(self._ticks, self._paths.shape[1] - 1)
-        fan_y = self._paths[rows, np.maximum(k - 1, 0)]
-        offset = qpos[:, 1] - fan_y
-        # written such that a number that is not finite counts as lost
-        flying = (
-            np.isfinite(states[:, :19].sum(axis=1))
-            & (1.0 - 2.0 * (qpos[:, 4] ** 2 + qpos[:, 5] ** 2) >= UPRIGHT)
-            & (np.abs(qvel) < FASTEST).all(axis=1)
-            & (np.abs(offset) <= LOST_OFFSET)
-            & (np.abs(qpos[:, 0] - self._distance) <= AWAY)
-            & (np.abs(qpos[:, 2] - self._env.fan.height) <= AWAY)
-        )
-        now = {
-            **reward_terms(offset, change),
-            "fan_y": fan_y,
-            "fan_velocity": (self._paths[rows, k] - fan_y) / TICK,
-            "y": qpos[:, 1],
-            "offset": offset,
-            "force": external[:, :3],
-            "torque": external[:, 3:],
-            "time": self._ticks * TICK,
-            "lost": broken | ~flying,
-        }
-        for name, value in now.items():
-            values[name][which] = value[which]
-        frames = seen_of(states, self._commands)
-        if self._env.view.is_of_a_frame:
-            self._frames[which] = self._env.view.of_frames(frames)[which]
+        if self._compiled_look is None:
+            self._compiled_look = specialised(look, *given)
+        self._compiled_look(*given)
+        values["time"][which] = self._ticks[which] * TICK
+        for name, terms in reward_terms(values["offset"], change).items():
+            values[name][which] = terms[which]
+        frames = self._seen
+        if view.is_of_a_frame:
+            self._frames[which] = frames[which] if view.is_plain else view.of_frames(frames[which])
             return
+        states = estimates_of(blocks.filters, self.num_envs)
         for i in np.flatnonzero(which).tolist():
             self._frames[i] = self._views[i].of(frames[i], states[i], int(self._ticks[i]))
+
+
+@compiled_without_gil
+def look(
+    which: Flags,
+    ticks: np.ndarray,
+    paths: Array,
+    distance: Array,
+    height: float,
+    commands: Array,
+    qpos: Array,
+    qvel: Array,
+    external: Array,
+    states: Array,
+    frames: Frame,
+    fan_y: Array,
+    fan_velocity: Array,
+    y: Array,
+    offset: Array,
+    force: Array,
+    torque: Array,
+    lost: Flags,
+) -> None:
+    """Write frames and the truth of the environments ``which`` as ``FanTrackingEnv`` has them."""
+    for n in np.flatnonzero(which):
+        b, lane = n // WIDTH, n % WIDTH
+        p, v = qpos[b, :, lane], qvel[b, :, lane]
+        broken = not (np.abs(p).max() <= _LARGEST and np.abs(v).max() <= _LARGEST)
+        if broken:  # MuJoCo starts over
+            p[:], v[:] = 0.0, 0.0
+            p[3] = 1.0
+        state = states[b, :, lane].copy()
+        see(state, commands[n, 0], frames[n])
+        k = min(ticks[n], paths.shape[1] - 1)
+        fan_y[n] = paths[n, max(k - 1, 0)]
+        fan_velocity[n] = (paths[n, k] - fan_y[n]) / TICK
+        y[n], offset[n] = p[1], p[1] - fan_y[n]
+        force[n], torque[n] = external[b, :3, lane], external[b, 3:, lane]
+        # written such that a number that is not finite counts as lost
+        lost[n] = broken or not (
+            is_healthy(state, v)
+            and 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
+            and abs(offset[n]) <= LOST_OFFSET
+            and abs(p[0] - distance[n]) <= AWAY
+            and abs(p[2] - height) <= AWAY
+        )
 
 
 def _places(which: list[int]) -> dict[int, tuple[int, int]]:
