@@ -22,14 +22,13 @@ from windwrench.estimator import (
     WrenchUKF,
     WrenchUKFBatch,
 )
-from windwrench.identification import FlightLog, findings
+from windwrench.identification import FlightLog
 from windwrench.paper import ObserverTuning
 
 DOCUMENTED = (
     *(Coefficient, Effect, EffectSetting, Mocap, MotorCurve, Vehicle),
     *(NoiseFit, NoiseFitSettings, ObserverTuning, Recovery),
     *(UKFTuning, FlightLog),
-    *(c for c in vars(findings).values() if inspect.isclass(c) and dataclasses.is_dataclass(c)),
 )
 VEHICLE = load_vehicle("ardrone2")
 POSE = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
