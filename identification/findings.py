@@ -25,51 +25,82 @@ CHANNELS = ("Fx", "Fy", "Fz", "tau_x", "tau_y", "tau_z")
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that the model lacked."""
+    """An effect that the model lacked.
 
-    name: str  # as the effect library has it
-    coefficients: Mapping[str, float]  # in ``units``
-    std: Mapping[str, float]  # standard deviation of each coefficient
-    units: Mapping[str, str]  # of each coefficient; "1" for a pure number
-    tentative: bool  # it may stand for another effect: see ``Diagnosis.structure``
-    indistinguishable_from: tuple[str, ...]  # effects that would explain these logs as well
-    # e.g. share of the residual on held-out blocks that it alone explains
+    Attributes:
+        name: as the effect library has it.
+        coefficients: in ``units``.
+        std: standard deviation of each coefficient.
+        units: of each coefficient; "1" for a pure number.
+        tentative: it may stand for another effect: see ``Diagnosis.structure``.
+        indistinguishable_from: effects that would explain these logs as well.
+        evidence: e.g. share of the residual on held-out blocks that it alone explains.
+        channels: of the logs, that carried the finding.
+    """
+
+    name: str
+    coefficients: Mapping[str, float]
+    std: Mapping[str, float]
+    units: Mapping[str, str]
+    tentative: bool
+    indistinguishable_from: tuple[str, ...]
     evidence: Mapping[str, float]
-    channels: tuple[str, ...] = ()  # of the logs, that carried the finding
+    channels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Errors:
-    """How wrong a model is on the held-out blocks; NaN where it could not be worked out."""
+    """How wrong a model is on the held-out blocks; NaN where it could not be worked out.
 
-    force_rms: float  # N, all three axes
-    torque_rms: float  # Nm
-    nis_without_wrench_state: float  # mean, 6 in a perfect filter
-    rollout_1s_position_rms: float  # m
+    Attributes:
+        force_rms: N, all three axes.
+        torque_rms: Nm.
+        nis_without_wrench_state: mean, 6 in a perfect filter.
+        rollout_1s_position_rms: m.
+    """
+
+    force_rms: float
+    torque_rms: float
+    nis_without_wrench_state: float
+    rollout_1s_position_rms: float
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that was tried first, alone, against the bare model."""
+    """An effect that was tried first, alone, against the bare model.
 
-    name: str  # as the effect library has it
-    # share of the residual's deviance that it explains on left-out blocks; may be negative
+    Attributes:
+        name: as the effect library has it.
+        gain: share of the residual's deviance that it explains on left-out blocks; may be negative.
+        named: whether the diagnosis names it.
+    """
+
+    name: str
     gain: float
-    named: bool  # whether the diagnosis names it
+    named: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The residual of one unbroken piece of a log, over time (n samples)."""
+    """The residual of one unbroken piece of a log, over time (n samples).
 
-    log: str  # its name
-    period: float  # s
-    t: Array  # (n,) s
-    before: Array  # (n, 6) N and Nm, by the declared vehicle
-    after: Array  # (n, 6) N and Nm, with the named effects
-    held_out: Mask  # (n,) the fit never saw it
-    # (n, 6) N and Nm, of each named effect: by how much ``after`` grows where this effect alone is
-    # left out
+    Attributes:
+        log: its name.
+        period: s.
+        t: (n,) s.
+        before: (n, 6) N and Nm, by the declared vehicle.
+        after: (n, 6) N and Nm, with the named effects.
+        held_out: (n,) the fit never saw it.
+        parts: (n, 6) N and Nm, of each named effect: by how much ``after`` grows where this
+            effect alone is left out.
+    """
+
+    log: str
+    period: float
+    t: Array
+    before: Array
+    after: Array
+    held_out: Mask
     parts: Mapping[str, Array] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -83,14 +114,22 @@ class Trace:
 class Signature:
     """Residual against the variable that a named effect follows (n points), with the effect's own
     part.
+
+    Attributes:
+        effect: its name.
+        channel: one of CHANNELS.
+        regressor: what x is, with its unit.
+        x: (n,) in the unit that ``regressor`` states.
+        residual: (n,) N or Nm, by the model with all named effects but this one.
+        fitted: (n,) N or Nm, by this effect.
     """
 
-    effect: str  # its name
-    channel: str  # one of CHANNELS
-    regressor: str  # what x is, with its unit
-    x: Array  # (n,) in the unit that ``regressor`` states
-    residual: Array  # (n,) N or Nm, by the model with all named effects but this one
-    fitted: Array  # (n,) N or Nm, by this effect
+    effect: str
+    channel: str
+    regressor: str
+    x: Array
+    residual: Array
+    fitted: Array
 
     def __repr__(self) -> str:
         return (
@@ -101,21 +140,34 @@ class Signature:
 
 @dataclass(frozen=True)
 class Structure:
-    """One sign that the residual after all named effects still has structure."""
+    """One sign that the residual after all named effects still has structure.
 
-    test: str  # what was tried, in words
-    where: str  # channel and regressor, in words
-    gain: float  # share of the residual's deviance that it explains on left-out blocks
-    kind: str  # of the test, one of ``STRUCTURE_TESTS``
+    Attributes:
+        test: what was tried, in words.
+        where: channel and regressor, in words.
+        gain: share of the residual's deviance that it explains on left-out blocks.
+        kind: of the test, one of ``STRUCTURE_TESTS``.
+    """
+
+    test: str
+    where: str
+    gain: float
+    kind: str
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood."""
+    """The disturbance of one channel: an Ornstein-Uhlenbeck process of maximum likelihood.
 
-    channel: str  # one of CHANNELS
-    rms: float  # N, or Nm
-    time: float  # s, correlation time
+    Attributes:
+        channel: one of CHANNELS.
+        rms: N, or Nm.
+        time: s, correlation time.
+    """
+
+    channel: str
+    rms: float
+    time: float
 
     def below(self, frequency: float) -> float:
         """Return the RMS (N, or Nm) of what is slower than a frequency (Hz)."""
@@ -126,53 +178,82 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class TransientDisturbance:
-    """The largest transient disturbance of one channel."""
+    """The largest transient disturbance of one channel.
 
-    channel: str  # one of CHANNELS
-    log: str  # its name
-    t: float  # s, of its peak
-    peak: float  # N, or Nm
+    Attributes:
+        channel: one of CHANNELS.
+        log: its name.
+        t: s, of its peak.
+        peak: N, or Nm.
+    """
+
+    channel: str
+    log: str
+    t: float
+    peak: float
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """A set of effects that may be what the model lacks."""
+    """A set of effects that may be what the model lacks.
 
-    effects: tuple[str, ...]  # names; empty: nothing of the library
-    probability: float  # that these act and no others of the library
+    Attributes:
+        effects: names; empty: nothing of the library.
+        probability: that these act and no others of the library.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
 
 
 @dataclass(frozen=True)
 class Probabilities:
-    """How probable the names are, by search and likelihood of the logs' poses together."""
+    """How probable what was found is, by the search and the likelihood of the logs' poses together.
 
-    # that it acts, of each effect that is named, or that an alternative has
+    Attributes:
+        names: that it acts, of each effect that is named, or that an alternative has.
+        alternatives: the likeliest sets of effects first.
+        unknown: that something acts which no effect of the library is.
+    """
+
     names: Mapping[str, float]
-    alternatives: tuple[Alternative, ...]  # the likeliest sets of effects first
-    unknown: float  # that something acts which no effect of the library is
+    alternatives: tuple[Alternative, ...]
+    unknown: float
 
 
 @dataclass(frozen=True)
 class RankedSet:
-    """A set of effects, by the posterior alone."""
+    """A set of effects, by the posterior alone.
 
-    effects: tuple[str, ...]  # names, in order of the alphabet
-    probability: float  # that these act and no others, if nothing acts but effects of the library
-    # of each effect, at the mode, in the units of the library
+    Attributes:
+        effects: names, in order of the alphabet.
+        probability: that these act and no others, if nothing acts but effects of the library.
+        coefficients: of each effect, at the mode, in the units of the library.
+        std: their standard deviations, where they have one.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
     coefficients: Mapping[str, Mapping[str, float]]
-    std: Mapping[str, Mapping[str, float]]  # their standard deviations, where they have one
+    std: Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """The posterior of a flight, given that nothing acts but effects of the library."""
+    """The posterior of a flight, given that nothing acts but effects of the library.
 
-    probability: Mapping[str, float]  # of each effect of the library, that it acts
-    sets: tuple[RankedSet, ...]  # the likeliest first
-    # logarithm of the Bayes factor of one more column, of a dictionary of what an effect outside
-    # the library may follow, beside the likeliest set
+    Attributes:
+        probability: of each effect of the library, that it acts.
+        sets: the likeliest first.
+        structure: logarithm of the Bayes factor of one more column, of a dictionary of what an
+            effect outside the library may follow, beside the likeliest set.
+        tempering: power of the likelihood, 1 where its scatter is what it should be.
+    """
+
+    probability: Mapping[str, float]
+    sets: tuple[RankedSet, ...]
     structure: float
-    tempering: float  # power of the likelihood, 1 where its scatter is what it should be
+    tempering: float
 
     def likeliest_with(self, effect: str) -> RankedSet | None:
         """Return the likeliest set that has an effect; None where no set has it."""
@@ -185,51 +266,73 @@ class Diagnosis:
 
     ``remainder``, ``gusts`` and ``pushes`` are named as in ``report.json``: the kind of the
     residual, the disturbances and the transient disturbances.
+
+    Attributes:
+        verdict: explained, partly explained, unexplained, nothing to explain.
+        remainder: none, random, structured.
+        effects: named ones, in the order in which they were found.
+        held_out_segments: log, from, to (s)
+        before: errors of the declared vehicle.
+        after: errors of the amended vehicle.
+        floor_force_rms: N, what sensors alone leave.
+        floor_torque_rms: Nm.
+        advice: what to fly to separate what these logs cannot.
+        notes: doubts about the logs, thrust models of readers, corrections that were made.
+        candidates: best first.
+        traces: residual over time, a piece of flight each.
+        signatures: one a named effect.
+        structure: strongest first.
+        gusts: of each channel; none where rotor speeds are worked out from commands.
+        pushes: one a channel at most, the plainest first; none where rotor speeds are worked out
+            from commands.
+        cutoff_hz: Hz, of the low-pass of everything that was compared.
+        declared: the vehicle that was given.
+        amended: with the named effects, ready for ``estimate`` and the environment.
+        logs: names of those it learned from.
+        test_logs: those the error is on, if they were given apart.
+        seconds: of flight in all.
+        floor_is_bound: whether the logs' noise was filtered before they were written (or is not
+            white for another reason): then the floor is a lower bound.
+        rotor_faults: one a log that can show it: whether a rotor lost thrust during the flight, as
+            plain data (``comparison/words.py``); empty where that was not looked for.
+        needs_pose: effects that these logs cannot show because the pose is missing, or too slow,
+            beside the IMU.
+        doubts: why names are tentative, by the check that says so: sentences, which are notes as
+            well, or names. Beside these, ``structure`` is a doubt of all names.
+        ranking: the posterior of sets of effects; none where it was not asked for, or where rotors
+            or pose were not measured as they were.
+        probabilities: of what was found, by search and posterior together, or by the search alone
+            where there is no posterior; none where they were not asked for, or where rotor speeds
+            are worked out from commands.
     """
 
-    verdict: str  # explained, partly explained, unexplained, nothing to explain
-    remainder: str  # none, random, structured
-    effects: tuple[NamedEffect, ...]  # named ones, in the order in which they were found
-    held_out_segments: tuple[tuple[str, float, float], ...]  # log, from, to (s)
-    before: Errors  # errors of the declared vehicle
-    after: Errors  # errors of the amended vehicle
-    floor_force_rms: float  # N, what sensors alone leave
-    floor_torque_rms: float  # Nm
-    advice: tuple[str, ...]  # what to fly to separate what these logs cannot
-    # doubts about the logs, thrust models of readers, corrections that were made
+    verdict: str
+    remainder: str
+    effects: tuple[NamedEffect, ...]
+    held_out_segments: tuple[tuple[str, float, float], ...]
+    before: Errors
+    after: Errors
+    floor_force_rms: float
+    floor_torque_rms: float
+    advice: tuple[str, ...]
     notes: tuple[str, ...]
-    candidates: tuple[Candidate, ...]  # best first
-    traces: tuple[Trace, ...]  # residual over time, a piece of flight each
-    signatures: tuple[Signature, ...]  # one a named effect
-    structure: tuple[Structure, ...]  # strongest first
-    # of each channel; none where rotor speeds are worked out from commands
+    candidates: tuple[Candidate, ...]
+    traces: tuple[Trace, ...]
+    signatures: tuple[Signature, ...]
+    structure: tuple[Structure, ...]
     gusts: tuple[Disturbance, ...]
-    # one a channel at most, the plainest first; none where rotor speeds are worked out from
-    # commands
     pushes: tuple[TransientDisturbance, ...]
-    cutoff_hz: float  # Hz, of the low-pass of everything that was compared
-    declared: Vehicle  # the vehicle that was given
-    amended: Vehicle  # with the named effects, ready for ``estimate`` and the environment
-    logs: tuple[str, ...]  # names of those it learned from
-    test_logs: tuple[str, ...]  # those the error is on, if they were given apart
-    seconds: float  # of flight in all
-    # whether the logs' noise was filtered before they were written (or is not white for another
-    # reason): then the floor is a lower bound
+    cutoff_hz: float
+    declared: Vehicle
+    amended: Vehicle
+    logs: tuple[str, ...]
+    test_logs: tuple[str, ...]
+    seconds: float
     floor_is_bound: bool = False
-    # one a log that can show it: whether a rotor lost thrust during the flight, as plain data
-    # (``comparison/words.py``); empty where that was not looked for
     rotor_faults: tuple[Mapping[str, Any], ...] = ()
-    # effects that these logs cannot show because the pose is missing, or too slow, beside the IMU
     needs_pose: tuple[str, ...] = ()
-    # why names are tentative, by the check that says so: sentences, which are notes as well, or
-    # names. Beside these, ``structure`` is a doubt of all names
     doubts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    # the posterior of sets of effects; none where it was not asked for, or where rotors or pose
-    # were not measured as they were
     ranking: Ranking | None = None
-    # of what was found, by search and posterior together, or by the search alone where there is no
-    # posterior; none where they were not asked for, or where rotor speeds are worked out from
-    # commands
     probabilities: Probabilities | None = None
 
     def __repr__(self) -> str:
