@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..runtime.errors import unknown_name
-from .admittance import Admittance, Ratio
-from .lead import AdmittancePID, Lead
-from .references import Hover, Oracle
+from .fan_laws import Admittance, AdmittancePID, Hover, Lead, Oracle, Ratio
 from .tracker import InformedTracker, Limit, Tracker
 from .tuned import tuned_controllers
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from ..runtime.errors import unknown_name
-from .fan_laws_2d import Admittance2D, Hover2D, Oracle2D, Ratio2D
+from .fan_laws import Admittance2D, Hover2D, Oracle2D, Ratio2D
 from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, WindOracle
 
 _WIND: dict[str, Callable[..., Any]] = {

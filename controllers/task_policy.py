@@ -1,8 +1,6 @@
 """Trained policies of the tasks beside ``FanTracking``: weights and a card, flown in NumPy."""
 
 from collections.abc import Mapping
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +67,3 @@ def load_task_policy(path: str | Path) -> TaskPolicy:
     """
     file, card, weights = read_policy(path)
     return TaskPolicy(card, weights, str(file))
-
-
-@cache
-def shipped_task_policies(task: str) -> dict[str, Path]:
-    """Return the file of each policy that comes with the kit for a task, by its name there."""
-    folder = Path(str(resources.files(__package__))).parent / "training" / "policies" / "tasks"
-    start = f"{task}-"
-    found = (path for path in sorted(folder.glob(f"{start}*.npz")))
-    return {path.stem.removeprefix(start): path for path in found}

@@ -10,7 +10,7 @@ from ..controllers import CONTROLLERS, make_controller
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.shipped import shipped_policies
 from ..controllers.task_laws import TASK_LAWS, make_task_law
-from ..controllers.task_policy import load_task_policy, shipped_task_policies
+from ..controllers.task_policy import load_task_policy
 from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.fan_tracking_2d import FanTracking2DEnv
@@ -74,14 +74,14 @@ TASKS: dict[str, Task] = {
         "admittance",
         tuple(TASK_LAWS["FanTracking2D"]),
         ("static", "base", "fast"),
-        partial(shipped_task_policies, "FanTracking2D"),
+        partial(shipped_policies, "FanTracking2D"),
     ),
     **{
         name: Task(
             environment=environment,
             laws=TASK_LAWS[name],
             standard=tuple(TASK_LAWS[name]),
-            policies=partial(shipped_task_policies, name),
+            policies=partial(shipped_policies, name),
             **_WIND,  # type: ignore[arg-type]
         )
         for name, environment in (

@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from ..controllers.fan_laws import Oracle
 from ..controllers.features import History
-from ..controllers.references import Oracle
 from ..controllers.trained_policy import TrainedPolicy, Weights
 from ..evaluation.episodes import DECISIONS
 from .configuration import Config, features_of

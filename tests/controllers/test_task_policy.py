@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers.task_policy import (
-    TaskPolicy,
-    load_task_policy,
-    shipped_task_policies,
-)
+from windwrench.controllers.shipped import shipped_policies
+from windwrench.controllers.task_policy import TaskPolicy, load_task_policy
 from windwrench.controllers.trained_policy import save_policy
 from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import fly_episode
@@ -82,7 +79,7 @@ def test_a_policy_of_another_task_is_refused(tmp_path):
 
 @pytest.mark.parametrize("task", SIZES)
 def test_shipped_policies_fly_better_than_hover(task):
-    shipped = shipped_task_policies(task)
+    shipped = shipped_policies(task)
     assert "gru-0" in shipped
     known, hover = TASKS[task], make_pilot("hover", task)
     env = known.environment("base")

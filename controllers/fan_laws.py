@@ -1,0 +1,222 @@
+"""Hand-designed laws of the tasks with a fan: velocities along y, or along y and z, of the wrench.
+
+With the fan at the origin and the jet along +x, the world's ``tau_z`` is positive at positive y,
+and ``tau_y`` negative above the axis: a vehicle that moves by ``(-k tau_z, +k tau_y)`` moves to the
+axis. (In the body frame of a vehicle that faces the fan, y and the sign turn round.)
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.errors import InputError
+from .observation import DECISION_PERIOD, FORCE_X, MAX_COMMAND, TORQUE_Y, TORQUE_Z
+
+Array = NDArray[np.floating[Any]]
+
+
+class FanLaw:
+    """What the laws share: a command within its limits, and no memory unless a law says so."""
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return the wanted velocity along each commanded axis, m/s."""
+        raise NotImplementedError
+
+    def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
+        """Return the command (1,) m/s for an observation (8,), or (2,) for one of (10,).
+
+        Raises:
+            InputError: an oracle without ``info``.
+        """
+        wanted = self.command(observation, info)
+        return np.clip(wanted, -MAX_COMMAND, MAX_COMMAND).astype(np.float32)
+
+
+class Hover(FanLaw):
+    """Stays where it is: the lower bound, score 0."""
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return no velocity."""
+        return (0.0,)
+
+
+class Hover2D(FanLaw):
+    """Stays where it is: the lower bound, score 0."""
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return no velocities."""
+        return 0.0, 0.0
+
+
+class Oracle(FanLaw):
+    """Sees the fan: moves with it and towards its axis. The upper bound, score 1.
+
+    Args:
+        gain: 1/s, from the true offset to velocity.
+    """
+
+    # entries of the environment's ``info``: the fan's place and velocity, and the vehicle's place
+    entries = "fan_y", "fan_velocity", "y"
+
+    def __init__(self, gain: float = 2.0) -> None:
+        self.gain = gain
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return the fan's velocity, and a share of the true offset.
+
+        Raises:
+            InputError: no ``info``.
+        """
+        if info is None:
+            raise InputError(
+                f"oracle: needs the environment's info ({', '.join(self.entries)}), which only a "
+                "simulator has"
+            )
+        fan, velocity, own = (info[name] for name in self.entries)
+        return tuple(np.atleast_1d(velocity + self.gain * (fan - own)).tolist())
+
+
+class Oracle2D(Oracle):
+    """Sees the fan: moves with it and towards its axis. The upper bound, score 1.
+
+    Args:
+        gain: 1/s, from the true offset to velocity.
+    """
+
+    entries = "fan", "fan_velocity", "position"
+
+
+class Admittance(FanLaw):
+    """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
+    torque.
+
+    Args:
+        gain: m/s per Nm; ``gain`` times the jet's largest torque bounds the speed of a fan that it
+            can follow.
+    """
+
+    def __init__(self, gain: float = 18.0) -> None:
+        self.gain = gain
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return ``-gain tau_z``."""
+        return (-self.gain * o[TORQUE_Z],)
+
+
+class Admittance2D(FanLaw):
+    """Velocities in proportion to the torques, as in McKinnon and Schoellig (2016) for one.
+
+    Args:
+        gain: m/s per Nm, sideways.
+        gain_z: up and down.
+    """
+
+    def __init__(self, gain: float = 18.0, gain_z: float = 18.0) -> None:
+        self.gain, self.gain_z = gain, gain_z
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return ``-gain tau_z`` and ``gain_z tau_y``."""
+        return -self.gain * float(o[TORQUE_Z]), self.gain_z * float(o[TORQUE_Y])
+
+
+class Ratio(FanLaw):
+    """Velocity in proportion to ``tau_z / f_x``, which grows with the offset where ``tau_z`` alone
+    falls off again.
+
+    Args:
+        gain: 1/s per metre-like ratio, m/s per m.
+        least_force: N, below which the force is held to be no jet at all.
+    """
+
+    def __init__(self, gain: float = 8.0, least_force: float = 0.1) -> None:
+        self.gain, self.least_force = gain, least_force
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return ``-gain tau_z / f_x``."""
+        return (-self.gain * o[TORQUE_Z] / max(float(o[FORCE_X]), self.least_force),)
+
+
+class Ratio2D(FanLaw):
+    """Velocities in proportion to the torques over the force along the jet.
+
+    Args:
+        gain: 1/s per metre-like ratio, sideways.
+        gain_z: up and down.
+        least_force: N, below which the force is held to be no jet at all.
+    """
+
+    def __init__(self, gain: float = 8.0, gain_z: float = 8.0, least_force: float = 0.1) -> None:
+        self.gain, self.gain_z, self.least_force = gain, gain_z, least_force
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return ``-gain tau_z / f_x`` and ``gain_z tau_y / f_x``."""
+        force = max(float(o[FORCE_X]), self.least_force)
+        return -self.gain * float(o[TORQUE_Z]) / force, self.gain_z * float(o[TORQUE_Y]) / force
+
+
+class Lead(FanLaw):
+    """Ratio with derivative: ``x = tau_z / max(f_x, least_force)``, ``u = -(gain x + lead dx/dt)``.
+
+    The rate is that from one decision to the next. The rate makes good for part of the filter's
+    lag, and a vehicle that falls behind turns round earlier.
+
+    Args:
+        gain: 1/s.
+        lead: of the rate, m/s per m/s.
+        least_force: N, below which the force is held to be no jet at all.
+    """
+
+    def __init__(self, gain: float = 11.35, lead: float = 2.79, least_force: float = 0.183) -> None:
+        self.gain, self.lead, self.least_force = gain, lead, least_force
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._last: float | None = None
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return ``-(gain x + lead dx/dt)``."""
+        x = float(o[TORQUE_Z]) / max(float(o[FORCE_X]), self.least_force)
+        rate = 0.0 if self._last is None else (x - self._last) / DECISION_PERIOD
+        self._last = x
+        return (-(self.gain * x + self.lead * rate),)
+
+
+class AdmittancePID(FanLaw):
+    """The admittance law with integral and lead: ``u = -(gain tau_z + integral S + lead
+    dtau_z/dt)``, ``S`` the integral of ``tau_z``.
+
+    The integral follows a fan that moves evenly without the steady offset that a proportional law
+    needs. It stops while the command is at its bound and would grow further (no windup).
+
+    Args:
+        gain: m/s per Nm.
+        integral: m/s per Nm s.
+        lead: m/s per Nm/s.
+    """
+
+    def __init__(self, gain: float = 20.0, integral: float = 0.4, lead: float = 7.0) -> None:
+        self.gain, self.integral, self.lead = gain, integral, lead
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self._sum = 0.0
+        self._last: float | None = None
+
+    def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
+        """Return the sum of the three parts."""
+        torque = float(o[TORQUE_Z])
+        rate = 0.0 if self._last is None else (torque - self._last) / DECISION_PERIOD
+        self._last = torque
+        proportional = self.gain * torque + self.lead * rate
+        total = self._sum + DECISION_PERIOD * torque
+        command = -(proportional + self.integral * total)
+        if abs(command) < MAX_COMMAND or command * torque > 0.0:
+            self._sum = total
+        return (-(proportional + self.integral * self._sum),)
