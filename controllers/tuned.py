@@ -1,9 +1,9 @@
-"""The hand-designed laws with gains found by search, ``tuned.yaml``; the file says for which
-scenario and how.
+"""Gains of the hand-designed laws found by search, ``tuned.yaml``; the file says for which scenario
+and how.
 """
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cache, partial
 from importlib import resources
 from typing import Any
 
@@ -11,14 +11,23 @@ import yaml
 
 # the scenario whose gains a law has that is called no more than tuned
 STANDARD = "base"
+# tasks that have a section of their own in the file; all else are laws of FanTracking
+_SECTIONS = ("FanTracking2D", "WindHover", "WindTrajectory")
 
 
-def tuned_gains() -> dict[str, dict[str, dict[str, Any]]]:
-    """Return what is known of tuned gains: law, scenario, and then ``gains`` and how they were
-    found.
-    """
+@cache
+def _file() -> dict[str, dict[str, dict[str, Any]]]:
     text = (resources.files(__package__) / "tuned.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text) or {}
+
+
+def tuned_gains(task: str = "FanTracking") -> dict[str, dict[str, Any]]:
+    """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
+    and how they were found.
+    """
+    if task in _SECTIONS:
+        return _file().get(task, {})
+    return {law: found for law, found in _file().items() if law not in _SECTIONS}
 
 
 def tuned_controllers(laws: Mapping[str, Callable[..., Any]]) -> dict[str, Callable[[], Any]]:

@@ -1,7 +1,7 @@
 """Flying a trajectory in the plant and keeping what a flight log holds."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,45 +40,39 @@ def _waves(
     return waves
 
 
+# standard deviation (m or rad), and the slowest and the fastest frequency (Hz), of waves
+_Wave = tuple[float, float, float]
+
+
+def _path_of_waves(
+    centre: Sequence[float], waves: Sequence[_Wave]
+) -> Callable[[np.random.Generator, Array, float], Array]:
+    """Return what draws x, y, z (m) and yaw (rad) as waves about a centre (4,)."""
+
+    def draw(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
+        columns = [at + _waves(rng, t, *wave) for at, wave in zip(centre, waves, strict=True)]
+        return np.stack(columns, axis=1)
+
+    return draw
+
+
+_DRIFT: _Wave = 0.3, 0.05, 0.2
+
+
 def _hover(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     return np.tile([0.0, 0.0, 1.2, 0.3], (len(t), 1))
 
 
-def _gentle(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 0.4, 0.05, 0.15),
-            _waves(rng, t, 0.4, 0.05, 0.15),
-            1.2 + _waves(rng, t, 0.12, 0.05, 0.15),
-            _waves(rng, t, 0.4, 0.03, 0.1),
-        ],
-        axis=1,
-    )
-
-
-def _excite(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 0.7, 0.1, 0.5),
-            _waves(rng, t, 0.7, 0.1, 0.5),
-            1.4 + _waves(rng, t, 0.18, 0.15, 0.7),
-            _waves(rng, t, 0.8, 0.05, 0.4),
-        ],
-        axis=1,
-    )
-
-
 def _ground(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     height = 0.13 + 0.5 * np.square(np.sin(math.pi * t / rng.uniform(5.0, 7.0)))
-    return np.stack(
-        [
-            _waves(rng, t, 0.3, 0.05, 0.2),
-            _waves(rng, t, 0.3, 0.05, 0.2),
-            height,
-            _waves(rng, t, 0.3, 0.05, 0.2),
-        ],
-        axis=1,
-    )
+    x, y, yaw = (_waves(rng, t, *_DRIFT) for _ in range(3))
+    return np.stack([x, y, height, yaw], axis=1)
+
+
+def _ceiling(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
+    gap = 0.3 + 0.5 * np.square(np.cos(math.pi * t / rng.uniform(5.0, 7.0)))
+    x, y, yaw = (_waves(rng, t, *_DRIFT) for _ in range(3))
+    return np.stack([x, y, ceiling - gap, yaw], axis=1)
 
 
 def _yaw(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
@@ -96,83 +90,40 @@ def _circle(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
     )
 
 
-def _ceiling(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    gap = 0.3 + 0.5 * np.square(np.cos(math.pi * t / rng.uniform(5.0, 7.0)))
-    return np.stack(
-        [
-            _waves(rng, t, 0.3, 0.05, 0.2),
-            _waves(rng, t, 0.3, 0.05, 0.2),
-            ceiling - gap,
-            _waves(rng, t, 0.3, 0.05, 0.2),
-        ],
-        axis=1,
-    )
-
-
-def _vertical(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 0.2, 0.05, 0.2),
-            _waves(rng, t, 0.2, 0.05, 0.2),
-            1.45 + _waves(rng, t, 0.3, 0.2, 0.6),
-            _waves(rng, t, 0.5, 0.05, 0.2),
-        ],
-        axis=1,
-    )
-
-
-def _fast(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 1.3, 0.08, 0.25),
-            _waves(rng, t, 1.3, 0.08, 0.25),
-            1.5 + _waves(rng, t, 0.25, 0.1, 0.5),
-            _waves(rng, t, 0.6, 0.05, 0.2),
-        ],
-        axis=1,
-    )
-
-
-def _shake(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 0.03, 1.2, 2.2),
-            _waves(rng, t, 0.03, 1.2, 2.2),
-            1.3 + _waves(rng, t, 0.1, 0.2, 0.7),
-            _waves(rng, t, 0.4, 0.1, 0.6),
-        ],
-        axis=1,
-    )
-
-
-def _jet(rng: np.random.Generator, t: Array, ceiling: float) -> Array:
-    return np.stack(
-        [
-            _waves(rng, t, 0.25, 0.03, 0.1),
-            _waves(rng, t, 0.7, 0.05, 0.2),
-            1.2 + _waves(rng, t, 0.12, 0.05, 0.2),
-            math.pi + _waves(rng, t, 0.3, 0.05, 0.2),
-        ],
-        axis=1,
-    )
-
-
 # in this order: hover at 1.2 m; slow waves; waves up to 3 m/s and 0.7 Hz; near the floor; steady
 # yaw; a circle of 1 m at 1.2 to 1.8 m/s; near the ceiling; climbs and descents up to 1.5 m/s; waves
 # up to 4 m/s; small waves of 1.2 to 2.2 Hz, for angular acceleration; across the jet of a fan that
 # stands at x = -2.3 m
 TRAJECTORIES: dict[str, Callable[[np.random.Generator, Array, float], Array]] = {
     "hover": _hover,
-    "gentle": _gentle,
-    "excite": _excite,
+    "gentle": _path_of_waves(
+        (0.0, 0.0, 1.2, 0.0),
+        ((0.4, 0.05, 0.15), (0.4, 0.05, 0.15), (0.12, 0.05, 0.15), (0.4, 0.03, 0.1)),
+    ),
+    "excite": _path_of_waves(
+        (0.0, 0.0, 1.4, 0.0),
+        ((0.7, 0.1, 0.5), (0.7, 0.1, 0.5), (0.18, 0.15, 0.7), (0.8, 0.05, 0.4)),
+    ),
     "ground": _ground,
     "yaw": _yaw,
     "circle": _circle,
     "ceiling": _ceiling,
-    "vertical": _vertical,
-    "fast": _fast,
-    "shake": _shake,
-    "jet": _jet,
+    "vertical": _path_of_waves(
+        (0.0, 0.0, 1.45, 0.0),
+        ((0.2, 0.05, 0.2), (0.2, 0.05, 0.2), (0.3, 0.2, 0.6), (0.5, 0.05, 0.2)),
+    ),
+    "fast": _path_of_waves(
+        (0.0, 0.0, 1.5, 0.0),
+        ((1.3, 0.08, 0.25), (1.3, 0.08, 0.25), (0.25, 0.1, 0.5), (0.6, 0.05, 0.2)),
+    ),
+    "shake": _path_of_waves(
+        (0.0, 0.0, 1.3, 0.0),
+        ((0.03, 1.2, 2.2), (0.03, 1.2, 2.2), (0.1, 0.2, 0.7), (0.4, 0.1, 0.6)),
+    ),
+    "jet": _path_of_waves(
+        (0.0, 0.0, 1.2, math.pi),
+        ((0.25, 0.03, 0.1), (0.7, 0.05, 0.2), (0.12, 0.05, 0.2), (0.3, 0.05, 0.2)),
+    ),
 }
 
 

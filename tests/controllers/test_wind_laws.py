@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from windwrench.controllers import wind_observation as seen
-from windwrench.controllers.task_laws import TASK_LAWS, make_task_law, task_gains
+from windwrench.controllers.task_laws import TASK_LAWS, make_task_law
+from windwrench.controllers.tuned import tuned_gains
 from windwrench.controllers.wind_laws import INDI, PID, L1Adaptive, PIDWithForce, WindOracle
 from windwrench.dynamics import InputError
 
@@ -17,7 +18,7 @@ def test_every_law_flies_with_the_gains_that_were_found():
             if name == "hover":
                 continue
             source = "WindHover" if task == "WindTrajectory" else task
-            found = task_gains()[source][name]
+            found = tuned_gains(source)[name]
             assert found["rmse_m"] <= found["default_rmse_m"]
             law = make_task_law(name, task)
             for gain, value in found["gains"].items():
