@@ -10,7 +10,7 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 
 from tests.support.flights import PERIOD, yawing_flight
-from windwrench.dynamics import EffectSetting, InputError, load_vehicle
+from windwrench.dynamics import EffectSetting, load_vehicle
 from windwrench.estimator import UKFTuning, WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
@@ -156,22 +156,3 @@ def test_close_to_the_unscented_filter_with_effects():
     for u, e in pairs[400:]:
         assert np.allclose(u.force, e.force, atol=2e-3)
         assert np.allclose(u.torque, e.torque, atol=5e-5)
-
-
-def test_the_interface_is_that_of_the_unscented_filter():
-    ekf = WrenchEKF(VEHICLE)
-    covariance = 1e-4 * np.eye(18)
-    ekf.reset([0, 0, 1], [1, 0, 0, 0], covariance)
-    assert np.array_equal(ekf.covariance, covariance)
-    hover = np.full(4, VEHICLE.hover_rate)
-    before = ekf.step(hover, [0, 0, 1], [-1, 0, 0, 0])
-    assert before.covariance.shape == (18, 18)
-    assert np.linalg.eigvalsh(before.covariance)[0] > 0
-    assert before.nis < 1
-    with pytest.raises(InputError, match="quaternion"):
-        ekf.step(hover, [0, 0, 1], [2, 0, 0, 0])
-    with pytest.raises(InputError, match="rotor_speeds"):
-        ekf.step(hover[:3])
-    assert np.array_equal(ekf.estimate.state, before.state)
-    assert np.array_equal(ekf.predict(hover, PERIOD).covariance, ekf.covariance)
-    assert ekf.correct([0, 0, 1.0], None).nis >= 0

@@ -89,6 +89,7 @@ def test_repr_is_short_and_says_what_it_is():
         ([[1.0], [1.0, 2.0]], *POSE, "got a list of list"),
         (SPEEDS, {"x": 1}, POSE[1], "expected position (3,) in m or None, got dict"),
         (SPEEDS, POSE[0], (1.0, 0.0), "expected quaternion (4,) or None, got shape (2,)"),
+        (SPEEDS, POSE[0], (2.0, 0.0, 0.0, 0.0), "quaternion must have length 1, got 2"),
         ([376.0, 376.0, -1.0, 376.0], *POSE, "must not be negative, got -1 rad/s"),
         (np.array([376.0, 376.0, -1.0, np.nan]), *POSE, "must not be negative, got "),
     ],
