@@ -1,14 +1,19 @@
 """Are a log's gyro and accelerometer what their columns claim: rad/s and m/s2, body axes forward,
 left, up?
 
-The pose knows. Over a short window the mean of the gyro is the turn of the attitude,
-``log(q(t)^-1 q(t + T)) / T``, but for a bias; and the accelerometer turned into the world, averaged
-twice over ``T``, is the second difference of the position, plus gravity:
+Where there is a pose, the pose knows. Over a short window the mean of the gyro is the turn of the
+attitude, ``log(q(t)^-1 q(t + T)) / T``, but for a bias; and the accelerometer turned into the
+world, averaged twice over ``T``, is the second difference of the position, plus gravity:
 ``(p(t + T) - 2 p(t) + p(t - T)) / T^2 + g e3``. Both hold whatever the vehicle's model lacks, on
-logs of any length. A sensor that contradicts them is left out, with a note of what it looks like:
-the pose and the rotors are enough for everything.
+logs of any length. A sensor that contradicts them is left out, with a note: the pose and the rotors
+are enough for everything.
+
+Where there is no pose, gravity shows the accelerometer's unit and axes: a flight's mean specific
+force is gravity, upwards in body axes. Such a log is refused. The rotors show the gyro's; see
+``evidence``. What neither shows (an accelerometer turned about z) stays the log's word.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +21,10 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
+from ...dynamics.vehicle import Vehicle
+from ...runtime.errors import InputError
+from ..motion.inertial_signals import inertial_pieces
+from .evidence import EVIDENCE, ratio
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 
 Array = NDArray[np.float64]
@@ -23,7 +32,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class InertialSettings:
-    """How inertial sensors are compared with the pose."""
+    """How inertial sensors are compared."""
 
     window: float = 0.2  # s: 5 mm of pose noise make 0.3 m/s2 over it
     step: float = 0.05  # s between two comparisons
@@ -31,34 +40,39 @@ class InertialSettings:
     fewest: int = 10  # comparisons that decide something
     samples: int = 20  # of pose and of sensor that do
     still: float = 0.1  # rad/s: what pose noise makes of the rate of a vehicle that stands still
-    bad: float = 0.4  # share of the motion that a sensor as declared leaves, if it is wrong
-    good: float = 0.2  # share that another reading of it may leave
+    least_hz: float = 45.0  # without a pose: a quadrotor turns within a tenth of a second
+    # of gravity, between which the median specific force of a flight lies
+    force: tuple[float, float] = (0.6, 1.7)
+    upright: float = 0.7  # cosine of the mean specific force's angle from body z
 
 
 INERTIAL = InertialSettings()
-
+AXES = {"flu": np.eye(3), "frd": np.diag([1.0, -1.0, -1.0])}  # by which readings are multiplied
 _G = 9.80665  # m/s2 in one g
-_FRD = np.diag([1.0, -1.0, -1.0])
 _DEGREES = np.pi / 180.0
-_FRD_WORDS = "of body axes forward, right, down; expected forward, left, up: negate y and z"
-_G_WORDS = "g; expected m/s2: multiply by 9.80665"
-_DEGREES_WORDS = "degrees per second; expected rad/s: multiply by 0.0174533"
-_GYRO_READINGS = (
-    (_DEGREES * np.eye(3), f"look like {_DEGREES_WORDS}"),
-    (_FRD, f"look like those {_FRD_WORDS}"),
-    (_DEGREES * _FRD, f"look like {_DEGREES_WORDS}, and like those {_FRD_WORDS}"),
-    (-np.eye(3), "look inverted: negate all three"),
-)
-_ACCELEROMETER_READINGS = (
-    (_G * np.eye(3), f"look like {_G_WORDS}"),
-    (_FRD, f"look like those {_FRD_WORDS}"),
-    (_G * _FRD, f"look like {_G_WORDS}, and like those {_FRD_WORDS}"),
-    (-np.eye(3), "look inverted (gravity, not specific force): negate all three"),
+_FRD_WORDS = "those of body axes forward, right, down; expected forward, left, up: negate y and z"
+
+
+def _readings(unit: float, unit_words: str, inverted: str) -> tuple[tuple[Array, str], ...]:
+    """Return other readings of a sensor: by what columns are multiplied, and in words."""
+    frd = AXES["frd"]
+    return (
+        (unit * np.eye(3), f"look like {unit_words}"),
+        (frd, f"look like {_FRD_WORDS}"),
+        (unit * frd, f"look like {unit_words}, and like {_FRD_WORDS}"),
+        (-np.eye(3), f"look inverted{inverted}: negate all three"),
+    )
+
+
+GYRO_READINGS = _readings(_DEGREES, "degrees per second; expected rad/s: multiply by 0.0174533", "")
+_ACCELEROMETER_READINGS = _readings(
+    _G, "g; expected m/s2: multiply by 9.80665", " (gravity, not specific force)"
 )
 _GRAVITY_LEFT_OUT = (
     "look like an acceleration without gravity; expected the specific force that an accelerometer "
     "measures, 9.81 m/s2 along z in a hover"
 )
+_UNITS = {"g": (_G, "multiply by 9.80665"), "milli-g": (1e-3 * _G, "multiply by 0.00980665")}
 
 
 def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
@@ -86,21 +100,43 @@ def _gyro_doubt(log: FlightLog, gyro: Array) -> str:
     t, measured = log.t[read], gyro[read]
     if _stuck(measured):
         return "never change: the gyro was not read"
-    begins = _windows(log, t, before=0.0)
-    if len(begins) < INERTIAL.fewest:
+    turns = [np.eye(3), *(A for A, _ in GYRO_READINGS)]
+    seen = np.flatnonzero(log.valid)
+    rotation = Rotation.from_quat(log.quaternion[seen], scalar_first=True)
+    shares = gyro_shares(t, measured, log.t[seen], rotation, turns)
+    if shares is None or shares[0] <= EVIDENCE.good:
         return ""
-    attitude = _attitude(log)
-    ends = begins + INERTIAL.window
-    turned = (attitude(begins).inv() * attitude(ends)).as_rotvec() / INERTIAL.window
-    sum_of = cumulative_trapezoid(measured, t, axis=0, initial=0.0)
+    readings = [
+        (float(left), words) for left, (_, words) in zip(shares[1:], GYRO_READINGS, strict=True)
+    ]
+    return _words(float(shares[0]), readings, "contradict the attitude's rate")
+
+
+def gyro_shares(
+    t: Array, gyro: Array, pose_times: Array, attitude: Rotation, turns: Sequence[Array]
+) -> Array | None:
+    """Return which share of the attitude's rate a gyro leaves, by each of several readings; None
+    where too little is measured.
+
+    Args:
+        t: (N,) s, of the gyro.
+        gyro: (N, 3) as it stands.
+        pose_times: (M,) s.
+        attitude: (M) body to world.
+        turns: (3, 3) each, by which a reading multiplies the gyro.
+    """
+    read = np.isfinite(t) & np.isfinite(gyro).all(axis=1)
+    t, gyro = t[read], gyro[read]
+    begins = _windows(pose_times, t, before=0.0)
+    if len(begins) < INERTIAL.fewest:
+        return None
+    at, ends = Slerp(pose_times, attitude), begins + INERTIAL.window
+    turned = (at(begins).inv() * at(ends)).as_rotvec() / INERTIAL.window
+    sum_of = cumulative_trapezoid(gyro, t, axis=0, initial=0.0)
     mean = (_at(t, sum_of, ends) - _at(t, sum_of, begins)) / INERTIAL.window
     motion, seen = turned - np.median(turned, axis=0), mean - np.median(mean, axis=0)  # a bias
     size = _middle(motion) + INERTIAL.still**2
-    left = _middle(motion - seen) / size
-    if left <= INERTIAL.bad:
-        return ""
-    readings = [(_middle(motion - seen @ A.T) / size, words) for A, words in _GYRO_READINGS]
-    return _words(left, readings, "contradict the attitude's rate")
+    return np.array([_middle(motion - seen @ A.T) / size for A in turns])
 
 
 def _accelerometer_doubt(log: FlightLog, accelerometer: Array, gravity: float) -> str:
@@ -109,7 +145,7 @@ def _accelerometer_doubt(log: FlightLog, accelerometer: Array, gravity: float) -
     t, measured = log.t[read], accelerometer[read]
     if _stuck(measured):
         return "never change: the accelerometer was not read"
-    middles = _windows(log, t, before=INERTIAL.window)
+    middles = _windows(log.t[log.valid], t, before=INERTIAL.window)
     if len(middles) < INERTIAL.fewest:
         return ""
     seen, T = np.flatnonzero(log.valid), INERTIAL.window
@@ -129,7 +165,7 @@ def _accelerometer_doubt(log: FlightLog, accelerometer: Array, gravity: float) -
 
     size = _middle(needed)
     left = _middle(needed - mean(measured)) / size
-    if left <= INERTIAL.bad:
+    if left <= EVIDENCE.good:
         return ""
     readings = [
         (_middle(needed - mean(measured @ A.T)) / size, words)
@@ -142,7 +178,8 @@ def _accelerometer_doubt(log: FlightLog, accelerometer: Array, gravity: float) -
 
 def _words(left: float, readings: list[tuple[float, str]], else_words: str) -> str:
     best, words = min(readings)
-    return words if best <= min(INERTIAL.good, 0.5 * left) else else_words
+    clear = best <= EVIDENCE.good and ratio(left, best, 3) >= EVIDENCE.refused
+    return words if clear else else_words
 
 
 def _stuck(measured: Array) -> bool:
@@ -154,11 +191,10 @@ def _middle(vectors: Array) -> float:
     return float(np.median(np.sum(np.square(vectors), axis=1)))
 
 
-def _windows(log: FlightLog, sensor_times: Array, before: float) -> Array:
+def _windows(pose_times: Array, sensor_times: Array, before: float) -> Array:
     """Return times (n,) in s around which, from ``before`` before to a window after, neither pose
     nor sensor has a gap.
     """
-    pose_times = log.t[log.valid]
     if min(len(pose_times), len(sensor_times)) < INERTIAL.samples:
         return np.empty(0)
     first = max(pose_times[0], sensor_times[0]) + before
@@ -181,3 +217,78 @@ def _attitude(log: FlightLog) -> Slerp:
 
 def _at(t: Array, values: Array, times: Array) -> Array:
     return np.column_stack([np.interp(times, t, column) for column in values.T])
+
+
+def check_imu(log: FlightLog, vehicle: Vehicle, least: float | None, where: str) -> None:
+    """Check rate, length, unit and axes of a log's IMU.
+
+    Args:
+        log: with gyro and accelerometer.
+        vehicle: as declared.
+        least: s of unbroken IMU that the log must have; None: any.
+        where: the file, for messages.
+
+    Raises:
+        InputError: one is wrong; the message says what it looks like.
+    """
+    assert log.gyro is not None
+    assert log.accelerometer is not None
+    read = np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0])
+    rows = np.flatnonzero(read)
+    if len(rows) < INERTIAL.samples:
+        raise InputError(
+            f"{where}: ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected "
+            "them in the same rows, and a whole flight"
+        )
+    for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
+        if np.all(np.ptp(x[rows], axis=0) == 0.0):
+            raise InputError(f"{where}: {names} never change: the sensor was not read")
+    rate = 1.0 / float(np.median(np.diff(log.t[rows])))
+    if rate < INERTIAL.least_hz:
+        raise InputError(
+            f"{where}: {rate:.3g} IMU readings a second and no pose as fast; expected at least "
+            f"{INERTIAL.least_hz:g}: a quadrotor turns within a tenth of a second"
+        )
+    pieces = inertial_pieces(log)
+    if least is not None:
+        there = sum(float(log.t[p[-1]] - log.t[p[0]]) for p in pieces)
+        if there < least - 1e-9:
+            raise InputError(
+                f"{where}: {there:.3g} s of unbroken gyro and accelerometer; expected at least "
+                f"{least:g} s of flight, in runs of more than 3 s"
+            )
+    _check_gravity(log.accelerometer[rows], log.rotor_speeds[rows], vehicle, where)
+
+
+def _check_gravity(force: Array, speeds: Array, vehicle: Vehicle, where: str) -> None:
+    """Check that the specific force (n, 3) of a flight is gravity, upwards."""
+    thrust = np.square(speeds) @ vehicle.k
+    flying = thrust > 0.5 * float(np.quantile(thrust, 0.9))
+    middle = np.median(force[flying], axis=0)
+    size = float(np.median(np.linalg.norm(force[flying], axis=1)))
+    low, high = INERTIAL.force
+    if not low <= size / vehicle.gravity <= high:
+        for unit, (factor, how) in _UNITS.items():
+            if low <= size * factor / vehicle.gravity <= high:
+                raise InputError(
+                    f"{where}: ax, ay, az look like {unit}: in flight they are {size:.3g} in the "
+                    f"median; expected m/s2, {vehicle.gravity:.3g} in a hover: {how}"
+                )
+        raise InputError(
+            f"{where}: ax, ay, az are {size:.3g} m/s2 in the median of a flight; expected the "
+            f"specific force, which gravity makes about {vehicle.gravity:.3g}"
+            + (" (an acceleration without gravity is none)" if size < vehicle.gravity else "")
+        )
+    upright = float(middle[2] / max(float(np.linalg.norm(middle)), 1e-9))
+    if upright < -INERTIAL.upright:
+        raise InputError(
+            f"{where}: az is {middle[2]:.3g} m/s2 in the median of a flight: the axes look like "
+            "forward, right, down, or inverted; expected forward, left, up and +9.81 in a hover: "
+            "negate ay and az (and gy and gz)"
+        )
+    if upright < INERTIAL.upright:
+        axis = "xyz"[int(np.argmax(np.abs(middle)))]
+        raise InputError(
+            f"{where}: gravity lies along a{axis} in the median of a flight; expected it along az: "
+            "axes forward, left, up, of the vehicle and not of the sensor's board"
+        )

@@ -9,9 +9,11 @@ the field is a guess.
 """
 
 import io
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -21,10 +23,13 @@ from numpy.typing import NDArray
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from .column_names import PLACES, Group, Name, best_group, groups_of, take_apart
-from .flight_physics import FlightPhysics, Pose
+from .evidence import EVIDENCE, Evidence, Ranking, ratio
+from .inertial import AXES, gyro_shares
 from .layout_guess import FoundLayout
 from .log_map import (
     COMMAND_UNITS,
+    LENGTH_UNITS,
+    RATE_UNITS,
     ROTOR_UNITS,
     TIME_UNITS,
     Attitude,
@@ -36,6 +41,7 @@ from .log_map import (
     Sensor,
     TimeColumn,
 )
+from .readings import DECLARED, rotations, table_readings
 from .rotor_orders import ORDERS, Order, order_names, order_words
 from .table import Table
 
@@ -188,15 +194,13 @@ def _guess(table: Table, names: list[Name], vehicle: Vehicle | None, name: str) 
         if group is not None and rivals[part] > 1:
             why = f"{rivals[part]} groups of columns look like it; taken: {group.columns[0]} ..."
             found.say(section, name_of_field, False, why)
-    physics = FlightPhysics(t, GUESS.samples)
     given: dict[str, Any] = {"time": time, "name": name}
-    motors = _motor_values(found, parts)
-    best = None
+    pose = None
     if parts["position"] is not None:
-        pose_map, best = _pose(found, parts, physics, motors)
+        pose_map, pose = _pose(found, parts, t)
         given |= pose_map
-    given |= _imu(found, parts, physics, best, given.get("body", ""))
-    given |= _motors(found, parts, physics, best, given, vehicle)
+    given |= _imu(found, parts, t, pose, given.get("body", ""))
+    given |= _motors(found, parts, t, pose, given, vehicle)
     given |= _battery(found, parts["battery"])
     used = set(wanted)
     return Guess(
@@ -338,65 +342,65 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
     return (raw - begin) * TIME_UNITS[unit], TimeColumn(name.column, unit)
 
 
-def _motor_values(found: _Found, parts: Mapping[str, Group | None]) -> Array | None:
-    group = parts["motors"] or parts["commands"]
-    return None if group is None else found.values(group.columns)
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """How a table's pose is read, and the evidence."""
+
+    evidence: Evidence
+    ranking: Ranking
+    attitude: Array  # columns (N, 3 or 4)
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the body's turning is known."""
+        names = ("world", "body", "sense", "order", "pitch_sign", "unit")
+        return self.ranking.certain(*names)
 
 
 def _pose(
-    found: _Found,
-    parts: Mapping[str, Group | None],
-    physics: FlightPhysics,
-    motors: Array | None,
-) -> tuple[dict[str, Any], "Pose"]:
+    found: _Found, parts: Mapping[str, Group | None], t: Array
+) -> tuple[dict[str, Any], _Pose]:
     """Return the map's sections of the pose and what they make of the table."""
     place, quaternion, angles = parts["position"], parts["quaternion"], parts["angles"]
+    group, motors = quaternion or angles, parts["motors"] or parts["commands"]
     assert place is not None
-    group = quaternion or angles
     assert group is not None
+    assert motors is not None
     attitude = found.values(group.columns)
-    orders: tuple[str, ...] = ("wxyz",)
-    if quaternion is not None and quaternion.numbered:
-        orders = ("wxyz", "xyzw")
-    units: tuple[str, ...] = ("",)
-    if quaternion is None:
-        units = (group.unit,) if group.unit in ("deg", "rad") else ("deg", "rad")
-        if len(units) == 2 and np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
-            units = ("deg",)
-    hint = "ned" if any(w in "".join(place.columns).lower() for w in ("ned", "down")) else ""
-    best = physics.best_pose(
-        found.values(place.columns),
-        attitude,
-        motors,
-        orders=orders,
-        units=units,
-        length=place.unit if place.unit in ("m", "cm", "mm") else "",
-        euler=quaternion is None,
-        hint=hint,
+    units: tuple[str, ...] = ("deg", "rad")
+    if group.unit in units:
+        units = (group.unit,)
+    elif np.nanmax(np.abs(attitude[:, :2]), initial=0.0) > np.pi:
+        units = ("deg",)
+    orders = () if quaternion is None else ("wxyz", "xyzw") if quaternion.numbered else ("wxyz",)
+    named = place.unit in LENGTH_UNITS
+    readings = table_readings(
+        orders,
+        units,
+        lengths=(place.unit,) if named else ("m", "cm", "mm"),
+        hint="ned" if re.search("ned|down", "".join(place.columns).lower()) else "",
     )
-    fit = f"{best.left:.0%} of the horizontal acceleration is left unexplained by the tilt"
-    sections: dict[str, Any] = {"world": best.world, "body": best.body}
-    found.say("world", "", best.sure("world"), f"{best.world}: {fit}{best.margin('world')}")
-    found.say(
-        "body", "", best.sure("body"), f"{best.body}: the thrust points up{best.margin('body')}"
-    )
-    if place.unit in ("m", "cm", "mm"):
+    thrusts = np.square(found.values(motors.columns))
+    evidence = Evidence(t, thrusts, found.values(place.columns), attitude)
+    ranking = Ranking.of(evidence, readings)
+    best = ranking.best
+    fit = f"{ranking.fit.horizontal:.0%} of the horizontal acceleration is left by the tilt"
+
+    def say(section: str, name: str, prop: str) -> None:
+        other, lead = ranking.other(prop)
+        why = f"{getattr(best, prop)}: {fit}"
+        if other is not None and lead > 0.0:
+            why += f", and {other} is less likely by a log-likelihood ratio of {lead:.3g}"
+        found.say(section, name, ranking.certain(prop), why)
+
+    say("world", "", "world")
+    say("body", "", "body")
+    if named:
         found.say("position", "unit", True, f"{best.length} by the columns' names")
     else:
-        found.say(
-            "position",
-            "unit",
-            best.sure_length,
-            f"{best.length}: accelerations are {best.gain:.3g} times gravity's tilt in m",
-        )
-    made: Attitude
-    if quaternion is not None:
-        made = Attitude(group.columns, order=best.order, sense=best.sense)
-        if quaternion.numbered:
-            found.say("attitude", "order", best.sure("order"), f"{best.order}: {fit}")
-        else:
-            found.say("attitude", "order", True, "by the columns' names")
-    else:
+        say("position", "unit", "length")
+    say("attitude", "sense", "sense")
+    if quaternion is None:
         signs = (1, best.pitch_sign, 1) if best.pitch_sign < 0 else ()
         made = Attitude(
             group.columns, unit=best.unit, euler=best.euler, sense=best.sense, signs=signs
@@ -405,32 +409,29 @@ def _pose(
             why = "by the columns' names" if group.unit else "angles beyond pi"
             found.say("attitude", "unit", True, f"{best.unit}: {why}")
         else:
-            found.say("attitude", "unit", best.sure("unit"), f"{best.unit}: {fit}")
-        found.say(
-            "attitude",
-            "euler",
-            best.sure("euler"),
-            f"{best.euler}: the usual order, and {fit}{best.margin('euler')}",
-        )
-        found.say(
-            "attitude",
-            "signs",
-            best.sure("pitch_sign"),
-            f"pitch {'turned over' if best.pitch_sign < 0 else 'as it stands'}: {fit}",
-        )
-    found.say("attitude", "sense", best.sure("sense"), f"{best.sense}: {fit}{best.margin('sense')}")
-    sections |= {
+            say("attitude", "unit", "unit")
+        say("attitude", "euler", "euler")
+        say("attitude", "signs", "pitch_sign")
+    else:
+        made = Attitude(group.columns, order=best.order, sense=best.sense)
+        if quaternion.numbered:
+            say("attitude", "order", "order")
+        else:
+            found.say("attitude", "order", True, "by the columns' names")
+    sections = {
+        "world": best.world,
+        "body": best.body,
         "position": Columns(place.columns, best.length),
         "attitude": made,
     }
-    return sections, best
+    return sections, _Pose(evidence, ranking, attitude)
 
 
 def _imu(
     found: _Found,
     parts: Mapping[str, Group | None],
-    physics: FlightPhysics,
-    pose: "Pose | None",
+    t: Array,
+    pose: _Pose | None,
     body: str,
 ) -> dict[str, Any]:
     """Return the sections of the inertial sensors."""
@@ -456,7 +457,7 @@ def _imu(
         values = found.values(gyro.columns)
         unit = gyro.unit if gyro.unit in ("rad/s", "deg/s") else ""
         if pose is not None:
-            unit2, axes2, sure, why = physics.gyro(values, pose, unit)
+            unit2, axes2, sure, why = _gyro_by_pose(t, values, pose, unit)
             found.say("gyro", "unit", bool(unit) or sure, unit or f"{unit2}: {why}")
             found.say("gyro", "body", sure, f"{axes2}: {why}")
             out["gyro"] = Sensor(gyro.columns, unit2, body=axes2)
@@ -475,6 +476,23 @@ def _imu(
     if body == "" and axes:
         out["body"] = axes
     return out
+
+
+def _gyro_by_pose(t: Array, values: Array, pose: _Pose, named: str) -> tuple[str, str, bool, str]:
+    """Return a gyro's unit and body axes, whether they are sure, and why."""
+    good, rotation = rotations(pose.attitude, pose.ranking.best)
+    rows = np.flatnonzero(good)
+    rows = rows[np.isfinite(t[rows])]
+    ways = list(product((named,) if named else ("rad/s", "deg/s"), AXES))
+    turns = [RATE_UNITS[unit] * AXES[body] for unit, body in ways]
+    shares = gyro_shares(t, values, t[rows], rotation[np.isfinite(t[good])], turns)
+    if shares is None:
+        return *ways[0], False, "the log is too short"
+    first, second = np.argsort(shares)[:2]
+    left = float(shares[first])
+    clear = ratio(shares[second], left, 3) >= EVIDENCE.certain
+    sure = pose.is_sure and left <= EVIDENCE.good and clear
+    return *ways[first], sure, f"{left:.0%} of the attitude's rate is left unexplained"
 
 
 def _acceleration_unit(found: _Found, named: str, size: float) -> tuple[str, float]:
@@ -496,8 +514,8 @@ def _acceleration_unit(found: _Found, named: str, size: float) -> tuple[str, flo
 def _motors(
     found: _Found,
     parts: Mapping[str, Group | None],
-    physics: FlightPhysics,
-    pose: "Pose | None",
+    t: Array,
+    pose: _Pose | None,
     given: Mapping[str, Any],
     vehicle: Vehicle | None,
 ) -> dict[str, Any]:
@@ -520,7 +538,7 @@ def _motors(
             limits = COMMAND_UNITS[unit] or (0.0, 65535.0)
             if unit in ("us", "counts", "dshot"):
                 found.say(kind, "range", False, f"{limits[0]:g} to {limits[1]:g}, the usual one")
-        order, sure, why = _order(found, group, values, kind, physics, pose, given)
+        order, sure, why = _order(found, group, values, t, pose, given)
         found.say(kind, "order", sure, why)
         if kind == "rotors":
             made = Rotors(group.columns, unit, order=order, pole_pairs=pairs)
@@ -597,48 +615,44 @@ def _order(
     found: _Found,
     group: Group,
     values: Array,
-    kind: str,
-    physics: FlightPhysics,
-    pose: "Pose | None",
+    t: Array,
+    pose: _Pose | None,
     given: Mapping[str, Any],
 ) -> tuple[Order, bool, str]:
     """Return the order of the rotors, whether it is certain, and why."""
     if group.key.startswith("place:"):
         return ORDERS["windwrench"], True, "the columns are named by the rotors' places"
-    thrusts = np.square(values) if kind == "rotors" else values
-    rates = None
-    gyro = given.get("gyro")
-    if isinstance(gyro, Sensor):
-        rates = physics.rates_of(found.values(gyro.columns), gyro.unit, gyro.body)
-    known = physics.orders(thrusts, pose, rates)
     text = " ".join(group.columns).lower()
     hint = next((name for word, name in _HINTS.items() if word in text), "windwrench")
-    if not known:
+    gyro, thrusts = given.get("gyro"), np.square(values)
+    evidence, best = None, DECLARED
+    if isinstance(gyro, Sensor):
+        rates = found.values(gyro.columns) * RATE_UNITS[gyro.unit] @ AXES[gyro.body]
+        evidence = Evidence(t, thrusts, gyro=rates)
+    elif pose is not None and pose.is_sure:
+        best = pose.ranking.best
+        evidence = Evidence(t, thrusts, found.values(given["position"].columns), pose.attitude)
+    if evidence is None or not evidence.enough:
         return ORDERS[hint], False, f"{hint}: the log does not show how the body turns"
-    ranked = sorted(known.items(), key=lambda item: item[1])
-    (best, left), (_, second) = ranked[0], ranked[1]
-    sure = physics.sure_order(left, second)
-    if not sure and order_names(best) and physics.likely_order(left, second):
-        return (
-            best,
-            False,
-            f"{order_names(best)[0]}: likeliest, it leaves {left / 2:.0%} of the angular "
-            f"acceleration unexplained, the next best {second / 2:.0%}",
-        )
-    if not sure:
-        return (
-            ORDERS[hint],
-            False,
-            f"{hint}: no order explains the body's turning much better than all others",
-        )
-    names = order_names(best)
-    what = names[0] if names else order_words(best)
-    return (
-        best,
-        True,
-        f"{what}: it leaves {left / 2:.0%} of the angular acceleration unexplained, the next best "
-        f"{second / 2:.0%}",
+    ranked = evidence.orders(best)
+    (left, reading), (second, _) = ranked[0], ranked[1]
+    order = reading.motors
+    names = order_names(order)
+    lead = left.log_likelihood - second.log_likelihood
+    why = (
+        f"{names[0] if names else order_words(order)}: {left.torque:.0%} of the angular "
+        f"acceleration is left, and the next best is less likely by a log-likelihood ratio of "
+        f"{lead:.3g}"
     )
+    if (
+        left.torque <= EVIDENCE.good_torque
+        and lead >= EVIDENCE.certain
+        and evidence.turns(best) >= EVIDENCE.turning
+    ):
+        return order, True, why
+    if names and left.torque <= 0.9 and lead >= EVIDENCE.unusual:
+        return order, False, why
+    return ORDERS[hint], False, f"{hint}: no order is much likelier than all others"
 
 
 def _battery(found: _Found, group: Group | None) -> dict[str, Any]:

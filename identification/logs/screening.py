@@ -23,10 +23,11 @@ from ...runtime.errors import InputError
 from ..motion.inertial_signals import reads_imu
 from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass
-from .conventions import Balances, recognise, time_shift
+from .evidence import Evidence, contradicted, recognise
 from .excerpt import excerpt
 from .flight_log import FlightLog
-from .inertial_screening import check_imu, check_rotation, inertial_balances
+from .inertial import GYRO_READINGS, check_imu
+from .readings import DECLARED, rotor_readings
 from .stuck_channels import stuck_notes
 
 Array = NDArray[np.float64]
@@ -189,9 +190,9 @@ class _Screening:
                 f"expected at "
                 f"least {least_seconds:g} s in flight, in runs of more than {_LEAST_PIECE:g} s"
             )
-        balances = Balances(excerpt([log])[0], vehicle) if pieces else None
-        if balances is not None:
-            _check_conventions(balances, where)
+        evidence = Evidence.of_log(excerpt([log])[0], vehicle) if pieces else None
+        if evidence is not None:
+            _check_conventions(evidence, where)
         _, _, far, turned = _leaps(log)
         if far.size and np.mean(far | turned) > _MOST_LEAPS:
             _check_leaps(log, where)
@@ -199,8 +200,8 @@ class _Screening:
         self.part(_check_clock, log)
         if least_seconds is not None:
             self.notes += _check_length(log, vehicle, pieces, least_seconds, where)
-        if balances is not None:
-            self.part(_check_shift, balances)
+        if evidence is not None:
+            self.part(_check_shift, evidence)
         return log, tuple(self.notes)
 
     def run_by_imu(self, least_seconds: float | None) -> tuple[FlightLog, tuple[str, ...]]:
@@ -217,16 +218,16 @@ class _Screening:
         log = self.turning(log)
         check_imu(log, vehicle, least_seconds, where)
         self.notes += stuck_notes(log, vehicle)
-        balances = inertial_balances(excerpt([log])[0], vehicle)
-        check_rotation(balances, where)
-        self.part(_check_shift, balances)
+        evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu=True)
+        _check_rotation(evidence, where)
+        self.part(_check_shift, evidence)
         return log, tuple(self.notes)
 
 
-def _check_shift(balances: Balances, where: str) -> None:
+def _check_shift(evidence: Evidence, where: str) -> None:
     """Check that rotor speeds and pose are on one clock."""
-    shift = time_shift(balances)
-    if shift is not None:
+    if evidence.shift is not None:
+        shift = evidence.shift[0]
         late, sooner = ("late", "earlier") if shift > 0 else ("early", "later")
         raise InputError(
             f"{where}: the rotor speeds come {abs(shift):.2f} s too {late} against the motion; "
@@ -441,13 +442,29 @@ def _lost_words(log: FlightLog) -> str:
     )
 
 
-def _check_conventions(balances: Balances, where: str) -> None:
-    readings = recognise(balances)
+def _check_conventions(evidence: Evidence, where: str) -> None:
+    readings = recognise(evidence)
     if readings:
         says = "; or ".join(dict.fromkeys(reading.says for reading in readings[:3]))
         raise InputError(
             f"{where}: {says}. As logged, the motion contradicts the rotor speeds and gravity"
         )
+
+
+def _check_rotation(evidence: Evidence, where: str) -> None:
+    """Check that the rotors, as logged, turn the body as the gyro shows, or say which reading of
+    the columns explains the turning.
+    """
+    if not evidence.enough or not contradicted(evidence.torques(DECLARED)):
+        return
+    fits = [
+        (evidence.torques(DECLARED, turn), f"gx, gy, gz {words}") for turn, words in GYRO_READINGS
+    ]
+    fits += [(evidence.torques(reading), reading.says) for reading in rotor_readings()]
+    likely = evidence.likelier(fits)
+    if likely:
+        says = "; or ".join(dict.fromkeys(likely[:3]))
+        raise InputError(f"{where}: {says}. As logged, the gyro contradicts the rotors' torques")
 
 
 def _leaps(log: FlightLog) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:

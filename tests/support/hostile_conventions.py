@@ -132,7 +132,7 @@ HOSTILE = {
     ),
     "scalar last, NED": (
         lambda log: scalar_last(ned(log)),
-        "quaternion is scalar last and the world z down",
+        "quaternion is scalar last and the world (is )?z down",
     ),
     "millimetres": (
         lambda log: replace(log, position=1e3 * log.position),
