@@ -186,7 +186,8 @@ class Evidence:
         self._turnings: dict[object, _Turning] = {}
         self._needed: dict[object, Array] = {}
         self._torques: dict[object, tuple[float, ...]] = {}
-        moving = [x for x in (position, attitude) if x is not None] or [gyro]
+        known = [x for x in (position, attitude) if x is not None]
+        moving = known or [x for x in (gyro,) if x is not None]
         there = np.isfinite(t) & np.all([np.isfinite(x).all(axis=1) for x in moving], axis=0)
         self._pieces = self._cut(np.flatnonzero(there))
 
@@ -223,12 +224,12 @@ class Evidence:
             low_pass(p.even(self._t, self._thrusts), CUTOFFS.convention_hz, p.period) @ self._k
             for p in pieces
         ]
-        every = np.concatenate(totals)
-        turning = every[every > 0.1 * float(np.quantile(every, 0.9))]
+        total = np.concatenate(totals)
+        turning = total[total > 0.1 * float(np.quantile(total, 0.9))]
         least = EVIDENCE.flying * float(np.median(turning)) if turning.size else np.inf
         return [
-            replace(p, compared=p.compared[total[p.compared] > least])
-            for p, total in zip(pieces, totals, strict=True)
+            replace(p, compared=p.compared[x[p.compared] > least])
+            for p, x in zip(pieces, totals, strict=True)
         ]
 
     @property

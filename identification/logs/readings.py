@@ -309,7 +309,7 @@ def rotations(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rota
 
 def as_written(columns: Array, reading: Reading) -> tuple[NDArray[np.bool_], Rotation]:
     """Return the same in the columns' own frames and sense."""
-    good = np.isfinite(columns).all(axis=1)
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(columns).all(axis=1))
     if reading.euler:
         angles = columns[good] * ANGLE_UNITS[reading.unit] * [1.0, reading.pitch_sign, 1.0]
         axes = ["xyz".index(axis) for axis in reading.euler]
