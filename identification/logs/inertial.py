@@ -1,16 +1,12 @@
 """Are a log's gyro and accelerometer what their columns claim: rad/s and m/s2, body axes forward,
 left, up?
 
-Where there is a pose, the pose knows. Over a short window the mean of the gyro is the turn of the
+The pose knows. Over a short window the mean of the gyro is the turn of the
 attitude, ``log(q(t)^-1 q(t + T)) / T``, but for a bias; and the accelerometer turned into the
 world, averaged twice over ``T``, is the second difference of the position, plus gravity:
 ``(p(t + T) - 2 p(t) + p(t - T)) / T^2 + g e3``. Both hold whatever the vehicle's model lacks, on
 logs of any length. A sensor that contradicts them is left out, with a note: the pose and the rotors
 are enough for everything.
-
-Where there is no pose, gravity shows the accelerometer's unit and axes: a flight's mean specific
-force is gravity, upwards in body axes. Such a log is refused. The rotors show the gyro's; see
-``evidence``. What neither shows (an accelerometer turned about z) stays the log's word.
 """
 
 from collections.abc import Sequence
@@ -21,9 +17,6 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation, Slerp
 
-from ...dynamics.vehicle import Vehicle
-from ...runtime.errors import InputError
-from ..motion.inertial_signals import inertial_pieces
 from .evidence import EVIDENCE, ratio
 from .flight_log import ACCELEROMETER, GYRO, FlightLog
 
@@ -40,10 +33,6 @@ class InertialSettings:
     fewest: int = 10  # comparisons that decide something
     samples: int = 20  # of pose and of sensor that do
     still: float = 0.1  # rad/s: what pose noise makes of the rate of a vehicle that stands still
-    least_hz: float = 45.0  # without a pose: a quadrotor turns within a tenth of a second
-    # of gravity, between which the median specific force of a flight lies
-    force: tuple[float, float] = (0.6, 1.7)
-    upright: float = 0.7  # cosine of the mean specific force's angle from body z
 
 
 INERTIAL = InertialSettings()
@@ -72,7 +61,6 @@ _GRAVITY_LEFT_OUT = (
     "look like an acceleration without gravity; expected the specific force that an accelerometer "
     "measures, 9.81 m/s2 along z in a hover"
 )
-_UNITS = {"g": (_G, "multiply by 9.80665"), "milli-g": (1e-3 * _G, "multiply by 0.00980665")}
 
 
 def check_inertial(log: FlightLog, gravity: float = 9.81) -> tuple[FlightLog, tuple[str, ...]]:
@@ -217,78 +205,3 @@ def _attitude(log: FlightLog) -> Slerp:
 
 def _at(t: Array, values: Array, times: Array) -> Array:
     return np.column_stack([np.interp(times, t, column) for column in values.T])
-
-
-def check_imu(log: FlightLog, vehicle: Vehicle, least: float | None, where: str) -> None:
-    """Check rate, length, unit and axes of a log's IMU.
-
-    Args:
-        log: with gyro and accelerometer.
-        vehicle: as declared.
-        least: s of unbroken IMU that the log must have; None: any.
-        where: the file, for messages.
-
-    Raises:
-        InputError: one is wrong; the message says what it looks like.
-    """
-    assert log.gyro is not None
-    assert log.accelerometer is not None
-    read = np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0])
-    rows = np.flatnonzero(read)
-    if len(rows) < INERTIAL.samples:
-        raise InputError(
-            f"{where}: ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected "
-            "them in the same rows, and a whole flight"
-        )
-    for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
-        if np.all(np.ptp(x[rows], axis=0) == 0.0):
-            raise InputError(f"{where}: {names} never change: the sensor was not read")
-    rate = 1.0 / float(np.median(np.diff(log.t[rows])))
-    if rate < INERTIAL.least_hz:
-        raise InputError(
-            f"{where}: {rate:.3g} IMU readings a second and no pose as fast; expected at least "
-            f"{INERTIAL.least_hz:g}: a quadrotor turns within a tenth of a second"
-        )
-    pieces = inertial_pieces(log)
-    if least is not None:
-        there = sum(float(log.t[p[-1]] - log.t[p[0]]) for p in pieces)
-        if there < least - 1e-9:
-            raise InputError(
-                f"{where}: {there:.3g} s of unbroken gyro and accelerometer; expected at least "
-                f"{least:g} s of flight, in runs of more than 3 s"
-            )
-    _check_gravity(log.accelerometer[rows], log.rotor_speeds[rows], vehicle, where)
-
-
-def _check_gravity(force: Array, speeds: Array, vehicle: Vehicle, where: str) -> None:
-    """Check that the specific force (n, 3) of a flight is gravity, upwards."""
-    thrust = np.square(speeds) @ vehicle.k
-    flying = thrust > 0.5 * float(np.quantile(thrust, 0.9))
-    middle = np.median(force[flying], axis=0)
-    size = float(np.median(np.linalg.norm(force[flying], axis=1)))
-    low, high = INERTIAL.force
-    if not low <= size / vehicle.gravity <= high:
-        for unit, (factor, how) in _UNITS.items():
-            if low <= size * factor / vehicle.gravity <= high:
-                raise InputError(
-                    f"{where}: ax, ay, az look like {unit}: in flight they are {size:.3g} in the "
-                    f"median; expected m/s2, {vehicle.gravity:.3g} in a hover: {how}"
-                )
-        raise InputError(
-            f"{where}: ax, ay, az are {size:.3g} m/s2 in the median of a flight; expected the "
-            f"specific force, which gravity makes about {vehicle.gravity:.3g}"
-            + (" (an acceleration without gravity is none)" if size < vehicle.gravity else "")
-        )
-    upright = float(middle[2] / max(float(np.linalg.norm(middle)), 1e-9))
-    if upright < -INERTIAL.upright:
-        raise InputError(
-            f"{where}: az is {middle[2]:.3g} m/s2 in the median of a flight: the axes look like "
-            "forward, right, down, or inverted; expected forward, left, up and +9.81 in a hover: "
-            "negate ay and az (and gy and gz)"
-        )
-    if upright < INERTIAL.upright:
-        axis = "xyz"[int(np.argmax(np.abs(middle)))]
-        raise InputError(
-            f"{where}: gravity lies along a{axis} in the median of a flight; expected it along az: "
-            "axes forward, left, up, of the vehicle and not of the sensor's board"
-        )

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
-from ..motion.inertial_signals import reads_imu
+from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SIGNALS
 from ..motion.smoothing import CUTOFFS, low_pass
 from .evidence import Evidence, contradicted, recognise
 from .excerpt import excerpt
 from .flight_log import FlightLog
-from .inertial import GYRO_READINGS, check_imu
+from .inertial import GYRO_READINGS, INERTIAL
 from .readings import DECLARED, rotor_readings
 from .stuck_channels import stuck_notes
 
@@ -48,6 +48,14 @@ _RATE_UNITS = {
 }  # of 1 rad/s
 _TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 _PERIODS = 3e-4, 0.022  # s, of a pose once its unit is right
+
+_LEAST_IMU_HZ = 45.0  # without a pose: a quadrotor turns within a tenth of a second
+_GRAVITY = 0.6, 1.7  # of gravity, between which the median specific force of a flight lies
+_UPRIGHT = 0.7  # cosine of the mean specific force's angle from body z
+_FORCE_UNITS = {
+    "g": (9.80665, "multiply by 9.80665"),
+    "milli-g": (9.80665e-3, "multiply by 0.00980665"),
+}
 
 _UNEVEN = 0.4, 2.5  # of the median step: a step outside is uneven
 _UNEVEN_SHARE, _UNEVEN_NOTE = 0.25, 0.05
@@ -216,7 +224,7 @@ class _Screening:
                 )
         self.part(_check_stopped, log, vehicle)
         log = self.turning(log)
-        check_imu(log, vehicle, least_seconds, where)
+        _check_imu(log, vehicle, least_seconds, where)
         self.notes += stuck_notes(log, vehicle)
         evidence = Evidence.of_log(excerpt([log])[0], vehicle, by_imu=True)
         _check_rotation(evidence, where)
@@ -448,6 +456,75 @@ def _check_conventions(evidence: Evidence, where: str) -> None:
         says = "; or ".join(dict.fromkeys(reading.says for reading in readings[:3]))
         raise InputError(
             f"{where}: {says}. As logged, the motion contradicts the rotor speeds and gravity"
+        )
+
+
+def _check_imu(log: FlightLog, vehicle: Vehicle, least: float | None, where: str) -> None:
+    """Check rate, length, unit and axes of a log's IMU; ``least`` s of it must be unbroken.
+
+    Gravity shows the accelerometer's unit and axes, and the rotors the gyro's. What neither shows
+    (an accelerometer turned about z) stays the log's word.
+    """
+    assert log.gyro is not None
+    assert log.accelerometer is not None
+    read = np.isfinite(log.gyro[:, 0]) & np.isfinite(log.accelerometer[:, 0])
+    rows = np.flatnonzero(read)
+    if len(rows) < INERTIAL.samples:
+        raise InputError(
+            f"{where}: ax, ay, az and gx, gy, gz are read together in {len(rows)} row(s); expected "
+            "them in the same rows, and a whole flight"
+        )
+    for names, x in (("ax, ay, az", log.accelerometer), ("gx, gy, gz", log.gyro)):
+        if np.all(np.ptp(x[rows], axis=0) == 0.0):
+            raise InputError(f"{where}: {names} never change: the sensor was not read")
+    rate = 1.0 / float(np.median(np.diff(log.t[rows])))
+    if rate < _LEAST_IMU_HZ:
+        raise InputError(
+            f"{where}: {rate:.3g} IMU readings a second and no pose as fast; expected at least "
+            f"{_LEAST_IMU_HZ:g}: a quadrotor turns within a tenth of a second"
+        )
+    pieces = inertial_pieces(log)
+    if least is not None:
+        there = sum(float(log.t[p[-1]] - log.t[p[0]]) for p in pieces)
+        if there < least - 1e-9:
+            raise InputError(
+                f"{where}: {there:.3g} s of unbroken gyro and accelerometer; expected at least "
+                f"{least:g} s of flight, in runs of more than 3 s"
+            )
+    _check_gravity(log.accelerometer[rows], log.rotor_speeds[rows], vehicle, where)
+
+
+def _check_gravity(force: Array, speeds: Array, vehicle: Vehicle, where: str) -> None:
+    """Check that the specific force (n, 3) of a flight is gravity, upwards."""
+    thrust = np.square(speeds) @ vehicle.k
+    flying = thrust > 0.5 * float(np.quantile(thrust, 0.9))
+    middle = np.median(force[flying], axis=0)
+    size = float(np.median(np.linalg.norm(force[flying], axis=1)))
+    low, high = _GRAVITY
+    if not low <= size / vehicle.gravity <= high:
+        for unit, (factor, how) in _FORCE_UNITS.items():
+            if low <= size * factor / vehicle.gravity <= high:
+                raise InputError(
+                    f"{where}: ax, ay, az look like {unit}: in flight they are {size:.3g} in the "
+                    f"median; expected m/s2, {vehicle.gravity:.3g} in a hover: {how}"
+                )
+        raise InputError(
+            f"{where}: ax, ay, az are {size:.3g} m/s2 in the median of a flight; expected the "
+            f"specific force, which gravity makes about {vehicle.gravity:.3g}"
+            + (" (an acceleration without gravity is none)" if size < vehicle.gravity else "")
+        )
+    upright = float(middle[2] / max(float(np.linalg.norm(middle)), 1e-9))
+    if upright < -_UPRIGHT:
+        raise InputError(
+            f"{where}: az is {middle[2]:.3g} m/s2 in the median of a flight: the axes look like "
+            "forward, right, down, or inverted; expected forward, left, up and +9.81 in a hover: "
+            "negate ay and az (and gy and gz)"
+        )
+    if upright < _UPRIGHT:
+        axis = "xyz"[int(np.argmax(np.abs(middle)))]
+        raise InputError(
+            f"{where}: gravity lies along a{axis} in the median of a flight; expected it along az: "
+            "axes forward, left, up, of the vehicle and not of the sensor's board"
         )
 
 

@@ -27,7 +27,7 @@ FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 STOREYS = (
     {"logs"},
     {"motion"},
-    {"logs.conventions", "logs.inertial_screening"},
+    {"logs.evidence"},
     {"logs.screening", "findings"},
     {"inertial_wrench"},
     {"wrench_series"},
