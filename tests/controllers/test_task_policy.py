@@ -45,23 +45,6 @@ def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
     np.testing.assert_array_equal(policy(seen[0]), said[0])
 
 
-def test_its_gru_is_that_of_torch():
-    torch = pytest.importorskip("torch", reason="torch is not installed")
-    rng = np.random.default_rng(1)
-    w = weights(rng)
-    cell = torch.nn.GRU(27, 5)
-    names = {"weight_ih_l0": "gru_input", "weight_hh_l0": "gru_hidden"}
-    names |= {"bias_ih_l0": "gru_input_bias", "bias_hh_l0": "gru_hidden_bias"}
-    cell.load_state_dict({k: torch.from_numpy(w[v]) for k, v in names.items()})
-    seen = rng.standard_normal((6, 27)).astype(np.float32)
-    with torch.no_grad():
-        states, _ = cell(torch.from_numpy(seen / 2.0))
-    policy = TaskPolicy(CARD, w)
-    for x, state in zip(seen, states.numpy(), strict=True):
-        wanted = np.clip(w["weight0"] @ state + w["bias0"], -4.0, 4.0)
-        np.testing.assert_allclose(policy(x), wanted, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [({"scale": [1.0] * 26}, "as many numbers"), ({"largest": None}, "spoils an entry")],

@@ -1,6 +1,5 @@
 """The fan-tracking environment: its interface, its repeatability, how it starts and ends."""
 
-import hashlib
 import subprocess
 import sys
 import warnings
@@ -50,6 +49,9 @@ def test_stable_baselines_checker_finds_nothing():
 
 def test_the_name_makes_it_with_a_time_limit():
     env = gym.make(NAME, scenario="static")
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(250)]
+    assert ends == [(False, False)] * 249 + [(False, True)]
     assert isinstance(env.unwrapped, FanTrackingEnv)
     assert env.spec.max_episode_steps == 250
     assert windwrench.__version__
@@ -90,36 +92,19 @@ def test_an_episode_does_not_feel_another_environment(scenario):
     np.testing.assert_array_equal(np.array(rows, dtype=np.float64), alone)
 
 
-def test_an_episode_does_not_feel_numpy_s_global_random_state():
-    env = FanTrackingEnv("gusty")
+def test_an_episode_and_numpy_s_global_random_state_leave_each_other_alone():
+    env = FanTrackingEnv("varied")
     first = fly(env, 5)
     np.random.seed(123)  # noqa: NPY002
-    np.random.random(1000)  # noqa: NPY002
-    np.testing.assert_array_equal(fly(env, 5), first)
-
-
-def test_an_episode_leaves_numpy_s_global_random_state_alone():
-    np.random.seed(5)  # noqa: NPY002
     expected = np.random.random(3)  # noqa: NPY002
-    np.random.seed(5)  # noqa: NPY002
-    fly(FanTrackingEnv("varied"), 5, 3)
+    np.random.seed(123)  # noqa: NPY002
+    np.testing.assert_array_equal(fly(env, 5), first)
     np.testing.assert_array_equal(np.random.random(3), expected)  # noqa: NPY002
 
 
-def test_another_process_flies_the_same_episode(tmp_path):
-    code = (
-        "import numpy as np, hashlib, windwrench, gymnasium as gym\n"
-        "env = gym.make('windwrench/FanTracking-v0').unwrapped\n"
-        "o, i = env.reset(seed=11); rows = [[*o, 0.0, i['y'], i['fan_y']]]\n"
-        "for a in np.random.default_rng(0).uniform(-0.5, 0.5, (15, 1)).astype(np.float32):\n"
-        "    o, r, _, _, i = env.step(a); rows.append([*o, r, i['y'], i['fan_y']])\n"
-        "print(hashlib.sha256(np.array(rows, dtype=np.float64).tobytes()).hexdigest())"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.stdout.strip() == hashlib.sha256(fly(FanTrackingEnv(), 11).tobytes()).hexdigest(), (
-        done.stderr
+def test_what_is_there_to_be_drawn_does_not_change_the_flight():
+    np.testing.assert_array_equal(
+        fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3)
     )
 
 
@@ -243,14 +228,6 @@ def test_a_bad_fan_path_is_named(path):
         FanTrackingEnv(fan_path=path).reset(seed=0)
 
 
-def test_an_episode_is_truncated_after_250_decisions():
-    env = gym.make(NAME, scenario="static")
-    env.reset(seed=0)
-    ends = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(250)]
-    assert ends[:-1] == [(False, False)] * 249
-    assert ends[-1] == (False, True)
-
-
 def test_a_vehicle_that_leaves_is_lost():
     env = FanTrackingEnv("static")
     env.reset(seed=0)
@@ -313,20 +290,6 @@ def test_a_state_that_is_no_number_is_lost(what, tmp_path, monkeypatch):
     assert lost == info["lost"] == (what == "plant")
     assert np.isfinite(env.loop.state[:19]).all()
     assert observation in env.observation_space
-
-
-def test_what_is_there_to_be_drawn_does_not_change_the_flight():
-    np.testing.assert_array_equal(
-        fly(FanTrackingEnv(render_mode="rgb_array"), 3), fly(FanTrackingEnv(), 3)
-    )
-    assert FanTrackingEnv(render_mode="rgb_array").render_mode == "rgb_array"
-
-
-def test_a_fan_path_in_any_memory_order_is_followed():
-    env = FanTrackingEnv("static", fan_path=lambda t: np.stack([0.1 * np.sin(t), t], axis=1)[:, 0])
-    env.reset(seed=0)
-    _, _, _, _, info = env.step(np.zeros(1, np.float32))
-    assert info["fan_y"] == pytest.approx(0.1 * np.sin(0.075), abs=1e-9)
 
 
 def test_without_a_time_limit_it_flies_on_and_the_fan_stands_still_after_20_s():

@@ -152,15 +152,6 @@ def test_another_mode_is_refused():
         )
 
 
-def test_unknown_options_are_refused_in_one_line():
-    single = FanTrackingEnv()
-    many = gym.make_vec(NAME, num_envs=1, vectorization_mode="vector_entry_point")
-    for envs in (single, many):
-        with pytest.raises(InputError, match="unknown option") as refused:
-            envs.reset(seed=0, options={"speed": 2})
-        assert "\n" not in str(refused.value)
-
-
 def test_the_stated_distribution_is_the_one_drawn_from():
     narrow = Variation(**{f.name: (1.0, 1.0) for f in fields(Variation)})
     narrow = replace(narrow, mass=(1.3, 1.3), distance=(2.5, 2.5))
