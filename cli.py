@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 
 from . import __version__
 from .commands.benchmarking import benchmark
-from .commands.checking import check, convert
+from .commands.checking import check
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
@@ -82,7 +82,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     fly,
     benchmark,
     check,
-    convert,
     estimate,
     diagnose,
     live,

@@ -1,9 +1,8 @@
 """Anyone's log: what is in it, and in this kit's own format."""
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import box
@@ -25,6 +24,9 @@ from .terminal import (
     working,
 )
 
+if TYPE_CHECKING:
+    from ..identification.logs.flight_log import FlightLog
+
 CheckVehicleOption = Annotated[
     str | None,
     typer.Option(
@@ -45,6 +47,12 @@ def check(
         Path | None,
         typer.Option("--write-map", help="Write the map by which the log was read: a YAML file."),
     ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write", help="Write the log in the kit's own format: .csv, .csv.gz or .parquet."
+        ),
+    ] = None,
     out: Out = Path("results/check"),
 ) -> dict[str, Any]:
     """Say what a flight log holds. How it was read and why; its channels, rates, gaps and doubts.
@@ -63,8 +71,12 @@ def check(
         raise InputError(
             f"--write-map {write_map}: {log} is read by {found.read_by} and needs no map"
         )
+    written, said = [], []
+    if write is not None:
+        said = _write(found.log, log, write)
+        written.append(write)
     folder = results_folder(out)
-    written = [plot_log(found.log, folder / "check.png")]
+    written.append(plot_log(found.log, folder / "check.png"))
     if write_map is not None:
         with replaced(write_map) as temporary:
             temporary.write_text(found.map_text, encoding="utf-8")
@@ -102,6 +114,8 @@ def check(
             _print(text)
     for text in found.doubts:
         note(f"warning: {text.removeprefix('warning: ')}")
+    for text in said:
+        note(text)
     say(*written)
     return found.as_dict()
 
@@ -110,65 +124,19 @@ def _print(text: str) -> None:
     console.print(text, highlight=False, markup=False)
 
 
-def convert(
-    log: Annotated[Path, typer.Argument(help="Flight log of any kind.")],
-    map: MapOption = None,
-    reader: ReaderOption = None,
-    vehicle: CheckVehicleOption = None,
-    out: Annotated[
-        Path, typer.Option("--out", help="Flight log to write: .csv, .csv.gz or .parquet.")
-    ] = Path("results/flight.csv.gz"),
-) -> dict[str, Any]:
-    """Write any log that can be read in the kit's own format.
-
-    Example: windwrench convert theirs.csv --map rpm --out flight.csv.gz
-    """
+def _write(flight: "FlightLog", log: Path, path: Path) -> list[str]:
+    """Write a flight in the kit's own format; return what is to be said of it."""
     import numpy as np
 
-    from ..dynamics.vehicle_file import load_vehicle
     from ..identification.logs.flight_log import write_log
-    from ..identification.logs.reading import read_log
 
-    model = None if vehicle is None else load_vehicle(vehicle)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
-        flight = read_log(log, reader, model, map)
-    if out.exists() and out.samefile(log):
-        raise InputError(f"--out {out}: is the log itself; expected another file")
-    notes = list(flight.notes)
+    if path.exists() and path.samefile(log):
+        raise InputError(f"--write {path}: is the log itself; expected another file")
+    said = []
     if flight.commanded and flight.command is not None:
         # what a command makes is the vehicle's to say each time the log is read
         flight = replace(flight, rotor_speeds=np.full_like(flight.rotor_speeds, np.nan))
-        notes.append("the motor commands are written, and not the rotor speeds that follow them")
+        said.append("the motor commands are written, and not the rotor speeds that follow them")
     with working("writing"):
-        write_log(flight, out)
-    for text in notes:
-        note(text)
-    channels = [
-        name
-        for name, there in (
-            ("pose", flight.has_pose),
-            ("position", not flight.has_pose and bool(np.isfinite(flight.position).any())),
-            ("rotor speeds", flight.has_rotor_speeds),
-            ("motor commands", flight.command is not None),
-            ("voltage", flight.voltage is not None),
-            ("accelerometer", flight.accelerometer is not None),
-            ("gyro", flight.gyro is not None),
-            ("true wrench", flight.force is not None),
-        )
-        if there
-    ]
-    seconds = float(flight.t[-1] - flight.t[0])
-    console.print(
-        f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s: {', '.join(channels)}",
-        highlight=False,
-        markup=False,
-    )
-    say(out)
-    return {
-        "log": flight.name,
-        "samples": len(flight.t),
-        "seconds": seconds,
-        "channels": channels,
-        "notes": notes,
-    }
+        write_log(flight, path)
+    return said

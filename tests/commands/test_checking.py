@@ -1,4 +1,4 @@
-"""``check`` and ``convert``: anyone's table in, by the command line."""
+"""``check``: anyone's table in, by the command line."""
 
 import json
 from pathlib import Path
@@ -23,7 +23,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, obj
     return found
 
 
-def test_check_proposes_a_map_that_convert_takes(
+def test_check_proposes_a_map_and_writes_the_log_by_it(
     tmp_path: Path, written: Written, capsys: pytest.CaptureFixture[str]
 ) -> None:
     theirs, map_file = save(written, tmp_path / "theirs.csv"), tmp_path / "map.yaml"
@@ -35,7 +35,7 @@ def test_check_proposes_a_map_that_convert_takes(
     assert found["map"] == map_file.read_text()
     assert all(field["why"] for field in found["fields"])  # type: ignore[attr-defined]
     ours = tmp_path / "ours.csv.gz"
-    run(capsys, "convert", theirs, "--map", map_file, "--out", ours)
+    run(capsys, "check", theirs, "--map", map_file, "--write", ours, "--out", tmp_path / "by_map")
     log = read_log(ours)
     np.testing.assert_allclose(log.position, written.log.position, atol=1e-9)
     again = run(capsys, "check", ours, "--out", tmp_path / "again")
@@ -54,10 +54,10 @@ def test_a_log_of_the_kits_own_needs_no_map(
         )
     own = str(tmp_path / "own.csv")
     with pytest.raises(InputError, match="is the log itself"):
-        app(["convert", own, "--out", own], standalone_mode=False)
+        app(["check", own, "--write", own], standalone_mode=False)
 
 
-def test_commands_stay_commands_when_they_are_converted(
+def test_commands_stay_commands_when_they_are_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What nobody measured must not come back as if it had been."""
@@ -66,8 +66,8 @@ def test_commands_stay_commands_when_they_are_converted(
     (tmp_path / "a.csv").write_text("\n".join(lines))
     out = tmp_path / "b.csv"
     run(
-        capsys, "convert", tmp_path / "a.csv", "--map", "euler-pwm", "--vehicle", "crazyflie",
-        "--out", out,
+        capsys, "check", tmp_path / "a.csv", "--map", "euler-pwm", "--vehicle", "crazyflie",
+        "--write", out, "--out", tmp_path,
     )  # fmt: skip
     assert "cmd1" in out.read_text().split("\n")[0]
     assert "omega1" not in out.read_text().split("\n")[0]

@@ -616,7 +616,7 @@ def forms() -> dict[str, Form]:
             lambda: _MAP,
             text,
             _use_map,
-            ("convert", "log.csv", "--out", "out.csv", "--map"),
+            ("check", "log.csv", "--out", "out", "--map"),
             lambda: {"log.csv": _own_log("log.csv")},
         ),
         Form(
