@@ -18,12 +18,13 @@ from .fan import Fan
 from .observing import LIMITS, View
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS, Scenario, draw_fan_path
-from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task
+from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 
 DECISION_TICKS = 16  # 12.5 Hz
 DISTANCE = 2.3  # m, from the fan
 TRACKING_WIDTH = 0.3  # m, offset at which the tracking reward is a half
 CHANGE_COST = 0.05  # per (m/s)^2 of change of the command
+_LIMITS = np.array(LIMITS)
 AWAY = 1.0  # m, off its height or its distance, at which a vehicle is lost
 FAN_TIMES = TICK * np.arange(round(EPISODE_SECONDS / TICK) + 2, dtype=np.float64)
 
@@ -36,9 +37,7 @@ def see(state: Array, command: float, frame: Frame) -> None:
     for i in range(3):
         frame[i], frame[3 + i] = state[16 + i], state[13 + i]
     frame[6], frame[7] = state[8], command
-    for i in range(OBSERVATION_SIZE):
-        seen = frame[i]
-        frame[i] = min(max(seen, -LIMITS[i]), LIMITS[i]) if math.isfinite(seen) else 0.0
+    keep_within(frame, _LIMITS)
 
 
 def reward_terms(offset: Any, change: Any) -> dict[str, Any]:

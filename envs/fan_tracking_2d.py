@@ -15,7 +15,7 @@ from .fan import Fan
 from .fan_tracking import AWAY, CHANGE_COST, DECISION_TICKS, DISTANCE, FAN_TIMES, TRACKING_WIDTH
 from .plant import TICK, PlantSettings
 from .scenarios import SCENARIOS, Scenario, draw_fan_path
-from .task import LOST_OFFSET, SETTLE_TICKS, Frame, Task, limited
+from .task import LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
 CAGE = 0.6  # rad, of the cage's stations above and below the rotors' plane
@@ -163,8 +163,9 @@ class FanTracking2DEnv(Task):
 
     def _get_obs(self) -> Frame:
         x = self.loop.state
-        seen = np.concatenate([x[16:19], x[13:16], x[8:10], self.command])
-        return limited(seen, _LIMITS) / self._scales
+        frame = np.concatenate([x[16:19], x[13:16], x[8:10], self.command]).astype(np.float32)
+        keep_within(frame, _LIMITS)
+        return frame / self._scales
 
     def _get_info(self) -> dict[str, Any]:
         loop, path = self.loop, self._path

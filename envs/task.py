@@ -19,7 +19,7 @@ from ..dynamics.motion import Array
 from ..dynamics.vehicle import EffectSetting, Mocap, Vehicle
 from ..dynamics.vehicle_file import load_vehicle
 from ..estimator.tuning import UKFTuning
-from ..runtime.compiled import specialised
+from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError, unknown_name
 from .closed_loop import ESTIMATORS, ClosedLoop, Stage
 from .display import modes_shown, need_display
@@ -36,11 +36,12 @@ UPRIGHT = 0.34  # cosine of 70 degrees
 _NUMBERS = {1: "one finite number", 2: "two finite numbers", 3: "three finite numbers"}
 
 
-def limited(values: Array, limits: Array) -> Frame:
-    """Return values (..., n) between ``-limits`` and ``limits`` (n,); not finite: 0."""
-    if not math.isfinite(values.sum()):
-        values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
-    return np.minimum(np.maximum(values, -limits), limits).astype(np.float32)
+@compiled
+def keep_within(frame: Frame, limits: Array) -> None:
+    """Limit the numbers of a frame (n,) to ``limits`` (n,) on either side; not finite: 0."""
+    for i in range(len(frame)):
+        seen = frame[i]
+        frame[i] = min(max(seen, -limits[i]), limits[i]) if math.isfinite(seen) else 0.0
 
 
 class Task(gym.Env[Frame, Frame], ABC):

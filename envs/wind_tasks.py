@@ -9,15 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..controllers.flight import FlightGains
-from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_LIMITS, OBSERVATION_SCALES
+from ..controllers.wind_observation import (
+    MAX_ACCELERATION,
+    OBSERVATION_LIMITS,
+    OBSERVATION_SCALES,
+    WIND_OBSERVATION_SIZE,
+)
 from ..dynamics.mean_jet import AIR_DENSITY
 from ..dynamics.motion import Array
 from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
 from .closed_loop import ClosedLoop, Stage
 from .fan import STATIONS, Fan
 from .plant import TICK, PlantSettings
-from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, limited
+from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 from .wind import FanWall, Sum, Wind, winds_of
 from .wind.field import check_wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, WindScenario, draw_reference, draw_winds
@@ -36,6 +42,19 @@ def _square(vector: Array) -> float:
     """Return the squared length of a vector (3,)."""
     x, y, z = vector.tolist()
     return float(x * x + y * y + z * z)
+
+
+@compiled
+def see(
+    x: Array, reference: Array, specific: Array, thrust: Array, action: Array, frame: Frame
+) -> None:
+    """Write the frame (27,) of an estimated state (20,) and the reference (10,), within limits."""
+    for i in range(3):
+        frame[i], frame[3 + i] = reference[i] - x[i], x[7 + i]  # position error, velocity
+        frame[6 + i], frame[9 + i] = reference[3 + i], reference[6 + i]
+        frame[12 + i], frame[15 + i] = x[16 + i], x[13 + i]  # force, torque
+        frame[18 + i], frame[21 + i], frame[24 + i] = specific[i], thrust[i], action[i]
+    keep_within(frame, _LIMITS)
 
 
 class WindHoverEnv(Task):
@@ -169,6 +188,8 @@ class WindHoverEnv(Task):
         self._scales = np.array(scales, dtype=np.float32)
         bound = _LIMITS.astype(np.float32) / self._scales
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
+        frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
+        self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""
         self.blowing: list[Wind] = []
         self.preview = 0.0  # s; above 0, ``info["force_ahead"]`` is the true force to come
@@ -215,20 +236,18 @@ class WindHoverEnv(Task):
         return row
 
     def _get_obs(self) -> Frame:
-        loop, r = self.loop, self._row()
-        x = loop.state
-        # position error, velocity, reference's velocity and acceleration, force, torque
-        motion = r[0:3] - x[0:3], x[7:10], r[3:9], x[16:19], x[13:16]
-        seen = np.concatenate([*motion, loop.specific, loop.thrust, loop.action])
-        return limited(seen, _LIMITS) / self._scales
+        loop, frame = self.loop, np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32)
+        self._see(loop.state, self._row(), loop.specific, loop.thrust, loop.action, frame)
+        return frame / self._scales if self.normalize else frame
 
     def _get_info(self) -> dict[str, Any]:
         loop, reference = self.loop, self._row()[:3]
-        error = math.sqrt(_square(loop.position - reference))
-        flying = self.is_flying() and loop.position[2] > 0.0 and error <= LOST_OFFSET
+        position = loop.position.copy()
+        error = math.sqrt(_square(position - reference))
+        flying = self.is_flying() and position.item(2) > 0.0 and error <= LOST_OFFSET
         info = {
             "error": error,
-            "position": loop.position.copy(),
+            "position": position,
             "reference": reference.copy(),
             "force": loop.external[:3].copy(),
             "torque": loop.external[3:].copy(),
