@@ -93,8 +93,71 @@ def _sigmoid(x: Array) -> Array:
     return between
 
 
-class TrainedPolicy:
-    """A policy that was learned, as a controller.
+class _Network:
+    """What the policies share: a recurrent cell where there is one, and dense layers.
+
+    The card says ``activation``, and ``squash``: the output goes through a tanh and is a share of
+    the largest action.
+    """
+
+    def __init__(
+        self, card: Mapping[str, Any], weights: Weights, seen: int, largest: float, name: str
+    ) -> None:
+        self.card, self.weights, self._largest = dict(card), weights, largest
+        self._activation, self._squash = str(card["activation"]), bool(card["squash"])
+        if self._activation not in _ACTIVATIONS:
+            raise InputError(f"{name}: activation must be one of {', '.join(_ACTIVATIONS)}")
+        self._cell = cell_of(weights)
+        entry = weights.get("weight0" if self._cell is None else f"{self._cell}_input")
+        if entry is None or entry.ndim != 2 or entry.shape[1] != seen:
+            raise InputError(f"{name}: the first layer must take {seen} numbers")
+        if self._cell is not None:
+            self._check_cell(self._cell, seen, name)
+        for i in range(layers_of(weights)):
+            bias = weights.get(f"bias{i}")
+            below = (self._memory_size or seen) if i == 0 else weights[f"weight{i - 1}"].shape[0]
+            if bias is None or weights[f"weight{i}"].shape != (len(bias), below):
+                raise InputError(f"{name}: layer {i} does not fit the one before it")
+        if layers_of(weights) == 0:
+            raise InputError(f"{name}: has no dense layer")
+
+    def _check_cell(self, cell: str, seen: int, name: str) -> None:
+        size, gates = self._memory_size, _CELLS[cell] * self._memory_size
+        shapes = {
+            "input": (gates, seen),
+            "hidden": (gates, size),
+            "input_bias": (gates,),
+            "hidden_bias": (gates,),
+        }
+        for part, shape in shapes.items():
+            if self.weights[f"{cell}_{part}"].shape != shape:
+                raise InputError(f"{name}: {cell}_{part} must have the shape {shape}")
+
+    @property
+    def _memory_size(self) -> int:
+        """Size of the recurrent cell's state, 0 where there is none."""
+        return 0 if self._cell is None else int(self.weights[f"{self._cell}_hidden"].shape[1])
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        size = self._memory_size
+        self._hidden, self._kept = (np.zeros(size, dtype=np.float32) for _ in range(2))
+
+    def act(self, x: Array) -> Array:
+        """Return the action for what is seen (n,); a recurrent policy remembers what it saw."""
+        if self._cell == "lstm":
+            self._hidden, self._kept = lstm(self.weights, x, self._hidden, self._kept)
+            x = self._hidden
+        elif self._cell == "gru":
+            x = self._hidden = gru(self.weights, x, self._hidden)
+        out = dense(self.weights, self._activation, x)
+        if self._squash:
+            out = np.tanh(out) * np.float32(self._largest)
+        return np.clip(out, -self._largest, self._largest).astype(np.float32)
+
+
+class TrainedPolicy(_Network):
+    """A policy of ``FanTracking`` that was learned, as a controller.
 
     Args:
         card: what the policy is: ``features``, ``repeat`` (decisions that a command is held),
@@ -108,65 +171,31 @@ class TrainedPolicy:
     """
 
     def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
-        self.card, self.weights = dict(card), weights
         try:
             seen = card["features"]
             self.features = Features(
                 tuple(seen["frame"]), int(seen["history"]), tuple(map(float, seen["scale"]))
             )
-            self._repeat, self._activation, self._squash = (
-                int(card["repeat"]),
-                card["activation"],
-                bool(card["squash"]),
-            )
+            self._repeat = int(card["repeat"])
+            if card["activation"] not in _ACTIVATIONS or self._repeat < 1:
+                raise InputError(
+                    f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at "
+                    f"least 1"
+                )
+            super().__init__(card, weights, self.features.size, MAX_COMMAND, name)
         except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
             raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
-        if self._activation not in _ACTIVATIONS or self._repeat < 1:
-            raise InputError(
-                f"{name}: activation must be one of {', '.join(_ACTIVATIONS)} and repeat at least 1"
-            )
-        self._cell = cell_of(weights)
-        entry = weights.get("weight0" if self._cell is None else f"{self._cell}_input")
-        if entry is None or entry.shape[1] != self.features.size:
-            raise InputError(f"{name}: the first layer must take {self.features.size} numbers")
-        if self._cell is not None:
-            self._check_cell(self._cell, name)
-        for i in range(layers_of(weights)):
-            bias = weights.get(f"bias{i}")
-            below = self._memory_size or self.features.size
-            below = below if i == 0 else weights[f"weight{i - 1}"].shape[0]
-            if bias is None or weights[f"weight{i}"].shape != (len(bias), below):
-                raise InputError(f"{name}: layer {i} does not fit the one before it")
         if weights[f"weight{layers_of(weights) - 1}"].shape[0] != 1:
             raise InputError(f"{name}: the last layer must give one number")
         self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
+        super().reset()
         self._history = History(self.features, 1)
         self._count, self._held = 0, np.zeros(1, dtype=np.float32)
-        size = self._memory_size
-        self._hidden, self._kept = (
-            np.zeros(size, dtype=np.float32),
-            np.zeros(size, dtype=np.float32),
-        )
-
-    @property
-    def _memory_size(self) -> int:
-        """Size of the recurrent cell's state, 0 where there is none."""
-        return 0 if self._cell is None else int(self.weights[f"{self._cell}_hidden"].shape[1])
-
-    def _check_cell(self, cell: str, name: str) -> None:
-        size = self._memory_size
-        shapes = {
-            "input": (_CELLS[cell] * size, self.features.size),
-            "hidden": (_CELLS[cell] * size, size),
-            "input_bias": (_CELLS[cell] * size,),
-            "hidden_bias": (_CELLS[cell] * size,),
-        }
-        for part, shape in shapes.items():
-            if self.weights[f"{cell}_{part}"].shape != shape:
-                raise InputError(f"{name}: {cell}_{part} must have the shape {shape}")
 
     def __call__(
         self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
@@ -185,19 +214,38 @@ class TrainedPolicy:
         self._count += 1
         return self._held
 
-    def act(self, x: Array) -> Array:
-        """Return the command (1,) for features (size,); a recurrent policy remembers them."""
-        if self._cell == "lstm":
-            self._hidden, self._kept = lstm(self.weights, x, self._hidden, self._kept)
-            x = self._hidden
-        elif self._cell == "gru":
-            x = self._hidden = gru(self.weights, x, self._hidden)
-        out = dense(self.weights, self._activation, x)
-        return (
-            np.tanh(out) * np.float32(MAX_COMMAND)
-            if self._squash
-            else np.clip(out, -MAX_COMMAND, MAX_COMMAND)
-        ).astype(np.float32)
+
+class TaskPolicy(_Network):
+    """A learned policy of another task: scaled observations, and the same layers.
+
+    Args:
+        card: ``task``; ``scale`` (n,), what each number of the observation is divided by;
+            ``largest``, of the action; ``activation``; ``squash`` (the output goes through a tanh
+            and is a share of ``largest``).
+        weights: as those of a ``TrainedPolicy``.
+
+    Raises:
+        InputError: card and weights do not go together.
+    """
+
+    def __init__(self, card: Mapping[str, Any], weights: Weights, name: str = "policy") -> None:
+        try:
+            self.task, largest = str(card["task"]), float(card["largest"])
+            self._scale = np.array(card["scale"], dtype=np.float32)
+            if self._scale.ndim != 1:
+                raise InputError(f"{name}: scale must be a list of numbers")
+            super().__init__(card, weights, len(self._scale), largest, name)
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
+        self.reset()
+
+    def __call__(
+        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
+    ) -> Array:
+        """Return the action of the task, in its units, for an observation in SI units."""
+        return self.act((np.asarray(observation) / self._scale).astype(np.float32))
 
 
 def save_policy(card: Mapping[str, Any], weights: Weights, path: Path) -> Path:
@@ -267,6 +315,16 @@ def load_policy(path: str | Path) -> TrainedPolicy:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{file}: its weights lack or spoil an entry: {error}") from error
+
+
+def load_task_policy(path: str | Path) -> TaskPolicy:
+    """Read a policy of another task from its ``.npz`` or its card.
+
+    Raises:
+        InputError: as ``load_policy``.
+    """
+    file, card, weights = read_policy(path)
+    return TaskPolicy(card, weights, str(file))
 
 
 def is_policy_path(name: str) -> bool:

@@ -10,8 +10,12 @@ from ..controllers import CONTROLLERS, make_controller
 from ..controllers.own_file import is_file_name, load_controller
 from ..controllers.shipped import shipped_policies
 from ..controllers.task_laws import TASK_LAWS, make_task_law
-from ..controllers.task_policy import load_task_policy
-from ..controllers.trained_policy import TrainedPolicy, is_policy_path, load_policy
+from ..controllers.trained_policy import (
+    TrainedPolicy,
+    is_policy_path,
+    load_policy,
+    load_task_policy,
+)
 from ..envs.fan_tracking import FanTrackingEnv
 from ..envs.fan_tracking_2d import FanTracking2DEnv
 from ..envs.scenarios import SCENARIOS

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from ..controllers.observation import MAX_COMMAND
 from ..controllers.task_laws import make_task_law
-from ..controllers.task_policy import TaskPolicy
-from ..controllers.trained_policy import save_policy
+from ..controllers.trained_policy import TaskPolicy, save_policy
 from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_SCALES
 from ..envs.fan_tracking_2d import SCALES_2D
 from ..evaluation.episodes import fly_episode

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from windwrench.controllers.shipped import shipped_policies
-from windwrench.controllers.task_policy import TaskPolicy, load_task_policy
-from windwrench.controllers.trained_policy import save_policy
+from windwrench.controllers.trained_policy import TaskPolicy, load_task_policy, save_policy
 from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import fly_episode
 from windwrench.evaluation.tasks import TASKS, make_pilot
@@ -47,7 +46,7 @@ def test_a_policy_comes_back_from_its_file_and_remembers(tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"scale": [1.0] * 26}, "as many numbers"), ({"largest": None}, "spoils an entry")],
+    [({"scale": [1.0] * 26}, "must take 26 numbers"), ({"largest": None}, "spoils an entry")],
 )
 def test_a_card_that_does_not_fit_is_refused(change, words):
     with pytest.raises(InputError, match=words):
