@@ -137,9 +137,14 @@ class _Piece:
     compared: Rows
 
     def even(self, t: Array, values: Array) -> Array:
-        """Return columns (m, k) of the rows on the piece's clock."""
-        x, at = values[self.rows], t[self.rows]
-        there = np.isfinite(x).all(axis=1)
+        """Return columns (m, k) on the piece's clock, also of rows between those of the piece; NaN
+        where there are none.
+        """
+        inside = slice(self.rows[0], self.rows[-1] + 1)
+        x, at = values[inside], t[inside]
+        there = np.isfinite(x).all(axis=1) & np.isfinite(at)
+        if not there.any():
+            return np.full((len(self.t), x.shape[1]), np.nan)
         return np.column_stack([np.interp(self.t, at[there], column) for column in x[there].T])
 
 
@@ -200,8 +205,10 @@ class Evidence:
             assert log.accelerometer is not None
             force = log.accelerometer[:, 2]
             return cls(log.t, squares, gyro=log.gyro, along=force, vehicle=vehicle)
-        position = np.where(log.valid[:, None], log.position, np.nan)
-        return cls(log.t, squares, position, log.quaternion, vehicle=vehicle)
+        position, quaternion = (
+            np.where(log.valid[:, None], x, np.nan) for x in (log.position, log.quaternion)
+        )
+        return cls(log.t, squares, position, quaternion, vehicle=vehicle)
 
     def _cut(self, rows: Rows) -> list[_Piece]:
         """Return the pieces in which the motion is known, and of each which samples fly."""
@@ -224,12 +231,13 @@ class Evidence:
             low_pass(p.even(self._t, self._thrusts), CUTOFFS.convention_hz, p.period) @ self._k
             for p in pieces
         ]
-        total = np.concatenate(totals)
+        total = np.nan_to_num(np.concatenate(totals))
         turning = total[total > 0.1 * float(np.quantile(total, 0.9))]
         least = EVIDENCE.flying * float(np.median(turning)) if turning.size else np.inf
         return [
             replace(p, compared=p.compared[x[p.compared] > least])
             for p, x in zip(pieces, totals, strict=True)
+            if np.isfinite(x).all()
         ]
 
     @property
@@ -242,13 +250,10 @@ class Evidence:
         """Whether the flight is long enough to decide something."""
         return self.samples >= EVIDENCE.fewest
 
-    def _at(
-        self, values: Callable[[_Piece], Array], cutoff: float = CUTOFFS.convention_hz
-    ) -> Array:
+    def _at(self, values: Callable[[_Piece], Array]) -> Array:
         """Return values on the pieces' clocks, low-passed, at the samples compared."""
-        return np.concatenate(
-            [low_pass(values(p), cutoff, p.period)[p.compared] for p in self._pieces]
-        )
+        hz = CUTOFFS.convention_hz
+        return np.concatenate([low_pass(values(p), hz, p.period)[p.compared] for p in self._pieces])
 
     @cached_property
     def _acceleration(self) -> Array:

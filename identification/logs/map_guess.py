@@ -12,7 +12,7 @@ import io
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
@@ -61,7 +61,7 @@ class GuessSettings:
     gravity: float = 0.15  # relative difference of the median specific force from 1 g
     fast_gyro: float = 35.0  # beyond the range of gyros in rad/s (2000 deg/s)
     carries: tuple[float, float] = (0.6, 1.7)  # thrust by weight of rotors in their right unit
-    samples: int = 20_000  # rows that are looked at
+    longest: float = 480.0  # s of the flight that are looked at, its middle
 
 
 GUESS = GuessSettings()
@@ -338,8 +338,10 @@ def _time(found: _Found, name: Name) -> tuple[Array, TimeColumn]:
         unit = next((u for u, rate in rates.items() if low <= rate <= high), "s")
         sure = GUESS.sure_rates[0] <= rates[unit] <= GUESS.sure_rates[1]
         found.say("time", "unit", sure, f"in {unit} there are {rates[unit]:.4g} rows a second")
-    begin = raw[np.isfinite(raw)][0]
-    return (raw - begin) * TIME_UNITS[unit], TimeColumn(name.column, unit)
+    t = (raw - raw[np.isfinite(raw)][0]) * TIME_UNITS[unit]
+    middle = 0.5 * (np.nanmin(t) + np.nanmax(t))
+    t[~(np.abs(t - middle) <= 0.5 * GUESS.longest)] = np.nan
+    return t, TimeColumn(name.column, unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -733,8 +735,3 @@ def _fields(part: Columns) -> dict[str, Any]:
     if part.signs:
         fields["signs"] = list(part.signs)
     return fields
-
-
-def with_name(guess: Guess, name: str) -> Guess:
-    """Return a guess whose map has another name."""
-    return replace(guess, log_map=replace(guess.log_map, name=name))

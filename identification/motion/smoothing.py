@@ -115,13 +115,6 @@ def derivative(x: Array, period: float, order: int = 1) -> Array:
     return np.asarray(savgol_filter(x, 5, 4, deriv=order, delta=period, axis=0))
 
 
-def central_difference(x: Array, period: float) -> Array:
-    """Return the first derivative of ``x`` (n, k) along its first axis, true to the second power of
-    the period: enough for what is low-passed and compared at ``CUTOFFS.convention_hz``.
-    """
-    return np.asarray(np.gradient(x, period, axis=0))
-
-
 def continuous(quaternion: Array) -> Array:
     """Return quaternions (n, 4) with the signs that make the sequence continuous, so that it can be
     smoothed: a quaternion and its negative are one attitude.
