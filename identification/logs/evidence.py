@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
-from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass
+from ..motion.smoothing import CUTOFFS, continuous, derivative, low_pass, resampled, unbroken
 from .flight_log import FlightLog
 from .log_map import LENGTH_UNITS
 from .readings import DECLARED, Reading, as_written, pose_readings, rotor_readings
@@ -145,7 +145,7 @@ class _Piece:
         there = np.isfinite(x).all(axis=1) & np.isfinite(at)
         if not there.any():
             return np.full((len(self.t), x.shape[1]), np.nan)
-        return np.column_stack([np.interp(self.t, at[there], column) for column in x[there].T])
+        return resampled(self.t, at[there], x[there])
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +216,8 @@ class Evidence:
             return []
         step = float(np.median(np.diff(self._t[rows])))
         period = max(step, EVIDENCE.period)
-        breaks = np.diff(self._t[rows]) > max(EVIDENCE.gap, 3.5 * step)
         pieces = []
-        for part in np.split(rows, np.flatnonzero(breaks) + 1):
+        for part in unbroken(self._t, rows, max(EVIDENCE.gap, 3.5 * step)):
             begin, end = self._t[part[0]], self._t[part[-1]]
             if end - begin > EVIDENCE.shortest and len(part) > 8:
                 t = np.arange(begin, end, period)

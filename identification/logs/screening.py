@@ -22,7 +22,7 @@ from ...dynamics.vehicle import Vehicle
 from ...runtime.errors import InputError
 from ..motion.inertial_signals import inertial_pieces, reads_imu
 from ..motion.signals import SIGNALS
-from ..motion.smoothing import CUTOFFS, low_pass
+from ..motion.smoothing import CUTOFFS, low_pass, runs_of
 from .evidence import Evidence, contradicted, recognise
 from .excerpt import excerpt
 from .flight_log import FlightLog
@@ -246,8 +246,7 @@ def _check_shift(evidence: Evidence, where: str) -> None:
 
 def _stretches(rows: NDArray[np.bool_], t: Array) -> list[tuple[float, float]]:
     """Return the first and the last time (s) of each run of rows (N,)."""
-    edges = np.flatnonzero(np.diff(rows, prepend=False, append=False))
-    return [(float(t[a]), float(t[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [(float(t[a]), float(t[b - 1])) for a, b in runs_of(rows)]
 
 
 def _carrying(log: FlightLog, vehicle: Vehicle) -> NDArray[np.bool_]:

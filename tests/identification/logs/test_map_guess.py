@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.support.random_tables import fields_of, flight, judge, random_table, save
+from tests.support.random_tables import fields_of, flight, random_table, save
 from windwrench.dynamics import load_vehicle
 from windwrench.identification.logs.column_names import Group, take_apart
 from windwrench.identification.logs.flight_log import FlightLog
@@ -17,9 +17,9 @@ from windwrench.runtime.errors import InputError
 
 
 @pytest.fixture(scope="module")
-def flown() -> list[FlightLog]:
-    """A lively flight and a hover."""
-    return [flight("ardrone2", "excite", 1, 15.0), flight("crazyflie", "hover", 2, 10.0)]
+def flown() -> FlightLog:
+    """A lively flight."""
+    return flight("ardrone2", "excite", 1, 15.0)
 
 
 def guessed(path: Path, name: str = "") -> Guess:
@@ -27,40 +27,28 @@ def guessed(path: Path, name: str = "") -> Guess:
     return guess_map(table, layout, load_vehicle(name) if name else None)
 
 
-@pytest.mark.parametrize("seed", range(24))
-def test_no_guess_is_silently_wrong(tmp_path: Path, flown: list[FlightLog], seed: int) -> None:
-    rng = np.random.default_rng(100 + seed)
-    log = flown[seed % 4 == 3]
-    written = random_table(log, rng)
-    found = guessed(save(written, tmp_path / "table.csv"), log.vehicle if seed % 2 else "")
-    _, silent = judge(found, written.log_map)
-    assert not silent
-
-
-def test_a_lively_flight_is_read_right_with_its_vehicle(
-    tmp_path: Path, flown: list[FlightLog]
-) -> None:
-    """Most fields of most tables are right; here every field of 4 of 5 tables, guessed or not."""
-    right = 0
-    for seed in range(5):
-        written = random_table(flown[0], np.random.default_rng(seed), imu_only=0.0)
-        flagged, silent = judge(
-            guessed(save(written, tmp_path / "table.csv"), "ardrone2"), written.log_map
-        )
-        right += not flagged and not silent
-    assert right >= 4
-
-
 def test_the_map_that_is_written_is_the_map_that_was_guessed(
-    tmp_path: Path, flown: list[FlightLog]
+    tmp_path: Path, flown: FlightLog
 ) -> None:
     for seed in range(4):
-        written = random_table(flown[0], np.random.default_rng(seed))
+        written = random_table(flown, np.random.default_rng(seed))
         found = guessed(save(written, tmp_path / "table.csv"))
         text = map_yaml(found)
         again = parse_map(yaml.safe_load(text), "map")
         assert fields_of(again) == fields_of(found.log_map)
         assert text.count("# GUESS") == len(found.doubts)
+
+
+def test_pose_and_motors_in_rows_of_their_own_are_read(tmp_path: Path, flown: FlightLog) -> None:
+    """A logger that writes each message in a row leaves the other columns empty."""
+    rows = ["t,x,y,z,qw,qx,qy,qz,rpm1,rpm2,rpm3,rpm4"]
+    for k, t in enumerate(flown.t):
+        pose = [*flown.position[k], *flown.quaternion[k]] if k % 2 else [""] * 7
+        speeds = [""] * 4 if k % 2 else flown.rotor_speeds[k] * 30.0 / np.pi
+        rows.append(",".join(map(str, [t, *pose, *speeds])))
+    path = tmp_path / "sparse.csv"
+    path.write_text("\n".join(rows))
+    assert not guessed(path).doubts
 
 
 def test_names_are_taken_apart() -> None:

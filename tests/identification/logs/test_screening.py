@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.support.data_paths import NANOBENCH, crazyswarm2_file, data_file
-from tests.support.hostile_conventions import HOSTILE, turned
+from tests.support.data_paths import crazyswarm2_file
+from tests.support.hostile_conventions import turned
 from tests.support.parameters import mostly_slow
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import get, names, parse_setting
@@ -52,14 +52,6 @@ def flight(trajectory="excite", effect=None, size=2.0, seconds=14.0):
         name=trajectory,
         source="flight.csv",
     )
-
-
-@pytest.mark.parametrize("trajectory", EXCITED)
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_another_convention_is_named(kind, trajectory):
-    make, expected = HOSTILE[kind]
-    with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
-        screen_log(make(flight(trajectory)), VEHICLE)
 
 
 @pytest.mark.parametrize(
@@ -144,26 +136,6 @@ def test_a_quiet_hover_decides_nothing():
     )
     assert screen_log(log, VEHICLE) == ()
     assert Evidence.of_log(log, VEHICLE).fit(DECLARED).torque > 0.5  # there is nothing to tell
-
-
-@pytest.mark.parametrize("number", range(16))
-@pytest.mark.slow
-def test_the_shared_flights_pass(number):
-    kind = "labelled" if number < 8 else "unlabelled"
-    vehicle = load_vehicle(data_file("flights/vehicle.yaml"))
-    assert (
-        screen_log(
-            read_log(data_file(f"flights/{kind}_{number % 8:02d}.csv.gz"), None, vehicle), vehicle
-        )
-        == ()
-    )
-
-
-@pytest.mark.measured
-@pytest.mark.parametrize("name", NANOBENCH)
-def test_measured_flights_pass(name):
-    vehicle = load_vehicle("crazyflie")
-    screen_log(read_log(data_file(f"nanobench/{name}.csv"), "nanobench", vehicle), vehicle)
 
 
 @pytest.mark.measured
@@ -320,21 +292,6 @@ def test_a_file_cut_within_its_last_line_says_so(tmp_path, cut):
 
 
 # for an estimate
-
-SHIFTED = ("rotors late", "rotors early")
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_an_estimate_refuses_what_a_diagnosis_refuses(kind):
-    make, expected = HOSTILE[kind]
-    log = make(flight())
-    if kind in SHIFTED:
-        (note,) = screen_for_estimate(log, VEHICLE)[1]
-        assert re.search(f"warning: {expected}", note.replace("the rotor", "rotor"))
-        return
-    with pytest.raises(InputError, match=f"flight.csv: .*{expected}"):
-        estimate_log(log, VEHICLE)
-
 
 ENOUGH = ("short", "very short", "slow", "held", "lost often", "lost long", "uneven clock")
 PARTS = ("clock jump", "rows cut out")
