@@ -568,10 +568,11 @@ def recognise(evidence: Evidence) -> tuple[Reading, ...]:
         return ()
     declared = evidence.fit(DECLARED)
     fits = [(reading, evidence.fit(reading)) for reading in pose_readings()]
-    fits += [
-        (reading, replace(declared, torques=evidence.torques(reading)))
-        for reading in rotor_readings()
-    ]
+    if contradicted(declared.torques):
+        fits += [
+            (reading, replace(declared, torques=evidence.torques(reading)))
+            for reading in rotor_readings()
+        ]
     winners = [(evidence.score(r, fit), r, fit) for r, fit in fits if _wins(fit, declared)]
     if any(r.turns_rotors for _, r, _ in winners) and evidence.shift is not None:
         # a shift by half a period of the motion looks like exchanged rotors
