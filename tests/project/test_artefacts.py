@@ -19,10 +19,8 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "real-flights.md",
     "leaderboard.md",
     "speed.md",
-    "imu.md",
-    "log-estimates.md",
-    "faults.md",
-    "fleets.md",
+    "measured-estimator.md",
+    "measured-logs.md",
     "identify.md",
     "export-c.md",
 )

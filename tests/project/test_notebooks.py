@@ -31,7 +31,7 @@ def run(monkeypatch, tmp_path):
 def test_every_notebook_is_in_the_table_the_gallery_and_these_tests():
     names = {path.stem for path in FOLDER.glob("*.py")}
     table = (ROOT / "examples" / "README.md").read_text(encoding="utf-8")
-    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    gallery = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     assert names == set(re.findall(r"\(notebooks/(\w+)\.py\)", table))
     assert names == set(re.findall(r"examples/notebooks/(\w+)\.py", gallery))
     assert names == {"estimator", "environment", "your_log"}
