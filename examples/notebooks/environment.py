@@ -78,5 +78,5 @@ figure.savefig("environment.png", dpi=110)
 
 # %% [markdown]
 # One episode ranks nobody: `windwrench benchmark` flies 40 paired ones and gives intervals. Next:
-# [Design a controller](../../docs/tutorials/controller.md), [Train a
+# [Design a controller](../../docs/tutorials/train.md), [Train a
 # policy](../../docs/tutorials/train.md).
