@@ -8,9 +8,7 @@ and a line in ``READERS``.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
-from ....dynamics.vehicle import Vehicle
 from ....runtime.errors import InputError, unknown_name
 from ..flight_log import FlightLog
 from . import (
@@ -36,12 +34,10 @@ class Reader:
 
     name: str
     what: str  # a log of its form, in words
-    read: Callable[[Path, Vehicle | None], FlightLog]
+    read: Callable[..., FlightLog]  # of a path and a vehicle, which may be None
     signature: tuple[str, ...] = ()  # columns of a table
     begins: tuple[bytes, ...] = ()  # first bytes of a file
-    read_with: Callable[..., FlightLog] | None = (
-        None  # takes a third argument, the option behind the name's colon
-    )
+    takes_option: bool = False  # ``read`` takes ``option``: the words behind the name's colon
 
 
 READERS = {
@@ -68,14 +64,14 @@ READERS = {
             "a blackbox of Betaflight or INAV",
             betaflight_bbl.read,
             begins=betaflight_bbl.BEGINS,
-            read_with=betaflight_bbl.read,
+            takes_option=True,
         ),
         Reader(
             "betaflight_csv",
             "a blackbox_decode table",
             betaflight_csv.read,
             betaflight_csv.SIGNATURE,
-            read_with=betaflight_csv.read,
+            takes_option=True,
         ),
         Reader(
             "ardupilot_bin",
@@ -89,7 +85,7 @@ READERS = {
             "a ROS bag (ROS 1, SQLite or MCAP)",
             rosbag.read,
             begins=rosbag.BEGINS,
-            read_with=rosbag.read,
+            takes_option=True,
         ),
     )
 }
@@ -107,8 +103,8 @@ def find_reader(name: str) -> Reader:
     reader = READERS[name]
     if not colon:
         return reader
-    if reader.read_with is None:
+    if not reader.takes_option:
         raise InputError(
             f"reader {name!r} takes no option, got {option!r}; expected the name alone"
         )
-    return replace(reader, read=partial(reader.read_with, option=option))
+    return replace(reader, read=partial(reader.read, option=option))
