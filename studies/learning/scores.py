@@ -10,13 +10,9 @@ from numpy.typing import NDArray
 from windwrench.evaluation.statistics import (
     hierarchical_bootstrap,
     hierarchical_draws,
-    interquartile_mean,
     interval_of,
     mean,
-    paired_wins,
-    probability_of_improvement,
     relative_change,
-    sign_probability,
 )
 
 Array = NDArray[np.float64]
@@ -26,7 +22,7 @@ REFERENCES = ("hover", "oracle")
 # laws that every controller is compared with, each with its best gains; two must have flown
 NEEDED = ("admittance", "ratio")
 RIVALS = (*NEEDED, "lead", "tracker")
-_CLAIM_RESAMPLES = 4_000  # enough for a p-value that is corrected for a hundred claims
+_CLAIM_RESAMPLES = 4_000
 
 
 @dataclass(frozen=True)
@@ -51,10 +47,6 @@ class Comparison:
     rival: str
     change: float
     interval: Interval  # 95 %, over policies and episodes, as all of them
-    p: float  # two-sided, of no change
-    wins: float  # paired episodes with a smaller RMSE
-    improvement: float  # probability of improvement
-    improvement_interval: Interval
 
 
 @dataclass(frozen=True)
@@ -73,7 +65,6 @@ class Row:
     lost_fraction: float
     lost_interval: Interval
     score: float  # 0: hover, 1: oracle
-    share: float | None  # of the way from the admittance law to the limit, where that has flown
     against: dict[str, Comparison]  # by law: with the gains that are best in this very world
 
 
@@ -131,10 +122,6 @@ def compare(x: Array, rival: Line, world: str) -> Comparison:
         rival=rival.name,
         change=float(relative_change(x, y)),
         interval=interval_of(draws),
-        p=sign_probability(draws),
-        wins=float(paired_wins(x, y)),
-        improvement=float(probability_of_improvement(-x, -y)),
-        improvement_interval=hierarchical_bootstrap(probability_of_improvement, -x, -y),
     )
 
 
@@ -171,7 +158,6 @@ def rows_of(
                     lost_fraction=float(line.lost[world].mean()),
                     lost_interval=hierarchical_bootstrap(mean, line.lost[world]),
                     score=(hover - float(x.mean())) / (hover - oracle),
-                    share=_share(by_name, world, float(x.mean())),
                     against={
                         law: compare(x, rival, world)
                         for law, rival in rivals.items()
@@ -181,14 +167,6 @@ def rows_of(
             )
         rows.extend(sorted(some, key=lambda row: row.rmse_m))
     return rows
-
-
-def _share(by_name: Mapping[str, Line], world: str, rmse: float) -> float | None:
-    ends = [by_name[n].rmse.get(world) if n in by_name else None for n in ("admittance", "limit")]
-    if ends[0] is None or ends[1] is None:
-        return None
-    start, end = (float(x.mean()) for x in ends if x is not None)
-    return (start - rmse) / (start - end) if start > end else None
 
 
 def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Array | None:
@@ -209,41 +187,12 @@ def normalised(line: Line, lines: Sequence[Line], worlds: Sequence[str]) -> Arra
     return np.concatenate([c[:seeds] for c in columns], axis=1)
 
 
-@dataclass(frozen=True)
-class Aggregate:
-    """One controller over several worlds: mean of its scores, none of them left out."""
-
-    name: str
-    seeds: int
-    score: float
-    interval: Interval  # 95 %, over policies and episodes
-    middle: float  # interquartile mean, of the middle half of the scores
-    middle_interval: Interval
-    lost: float  # share of all episodes
-    lost_interval: Interval
-
-
-def aggregate(lines: Sequence[Line], worlds: Sequence[str]) -> list[Aggregate]:
-    """Return what controllers reach over all worlds, best mean score first; the interquartile mean,
-    which does not see a lost episode, stands beside it, not in its place.
-    """
-    found = []
+def overall(lines: Sequence[Line], worlds: Sequence[str]) -> dict[str, tuple[float, Interval]]:
+    """Return controllers' mean score over all worlds with its 95 % interval, best first."""
+    found = {}
     for line in lines:
         scores = None if line.group == "ablation" else normalised(line, lines, worlds)
-        if scores is None:
-            continue
-        lost = np.concatenate([line.lost[w][: len(scores)] for w in worlds], axis=1)
-        blocks = len(worlds)
-        found.append(
-            Aggregate(
-                name=line.name,
-                seeds=len(scores),
-                score=float(mean(scores)),
-                interval=hierarchical_bootstrap(mean, scores, blocks=blocks),
-                middle=float(interquartile_mean(scores)),
-                middle_interval=hierarchical_bootstrap(interquartile_mean, scores, blocks=blocks),
-                lost=float(lost.mean()),
-                lost_interval=hierarchical_bootstrap(mean, lost, blocks=blocks),
-            )
-        )
-    return sorted(found, key=lambda one: -one.score)
+        if scores is not None:
+            interval = hierarchical_bootstrap(mean, scores, blocks=len(worlds))
+            found[line.name] = float(mean(scores)), interval
+    return dict(sorted(found.items(), key=lambda one: -one[1][0]))

@@ -6,15 +6,16 @@ goes on where it was.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
-from concurrent.futures import FIRST_EXCEPTION, wait
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from windwrench import __version__
 from windwrench.controllers import Limit
 from windwrench.controllers.flight_response import half_response
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy, save_policy
@@ -25,11 +26,13 @@ from windwrench.evaluation.episodes import benchmark_seeds, fly_episode
 from windwrench.evaluation.tasks import make_pilot
 from windwrench.runtime.errors import InputError, unknown_name
 from windwrench.runtime.page_files import write_json
-from windwrench.runtime.workers import shared_dict, workers
+from windwrench.runtime.provenance import commit
+from windwrench.runtime.workers import Lost, each
+from windwrench.studies.pages import DOCS, ROOT
 from windwrench.training.configuration import load_config
 from windwrench.training.train import Progress, read_progress
 
-Advance = Callable[[str, float], None]  # what is being done, and the share of it that is
+_MOST_SECONDS = 24 * 3600.0  # of an entry
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,11 @@ class Places:
     runs: Path  # training runs, with checkpoints; large, and of no use once a policy is scored
     results: Path  # a small JSON file for each entry
     policies: Path  # the policies that are shipped
+
+
+KEPT = Places(
+    Path("results/leaderboard"), DOCS / "results" / "learning", ROOT / "training" / "policies"
+)
 
 
 def load_plan(file: Path | None = None) -> dict[str, Any]:
@@ -149,9 +157,12 @@ def is_done(entry: Entry, plan: Mapping[str, Any], places: Places) -> bool:
     )
 
 
-def train_entry(
-    entry: Entry, places: Places, advance: Advance = lambda text, share: None
-) -> tuple[Path, Progress]:
+def missing_of(plan: Mapping[str, Any], places: Places) -> list[str]:
+    """Return the files of the entries that are not done."""
+    return [entry.file for entry in entries_of(plan) if not is_done(entry, plan, places)]
+
+
+def train_entry(entry: Entry, places: Places) -> tuple[Path, Progress]:
     """Train an entry's policy, or take up its training where it was left; return the best policy
     and how it went.
     """
@@ -162,15 +173,7 @@ def train_entry(
     if done is None or not done.steps or done.steps[-1] < config["steps"]:
         from windwrench.training.algorithms import run_training
 
-        run_training(
-            config,
-            entry.scenario,
-            entry.seed,
-            folder,
-            advance=lambda steps: advance(
-                f"{entry.file}: training", min(steps / config["steps"], 1.0)
-            ),
-        )
+        run_training(config, entry.scenario, entry.seed, folder)
         done = read_progress(folder)
     assert done is not None
     return folder / "best.npz", done
@@ -206,18 +209,15 @@ def fly_world(
         yield episode.rmse, episode.lost, bound
 
 
-def do_entry(
-    entry: Entry,
-    plan: Mapping[str, Any],
-    places: Places,
-    advance: Advance = lambda text, share: None,
-) -> None:
+def do_entry(entry: Entry, plan: Mapping[str, Any], places: Places) -> None:
     """Train and score one entry, as far as that is not done; its result grows world by world."""
     path = result_path(entry, places)
     result: dict[str, Any] = {
         "name": entry.name,
         "group": entry.group,
         "seed": entry.seed,
+        "commit": commit(),
+        "version": __version__,
         "scores": {},
     }
     if entry.seed is None:
@@ -227,7 +227,7 @@ def do_entry(
         if entry.ship and shipped.exists() and path.exists():
             pilot = load_policy(shipped)
         else:
-            best, progress = train_entry(entry, places, advance)
+            best, progress = train_entry(entry, places)
             pilot = load_policy(best)
             if entry.ship:
                 save_policy(
@@ -252,7 +252,7 @@ def do_entry(
             "sha256"
         ):  # else the scores are those of another policy
             result = {**kept, **result, "scores": kept["scores"]}
-    for done, name in enumerate(entry.worlds):
+    for name in entry.worlds:
         if len(result["scores"].get(name, {}).get("rmse_m", ())) >= plan["episodes"]:
             continue
         rmse, lost, bounds = [], [], []
@@ -262,9 +262,6 @@ def do_entry(
             rmse.append(round(value, 6))
             lost.append(int(gone))
             bounds += [round(bound, 6)] if bound is not None else []
-            advance(
-                f"{entry.file}: {name}", (done + len(rmse) / plan["episodes"]) / len(entry.worlds)
-            )
         result["scores"][name] = {"rmse_m": rmse, "lost": lost}
         if bounds:
             result["scores"][name]["bound_m"] = bounds
@@ -280,46 +277,24 @@ def read_results(places: Places) -> list[dict[str, Any]]:
 
 
 def run_study(
-    entries: Sequence[Entry],
-    plan: Mapping[str, Any],
-    places: Places,
-    jobs: int,
-    report: Callable[[dict[str, tuple[str, float]], int], None] = lambda shares, done: None,
+    entries: Sequence[Entry], plan: Mapping[str, Any], places: Places, jobs: int = 1
 ) -> int:
-    """Train and score what is not done yet, in ``jobs`` processes; return how many entries that
-    were.
+    """Train and score entries that are not done yet, in ``jobs`` processes; return how many entries
+    that were.
 
     Args:
         entries: of ``entries_of``.
         plan: of ``load_plan``.
         places: where everything is kept.
         jobs: processes.
-        report: called now and then with what each entry in work is at, and how many are done.
 
     Raises:
         InputError: what training or scoring refuses.
     """
     waiting = [e for e in entries if not is_done(e, plan, places)]
-    with shared_dict({}) as shares, workers(min(jobs, max(len(waiting), 1))) as pool:
-        futures = {pool.submit(_work, e, plan, places, shares) for e in waiting}
-        open_ones = set(futures)
-        while open_ones:
-            finished, open_ones = wait(open_ones, timeout=0.5, return_when=FIRST_EXCEPTION)
-            for future in finished:
-                future.result()
-            report(shares.copy(), len(futures) - len(open_ones))
+    work = partial(do_entry, plan=plan, places=places)
+    for count, (entry, result) in enumerate(each(work, waiting, _MOST_SECONDS, jobs), 1):
+        if isinstance(result, Lost):
+            raise InputError(f"{entry.file}: {result.words}; run the study again")
+        print(f"{entry.file}: {count} of {len(waiting)}", flush=True)
     return len(waiting)
-
-
-def _work(
-    entry: Entry, plan: Mapping[str, Any], places: Places, shares: MutableMapping[str, Any]
-) -> None:
-    last = ("", -1.0)
-
-    def advance(text: str, share: float) -> None:
-        nonlocal last
-        if (now := (text, round(share, 2))) != last:  # the dictionary lies in another process
-            shares[entry.file] = last = now
-
-    do_entry(entry, plan, places, advance)
-    shares.pop(entry.file, None)

@@ -1,24 +1,26 @@
-"""``python -m studies.probabilities``; ``--help`` lists what it takes."""
+"""``python -m studies.probabilities`` flies and diagnoses flights whose truth is known, and writes
+the page of what their probabilities are worth.
+"""
 
-import argparse
-import gzip
-import json
 from pathlib import Path
+from typing import Annotated
 
-from windwrench.runtime.page_files import write_text
-from windwrench.studies.page_tables import put_between
-from windwrench.studies.probabilities.flights import OF_TEN, recorded
-from windwrench.studies.probabilities.scores import tables, tables_of_later_flights
-from windwrench.studies.resumed_tasks import Task, run_tasks
+import typer
 
-RESULTS = Path("docs/probabilities/results.json.gz")
-LATER, LATER_PART = Path("docs/probabilities/later.json.gz"), "later flights"
+from windwrench.runtime.errors import unknown_name
+from windwrench.runtime.page_files import write_json
+from windwrench.studies.pages import DOCS, write_page
+from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
+from windwrench.studies.probabilities.scores import RESULTS, page
+from windwrench.studies.runner import Jobs, Page, Task, run_tasks, start
+
+_FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}
 # the other simulator's flight i is this one of its catalogue, so that few flights hold many kinds
 _STRIDE, _CATALOGUE = 7, 33
 
 
 def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> list[Task]:
-    """Return the flights of a run: simulator, kind and number each."""
+    """Return the flights of a run whose pose is logged: simulator, kind and number each."""
     out: list[Task] = []
     # in turn, so that a run that is stopped has both
     for i in range(max(own, other)):
@@ -33,42 +35,54 @@ def plan(own: int, other: int, first: int, catalogue: int, simulator: str) -> li
     return out
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m studies.probabilities")
-    parser.add_argument(
-        "--later",
-        action="store_true",
-        help="flights that the weights in use were not fitted to: 200 of either, of other numbers",
-    )
-    parser.add_argument("--own", type=int, help="flights of this project's plant")
-    parser.add_argument("--other", type=int, help="flights of the other simulator")
-    parser.add_argument("--simulator", default="../shared/generator/make_flights.py")
-    parser.add_argument("--first", type=int, help="number of the first own flight")
-    parser.add_argument("--catalogue", type=int, help="first of the other's catalogues")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=Path("results/probabilities"))
-    parser.add_argument("--results", type=Path, help="what is kept for the page")
-    parser.add_argument("--page", type=Path, default=None, help="page whose tables are made anew")
-    parser.add_argument("--done", action="store_true", help="score only what has been kept")
-    later = parser.parse_known_args()[0].later
-    parser.set_defaults(
-        own=200 if later else 350,
-        other=200 if later else 350,
-        first=850_000 if later else 800_000,
-        catalogue=5000 if later else 3000,
-        results=LATER if later else RESULTS,
-    )
-    given = parser.parse_args()
-    if not given.done:
-        wanted = plan(given.own, given.other, given.first, given.catalogue, given.simulator)
-        outcomes = run_tasks(recorded, wanted, given.out / "flights.jsonl", given.jobs)
+def plan_of_other_logs(flights: int, first: int, catalogue: int, simulator: str) -> list[Task]:
+    """Return so many flights of each way to log but the pose; half of the filtered ones are of the
+    other simulator.
+    """
+    out: list[Task] = []
+    for i in range(flights):
+        for j, way in enumerate(WAYS_TO_LOG[1:]):
+            k = i // 2 if way == "filtered" else i
+            if way != "filtered" or i % 2 == 0:
+                out.append(("own", OF_TEN[k % len(OF_TEN)], first + flights * j + k, way))
+            else:
+                kind = "catalogue" if k % 5 else "left out"
+                out.append((simulator, kind, catalogue + 7 * k, way))
+    return out
+
+
+def study(
+    flights: Annotated[
+        str, typer.Option(help=f"Which are flown: {', '.join(RESULTS)}; none: those kept.")
+    ] = "none",
+    count: Annotated[int, typer.Option(min=1, help="Flights of either simulator.")] = 350,
+    simulator: Annotated[
+        str, typer.Option(help="File of the other simulator.")
+    ] = "../shared/generator/make_flights.py",
+    jobs: Jobs = 1,
+    out: Annotated[Path, typer.Option(help="Folder of what is done.")] = Path(
+        "results/probabilities"
+    ),
+    markdown: Page = None,
+) -> None:
+    """Fly, diagnose and keep flights, and write the page of all that are kept."""
+    if flights != "none":
+        if flights not in RESULTS:
+            raise unknown_name("set of flights", flights, RESULTS)
+        own, other = _FIRST[flights]
+        wanted = (
+            plan_of_other_logs(count, own, other, simulator)
+            if flights == "other logs"
+            else plan(count, count, own, other, simulator)
+        )
+        done = run_tasks(recorded, wanted, out / f"{flights}.jsonl", jobs)
         kept = [
             {"task": ["own" if task[0] == "own" else "other", *task[1:]], "result": result}
-            for task, result in outcomes.items()
+            for task, result in done.items()
         ]
-        lines = ",\n".join(json.dumps(x) for x in kept)
-        write_text(f"[\n{lines}\n]\n", given.results)
-    records = json.loads(gzip.decompress(given.results.read_bytes()))
-    text = tables_of_later_flights(records) if later else tables(records)
-    put_between(text, given.page, LATER_PART if later else "tables")
-    print(text)
+        write_json(kept, DOCS / RESULTS[flights])
+    print(write_page("probabilities", page(), markdown))
+
+
+if __name__ == "__main__":
+    start(study)

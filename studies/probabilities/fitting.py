@@ -19,7 +19,7 @@ from windwrench.identification.posterior.pooling import (
     features,
     pooled,
 )
-from windwrench.studies.trials.trials import EQUIVALENTS
+from windwrench.studies.scoring import EQUIVALENTS
 
 Array = NDArray[np.float64]
 
@@ -69,11 +69,6 @@ def stands_for(flight: dict[str, Any], name: str) -> set[str]:
 def is_right(flight: dict[str, Any], name: str) -> bool:
     """Return whether a name is right: its effect acts, and was there to be named."""
     return bool(stands_for(flight, name) & _to_be_named(flight))
-
-
-def checks_of(flight: Mapping[str, Any]) -> set[str]:
-    """Return the checks that doubt the names of a recorded flight."""
-    return {f"structure: {kind}" for kind in flight["signs"]} | set(flight["doubts"])
 
 
 def signs_of(flight: dict[str, Any]) -> Signs:
@@ -147,17 +142,3 @@ def fit(flights: Sequence[dict[str, Any]]) -> PoolingSettings:
         other=a[3],
         **dict(zip(SIGNS, b, strict=True)),
     )
-
-
-def frequencies(flights: Sequence[dict[str, Any]]) -> dict[bool, float]:
-    """Return how often a tentative name (True), and one that is not, is right (Laplace's rule)."""
-    out = {}
-    for tentative in (False, True):
-        right = [
-            is_right(f, e["name"])
-            for f in flights
-            for e in f["named"]
-            if e["tentative"] is tentative
-        ]
-        out[tentative] = (sum(right) + 1) / (len(right) + 2)
-    return out

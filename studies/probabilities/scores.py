@@ -8,32 +8,41 @@ with weights that were fitted to the other: no flight is scored with weights tha
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from windwrench.identification.diagnosis import DIAGNOSIS
-from windwrench.identification.findings import Alternative, Probabilities
+from windwrench.identification.findings import Probabilities
 from windwrench.identification.posterior.deviations import without_other_estimate
-from windwrench.identification.posterior.pooling import POOLING, SIGNS
-from windwrench.studies.page_tables import area_under_curve, share, table
-from windwrench.studies.probabilities.doubts import table_of_doubts
+from windwrench.identification.posterior.pooling import SEARCH_ALONE, PoolingSettings
+from windwrench.studies.pages import kept
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
     fit,
-    frequencies,
     is_right,
     pool,
     stands_for,
+    without_posterior,
 )
+from windwrench.studies.scoring import area_under_curve, share
 
+RESULTS = {  # kept flights, below docs/
+    "first": "probabilities/results.json.gz",
+    "later": "probabilities/later.json.gz",
+    "other logs": "probabilities/other-logs.json.gz",
+}
+TITLES = {
+    "pose": "a pose, without its posterior",
+    "no pose": "an IMU alone",
+    "position at 10 Hz": "an IMU, and ten positions a second",
+    "filtered": "a pose filtered before it was written",
+}
 EDGES = (0.05, 0.2, 0.5, 0.8, 0.95, 1.0001)  # of the reliability diagram; below, nothing is said
 _CERTAIN = 1e-3  # no probability counts as less than this in the log score
 _RESAMPLED = 2000
-_MUCH = 3.0  # nats, a dictionary's
 Claim = tuple[float, bool]
-WAYS = ("pooled", "search alone", "posterior alone")
 
 
 @dataclass(frozen=True)
@@ -94,37 +103,6 @@ def cross_fitted(records: Sequence[Mapping[str, Any]]) -> list[Scored]:
     ]
 
 
-def scored(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Scored]]:
-    """Return the flights with the probabilities of each way, none by weights that know it.
-
-    Args:
-        records: ``{"task": [simulator, kind, number], "result": ...}`` each.
-    """
-    shares = [frequencies(half) for half in reversed(_halves(records))]
-    out: dict[str, list[Scored]] = {way: [] for way in WAYS}
-    out[WAYS[0]] = cross_fitted(records)
-    for record in records:
-        own, flight = record["task"][0] == "own", record["result"]
-        out[WAYS[1]].append(Scored(own, flight, _by_frequency(flight, shares[half_of(record)])))
-        out[WAYS[2]].append(Scored(own, flight, _by_posterior(flight)))
-    return out
-
-
-def _by_frequency(flight: Mapping[str, Any], right: Mapping[bool, float]) -> Probabilities:
-    names = {e["name"]: right[e["tentative"]] for e in flight["named"]}
-    return Probabilities(names, (), float(flight["remainder"] == "structured"))
-
-
-def _by_posterior(flight: Mapping[str, Any]) -> Probabilities:
-    names: dict[str, float] = {}
-    for effects, p in flight["sets"]:
-        for e in effects:
-            names[e] = names.get(e, 0.0) + p
-    sets = tuple(Alternative(tuple(e), p) for e, p in flight["sets"])
-    odds = 1.0 / (1.0 + math.exp(-max(min(flight["structure"], 30.0), -30.0)))
-    return Probabilities(names, sets, odds)
-
-
 def expected_calibration_error(claims: Sequence[Claim]) -> float:
     """Return the mean distance of stated probability and share that is right, over bins."""
     total = 0.0
@@ -181,16 +159,19 @@ def mean_and_interval(values: Sequence[float]) -> str:
     return f"{x.mean():.2f} ({low:.2f} to {high:.2f})"
 
 
-def reliability(flights: Sequence[Scored]) -> list[list[str]]:
+def reliability(flights: Sequence[Scored]) -> list[dict[str, Any]]:
     """Return rows of the reliability diagram: probability, its mean, and how often it is right."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     claims = claims_of(flights)
     for low, high in itertools.pairwise((0.0, *EDGES)):
         inside = [x for x in claims if low <= x[0] < high]
         if inside:
-            mean = float(np.mean([p for p, _ in inside]))
-            right = share(sum(right for _, right in inside), len(inside))
-            rows.append([f"{low:g} to {min(high, 1.0):g}", f"{mean:.3f}", right])
+            row = {
+                "from": low,
+                "to": min(high, 1.0),
+                "mean": float(np.mean([p for p, _ in inside])),
+            }
+            rows.append(row | {"right": share(sum(right for _, right in inside), len(inside))})
     return rows
 
 
@@ -201,7 +182,7 @@ def area(flights: Sequence[Scored]) -> str:
     return area_under_curve(strange, known)
 
 
-def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
+def errors_of_coefficients(flights: Sequence[Scored], both: bool) -> list[float]:
     """Return errors of coefficients in stated standard deviations, of right names whose truth is
     known; ``both``: of the two estimates, else of the search alone.
     """
@@ -219,113 +200,117 @@ def _coverage(flights: Sequence[Scored], both: bool) -> list[float]:
     return out
 
 
-def _comparison(every: Mapping[str, Sequence[Scored]]) -> str:
-    rows = []
-    for way, flights in every.items():
-        claims = claims_of(flights)
-        low, high = calibration_interval(flights)
-        rows.append(
-            [
-                way,
-                f"{expected_calibration_error(claims):.3f} ({low:.3f} to {high:.3f})",
-                f"{error_of_perfect_calibration(claims):.3f}",
-                mean_and_interval([x.log_score() for x in flights]),
-                area(flights),
-                str(len(claims)),
-            ]
-        )
-    return table(
-        [
-            "probabilities",
-            "expected calibration error of names (95 %)",
-            "of a perfect forecaster of as many",
-            "log score a flight (95 %)",
-            "area under the curve of `unknown`",
-            "names",
-        ],
-        rows,
-    )
+def summary(title: str, flights: Sequence[Scored]) -> dict[str, Any]:
+    """Return what names and probabilities of flights are worth, as a row of a table."""
+    claims = claims_of(flights)
+    named = [(e, x) for x in flights for e in x.flight["named"]]
+
+    def right(tentative: bool) -> str:
+        some = [(e, x) for e, x in named if e["tentative"] is tentative]
+        return share(sum(is_right(x.flight, e["name"]) for e, x in some), len(some))
+
+    return {
+        "title": title,
+        "flights": len(flights),
+        "unknown": sum(acts_unknown(x.flight) for x in flights),
+        "sure": right(False),
+        "tentative": right(True),
+        "error": expected_calibration_error(claims),
+        "error_ci95": calibration_interval(flights),
+        "error_of_perfect": error_of_perfect_calibration(claims),
+        "log_score": mean_and_interval([x.log_score() for x in flights]),
+        "area": area(flights),
+    }
 
 
-def _counts(flights: Sequence[Scored]) -> str:
+def counts(flights: Sequence[Scored]) -> dict[str, str]:
+    """Return counts with their intervals: names that are sure by their probability, names where
+    nothing is missing or something unknown acts, and the coverage of coefficients' intervals.
+    """
     known = [x for x in flights if not acts_unknown(x.flight)]
     nothing = [x for x in known if not x.flight["truth"]]
     strange = [x for x in flights if acts_unknown(x.flight)]
-    sure = [(e, x) for x in flights for e in x.flight["named"] if not e["tentative"]]
-    stated = [
+    least = DIAGNOSIS.least_sure_probability
+    sure = [
         (e, x)
-        for e, x in sure
-        if min(x.found.names[n["name"]] for n in x.flight["named"])
-        >= DIAGNOSIS.least_sure_probability
+        for x in flights
+        for e in x.flight["named"]
+        if not e["tentative"] and min(x.found.names[n["name"]] for n in x.flight["named"]) >= least
     ]
 
     def above(some: Sequence[Scored], least: float) -> str:
         return share(sum(any(p >= least for p in x.found.names.values()) for x in some), len(some))
 
-    rows = [
-        ["flights", str(len(flights))],
-        [
-            "names that are sure, and right",
-            share(sum(is_right(x.flight, e["name"]) for e, x in stated), len(stated)),
-        ],
-        [
-            "... by the checks of the search alone",
-            share(sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)),
-        ],
-        [
-            f"dictionary worth more than {_MUCH:g} nats, nothing unknown",
-            share(sum(x.flight["structure"] > _MUCH for x in known), len(known)),
-        ],
-        [
-            "... outsiders and left-out effects",
-            share(sum(x.flight["structure"] > _MUCH for x in strange), len(strange)),
-        ],
-        ["nothing missing, yet a name of 0.5 and more", above(nothing, 0.5)],
-        ["outsiders and left-out effects, yet a name of 0.5 and more", above(strange, 0.5)],
-        ["... of 0.95 and more", above(strange, 0.95)],
-    ]
+    out = {
+        "names that are sure, and right": share(
+            sum(is_right(x.flight, e["name"]) for e, x in sure), len(sure)
+        ),
+        "nothing missing, yet a name of 0.5 and more": above(nothing, 0.5),
+        "outsiders and left-out effects, yet a name of 0.5 and more": above(strange, 0.5),
+        "outsiders and left-out effects, yet a name of 0.95 and more": above(strange, 0.95),
+    }
     for both, words in ((True, ""), (False, ", by the search alone")):
-        errors = _coverage(flights, both)
+        errors = errors_of_coefficients(flights, both)
         for level, most in ((68, 0.9945), (95, 1.96)) if errors else ():
             count = share(sum(e < most for e in errors), len(errors))
-            rows.append([f"coverage of {level} % intervals of coefficients{words}", count])
+            out[f"coverage of {level} % intervals of coefficients{words}"] = count
     low, middle, high = np.quantile([x.flight["cpu_s"] for x in flights], [0.05, 0.5, 0.95])
-    rows.append(
-        ["CPU time, median (5 to 95 % of flights)", f"{middle:.1f} s ({low:.1f} to {high:.1f})"]
-    )
-    return table(["", "value (95 % interval)"], rows)
+    told = f"{middle:.1f} s ({low:.1f} to {high:.1f})"
+    return out | {"CPU time, median (5 to 95 % of flights)": told}
 
 
-def _weights(records: Sequence[Mapping[str, Any]]) -> str:
-    w = fit([r["result"] for r in records])
-    names = ("evidence", "sure", "tentative", "other", *SIGNS)
-    rows = [[f"`{x}`", f"{getattr(w, x):.2f}", f"{getattr(POOLING, x):.2f}"] for x in names]
-    return table(["weight, nats", "fitted to all these flights", "in use"], rows)
+def without_posteriors(
+    records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
+) -> dict[str, list[Mapping[str, Any]]]:
+    """Return records without a posterior by the keys of ``SEARCH_ALONE``; refused flights are left
+    out.
+
+    Args:
+        records: of logs of other kinds, whose task ends with the way to log.
+        poses: of flights whose pose is logged as measured.
+    """
+    out: dict[str, list[Mapping[str, Any]]] = {kind: [] for kind in SEARCH_ALONE}
+    for record in (*({**r, "task": [*r["task"], "pose"]} for r in poses), *records):
+        way = record["task"][3]
+        if "refused" not in record["result"]:
+            found = {**record, "result": without_posterior(record["result"])}
+            out[way if way in SEARCH_ALONE else "imu"].append(found)
+    return out
 
 
-def tables_of_later_flights(records: Sequence[Mapping[str, Any]]) -> str:
-    """Return the scores of flights that were flown after the weights in use were fitted."""
-    flights = [Scored(r["task"][0] == "own", r["result"], pool(r["result"])) for r in records]
-    parts = [_comparison({"weights in use": flights}), _counts(flights)]
-    parts += [table(["probability", "mean", "right"], reliability(flights))]
-    return "\n\n".join(parts)
+def weights_without_posterior(
+    records: Sequence[Mapping[str, Any]], poses: Sequence[Mapping[str, Any]]
+) -> dict[str, PoolingSettings]:
+    """Return what ``SEARCH_ALONE`` should be by these flights; arguments as of
+    ``without_posteriors``.
+    """
+    found = {
+        kind: fit([r["result"] for r in some])
+        for kind, some in without_posteriors(records, poses).items()
+    }
+    return {k: replace(x, evidence=0.0, other=0.0, structure=0.0) for k, x in found.items()}
 
 
-def tables(records: Sequence[Mapping[str, Any]]) -> str:
-    """Return the scores of recorded flights as Markdown tables."""
-    every = scored(records)
-    parts = ["**Three ways to a probability, all flights**", _comparison(every)]
-    both = zip(every[WAYS[0]], every[WAYS[1]], strict=True)
-    gained = mean_and_interval([a.log_score() - b.log_score() for a, b in both])
-    parts += [f"Log score that pooling gains over the search alone, a flight: {gained}."]
-    best = every[WAYS[0]]
-    parts += ["**Pooled: names by their probability, all flights**"]
-    parts += [table(["probability", "mean", "right"], reliability(best))]
-    for own, title in ((True, "Own flights"), (False, "The other simulator")):
-        some = [x for x in best if x.own == own]
-        if some:
-            parts += [f"**{title}**", _counts(some)]
-            parts += [table(["probability", "mean", "right"], reliability(some))]
-    parts += ["**Checks that make names tentative**"]
-    parts += [table_of_doubts([r["result"] for r in records])]
-    return "\n\n".join([*parts, "**Weights of the pool**", _weights(records)])
+def page() -> dict[str, Any]:
+    """Return what the page shows of the kept results."""
+    records, later = kept(RESULTS["first"]), kept(RESULTS["later"])
+    others = kept(RESULTS["other logs"])
+    fitted = cross_fitted(records)
+    after = [Scored(r["task"][0] == "own", r["result"], pool(r["result"])) for r in later]
+    rows = [
+        summary("this project's plant", [x for x in fitted if x.own]),
+        summary("the other simulator", [x for x in fitted if not x.own]),
+        summary("both, later, with the weights in use", after),
+    ]
+    for some in without_posteriors(others, records).values():
+        scored = cross_fitted(some)
+        ways = [record["task"][3] for record in some]
+        for way in dict.fromkeys(ways):
+            mine = [x for x, own in zip(scored, ways, strict=True) if own == way]
+            rows.append(summary(TITLES[way], mine))
+    return {
+        "rows": rows,
+        "counts": {"earlier": counts(fitted), "later": counts(after)},
+        "reliability": {"earlier": reliability(fitted), "later": reliability(after)},
+        "refused": share(sum("refused" in r["result"] for r in others), len(others)),
+    }

@@ -17,7 +17,6 @@ from windwrench.dynamics.rotation import matrix_of
 from windwrench.dynamics.vehicle import Vehicle
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import TICK
-from windwrench.runtime.errors import unknown_name
 
 Array = NDArray[np.float64]
 
@@ -322,26 +321,6 @@ OUTSIDERS: dict[str, ModelMaker] = {
         torque_drift,
     )
 }
-
-
-def outside_disturbance(
-    name: str, vehicle: Vehicle, rng: np.random.Generator, path: Array, size: float = 1.0
-) -> Callable[[ClosedLoop], Array]:
-    """Return what gives a loop its wrench (6,) of a disturbance at each tick.
-
-    Args:
-        name: one of ``OUTSIDERS``.
-        vehicle: that flies.
-        rng: of what the disturbance draws at random.
-        path: set points (n, 3) m of the flight, near which it has its place.
-        size: factor on the wrench.
-
-    Raises:
-        InputError: no disturbance has this name.
-    """
-    if name not in OUTSIDERS:
-        raise unknown_name("disturbance", name, OUTSIDERS)
-    return wrench_input(OUTSIDERS[name](vehicle, rng, path), size)
 
 
 def wrench_input(model: WrenchModel, size: float = 1.0) -> Callable[[ClosedLoop], Array]:

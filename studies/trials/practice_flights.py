@@ -20,7 +20,8 @@ from windwrench.envs.recording import background, draw_trajectory, record_flight
 from windwrench.identification.inference.regression import typical_size
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.runtime.errors import InputError, unknown_name
-from windwrench.studies.trials.outsiders import OUTSIDERS, outside_disturbance
+from windwrench.studies.trials.held_back_outsiders import HELD_BACK
+from windwrench.studies.trials.outsiders import OUTSIDERS, wrench_input
 
 Array = NDArray[np.float64]
 
@@ -147,6 +148,7 @@ def fly_practice(
     imu: bool = False,
     gust_time: float | None = None,
     seen: float = 1.0,
+    outsider_rng: np.random.Generator | None = None,
 ) -> FlightLog:
     """Fly a vehicle with effects that it does not declare and with a disturbance; return the log,
     with the true wrench.
@@ -157,7 +159,7 @@ def fly_practice(
         trajectory: one of ``envs.recording.TRAJECTORIES``.
         seconds: length of the log.
         seed: of everything random; the same arguments give the same log.
-        outsider: one of ``studies.trials.outsiders.OUTSIDERS``, or none.
+        outsider: one of ``OUTSIDERS`` or of ``HELD_BACK``, or none.
         turbulence: factor on the background turbulence; 0: still air.
         sensor: factor on the declared noise of the pose.
         outsider_size: factor on the disturbance.
@@ -166,6 +168,7 @@ def fly_practice(
         seen: share of the log's noise that the flight loop's own pose has. A loop that reads a gyro
             sees more than a log of poses holds: with a small share it answers a gust before the
             log shows it.
+        outsider_rng: of what the disturbance draws; default: one of ``seed``.
 
     Raises:
         InputError: an unknown name, a number out of range, or a crash.
@@ -196,9 +199,11 @@ def fly_practice(
     if outsider is not None:
         t = TICK * np.arange(max(round(seconds / TICK), 1) + 1, dtype=np.float64)
         path = draw_trajectory(trajectory, np.random.default_rng(seed), t, vehicle.ceiling_z)[:, :3]
-        disturbance = outside_disturbance(
-            outsider, vehicle, np.random.default_rng((seed, 1)), path, outsider_size
-        )
+        known = {**OUTSIDERS, **HELD_BACK}
+        if outsider not in known:
+            raise unknown_name("disturbance", outsider, known)
+        rng = outsider_rng or np.random.default_rng((seed, 1))
+        disturbance = wrench_input(known[outsider](vehicle, rng, path), outsider_size)
     c = record_flight(flown, effects, trajectory, seconds, seed, settings, disturbance, imu=imu)
     added = "+".join([*(e.name for e in effects), *([outsider] if outsider else [])]) or "nothing"
     position, quaternion = c["position"], c["quaternion"]
@@ -374,6 +379,57 @@ def practise(
         turbulence,
         sensor,
         replace(log, name=name),
+        vehicle,
+    )
+
+
+def practise_held_back(
+    vehicle: Vehicle, name: str, size: str = "typical", seed: int = 0, seconds: float = 60.0
+) -> Practice:
+    """Fly one practice flight with a disturbance of ``HELD_BACK``.
+
+    Args:
+        vehicle: as declared; without a ceiling it gets one at 2.6 m.
+        name: one of ``HELD_BACK``.
+        size: one of ``SIZES``, factor on the wrench.
+        seed: of everything random.
+        seconds: length of the log.
+
+    Raises:
+        InputError: an unknown name, or a crash.
+    """
+    if name not in HELD_BACK:
+        raise unknown_name("disturbance", name, HELD_BACK)
+    if size not in SIZES:
+        raise unknown_name("size", size, SIZES)
+    vehicle = vehicle if np.isfinite(vehicle.ceiling_z) else replace(vehicle, ceiling_z=_CEILING)
+    rng = np.random.default_rng((seed, zlib.crc32(f"{name}+{size}".encode())))
+    trajectory = str(rng.choice(["excite", "fast"]))
+    turbulence, sensor = float(rng.integers(2)), float(rng.choice([0.5, 1.0, 2.0]))
+    log = fly_practice(
+        vehicle,
+        (),
+        trajectory,
+        seconds,
+        seed,
+        name,
+        turbulence,
+        sensor,
+        SIZES[size],
+        outsider_rng=rng,
+    )
+    title = f"held_back_{name}_{size}_{trajectory}_{seed}"
+    return Practice(
+        title,
+        "outsider",
+        size,
+        trajectory,
+        seed,
+        (),
+        name,
+        turbulence,
+        sensor,
+        replace(log, name=title),
         vehicle,
     )
 

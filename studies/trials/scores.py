@@ -1,13 +1,10 @@
 """What the outcomes of ``trials`` are worth: one judgement a diagnosis, and the rules that they are
 held to.
 
-A name is *true* where the effect was added, and stands for the truth where the diagnosis says that
-its flights cannot tell it from an added effect. A name is *confidently wrong* where it is neither
-of these and not marked as tentative. A diagnosis is *right* where every added effect has its name
-and there is no other.
+A name is *confidently wrong* where it stands for no added effect and is not tentative. A diagnosis
+is *right* where every added effect has its name and there is no other.
 """
 
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import erf, sqrt
@@ -16,17 +13,18 @@ from typing import Any
 import numpy as np
 
 from windwrench.identification.diagnosis import DIAGNOSIS
-from windwrench.studies.page_tables import area_under_curve
-from windwrench.studies.page_tables import share as counted
-from windwrench.studies.trials.trials import EQUIVALENTS
-from windwrench.studies.trials.unseen_outsiders import UNSEEN
-
-RIGHT, RIGHT_TENTATIVE, TENTATIVE, WRONG = (
-    "right",
-    "right, tentative",
-    "tentative",
-    "confidently wrong",
+from windwrench.studies.scoring import (
+    EQUIVALENTS,
+    area_under_curve,
+    coefficient_errors,
+    match,
+    share,
+    stands_for,
 )
+from windwrench.studies.trials.held_back_outsiders import UNSEEN
+
+RIGHT, RIGHT_TENTATIVE = "right", "right, tentative"
+TENTATIVE, WRONG = "tentative", "confidently wrong"
 PARTIAL, UNEXPLAINED, SILENT, FAILED = "partial", "unexplained", "silent", "failed"
 OUTCOMES: Mapping[str, str] = {
     RIGHT: "every added effect named, no other, none tentative; with nothing added, nothing named",
@@ -46,39 +44,54 @@ _ROTORPY = {"rotor_drag": ("kdx", "kdy"), "inflow_thrust": ("kz",), "translation
 
 @dataclass(frozen=True)
 class Judgement:
-    """What one diagnosis of one flight is worth."""
+    """What one diagnosis of one flight is worth.
 
-    key: str  # of the trial
+    Attributes:
+        key: of the trial.
+        cause: what was added, in words.
+        flight: trajectory and conditions, in words.
+        without: effects that were taken out of the library.
+        truth: effects that were added.
+        outcome: one of OUTCOMES.
+        named: with a question mark where tentative, and what flights cannot tell from each.
+        exact: right by the very names, not only up to what flights cannot tell.
+        classes: all that is named, or that flights cannot tell from a name.
+        errors: of coefficients: relative, and in their own standard deviations.
+        floor_ratio: largest of force's and torque's residual after, over the noise floor.
+        rollout_ratio: one-second prediction error after, over before.
+        rollout_of_truth: the same of the true model, on the same blocks.
+        gusts: in force, found over flown; NaN in still air.
+        probable: whether each name is true whose probability makes the name sure.
+        unknown: probability that something outside the library acts.
+        gave_away: strongest sign of structure.
+        problem: the error's text where the diagnosis failed.
+        seconds: that the diagnosis took.
+    """
+
+    key: str
     group: str
-    cause: str  # what was added, in words
+    cause: str
     size: str
     vehicle: str
-    flight: str  # trajectory and conditions, in words
-    without: tuple[str, ...]  # taken out of the library
-    truth: tuple[str, ...]  # effects that were added
-    outcome: str  # one of OUTCOMES
-    named: tuple[
-        str, ...
-    ]  # a question mark behind tentative ones, and what they cannot be told from
-    exact: bool  # right by the very names, not only up to what flights cannot tell
-    classes: tuple[str, ...]  # all that is named, or that flights cannot tell from what is named
-    all_tentative: bool  # every name is
-    errors: Mapping[
-        str, tuple[float, float]
-    ]  # coefficient: relative error, and error in its own standard deviations
+    flight: str
+    without: tuple[str, ...]
+    truth: tuple[str, ...]
+    outcome: str
+    named: tuple[str, ...]
+    exact: bool
+    classes: tuple[str, ...]
+    all_tentative: bool
+    errors: Mapping[str, tuple[float, float]]
     verdict: str
-    remainder: str
-    floor_ratio: (
-        float  # largest of force's and torque's residual after, over what the sensors leave
-    )
-    rollout_ratio: float  # one-second prediction error after over before
-    rollout_of_truth: float  # that of the true model over before, on the same blocks
-    gusts: float  # in force, found over flown; NaN in still air
-    probable: tuple[bool, ...]  # whether each name of a probability that makes it sure is true
-    unknown: float  # probability that something acts which no effect of the library is
-    gave_away: str  # strongest sign of structure
-    problem: str  # the error's text where it failed
-    seconds: float  # that the diagnosis took
+    floor_ratio: float
+    rollout_ratio: float
+    rollout_of_truth: float
+    gusts: float
+    probable: tuple[bool, ...]
+    unknown: float
+    gave_away: str
+    problem: str
+    seconds: float
 
     @property
     def right(self) -> bool:
@@ -98,7 +111,7 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
     truth: Mapping[str, Mapping[str, float]] = flown["truth"]
     effects = found.get("effects", [])
     failed = "error" in found
-    wrong = [e["name"] for e in effects if not e["tentative"] and not (_stands_for(e) & set(truth))]
+    wrong = [e["name"] for e in effects if not e["tentative"] and not (stands_for(e) & set(truth))]
     pairs = match(effects, list(truth))
     right = pairs is not None and not flown["outsider"]
     tentative = any(e["tentative"] for e in effects) or (
@@ -115,7 +128,7 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
     else:
         verdict = SILENT if found["remainder"] == "none" else UNEXPLAINED
     after, floor = found.get("after", {}), found.get("floor", {})
-    behind = set().union(*(_stands_for(e) for e in effects))
+    behind = set().union(*(stands_for(e) for e in effects))
     size = "" if trial["group"] in ("nothing", "strong turbulence") else f", {trial['size']}"
     structure = found.get("structure", [])
     return Judgement(
@@ -137,7 +150,6 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
             effects, truth, pairs or [(e["name"], e["name"]) for e in effects if e["name"] in truth]
         ),
         verdict=found.get("verdict", ""),
-        remainder=found.get("remainder", ""),
         floor_ratio=max(
             (_ratio(after.get(k), floor.get(k)) for k in ("force_rms", "torque_rms")),
             default=np.nan,
@@ -151,7 +163,7 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
         if found.get("gusts")
         else np.nan,
         probable=tuple(
-            bool(_stands_for(e) & set(truth))
+            bool(stands_for(e) & set(truth))
             for e in effects
             if (e.get("probability") or 0.0) >= DIAGNOSIS.least_sure_probability
         ),
@@ -160,10 +172,6 @@ def _judge(outcome: Mapping[str, Any], found: Mapping[str, Any]) -> Judgement:
         problem=found.get("error", ""),
         seconds=found["seconds"],
     )
-
-
-def _stands_for(effect: Mapping[str, Any]) -> set[str]:
-    return {effect["name"], *effect["indistinguishable_from"]}
 
 
 def _word(effect: Mapping[str, Any]) -> str:
@@ -179,53 +187,6 @@ def _number(value: float | None) -> float:
 
 def _ratio(after: float | None, before: float | None) -> float:
     return float(after / before) if after is not None and before else float("nan")
-
-
-def match(
-    effects: Sequence[Mapping[str, Any]], truth: Sequence[str]
-) -> list[tuple[str, str]] | None:
-    """Return pairs (name, added effect) if names and added effects stand for each other one by one,
-    else None.
-    """
-    if len(effects) != len(truth):
-        return None
-    best: list[tuple[str, str]] | None = None
-    for order in itertools.permutations(truth):
-        if all(added in _stands_for(e) for e, added in zip(effects, order, strict=True)):
-            pairs = [(str(e["name"]), added) for e, added in zip(effects, order, strict=True)]
-            if best is None or sum(a == b for a, b in pairs) > sum(a == b for a, b in best):
-                best = pairs
-    return best
-
-
-def coefficient_errors(
-    effects: Sequence[Mapping[str, Any]],
-    truth: Mapping[str, Mapping[str, float]],
-    pairs: Sequence[tuple[str, str]],
-) -> dict[str, tuple[float, float]]:
-    """Return, for each coefficient that is not zero in the truth, its relative error and that in
-    standard deviations.
-
-    Only names that are the added effect's own are compared, and a latency with a clock offset,
-    which is the same number.
-    """
-    by_name = {e["name"]: e for e in effects}
-    out = {}
-    for name, added in pairs:
-        true, e = truth[added], by_name[name]
-        if name != added:
-            if (
-                name not in EQUIVALENTS.get(added, ())
-                or len(true) != 1
-                or len(e["coefficients"]) != 1
-            ):
-                continue
-            e = {k: dict(zip(true, e[k].values(), strict=True)) for k in ("coefficients", "std")}
-        for c, value in true.items():
-            if value != 0.0 and c in e["coefficients"]:
-                miss, std = abs(e["coefficients"][c] - value), e["std"].get(c) or float("nan")
-                out[f"{added}.{c}"] = (float(miss / abs(value)), float(miss / std))
-    return out
 
 
 @dataclass(frozen=True)
@@ -419,12 +380,12 @@ def _not_wrong(j: Judgement) -> bool:
 
 
 def _rule(
-    subject: str, share: float, bar: float | None, count: int, more: str, at_most: bool = False
+    subject: str, part: float, bar: float | None, count: int, more: str, at_most: bool = False
 ) -> Rule:
     if not count:
         return Rule(subject, _target(bar, at_most), "not flown", None, 0)
-    met = None if bar is None else bool(share <= bar if at_most else share >= bar)
-    return Rule(subject, _target(bar, at_most), f"{share:.1%} {more}".strip(), met, count)
+    met = None if bar is None else bool(part <= bar if at_most else part >= bar)
+    return Rule(subject, _target(bar, at_most), f"{part:.1%} {more}".strip(), met, count)
 
 
 def _target(bar: float | None, at_most: bool = False) -> str:
@@ -441,14 +402,8 @@ def _share(
     at_most: bool = False,
 ) -> Rule:
     count = sum(map(good, some))
-    return _rule(
-        subject, count / max(len(some), 1), bar, len(some), f"({_counted(count, some)})", at_most
-    )
-
-
-def _counted(count: int, some: Sequence[Judgement]) -> str:
-    """Return a count and its 95 % interval."""
-    return counted(count, len(some)).replace(" (", ", ").rstrip(")")
+    told = f"({share(count, len(some)).replace(' (', ', ')}"
+    return _rule(subject, count / max(len(some), 1), bar, len(some), told, at_most)
 
 
 def _by_kind(subject: str, some: Sequence[Judgement], bar: float) -> Rule:
@@ -536,14 +491,14 @@ def _probabilities(inside: Sequence[Judgement], foreign: Sequence[Judgement]) ->
         Rule(
             f"8. names with a probability of {least} and more, the cause in the library: true",
             "-",
-            counted(sum(names), len(names)),
+            share(sum(names), len(names)),
             None,
             len(inside),
         ),
         Rule(
             f"8. the cause not in the library: no name has a probability of {least} and more",
             "-",
-            counted(len(foreign) - false, len(foreign)),
+            share(len(foreign) - false, len(foreign)),
             None,
             len(foreign),
         ),

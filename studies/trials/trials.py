@@ -2,19 +2,13 @@
 diagnosed as a user would.
 
 Every trial is one flight, diagnosed with the whole library and, where it asks for that, with
-effects left out. Its outcome is one line of ``trials.jsonl``: an interrupted run goes on where it
-stopped, and a line that other code has written is not used. What the outcomes are worth is the
-subject of ``scores``, and their page that of ``page``.
+effects left out. ``scores`` says what the outcomes are worth.
 """
 
-import json
-import os
 import time
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +23,11 @@ from windwrench.identification.findings import Diagnosis
 from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.prediction import rollout_error
 from windwrench.runtime.errors import InputError, unknown_name
-from windwrench.runtime.provenance import commit
-from windwrench.runtime.whole_files import replaced
-from windwrench.runtime.workers import workers
-from windwrench.studies.code_stamp import code_stamp
-from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
+from windwrench.studies.runner import code_stamp, run_tasks
+from windwrench.studies.scoring import EQUIVALENTS
+from windwrench.studies.trials.held_back_outsiders import HELD_BACK
 from windwrench.studies.trials.outsiders import OUTSIDERS
-from windwrench.studies.trials.practice_flights import practise, shown_in
+from windwrench.studies.trials.practice_flights import practise, practise_held_back, shown_in
 from windwrench.studies.trials.rotorpy_flights import (
     aero_settings,
     available,
@@ -43,16 +35,6 @@ from windwrench.studies.trials.rotorpy_flights import (
     rotorpy_flight,
 )
 
-# Effects that leave the very log that another one leaves, whatever is flown: taken out together. A
-# latency is a positive clock offset; a thrust scale is a rotor efficiency with four equal numbers;
-# and turning the world's frame turns all forces but the weight that the model assumes, which leaves
-# a constant horizontal force.
-EQUIVALENTS: Mapping[str, tuple[str, ...]] = {
-    "latency": ("clock_offset",),
-    "clock_offset": ("latency",),
-    "thrust_scale": ("rotor_efficiency",),
-    "world_tilt": ("constant_force",),
-}
 _ATTEMPTS = 4  # at a flight that crashes
 _ROTORPY_SECONDS = 40.0  # RotorPy is slow
 STRONG_TURBULENCE = 4.0  # times the background's
@@ -72,7 +54,6 @@ _PRESET_EFFECTS = ("rotor_drag", "mass", "com_offset", "motor_lag", "thrust_curv
 _QUICK_EFFECTS = ("rotor_drag", "mass", "inflow_thrust", "ground_effect", "com_offset", "latency")
 _QUICK_OUTSIDERS = ("contact_pushes", "sloshing", "cubic_drag")
 _ROTORPY_PATHS = ("excite", "fast")
-_BLAS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _KIND = {
     "typical": "effect",
     "third": "effect",
@@ -208,7 +189,6 @@ def stamp() -> str:
         "trials/outsiders",
         "trials/practice_flights",
         "trials/rotorpy_flights",
-        "trials/unseen_outsiders",
     )
 
 
@@ -218,7 +198,6 @@ def fly_and_diagnose(trial: Trial) -> dict[str, Any]:
     """
     out: dict[str, Any] = {
         "key": trial.key,
-        "code": stamp(),
         "trial": _plain(asdict(trial)),
         "diagnoses": [],
     }
@@ -352,81 +331,24 @@ def _findings(found: Diagnosis) -> dict[str, Any]:
     return dict(_plain(summary))
 
 
-def run_trials(
-    trials: Iterable[Trial],
-    folder: Path,
-    jobs: int | None = None,
-    report: Callable[[int], None] = lambda done: None,
-) -> list[dict[str, Any]]:
+def run_trials(trials: Iterable[Trial], folder: Path, jobs: int = 1) -> list[dict[str, Any]]:
     """Run those trials whose outcomes are not in the folder; return the outcomes of all, in the
     order of the trials.
 
     Args:
         trials: as ``plan`` makes them.
         folder: for ``trials.jsonl``.
-        jobs: processes, of one thread each; default: one a core.
-        report: called with the number of trials that are done, whenever it grows.
+        jobs: processes.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    commit()  # asked before the flights: it is the code that flies
-    wanted = {trial.key: trial for trial in trials}
-    path = folder / "trials.jsonl"
-    done = {
-        key: kept
-        for key, kept in _read(path)
-        if key in wanted and kept["trial"] == _plain(asdict(wanted[key]))
-    }
-    with replaced(path) as partial:  # drops what a cut-off run or other code has left
-        partial.write_text("".join(_line(kept) for kept in done.values()), encoding="utf-8")
-    report(len(done))
-    pending = [trial for key, trial in wanted.items() if key not in done]
-    if pending:
-        count = min(jobs or os.cpu_count() or 1, len(pending))
-        with (
-            _one_thread_each(),
-            path.open("a", encoding="utf-8") as kept_file,
-            workers(count) as pool,
-        ):
-            for future in as_completed([pool.submit(fly_and_diagnose, trial) for trial in pending]):
-                outcome = future.result()
-                kept_file.write(_line(outcome))
-                kept_file.flush()
-                done[outcome["key"]] = outcome
-                report(len(done))
-    return [done[key] for key in wanted]
+    tasks = [astuple(trial) for trial in trials]
+    return list(run_tasks(_outcome, tasks, folder / "trials.jsonl", jobs, stamp()).values())
 
 
-def _read(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the whole outcomes of this very code in a file."""
-    with suppress(OSError):
-        for text in path.read_text(encoding="utf-8").splitlines():
-            with suppress(ValueError, KeyError, TypeError):
-                kept = json.loads(text)
-                if kept["code"] == stamp():
-                    yield kept["key"], kept
-
-
-def _line(outcome: Mapping[str, Any]) -> str:
-    return json.dumps(outcome) + "\n"
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Have processes that start in the block run linear algebra on one thread: they fill the cores
-    already.
-    """
-    before = {name: os.environ.get(name) for name in _BLAS}
-    os.environ.update(dict.fromkeys(_BLAS, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+def _outcome(*parts: Any) -> dict[str, Any]:
+    return fly_and_diagnose(Trial(*parts))
 
 
 def _plain(value: Any) -> Any:

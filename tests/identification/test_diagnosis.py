@@ -24,8 +24,7 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.sensor_noise import sensor_noise, with_noise
 from windwrench.runtime.errors import InputError
-from windwrench.studies.trials.held_back_outsiders import practise_held_back
-from windwrench.studies.trials.practice_flights import fly_practice, practise
+from windwrench.studies.trials.practice_flights import fly_practice, practise, practise_held_back
 
 
 @cache

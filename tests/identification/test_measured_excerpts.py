@@ -14,7 +14,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.screening import screen_log
 from windwrench.identification.wrench_series import counts, estimate_log
-from windwrench.studies.measured_flights.measured_flights import (
+from windwrench.studies.measured_flights import (
     compare,
     imu_check,
     linear_drag,

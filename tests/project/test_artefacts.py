@@ -15,7 +15,6 @@ PAGES_OF_COMMANDS = (  # a line that says how the page was made, once or once a 
     "reproduction.md",
     "close-loop.md",
     "diagnosis-trials.md",
-    "real-faults.md",
     "real-flights.md",
     "leaderboard.md",
     "speed.md",

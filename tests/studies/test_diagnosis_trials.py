@@ -2,25 +2,24 @@
 stopped.
 """
 
-import gzip
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib import image
 
-from windwrench.cli import main
 from windwrench.dynamics import InputError, load_vehicle
 from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
-from windwrench.runtime.provenance import commit, made_by
-from windwrench.studies.trials.held_back_outsiders import HELD_BACK, practise_held_back
+from windwrench.studies.pages import render
+from windwrench.studies.scoring import EQUIVALENTS, match
+from windwrench.studies.trials.held_back_outsiders import HELD_BACK
 from windwrench.studies.trials.outsiders import OUTSIDERS
-from windwrench.studies.trials.page import write_results
+from windwrench.studies.trials.page import page as shown_of
+from windwrench.studies.trials.practice_flights import practise_held_back
 from windwrench.studies.trials.scores import (
     FAILED,
     RIGHT,
@@ -31,10 +30,9 @@ from windwrench.studies.trials.scores import (
     WRONG,
     judge,
     left_out,
-    match,
     rules,
 )
-from windwrench.studies.trials.trials import EQUIVALENTS, Trial, fly_and_diagnose, plan, run_trials
+from windwrench.studies.trials.trials import Trial, fly_and_diagnose, plan, run_trials
 
 SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, seconds=20.0)
 
@@ -336,7 +334,7 @@ def test_coefficients_of_rotorpy_are_held_to_the_bar():
     assert [r.met for r in rules(bad) if r.subject.startswith("7.")] == [False, False, None]
 
 
-def test_the_page_lists_every_miss(tmp_path):
+def test_the_page_lists_every_miss():
     outcomes = [
         outcome(
             "typical", MASS, found(name("mass", dm=0.05)), found(name("wind"), without=("mass",))
@@ -357,26 +355,14 @@ def test_the_page_lists_every_miss(tmp_path):
             "diagnoses": [],
         },
     ]
-    data, picture, page = write_results(
-        outcomes, tmp_path, tmp_path / "docs" / "page.md", 1, quick=True
-    )
-    text = page.read_text(encoding="utf-8")
-    missed = text.split("## What was missed")[1]
-    assert "mass.dm by 25.0%" in missed
-    assert "without mass): confidently wrong: wind" in missed
-    assert "* mass (third" in missed
-    assert "pair/-/typical/-/ardrone2/0: not flown: it crashed" in missed
-    assert "tether" not in missed
-    assert "nothing (" not in missed
-    assert "(../trials.png)" in text
-    assert "RotorPy" in text
-    assert image.imread(picture).shape[2] == 4
-    assert made_by("windwrench trials --seed 0 --seeds 1 --quick", [commit()]) in text.splitlines()
-    kept = json.loads(gzip.decompress(data.read_bytes()))
-    assert kept["commit"] == commit()
-    assert len(kept["trials"]) == 5
-    assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. one effect")] == [True]
-    assert [r["met"] for r in kept["rules"] if r["subject"].startswith("1. every coef")] == [False]
+    result = {"seed": 0, "seeds": 1, "quick": True, "version": "1", "commit": "c"}
+    text = render("diagnosis-trials", shown_of({**result, "trials": outcomes}))
+    assert "mass.dm by 25.0%" in text
+    assert "without mass): confidently wrong: wind" in text
+    assert "mass (third" in text
+    assert "pair/-/typical/-/ardrone2/0" in text
+    assert "tether (" not in text
+    assert "`python -m studies.trials --seed 0 --seeds 1 --quick`" in text
 
 
 def timeless(outcome):
@@ -397,68 +383,6 @@ def test_a_flight_is_diagnosed_and_not_again(tmp_path):
     assert judged.cause == "mass"
     assert 0.0 < judged.rollout_of_truth < 0.3
     json.dumps(whole)
-    path = tmp_path / "trials.jsonl"
-    other = json.dumps({**whole, "key": "of/other/code", "code": "other"})
-    path.write_text(f"{other}\n{json.dumps(whole)}\n{json.dumps(whole)[:100]}", encoding="utf-8")
-    unknown = Trial("outsider", ("gremlins",))
-    counts = []
-    kept, refused = run_trials([SHORT, unknown], tmp_path, 1, counts.append)
-    assert kept == whole
-    assert "gremlins" in refused["error"]
-    assert judge(refused) == []
-    assert counts == [1, 2]
-    lines = [json.loads(line)["key"] for line in path.read_text(encoding="utf-8").splitlines()]
-    assert lines == [SHORT.key, unknown.key]
-    # what has been flown under the same key but otherwise is flown anew
-    run_trials([replace(unknown, seconds=30.0)], tmp_path, 1, counts.append)
-    assert counts == [1, 2, 0, 1]
-    with pytest.raises(InputError, match="cannot be written"):
-        run_trials([unknown], path)
-
-
-def test_the_command_flies_the_plan_and_writes_the_page(tmp_path, monkeypatch, capfd):
-    asked = []
-
-    def planned(seeds, quick, first, groups):
-        asked.append((seeds, quick, first, *groups))
-        return [Trial("outsider", ("gremlins",))]
-
-    monkeypatch.setattr("windwrench.studies.trials.trials.plan", planned)
-    page = tmp_path / "page.md"
-    monkeypatch.setattr(
-        "sys.argv",
-        [
-            "windwrench",
-            "trials",
-            "--seeds",
-            "3",
-            "--seed",
-            "5",
-            "--quick",
-            "--group",
-            "outsider",
-            "--jobs",
-            "1",
-            "--out",
-            str(tmp_path / "out"),
-            "--markdown",
-            str(page),
-        ],
-    )
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert end.value.code in (0, None)
-    assert asked == [(3, True, 5, "outsider")]
-    assert "1. one effect of typical size" in capfd.readouterr().out
-    assert "`windwrench trials --seed 5 --seeds 3 --quick --group outsider`" in page.read_text(
-        encoding="utf-8"
-    )
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "run.json",
-        "trials.json.gz",
-        "trials.jsonl",
-        "trials.png",
-    }
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.data_paths import crazyswarm2_file, data_file
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import load_vehicle
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.commanded_rotors import (
     deviation,
@@ -19,16 +19,14 @@ from windwrench.identification.inference.commanded_rotors import (
 )
 from windwrench.identification.logs.reading import read_log
 from windwrench.identification.motion.signals import log_signals
-from windwrench.studies.measured_flights.measured_flights import (
+from windwrench.studies.measured_flights import (
     CARRIER,
     compare,
     imu_check,
     linear_drag,
     names_of,
     nanobench_fold,
-    page,
     payload_vehicle,
-    run,
     swing,
     unmet,
 )
@@ -165,60 +163,3 @@ def test_deviations_have_no_mean():
         assert np.ptp(each) > 0.1
         assert deviation(setting, kind, 4, 4) == 0.0
     assert without_deviations(setting) == {"": {}, "mass": {"dm": 1.0}}
-
-
-def test_page_of_a_result():
-    fold = {
-        "flight": "B",
-        "fitted_on": "all others",
-        "before_rms": [1, 1, 6],
-        "after_rms": [0.1, 0.1, 0.125],
-        "before_std": [1, 1, 1],
-        "after_std": [0.5, 0.25, 0.1],
-        "constant_thrust_std": [1, 1, 0.2],
-        "norm_before": 9.0,
-        "norm_after": 3.0,
-        "drag_N_per_mps": [0.01, 0.01],
-        "imu": {"model_std": 0.1, "constant_std": 0.2},
-        "effects": [],
-    }
-    effect = {
-        "name": "slung_payload",
-        "coefficients": {"m": 0.005},
-        "tentative": True,
-        "indistinguishable_from": ["mass"],
-    }
-    load = {
-        "logs": ["202"],
-        "payload": True,
-        "effects": [effect],
-        "swing": {"log202": {"law_std": [0.01, 0.02], "tracked_std": [0.01, 0.03]}},
-    }
-    result = {
-        "version": "0.1.0",
-        "commit": "abc1234",
-        "cutoff_hz": 4.0,
-        "nanobench": [fold],
-        "slung_payload": [load],
-    }
-    text = page(result, "pictures")
-    made = "Made by `windwrench real-flights`, windwrench 0.1.0, commit abc1234."
-    assert made in text.splitlines()
-    assert "[real_flights.json](pictures/real_flights.json)" in text
-    assert (
-        "| B | all others | 6.00 | 0.125 | 0.100 | 0.200 | 2.0 | 4.0 | 3.0 | 0.100 / 0.200 |"
-        in text
-    )
-    assert (
-        "* B from all others: all three axes down 4 times; battery_sag named; delay of 30 to 55 ms"
-        in text
-    )
-    assert "| 202 | yes | slung_payload (tentative) | m = 0.005 kg | mass |" in text
-    assert "| 202 | log202 | 10.0, 20.0 | 10.0, 30.0 |" in text
-
-
-def test_flights_that_are_missing(tmp_path):
-    with pytest.raises(
-        InputError, match=r"0 CSV file\(s\); expected at least three NanoBench flights"
-    ):
-        run(tmp_path / "out", tmp_path, tmp_path)

@@ -2,37 +2,31 @@
 weights.
 """
 
-import gzip
 import json
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from windwrench.identification.findings import Probabilities
-from windwrench.identification.posterior.pooling import POOLING, SEARCH_ALONE
-from windwrench.studies.probabilities import other_logs
-from windwrench.studies.probabilities.__main__ import RESULTS, plan
-from windwrench.studies.probabilities.doubts import table_of_doubts
+from windwrench.identification.posterior.pooling import POOLING
+from windwrench.studies.pages import kept
+from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
     fit,
-    frequencies,
     is_right,
     signs_of,
 )
 from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
 from windwrench.studies.probabilities.scores import (
+    RESULTS,
     Scored,
+    cross_fitted,
     error_of_perfect_calibration,
     expected_calibration_error,
     half_of,
-    scored,
-    tables_of_later_flights,
 )
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", structure=-1.0):
@@ -56,7 +50,7 @@ def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", 
 
 @pytest.fixture(scope="module")
 def records():
-    return json.loads(gzip.decompress((ROOT / RESULTS).read_bytes()))
+    return kept(RESULTS["first"])
 
 
 def test_the_weights_in_use_are_those_of_the_kept_flights(records):
@@ -65,37 +59,12 @@ def test_the_weights_in_use_are_those_of_the_kept_flights(records):
         assert getattr(found, name) == pytest.approx(value, abs=0.02), name
 
 
-def test_each_half_is_scored_by_the_other(records):
-    changed = [json.loads(json.dumps(r)) for r in records]
-    for r in changed:
-        if half_of(r):
-            r["result"]["truth"] = {}
-    old, new = scored(records)["pooled"], scored(changed)["pooled"]
-    for r, a, b in zip(records, old, new, strict=True):
-        same = a.found.unknown == b.found.unknown
-        assert same == bool(half_of(r))  # it knows the other half, which did not change
-
-
 def test_what_is_right():
     assert is_right(flight(["mass"], ["mass"]), "mass")
     assert is_right(flight(["clock_offset"], ["latency"]), "clock_offset")  # exact equivalents
     assert not is_right(flight(["mass"], ["inertia"]), "mass")
     assert not is_right(flight(["mass"], ["inertia"], left_out=["inertia"]), "mass")
     assert not is_right(flight(["mass"], [], outsider="tether"), "mass")
-
-
-def test_a_check_is_worth_the_flights_that_it_alone_doubts():
-    wrong, right = flight(["wind?"], ["mass"]), flight(["mass?"], ["mass"])
-    wrong["doubts"] = {"pair": 1}
-    right["signs"] = ["candidate regressor"]
-    both = flight(["wind?"], ["mass"])
-    both["doubts"], both["signs"] = {"pair": 2}, right["signs"]
-    rows = [x.split(" | ") for x in table_of_doubts([wrong, right, both]).splitlines()[2:]]
-    assert [x.strip("| ") for x in rows[0]] == ["pair", "2", "1", "0", "0"]
-    assert [x.strip("| ") for x in rows[1]] == [
-        "structure: candidate regressor",
-        *("1", "0", "1", "1"),
-    ]
 
 
 def test_weights_follow_who_was_right():
@@ -109,7 +78,6 @@ def test_weights_follow_who_was_right():
     assert found.sure > 2.0
     assert found.unknown < -1.0 < 1.0 < found.doubts
     assert signs_of(strange[0]).doubts == 1
-    assert frequencies([*agree, *strange]) == {False: 21 / 22, True: 1 / 22}
 
 
 def test_calibration_of_made_up_claims():
@@ -132,21 +100,6 @@ def test_either_half_has_all_kinds():
         assert {t["task"][1] for t in tasks if half_of(t) == half} >= {*KINDS, "catalogue"}
 
 
-def test_the_weights_without_a_posterior_are_those_of_the_kept_flights(records):
-    found = other_logs.fitted_weights(other_logs.kept(ROOT / other_logs.RESULTS), records)
-    for kind, weights in found.items():
-        for name, value in asdict(SEARCH_ALONE[kind]).items():
-            assert getattr(weights, name) == pytest.approx(value, abs=0.02), (kind, name)
-
-
-def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
-    tasks = other_logs.plan(20, 0, 1000, "other.py")
-    assert len(set(tasks)) == len(tasks) == 60
-    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
-    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
-    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)
-
-
 def test_what_a_log_does_not_show_is_unknown_to_it():
     pair = {**flight(["mass", "wind"], ["mass", "wind"]), "hidden": ["wind"]}
     assert acts_unknown(pair)
@@ -154,14 +107,26 @@ def test_what_a_log_does_not_show_is_unknown_to_it():
     assert not is_right(pair, "wind")
 
 
-def test_later_flights_are_scored_with_the_weights_in_use(records):
-    text = tables_of_later_flights(records[:40])
-    assert "| weights in use |" in text
-    assert "| flights | 40 |" in text
-
-
 def test_a_run_has_flights_of_both_and_none_twice():
     tasks = plan(20, 20, 0, 3, "other.py")
     assert len(set(tasks)) == len(tasks)
     assert {t[1] for t in tasks if t[0] == "own"} >= {"single", "pair", "nothing", "left out"}
     assert {t[1] for t in tasks if t[0] == "other.py"} == {"catalogue", "left out"}
+
+
+def test_each_half_is_scored_by_the_other(records):
+    changed = [json.loads(json.dumps(r)) for r in records]
+    for r in changed:
+        if half_of(r):
+            r["result"]["truth"] = {}
+    for r, a, b in zip(records, cross_fitted(records), cross_fitted(changed), strict=True):
+        same = a.found.unknown == b.found.unknown
+        assert same == bool(half_of(r))  # the half that did not change gave its weights
+
+
+def test_other_logs_are_of_all_ways_and_none_is_flown_twice():
+    tasks = plan_of_other_logs(20, 0, 1000, "other.py")
+    assert len(set(tasks)) == len(tasks) == 60
+    assert {t[3] for t in tasks} == set(WAYS_TO_LOG[1:])
+    assert {t[3] for t in tasks if t[0] == "other.py"} == {"filtered"}
+    assert {t[1] for t in tasks if t[0] == "own"} == set(KINDS)

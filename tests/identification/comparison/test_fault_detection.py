@@ -7,13 +7,13 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.support.data_paths import data_file
+from tests.support.drawn_faults import draw_flight
 from windwrench.cli import app
 from windwrench.identification.comparison.fault_balance import AT_ONCE, Begin, FaultBalance
 from windwrench.identification.comparison.fault_channels import sample
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
 from windwrench.identification.comparison.words import fault_data, fault_headline
-from windwrench.studies.real_faults.flights import draw_flight
 
 
 def test_the_noise_of_an_autoregression_is_whitened():

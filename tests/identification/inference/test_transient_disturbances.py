@@ -12,8 +12,7 @@ from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.transient_disturbances import transient_disturbances
 from windwrench.identification.report.words import remainder_sentence
-from windwrench.studies.trials.held_back_outsiders import practise_held_back
-from windwrench.studies.trials.practice_flights import fly_practice
+from windwrench.studies.trials.practice_flights import fly_practice, practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 

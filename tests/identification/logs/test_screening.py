@@ -23,7 +23,7 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.identification.logs.readings import DECLARED
 from windwrench.identification.logs.screening import screen_for_estimate, screen_log
 from windwrench.identification.wrench_series import estimate_log
-from windwrench.studies.trials.held_back_outsiders import practise_held_back
+from windwrench.studies.trials.practice_flights import practise_held_back
 
 VEHICLE = load_vehicle("ardrone2")
 CLEAN = ("excite", "gentle", "circle", "yaw")

@@ -1,0 +1,554 @@
+"""The diagnosis on flights that others have measured.
+
+NanoBench logs hold PWM, battery voltage and motion capture. Crazyswarm2 logs of slung payloads hold
+commanded thrust. CrazyPAD logs hold motor requests of a vehicle with a weight or a cut propeller.
+ULogs hold a motor that is commanded to fail.
+
+Every NanoBench fold is one call of ``diagnose`` on some flights, judged on flights left out of this
+fit. The diagnosis of commanded flights was developed on these very flights, which the page says.
+Forces are stated as accelerations by the declared mass, through a 4 Hz low-pass with zero phase,
+over the time in the air.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from windwrench import __version__
+from windwrench.dynamics.effects import get
+from windwrench.dynamics.vehicle import EffectSetting, Vehicle
+from windwrench.dynamics.vehicle_file import load_vehicle
+from windwrench.identification.comparison.change import NOWHERE, Change
+from windwrench.identification.comparison.change import compare as compare_sets
+from windwrench.identification.comparison.fault_channels import read_channels
+from windwrench.identification.comparison.fault_detection import find_fault
+from windwrench.identification.comparison.trim import trim_of_log
+from windwrench.identification.comparison.words import fault_data
+from windwrench.identification.diagnosis import diagnose
+from windwrench.identification.findings import Diagnosis
+from windwrench.identification.inference.commanded_rotors import in_flight
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.logs.reading import read_log
+from windwrench.identification.logs.tables import open_table
+from windwrench.identification.motion.residual import residual_wrench
+from windwrench.identification.motion.sensing_effects import undo_log_sensing
+from windwrench.identification.motion.signals import Signals, log_signals
+from windwrench.identification.motion.smoothing import low_pass
+from windwrench.runtime.errors import InputError
+from windwrench.runtime.page_files import write_json, write_png
+from windwrench.runtime.provenance import commit
+from windwrench.studies.pages import DOCS, kept, write_page
+from windwrench.studies.runner import start
+
+Array = NDArray[np.float64]
+
+CUTOFF_HZ = 4.0
+_EDGE = 0.6  # s at either end, where filters start
+_DAY = 86400.0  # s
+PAYLOAD = 0.005  # kg, weighed by those who flew it
+CABLE = 0.5  # m
+CARRIER = 0.0369  # kg, the vehicle without its payload
+NO_PAYLOAD = (
+    (("146",), 0.033),
+    (("160", "165"), 0.032),
+    (("170", "172", "176", "178"), 0.032),
+    (("100", "130", "140"), 0.0375),
+)
+WITH_PAYLOAD = (("202",), ("201", "202", "204"), ("201",), ("204",))
+# CrazyPAD's motors: m1 front-right, m2 rear-right, m3 rear-left, m4 front-left
+PLACES = {
+    "M1": "rotor 4 (front-right)",
+    "M2": "rotor 3 (rear-right)",
+    "M3": "rotor 2 (rear-left)",
+    "M4": "rotor 1 (front-left)",
+    "M1_M2": "right",
+    "M2_M3": "rear",
+    "M3_M4": "left",
+    "M1_M4": "front",
+}
+
+
+def motion(log: FlightLog, vehicle: Vehicle) -> Signals:
+    """Return the signals of the longest piece of a log in the air, with the vehicle's sensing
+    effects undone.
+    """
+    pieces = log_signals(undo_log_sensing(in_flight(log, vehicle), vehicle))
+    return max(pieces, key=lambda s: len(s.t))
+
+
+def acceleration_residual(log: FlightLog, vehicle: Vehicle, mass: float) -> Array:
+    """Return the residual force (n, 3) by ``mass`` in m/s2, world, low-passed,
+    without the edges.
+    """
+    s = motion(log, vehicle)
+    edge = round(_EDGE / s.period)
+    return low_pass(residual_wrench(s, vehicle)[:, :3] / mass, CUTOFF_HZ, s.period)[edge:-edge]
+
+
+def constant_thrust(log: FlightLog, vehicle: Vehicle) -> Array:
+    """Return what (n, 3) m/s2 is left if thrust is taken to be the weight all the time."""
+    s = motion(log, replace(vehicle, effects=()))
+    edge = round(_EDGE / s.period)
+    up = np.array([0.0, 0.0, vehicle.gravity])
+    return low_pass(
+        s.acceleration + up - vehicle.gravity * s.rotation[:, :, 2], CUTOFF_HZ, s.period
+    )[edge:-edge]
+
+
+def level(x: Array) -> list[float]:
+    """Return the RMS per axis."""
+    return [float(v) for v in np.sqrt(np.mean(np.square(x), axis=0))]
+
+
+def spread(x: Array) -> list[float]:
+    """Return the standard deviation per axis."""
+    return [float(v) for v in x.std(axis=0)]
+
+
+def compare(log: FlightLog, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return how far a test flight is from the declared vehicle and from the amended one."""
+    declared, amended = diagnosis.declared, diagnosis.amended
+    before = acceleration_residual(log, declared, declared.mass)
+    after = acceleration_residual(log, amended, declared.mass)
+    constant = constant_thrust(log, declared)
+    return {
+        "flight": log.name,
+        "before_rms": level(before),
+        "after_rms": level(after),
+        "before_std": spread(before),
+        "after_std": spread(after),
+        "constant_thrust_std": spread(constant),
+        "norm_before": float(np.sqrt(np.mean(np.sum(before**2, axis=1)))),
+        "norm_after": float(np.sqrt(np.mean(np.sum(after**2, axis=1)))),
+        "drag_N_per_mps": linear_drag(diagnosis),
+    }
+
+
+def linear_drag(diagnosis: Diagnosis) -> list[float]:
+    """Return the linear drag along body x and y in N per m/s; rotor drag at the rotor speeds of
+    hover.
+    """
+    for e in diagnosis.effects:
+        if e.name == "body_drag":
+            return [e.coefficients["dx"], e.coefficients["dy"]]
+        if e.name == "rotor_drag":
+            rate = 4.0 * diagnosis.declared.hover_rate
+            return [rate * e.coefficients["kdx"], rate * e.coefficients["kdy"]]
+    return [0.0, 0.0]
+
+
+def imu_check(path: Path, log: FlightLog, diagnosis: Diagnosis) -> dict[str, float]:
+    """Return how the model's vertical specific force agrees with an accelerometer that nothing else
+    here looks at (m/s2).
+    """
+    table = open_table(path).read(["t", "imu_acc_z"])
+    s = motion(log, replace(diagnosis.declared, effects=()))
+    measured = 9.81 * np.interp(s.t, table["t"] - table["t"][0], table["imu_acc_z"])
+    up = np.array([0.0, 0.0, diagnosis.declared.gravity])
+    felt = s.acceleration + up
+    amended = replace(
+        diagnosis.amended,
+        effects=tuple(e for e in diagnosis.amended.effects if get(e.name).kind != "sensing"),
+    )
+    model = felt - residual_wrench(s, amended)[:, :3] / amended.mass
+    edge = round(_EDGE / s.period)
+
+    def along(x: Array) -> Array:
+        return low_pass(np.einsum("ni,ni->n", x, s.rotation[:, :, 2]), CUTOFF_HZ, s.period)[
+            edge:-edge
+        ]
+
+    imu = low_pass(measured, CUTOFF_HZ, s.period)[edge:-edge]
+    return {
+        "model_std": float((imu - along(model)).std()),
+        "motion_capture_std": float((imu - along(felt)).std()),
+        "constant_std": float(imu.std()),
+    }
+
+
+def names_of(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Return the named effects as plain data."""
+    return [
+        {
+            "name": e.name,
+            "coefficients": dict(e.coefficients),
+            "std": dict(e.std),
+            "tentative": e.tentative,
+            "indistinguishable_from": list(e.indistinguishable_from),
+        }
+        for e in diagnosis.effects
+    ]
+
+
+def nanobench_flights(folder: Path, vehicle: Vehicle) -> dict[str, tuple[Path, FlightLog, int]]:
+    """Return the NanoBench flights of a folder: path, log and day of recording.
+
+    Raises:
+        InputError: there are fewer than three.
+    """
+    paths = sorted(folder.glob("*.csv"))
+    if len(paths) < 3:
+        raise InputError(
+            f"{folder}: {len(paths)} CSV file(s); expected at least three NanoBench flights"
+        )
+    return {
+        p.stem: (
+            p,
+            read_log(p, "nanobench", vehicle),
+            int(open_table(p).read(["t"])["t"][0] // _DAY),
+        )
+        for p in paths
+    }
+
+
+def nanobench_fold(
+    logs: Sequence[FlightLog], test: Sequence[FlightLog], vehicle: Vehicle
+) -> tuple[Diagnosis, list[dict[str, Any]]]:
+    """Return the diagnosis of some flights and how it does on others."""
+    diagnosis = diagnose(logs, vehicle, test)
+    return diagnosis, [compare(log, diagnosis) for log in test]
+
+
+def payload_vehicle(mass: float) -> Vehicle:
+    """Return a Crazyflie of this mass whose file states a cable of 0.5 m and leaves load and
+    damping open.
+    """
+    return replace(
+        load_vehicle("crazyflie"),
+        mass=mass,
+        effects=(EffectSetting("slung_payload", {"l": CABLE}),),
+    )
+
+
+def payload_logs(folder: Path, numbers: Sequence[str], vehicle: Vehicle) -> list[FlightLog]:
+    """Return crazyswarm2 logs by number."""
+    return [read_log(folder / f"log{n}.csv", "crazyswarm2", vehicle) for n in numbers]
+
+
+def swing(log: FlightLog, diagnosis: Diagnosis) -> dict[str, list[float]] | None:
+    """Return how strongly the cable pulls sideways (standard deviation, N, x and y): by the model,
+    and by the payload's track.
+    """
+    found = next((e for e in diagnosis.effects if e.name == "slung_payload"), None)
+    if found is None or "payload_position" not in log.extra:
+        return None
+    bare = replace(diagnosis.declared, effects=())
+    flights = Flights([log], bare)
+    setting = {e.name: dict(e.coefficients) for e in diagnosis.amended.effects}
+    law = flights.residual(
+        {k: v for k, v in setting.items() if k != "slung_payload"}
+    ) - flights.residual(setting)
+    s = motion(log, bare)
+    track = np.column_stack([np.interp(s.t, log.t, x) for x in log.extra["payload_position"].T])
+    smooth = low_pass(track, CUTOFF_HZ, s.period)
+    pull = -PAYLOAD * np.gradient(np.gradient(smooth, s.period, axis=0), s.period, axis=0)
+    edge = round(_EDGE / s.period)
+    return {"law_std": spread(law[:, :2]), "tracked_std": spread(pull[edge:-edge, :2])}
+
+
+def truth_of(name: str) -> str:
+    """Return the place that a CrazyPAD file's name tells.
+
+    Raises:
+        InputError: it tells none.
+    """
+    condition = name.split("__")[0]
+    if condition.startswith("normal"):
+        return NOWHERE
+    words = condition.removeprefix("cut_propeller_").split("near_")[-1].split("_")
+    motors = "_".join(word for word in words if word in ("M1", "M2", "M3", "M4"))
+    if motors not in PLACES:
+        raise InputError(f"{name}: its name tells no place; expected M1 to M4, or two neighbours")
+    return PLACES[motors]
+
+
+def crazypad(folder: Path) -> list[dict[str, Any]]:
+    """Compare every flight with the other normal flights of the same vehicle."""
+    vehicle = load_vehicle("crazyflie")
+    trims = {
+        path.name: trim_of_log(read_log(path, "crazypad"), vehicle)
+        for path in sorted(folder.glob("*.csv.gz"))
+    }
+    rows = []
+    for name, trim in trims.items():
+        which = name.split("__")[1].split("_")[0]
+        normal = [
+            other
+            for file, other in trims.items()
+            if file.startswith("normal") and f"__{which}_" in file and file != name
+        ]
+        if normal:
+            rows.append(_compared(name, compare_sets([trim], normal)))
+    return rows
+
+
+def _compared(name: str, change: Change) -> dict[str, Any]:
+    """Return the answer of a comparison, beside the truth."""
+    truth = truth_of(name)
+    if_changed = max((p for p in change.places if p != NOWHERE), key=change.places.__getitem__)
+    return {
+        "flight": name.removesuffix(".csv.gz"),
+        "truth": truth,
+        "place": change.place,
+        "probability": change.places[change.place],
+        "if_changed": if_changed,
+        "changed": 1.0 - change.places[NOWHERE],
+        "sure": change.sure,
+        "difference": change.difference.tolist(),
+        "right": change.place == truth,
+        "right_if_changed": truth == NOWHERE or if_changed == truth,
+        "sure_and_wrong": change.sure and change.place != truth,
+    }
+
+
+def motor_faults(folder: Path) -> list[dict[str, Any]]:
+    """Search each ULog, and read from it what was commanded to fail, and when."""
+    return [
+        fault_data(find_fault(read_channels(path)[0]))
+        | {"log": path.name, "commanded": commanded_fault(path)}
+        for path in sorted(folder.glob("*.ulg"))
+    ]
+
+
+def commanded_fault(path: Path) -> dict[str, Any] | None:
+    """Return the motors that a log's topic ``rfly_ctrl_lxl`` commands to fail, what is left of
+    them, and the interval (s) in which the command came: the topic's last sample without it and the
+    first with it. None where the log has none.
+    """
+    from pyulog import ULog
+
+    topics = ULog(str(path), ["rfly_ctrl_lxl"]).data_list
+    for topic in topics:
+        fields = topic.data
+        on = np.flatnonzero(fields["mode"] != 0)
+        if on.size and on[0] > 0:
+            k = int(on[0])
+            left = {f"PX4 motor {i + 1}": float(fields[f"controls[{i}]"][k]) for i in range(4)}
+            return {
+                "motors": {name: share for name, share in left.items() if share < 1.0},
+                "between_s": [1e-6 * float(fields["timestamp"][j]) for j in (k - 1, k)],
+            }
+    return None
+
+
+def _picture(kept: Mapping[str, tuple[FlightLog, Diagnosis]], path: Path) -> None:
+    figure, panels = plt.subplots(
+        len(kept),
+        3,
+        figsize=(11, 2.0 * len(kept)),
+        sharex="col",
+        squeeze=False,
+        layout="constrained",
+    )
+    for row, (name, (log, diagnosis)) in zip(panels, kept.items(), strict=True):
+        mass = diagnosis.declared.mass
+        before, after = (
+            acceleration_residual(log, v, mass) for v in (diagnosis.declared, diagnosis.amended)
+        )
+        for i, (panel, axis) in enumerate(zip(row, "xyz", strict=True)):
+            for x, words in ((before, "declared"), (after, "amended")):
+                panel.plot(
+                    np.arange(len(x)) / 100.0,
+                    x[:, i] - x[:, i].mean() * (i < 2),
+                    lw=0.8,
+                    label=words,
+                )
+            panel.set_title(
+                f"{name.split('_')[0]}, {axis}" + (", mean removed" if i < 2 else ""), fontsize=9
+            )
+    panels[0, 0].legend(fontsize=8)
+    figure.supylabel("residual (m/s2)")
+    figure.supxlabel("time in the air (s)")
+    write_png(figure, path)
+    plt.close(figure)
+
+
+def nanobench(folder: Path, picture: Path) -> list[dict[str, Any]]:
+    """Return the folds of the NanoBench flights of a folder, and draw them.
+
+    Raises:
+        InputError: there are fewer than three flights.
+    """
+    vehicle = load_vehicle("crazyflie")
+    flights = nanobench_flights(folder, vehicle)
+    folds: list[dict[str, Any]] = []
+    drawn: dict[str, tuple[FlightLog, Diagnosis]] = {}
+    for test, (path, log, day) in flights.items():
+        groups = {"all others": [n for n in flights if n != test]}
+        same = [n for n in groups["all others"] if flights[n][2] == day]
+        if 2 <= len(same) < len(groups["all others"]):
+            groups["the same day"] = same
+        for words, names in groups.items():
+            print(f"NanoBench: {test} from {words}", flush=True)
+            diagnosis, (row,) = nanobench_fold([flights[n][1] for n in names], [log], vehicle)
+            folds.append(
+                {
+                    "fitted_on": words,
+                    "flights": names,
+                    **row,
+                    "effects": names_of(diagnosis),
+                    "verdict": diagnosis.verdict,
+                    "remainder": diagnosis.remainder,
+                    "imu": imu_check(path, log, diagnosis),
+                }
+            )
+            drawn[test] = log, diagnosis
+    _picture(drawn, picture)
+    return folds
+
+
+def slung_payload(folder: Path) -> list[dict[str, Any]]:
+    """Return what is found on the groups of crazyswarm2 logs that are in a folder."""
+    groups: list[tuple[Sequence[str], float, bool]] = [
+        (numbers, CARRIER, True) for numbers in WITH_PAYLOAD
+    ]
+    groups += [(numbers, mass, False) for numbers, mass in NO_PAYLOAD]
+    loads = []
+    for numbers, mass, loaded in groups:
+        if not all((folder / f"log{n}.csv").exists() for n in numbers):
+            continue
+        print(f"slung payload: {', '.join(numbers)}", flush=True)
+        carrier = payload_vehicle(mass)
+        logs = payload_logs(folder, numbers, carrier)
+        diagnosis = diagnose(logs, carrier)
+        loads.append(
+            {
+                "logs": list(numbers),
+                "payload": loaded,
+                "mass": mass,
+                "effects": names_of(diagnosis),
+                "swing": {log.name: swing(log, diagnosis) for log in logs},
+            }
+        )
+    return loads
+
+
+def pooled(folds: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the vertical residual of folds (m/s2), and by how many times residuals fall."""
+
+    def fell(before: str, after: str, axis: int) -> float:
+        a, b = (np.sqrt(np.mean([f[key][axis] ** 2 for f in folds])) for key in (before, after))
+        return float(a / b)
+
+    return {
+        "fitted_on": folds[0]["fitted_on"],
+        "vertical": float(np.sqrt(np.mean([f["after_rms"][2] ** 2 for f in folds]))),
+        "vertical_fell": fell("before_rms", "after_rms", 2),
+        "fell": [fell("before_std", "after_std", i) for i in range(2)],
+        "against_constant": [fell("constant_thrust_std", "after_std", i) for i in range(3)],
+    }
+
+
+def unmet(fold: Mapping[str, Any]) -> list[str]:
+    """Return which of the bounds that the diagnosis aims at a fold misses, in words."""
+    named = {e["name"]: e["coefficients"] for e in fold["effects"]}
+    delay = next(
+        (
+            next(iter(named[n].values()))
+            for n in ("motor_lag", "latency", "clock_offset")
+            if n in named
+        ),
+        0.0,
+    )
+    drag, before, after = fold["drag_N_per_mps"], fold["before_std"], fold["after_std"]
+    bounds = {
+        "vertical at most 0.18 m/s2": fold["after_rms"][2] <= 0.18,
+        "vertical down 5 times": fold["before_rms"][2] >= 5 * fold["after_rms"][2],
+        "vertical below constant thrust": after[2] < fold["constant_thrust_std"][2],
+        "x down 1.9 times": before[0] >= 1.9 * after[0],
+        "y down 4 times": before[1] >= 4.0 * after[1],
+        "all three axes down 4 times": fold["norm_before"] >= 4 * fold["norm_after"],
+        "battery_sag named": "battery_sag" in named,
+        "drag of 0.0095 to 0.012 N per m/s": all(0.0095 <= d <= 0.012 for d in drag),
+        "delay of 30 to 55 ms": 0.030 <= delay <= 0.055,
+    }
+    return [words for words, met in bounds.items() if not met]
+
+
+def _units(effect: str) -> dict[str, str]:
+    return {c.name: "" if c.unit == "1" else f" {c.unit}" for c in get(effect).coefficients}
+
+
+def coefficients(effect: Mapping[str, Any]) -> str:
+    """Return an effect's coefficients with their units, in words."""
+    units = _units(effect["name"])
+    return ", ".join(f"{k} = {v:.3g}{units[k]}" for k, v in effect["coefficients"].items())
+
+
+def ranges(folds: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return each effect that folds name: on how many, within which coefficients, and what some
+    fold cannot tell from the effect.
+    """
+    named: dict[str, list[Mapping[str, Any]]] = {}
+    for effect in (e for fold in folds for e in fold["effects"]):
+        named.setdefault(effect["name"], []).append(effect)
+    rows = []
+    for name, found in named.items():
+        units, told = _units(name), []
+        for c in found[0]["coefficients"]:
+            values = [effect["coefficients"][c] for effect in found]
+            told.append(f"{c} {min(values):.3g} to {max(values):.3g}{units[c]}")
+        others = sorted({x for effect in found for x in effect["indistinguishable_from"]})
+        row = {"name": name, "count": len(found), "coefficients": ", ".join(told)}
+        rows.append(row | {"others": others})
+    return rows
+
+
+def page() -> dict[str, Any]:
+    """Return what the page shows of the kept results."""
+    result: dict[str, Any] = kept("real-flights/real_flights.json")
+    folds = result["nanobench"]
+    groups = dict.fromkeys(fold["fitted_on"] for fold in folds)
+    names = [effect for fold in folds for effect in fold["effects"]]
+    return result | {
+        "names": names,
+        "tentative": [effect for effect in names if effect["tentative"]],
+        "pooled": [pooled([f for f in folds if f["fitted_on"] == words]) for words in groups],
+        "truth": {"payload_g": 1000 * PAYLOAD, "cable_m": CABLE},
+        "unmet": unmet,
+        "coefficients": coefficients,
+        "ranges": ranges,
+        "drag": [
+            extreme(fold["drag_N_per_mps"][axis] for fold in folds)
+            for axis in (0, 1)
+            for extreme in (min, max)
+        ],
+        "nowhere": NOWHERE,
+    }
+
+
+def study(
+    data: Annotated[
+        Path,
+        typer.Option(
+            help="Data folder that holds nanobench/, crazyswarm2_payload/csv/, crazypad/ and "
+            "motor_faults/."
+        ),
+    ] = Path("../shared/data"),
+    markdown: Annotated[Path | None, typer.Option(help="Markdown file of the page.")] = None,
+) -> None:
+    """Diagnose measured flights, test each on flights left out of its fit, and write the page."""
+    code = commit()  # before the diagnoses: the code that makes them
+    folder = DOCS / "real-flights"
+    result = {
+        "version": __version__,
+        "commit": code,
+        "cutoff_hz": CUTOFF_HZ,
+        "nanobench": nanobench(data / "nanobench", folder / "nanobench.png"),
+        "slung_payload": slung_payload(data / "crazyswarm2_payload" / "csv"),
+        "crazypad": crazypad(data / "crazypad"),
+        "motor_faults": motor_faults(data / "motor_faults"),
+    }
+    write_json(result, folder / "real_flights.json", allow_nan=True)
+    print(write_page("real-flights", page(), markdown))
+
+
+if __name__ == "__main__":
+    start(study)

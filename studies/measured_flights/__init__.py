@@ -1,1 +1,0 @@
-"""Measured flights of public data sets, diagnosed."""

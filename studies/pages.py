@@ -1,0 +1,137 @@
+"""Pages that show kept results. Each page is a Jinja template, filled from files below ``docs/``.
+
+``python -m studies.pages`` compares every page with its results, and quoted figures with theirs;
+``--write PAGE`` writes a page anew. A test does the same comparison.
+"""
+
+import argparse
+import difflib
+import re
+import sys
+from collections.abc import Mapping
+from functools import cache, partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from windwrench.runtime.page_files import write_text
+from windwrench.runtime.provenance import made_by
+from windwrench.studies.kept_results import DOCS, ROOT, kept
+from windwrench.studies.quotes import read_quotes, unknown_numbers, wrong_quotes
+from windwrench.studies.scoring import area_under_curve, share, table
+
+__all__ = ["DOCS", "PAGES", "ROOT", "kept", "write_page"]
+
+# the module of each page, whose function ``page`` returns what the template shows
+PAGES: Mapping[str, str] = {
+    "diagnosis-trials": "trials.page",
+    "leaderboard": "learning.page",
+    "probabilities": "probabilities.scores",
+    "real-flights": "measured_flights",
+    "tasks": "tasks",
+}
+_MODULE = re.compile(r"`((?:[a-z_]+/)+[a-z_0-9]+\.py)`")
+
+
+@cache
+def _templates() -> Environment:
+    found = Environment(
+        loader=FileSystemLoader(Path(__file__).with_name("templates")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    found.filters |= {"f": format, "zip": partial(zip, strict=True)}
+    found.globals |= {
+        "area_under_curve": area_under_curve,
+        "made_by": made_by,
+        "share": share,
+        "table": table,
+    }
+    return found
+
+
+def render(name: str, shown: Mapping[str, Any]) -> str:
+    """Return a page as Markdown.
+
+    Args:
+        name: of its template.
+        shown: what the template shows, by name.
+    """
+    return _templates().get_template(f"{name}.md").render(shown)
+
+
+def write_page(name: str, shown: Mapping[str, Any], path: Path | None = None) -> Path:
+    """Write a page; return its path.
+
+    Args:
+        name: one of ``PAGES``.
+        shown: what the template shows, by name.
+        path: default: the page below ``docs/``.
+    """
+    page = path or DOCS / f"{name}.md"
+    write_text(render(name, shown), page)
+    return page
+
+
+def page_of_results(name: str) -> str:
+    """Return one of ``PAGES`` as its kept results give the page."""
+    study = import_module(f"windwrench.studies.{PAGES[name]}")
+    return render(name, study.page())
+
+
+def differing_lines(name: str) -> list[str]:
+    """Return the lines of a page that its results give otherwise, or do not give."""
+    on_disk = (DOCS / f"{name}.md").read_text(encoding="utf-8").splitlines()
+    found = difflib.unified_diff(page_of_results(name).splitlines(), on_disk, n=0)
+    return [line for line in found if line[0] in "+-" and not line.startswith(("+++", "---"))]
+
+
+def missing_sources() -> list[str]:
+    """Return the modules that pages name and that do not exist, each with its page."""
+    pages = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
+    return [
+        f"{page.name} names {name}"
+        for page in pages
+        for name in sorted(set(_MODULE.findall(page.read_text(encoding="utf-8"))))
+        if not (ROOT / name).exists() and not name.startswith(("my_", "live/ros2"))
+    ]
+
+
+def main() -> int:
+    """Print what differs; return 1 where something does, else 0."""
+    parser = argparse.ArgumentParser(
+        prog="python -m studies.pages",
+        description="Compare pages and quoted figures with their results.",
+    )
+    parser.add_argument(
+        "--write",
+        metavar="PAGE",
+        nargs="+",
+        choices=list(PAGES),
+        default=[],
+        help="write these pages from their kept results first",
+    )
+    for name in parser.parse_args().write:
+        write_text(page_of_results(name), DOCS / f"{name}.md")
+    errors = missing_sources()
+    for name in PAGES:
+        different = differing_lines(name)
+        print(f"docs/{name}.md: {len(different)} lines differ from its results", flush=True)
+        errors += [f"docs/{name}.md: {line}" for line in different[:5]]
+    quotes, others = read_quotes()
+    errors += wrong_quotes(quotes)
+    for page, passages in others.items():
+        numbers = unknown_numbers(page, quotes, passages)
+        errors += [f"{page}: no source: {text!r}" for text in numbers]
+    print(f"{sum(len(quote.sources) for quote in quotes)} figures in prose compared")
+    for error in errors:
+        print(error, file=sys.stderr)
+    return int(bool(errors))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

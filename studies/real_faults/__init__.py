@@ -1,1 +1,0 @@
-"""Real faults: what is found of them on measured flights, and how sure it may be, on simulated."""
