@@ -13,7 +13,6 @@ from .commands.checking import check
 from .commands.demo import demo
 from .commands.exporting import export_c
 from .commands.flying import fly, record
-from .commands.from_checkout import close_loop, has_studies, leaderboard, real_flights, trials
 from .commands.identifying import identify
 from .commands.learning import train
 from .commands.library import effects
@@ -93,10 +92,8 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     effects,
     train,
 )
-_STUDIES: tuple[Callable[..., Any], ...] = (trials, real_flights, close_loop, leaderboard)
-for command in (*_COMMANDS, *_STUDIES):
-    hidden = command in _STUDIES and not has_studies()
-    app.command(command_name(command), hidden=hidden)(as_command(command))
+for command in _COMMANDS:
+    app.command(command_name(command))(as_command(command))
 
 
 def main() -> None:

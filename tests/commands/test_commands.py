@@ -18,7 +18,7 @@ from windwrench.commands.running import plain, write_run
 from windwrench.commands.terminal import names_in, offering
 
 COMMANDS = sorted(command.name for command in app.registered_commands)
-EXPENSIVE = ("benchmark", "close-loop", "imitate", "leaderboard", "reproduce", "trials")
+EXPENSIVE = ("benchmark", "imitate", "reproduce")
 COMMAND = Path(sys.executable).with_name("windwrench")
 
 

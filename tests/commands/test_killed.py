@@ -41,7 +41,6 @@ BENCHMARK = (
 DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
 FLEET = ("diagnose", ".", "--fleet", "--jobs", "1", "--out", "out")
 REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
-CLOSE_LOOP = ("close-loop", "--effect", "constant_force", "--episodes", "1", "--out", "out")
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks for processes in Linux's /proc"
@@ -133,7 +132,7 @@ def flight(tmp_path_factory):
 
 @pytest.mark.parametrize(
     "arguments",
-    [BENCHMARK, DIAGNOSE, FLEET, REPRODUCE, CLOSE_LOOP, ("trials",)],
+    [BENCHMARK, DIAGNOSE, FLEET, REPRODUCE, ("trials",)],
     ids=lambda a: a[2].strip("-") if a == FLEET else a[0],
 )
 @pytest.mark.slow

@@ -159,16 +159,6 @@ def test_the_wheel_is_small(wheel):
     assert wheel.stat().st_size <= MOST_BYTES
 
 
-def test_a_study_says_where_it_runs(empty, tmp_path):
-    for name in ("trials", "real-flights", "close-loop", "leaderboard"):
-        needed = ["--data", "."] if name == "real-flights" else []
-        done = call(empty, tmp_path, name, *needed)
-        assert done.returncode == 2
-        assert done.stderr.count("\n") == 1, done.stderr
-        assert f"{name}: expected a checkout" in done.stderr
-        assert f" {name} " not in call(empty, tmp_path, "--help").stdout
-
-
 @pytest.mark.slow
 def test_it_runs_from_any_folder(installed, tmp_path):
     out = run(
