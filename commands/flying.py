@@ -8,7 +8,6 @@ from rich import box
 from rich.table import Table
 
 from ..runtime.errors import InputError
-from .filming import SIZE, Tally, caption_of, films, written
 from .terminal import (
     Out,
     VehicleOption,
@@ -106,6 +105,7 @@ def fly(
     from ..evaluation.episodes import fly_episode, loop_of, time_series
     from ..evaluation.pictures import draw_episode
     from ..evaluation.tasks import make_pilot, short_names, task_of
+    from .filming import SIZE, Tally, caption_of, films, written
 
     kinds = [kind for kind, wanted in (("mp4", video), ("gif", gif)) if wanted]
     effects = [parse_setting(e) for e in effect or []]

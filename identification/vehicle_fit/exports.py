@@ -120,7 +120,7 @@ def _simulator(found: Identified, name: str) -> str:
         positions=(v.positions - v.com).tolist(),
         lag=lag.value if lag.status == IDENTIFIED else None,
         drag=-np.diag(drag) if any(drag) else None,
-        rotor_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
+        linear_drag=0.5 * sum(coefficient_of(v, Role.ROTOR_DRAG, i) for i in range(2)),
         effect=partial(coefficient_of, v),
         mixing=rows,
         per_rpm=_PER_RPM,

@@ -18,7 +18,7 @@ from windwrench.commands.running import plain, write_run
 from windwrench.commands.terminal import names_in, offering
 
 COMMANDS = sorted(command.name for command in app.registered_commands)
-EXPENSIVE = ("benchmark", "imitate", "reproduce")
+EXPENSIVE = ("benchmark", "reproduce")
 COMMAND = Path(sys.executable).with_name("windwrench")
 
 
@@ -60,7 +60,7 @@ def test_the_list_of_commands_has_whole_sentences_at_80_columns(call, monkeypatc
     monkeypatch.setenv("COLUMNS", "80")
     _, text, _ = call("--help")
     listed = text.split("Commands:")[1].split("Exit codes")[0].strip().splitlines()
-    assert len(listed) > 15
+    assert len(listed) > 12
     assert [line for line in listed if not line.endswith(".") or line.endswith("...")] == []
 
 
