@@ -9,18 +9,20 @@ from typer.core import TyperGroup
 
 from . import __version__
 from .commands.benchmarking import benchmark
+from .commands.changes import LogsAgainstLogs, compare
 from .commands.checking import check
 from .commands.demo import demo
+from .commands.diagnosing import diagnose
+from .commands.estimating import estimate
 from .commands.exporting import export_c
+from .commands.fleets import fleet
 from .commands.flying import fly, record
 from .commands.identifying import identify
 from .commands.learning import train
 from .commands.library import effects
 from .commands.live import live
-from .commands.logs import diagnose, estimate
 from .commands.output import prepare_output
 from .commands.paper import reproduce
-from .commands.replaying import replay
 from .commands.running import as_command, command_name
 from .commands.terminal import errors
 from .runtime.errors import InputError, unknown_name
@@ -83,17 +85,19 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     check,
     estimate,
     diagnose,
+    compare,
     live,
     identify,
+    fleet,
     export_c,
     record,
-    replay,
     reproduce,
     effects,
     train,
 )
 for command in _COMMANDS:
-    app.command(command_name(command))(as_command(command))
+    kind = LogsAgainstLogs if command is compare else None
+    app.command(command_name(command), cls=kind)(as_command(command))
 
 
 def main() -> None:

@@ -15,8 +15,7 @@ import typer
 
 from ..runtime.errors import InputError
 from ..runtime.workers import SINGLE_THREADED
-from .logs import STAGES
-from .opening import show_page
+from .diagnosing import STAGES
 from .terminal import (
     Out,
     VehicleOption,
@@ -25,6 +24,7 @@ from .terminal import (
     offering,
     results_folder,
     say,
+    show_page,
     working,
 )
 

@@ -7,17 +7,12 @@ from ..identification.logs.example import Example
 from .terminal import console
 
 
-def _print(text: str) -> None:
-    console.print(text, highlight=False, markup=False)
-
-
 def introduce(example: Example) -> None:
     """Say what flew, and what is known of it."""
-    _print(f"{example.what} ({example.source})")
-    _print("Known before the diagnosis:")
-    for known in example.known:
-        _print(f"  * {known.why}")
-    _print(f"  * {example.unknown}")
+    console.print(f"{example.what} ({example.source})")
+    console.print("Known before the diagnosis:")
+    for why in (*(known.why for known in example.known), example.unknown):
+        console.print(f"  * {why}")
 
 
 def confronted(example: Example, effects: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -40,9 +35,9 @@ def conclude(example: Example, effects: Sequence[Mapping[str, Any]]) -> list[dic
     rows = confronted(example, effects)
     for row in rows:
         found = f"found, as {' and '.join(row['named'])}" if row["named"] else "not found"
-        _print(f"{' or '.join(row['effects'])}: known, and {found}.")
+        console.print(f"{' or '.join(row['effects'])}: known, and {found}.")
     known = {name for row in rows for name in row["named"]}
     others = [effect["name"] for effect in effects if effect["name"] not in known]
     if others:
-        _print(f"Also named, and nobody knows whether it is so: {', '.join(others)}.")
+        console.print(f"Also named, and nobody knows whether it is so: {', '.join(others)}.")
     return rows

@@ -1,39 +1,64 @@
-"""Fleets: many logs of many vehicles, one diagnosis each; called by ``windwrench diagnose
---fleet``.
-"""
+"""Fleets: many logs of many vehicles, one diagnosis each."""
 
 import shlex
 import sys
-from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from rich import box
-from rich.table import Table
+import typer
 
 from ..runtime.errors import InputError
-from .terminal import console, note, progress_bar, results_folder, say
+from .flight_logs import LogVehicleOption
+from .terminal import (
+    MapOption,
+    Out,
+    ReaderOption,
+    Without,
+    console,
+    note,
+    progress_bar,
+    results_folder,
+    say,
+    show_table,
+)
 
 _MOST_ROWS = 20  # of the table in the terminal
 
 
-def diagnose_fleet(
-    logs: Sequence[Path],
-    vehicle: str | None,
-    reader: str | None,
-    log_map: str | None,
-    without: Sequence[str],
-    manifest: Path | None,
-    cluster: str | None,
-    jobs: int | None,
-    limit: float | None,
-    out: Path,
+def fleet(
+    logs: Annotated[
+        list[Path], typer.Argument(help="Folders of flight logs of any vehicles, or single logs.")
+    ],
+    manifest: Annotated[
+        Path | None,
+        typer.Option(
+            help="Which log is of which vehicle (.yaml or .csv); default: fleet.yaml in the folder "
+            "of logs."
+        ),
+    ] = None,
+    vehicle: LogVehicleOption = None,
+    reader: ReaderOption = None,
+    map: MapOption = None,
+    without: Without = None,
+    cluster: Annotated[
+        str | None, typer.Option(help="Address of a Ray cluster to work on, or local.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
+    ] = None,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0, help="Longest time for one log, s; default: 600. Then it is refused."
+        ),
+    ] = None,
+    out: Out = Path("results/fleet"),
 ) -> dict[str, Any]:
-    """Diagnose each log by itself; write the fleet's page, tables and picture.
+    """Diagnose every log of a fleet by itself. Many at a time; write one page and table of all:
+    fleet.html, fleet.json, fleet.csv, fleet.png. A run that was ended goes on.
 
-    Raises:
-        InputError: the request cannot be used, or no log at all could be diagnosed.
+    Example: windwrench fleet FOLDER --out results/fleet
     """
     from ..dynamics.effects import names
     from ..identification.fleet.drift import fleet_of
@@ -47,17 +72,17 @@ def diagnose_fleet(
     from ..runtime.errors import unknown_name
     from ..runtime.extras import need
 
-    for name in without:
+    for name in without or ():
         if name not in names():
             raise unknown_name("effect", name, names(), "--without")
     if reader is not None:
         find_reader(reader)
-    if log_map is not None:
-        load_map(log_map)
+    if map is not None:
+        load_map(map)
     if cluster is not None:
         need("ray", "cluster")
     described = None if manifest is None else read_manifest(manifest)
-    found, doubts = find_logs(logs, described, vehicle, reader, out, log_map)
+    found, doubts = find_logs(logs, described, vehicle, reader, out, map)
     folder = results_folder(out, logs=len(found), jobs=jobs, cluster=cluster)
     for text in doubts:
         note(text)
@@ -70,35 +95,33 @@ def diagnose_fleet(
                 progress.update(task, completed=sum(counts.values()), description=text)
 
             done = run_fleet(
-                found, outcomes, tuple(without), limit or LIMIT_S, jobs, cluster, report
+                found, outcomes, tuple(without or ()), limit or LIMIT_S, jobs, cluster, report
             )
-        fleet = fleet_of(rows(done, outcomes))
+        flown = fleet_of(rows(done, outcomes))
         command = shlex.join(["windwrench", *sys.argv[1:]])
-        written = write_fleet(fleet, lambda: rows(done, outcomes), folder, command)
-    console.print(headline(fleet), highlight=False, markup=False)
-    for one in changes(fleet):
-        console.print(change_in_words(one), highlight=False, markup=False)
-    if fleet.trends:
-        table = Table(
-            "vehicle", "effect", "coefficient", "named in", "sure in", "mean", box=box.SIMPLE_HEAD
+        written = write_fleet(flown, lambda: rows(done, outcomes), folder, command)
+    for sentence in (headline(flown), *(change_in_words(one) for one in changes(flown))):
+        console.print(sentence)
+    table = [
+        (
+            trend.series.id,
+            trend.series.effect,
+            trend.series.coefficient,
+            f"{len(trend.series.flights)} of {trend.among}",
+            str(sum(trend.series.sure)),
+            f"{trend.mean:.3g} {'' if trend.series.unit == '1' else trend.series.unit}",
         )
-        for trend in fleet.trends[:_MOST_ROWS]:
-            series = trend.series
-            table.add_row(
-                series.id,
-                series.effect,
-                series.coefficient,
-                f"{len(series.flights)} of {trend.among}",
-                str(sum(series.sure)),
-                f"{trend.mean:.3g} {'' if series.unit == '1' else series.unit}",
-            )
-        console.print(table)
-        if len(fleet.trends) > _MOST_ROWS:
-            console.print(f"{len(fleet.trends) - _MOST_ROWS} more rows in fleet.html")
+        for trend in flown.trends
+    ]
+    if table:
+        columns = "vehicle", "effect", "coefficient", "named in", "sure in", "mean"
+        show_table(columns, table[:_MOST_ROWS])
+    if len(table) > _MOST_ROWS:
+        console.print(f"{len(table) - _MOST_ROWS} more rows in fleet.html")
     say(*written)
-    if not fleet.verdicts:
+    if not flown.verdicts:
         raise InputError(
             f"none of {len(found)} logs could be diagnosed; {folder / 'fleet.html'} says why of "
             f"each"
         )
-    return fleet_data(fleet)
+    return fleet_data(flown)

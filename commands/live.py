@@ -4,6 +4,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +12,19 @@ import typer
 from rich.live import Live
 
 from ..runtime.errors import InputError
-from .terminal import MapOption, Out, console, errors, note, offering, run, vehicle_names, working
+from .terminal import (
+    Gate,
+    MapOption,
+    Out,
+    checked_gate,
+    console,
+    errors,
+    note,
+    offering,
+    run,
+    vehicle_names,
+    working,
+)
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
@@ -70,13 +83,7 @@ def live(
             min=0.1, help="End after so many seconds; default: with the source, or at Ctrl-C."
         ),
     ] = None,
-    gate: Annotated[
-        float | None,
-        typer.Option(
-            help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none. "
-            "Default: 0.9999."
-        ),
-    ] = None,
+    gate: Gate = None,
     horizon: Annotated[
         float,
         typer.Option(
@@ -123,11 +130,9 @@ def live(
     model = load_vehicle(vehicle or _SIMULATED)
     if diagnose_after and record is None:
         raise InputError("--diagnose-after: expected --record LOG with it, the log to diagnose")
-    if gate is not None and gate != 0.0 and not 0.5 <= gate < 1.0:
-        raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
     settings = LiveSettings(horizon=horizon, rate_hz=rate)
     if gate is not None:
-        settings = LiveSettings(gate=gate or None, horizon=horizon, rate_hz=rate)
+        settings = replace(settings, gate=checked_gate(gate) or None)
     tallies, means = Tallies(), Means()
     stream = make_source(source, model, None if map is None else load_map(map), tallies)
     recorder = None
@@ -172,7 +177,7 @@ def live(
     if diagnose_after:
         if recorder is None or not recorder.rows:
             raise InputError("--diagnose-after: nothing was recorded to diagnose")
-        from .logs import diagnose
+        from .diagnosing import diagnose
 
         result["diagnosis"] = diagnose([recorder.path], vehicle=vehicle or _SIMULATED, out=out)
     if interrupted:

@@ -1,15 +1,16 @@
-"""What the commands share: the terminal, the results' folder, options that mean the same
-everywhere.
-"""
+"""What the commands share: terminal, folder of results, and options with one meaning everywhere."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import sys
+import webbrowser
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich import box
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
@@ -22,6 +23,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.segment import Segment
+from rich.table import Table
 
 from ..runtime.errors import InputError
 from ..runtime.printable import printable
@@ -42,8 +44,8 @@ class _Terminal(Console):
 
 
 # without emoji: an address such as crazyflie:radio://0/80 is no picture of a radio
-console = _Terminal(emoji=False)
-errors = _Terminal(stderr=True, emoji=False)
+console = _Terminal(emoji=False, markup=False, highlight=False)
+errors = _Terminal(stderr=True, emoji=False, markup=False, highlight=False)
 
 
 @dataclass
@@ -175,6 +177,35 @@ MapOption = Annotated[
 ]
 
 
+Without = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--without",
+        help="Effect to leave out of the library; may be repeated.",
+        autocompletion=offering(effect_names),
+    ),
+]
+Gate = Annotated[
+    float | None,
+    typer.Option(
+        "--gate",
+        help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none. "
+        "Default: 0.9999.",
+    ),
+]
+
+
+def checked_gate(gate: float) -> float:
+    """Return a gate: 0, or a probability.
+
+    Raises:
+        InputError: the gate is neither.
+    """
+    if gate != 0.0 and not 0.5 <= gate < 1.0:
+        raise InputError(f"--gate: expected 0, or a probability from 0.5 to below 1, got {gate:g}")
+    return gate
+
+
 def results_folder(
     out: Path, *, takes: Callable[[], str | None] | None = None, **plan: object
 ) -> Path:
@@ -290,13 +321,31 @@ def names_in(text: str, option: str) -> list[str]:
 
 def note(text: str) -> None:
     """Say on standard error what is worth knowing about the input; a warning stands out."""
-    errors.print(
-        text, style="yellow" if text.startswith("warning") else "dim", highlight=False, markup=False
-    )
+    errors.print(text, style="yellow" if text.startswith("warning") else "dim")
+
+
+def show_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table."""
+    table = Table(*header, box=box.SIMPLE_HEAD)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
 
 
 def say(*paths: Path) -> None:
     """Say which files were written."""
     run.written.extend(paths)
     for path in paths:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True, markup=False)
+        console.print(f"wrote {path}", soft_wrap=True)
+
+
+def show_page(path: Path, wanted: bool) -> None:
+    """Say where a page is, and open it in a browser if that is wanted and a display is there."""
+    address = path.resolve().as_uri()
+    console.print(f"page: {address}", soft_wrap=True)
+    display = not sys.platform.startswith("linux") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    if wanted and display and not console.quiet:
+        with suppress(webbrowser.Error, OSError):
+            webbrowser.open(address)

@@ -39,7 +39,7 @@ BENCHMARK = (
     "out",
 )
 DIAGNOSE = ("diagnose", "flight.csv", "--out", "out")
-FLEET = ("diagnose", ".", "--fleet", "--jobs", "1", "--out", "out")
+FLEET = ("fleet", ".", "--jobs", "1", "--out", "out")
 REPRODUCE = ("reproduce", "fig6", "--seeds", "1", "--out", "out")
 
 pytestmark = pytest.mark.skipif(

@@ -200,30 +200,32 @@ def test_commands_write_films_and_replays(tmp_path):
     done = run(
         tmp_path,
         *command,
-        "replay",
+        "estimate",
         "log.csv",
+        "--film",
         "--vehicle",
         "crazyflie",
         "--from",
         "2",
         "--film-seconds",
         "0.5",
-        "--gif",
         "--json",
         "--out",
         "again",
     )
     assert done.returncode == 0, done.stderr
     assert {p.name for p in (tmp_path / "again").iterdir()} == {
-        "replay.gif",
-        "replay.png",
+        "film.gif",
+        "film.png",
         "run.json",
+        "wrench.csv",
+        "wrench.png",
     }
-    assert json.loads(done.stdout)["result"]["largest_force_N"] > 0.02
-    picture = matplotlib.image.imread(tmp_path / "again" / "replay.png")
+    assert json.loads(done.stdout)["result"]["force_mean_N"][0] > 0.02
+    picture = matplotlib.image.imread(tmp_path / "again" / "film.png")
     red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
     assert np.count_nonzero((red - green > 0.25) & (red - blue > 0.25)) > 30  # path and force
-    done = run(tmp_path, *command, "replay", "log.csv", "--from", "4", "--out", "late")
+    done = run(tmp_path, *command, "estimate", "log.csv", "--film", "--from", "4", "--out", "late")
     assert done.returncode == 2
     assert "--from 4" in done.stderr
     assert not (tmp_path / "late").exists()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import binomtest
 
-from windwrench.commands.replaying import flight_to_draw
+from windwrench.commands.log_film import flight_to_draw
 from windwrench.dynamics import EffectSetting
 from windwrench.dynamics.effects import parse_setting
 from windwrench.dynamics.vehicle import Vehicle
@@ -310,7 +310,9 @@ def replay_of(number: int, fault: Fault, seed: int) -> tuple[str, str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            drawn, series = flight_to_draw(fault.spoil(flight(number), rng), vehicle())
+            log = fault.spoil(flight(number), rng)
+            series = estimate_log(log, vehicle())
+            drawn = flight_to_draw(log, series)
         except InputError as error:
             return "refused", str(error)
     arrows = arrow_scales(drawn, vehicle().arm_l)

@@ -194,10 +194,10 @@ def test_a_measured_weight_is_named_from_the_requests_alone(tmp_path):
     weight = str(folder / "add_weight_W3_near_M3__E9_log00.csv.gz")
     options = ["--reader", "crazypad", "--out", str(tmp_path)]
     against = [word for path in normal for word in ("--against", path)]
-    result = CliRunner().invoke(app, ["diagnose", weight, *against, *options])
+    result = CliRunner().invoke(app, ["compare", weight, *against, *options])
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "change.json").read_text(encoding="utf-8"))
     assert found["place"] == ROTORS[1]
-    result = CliRunner().invoke(app, ["diagnose", normal[0], "--against", normal[1], *options])
+    result = CliRunner().invoke(app, ["compare", normal[0], "--against", normal[1], *options])
     assert result.exit_code == 0, result.output
     assert json.loads((tmp_path / "change.json").read_text("utf-8"))["place"] == NOWHERE

@@ -1,0 +1,73 @@
+"""Two sets of flights of one vehicle, compared."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from .flight_logs import LogVehicleOption, log_notes, read_flights
+from .terminal import MapOption, Out, ReaderOption, console, results_folder, say, show_table
+
+_AGAINST = "--against"
+
+
+def compare(
+    logs: Annotated[list[Path], typer.Argument(help="Flight logs after the change.")],
+    against: Annotated[
+        list[Path],
+        typer.Option(
+            _AGAINST, help="Log of the same vehicle before the change, or several, one by one."
+        ),
+    ],
+    reader: ReaderOption = None,
+    map: MapOption = None,
+    vehicle: LogVehicleOption = None,
+    out: Out = Path("results/compare"),
+) -> dict[str, Any]:
+    """Find what changed between two sets of flights. Which rotor, which side: no model has to be
+    true. Write change.json and change.png.
+
+    Example: windwrench compare today.csv --against yesterday.csv --vehicle my_drone.yaml
+    """
+    from ..identification.comparison.change import compare as find_change
+    from ..identification.comparison.trim import trim_of_log
+    from ..identification.comparison.words import change_data, change_headline, write_change
+
+    every, model = read_flights([*logs, *against], reader, vehicle, map)
+    folder = results_folder(out)
+    trims = [trim_of_log(log, model) for log in every]
+    change = find_change(trims[: len(logs)], trims[len(logs) :])
+    written = write_change(change, folder)
+    log_notes(text for log in every for text in log.notes)
+    console.print(f"vehicle: {model.name}")
+    console.print(change_headline(change))
+    places = sorted(change.places.items(), key=lambda item: -item[1])
+    rows = [(name, f"{chance:.3f}") for name, chance in places]
+    show_table(("where something changed", "probability"), rows)
+    say(*written)
+    return change_data(change)
+
+
+class LogsAgainstLogs(TyperCommand):
+    """A command in which ``--against`` takes every log up to the next option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return what is left of the words of a command line."""
+        return super().parse_args(ctx, list(_each_against(args)))
+
+
+def _each_against(words: Sequence[str]) -> Iterator[str]:
+    """Yield the words with ``--against`` before each log of its list."""
+    # where logs come behind the list alone, the list is one log long
+    ends = not words or words[0].startswith("-")
+    logs = -1
+    for word in words:
+        if word.startswith("-"):
+            logs = 0 if word == _AGAINST and not ends else -1
+        elif logs >= 0:
+            logs += 1
+            if logs > 1:
+                yield _AGAINST
+        yield word

@@ -1,0 +1,246 @@
+"""The effects that a vehicle's model lacks, found from flight logs."""
+
+import math
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..runtime.errors import InputError
+from .flight_logs import LogVehicleOption, log_notes, read_flights
+from .terminal import (
+    MapOption,
+    Out,
+    ReaderOption,
+    Without,
+    console,
+    results_folder,
+    say,
+    show_page,
+    show_table,
+    working,
+)
+
+if TYPE_CHECKING:
+    from ..identification.findings import Diagnosis
+    from ..identification.logs.flight_log import FlightLog
+
+# share of a diagnosis' time at which its stages begin
+STAGES = {
+    "looking at the logs": 0.0,
+    "asking whether every effect is needed": 0.45,
+    "asking what else it could be": 0.75,
+    "looking for structure in the residual": 0.9,
+    "predicting the flights": 0.96,
+}
+
+
+def diagnose(
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Flight logs of one vehicle: tables, or of autopilots or bags."),
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example",
+            help="Diagnose a measured flight that comes with the kit, beside what is known of it, "
+            "and open the report.",
+        ),
+    ] = False,
+    no_open: Annotated[
+        bool,
+        typer.Option("--no-open", help="With --example: do not open the report in a browser."),
+    ] = False,
+    test: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Test log: kept out of the fit, the error is reported on test logs alone; may be "
+            "repeated."
+        ),
+    ] = None,
+    reader: ReaderOption = None,
+    map: MapOption = None,
+    rotor_faults: Annotated[
+        bool,
+        typer.Option(
+            "--rotor-faults",
+            help="Look only for a rotor that lost thrust during a flight: which, when and how "
+            "much. Needs gyro, accelerometer and motor commands; no pose and no vehicle.",
+        ),
+    ] = False,
+    without: Without = None,
+    probabilities: Annotated[
+        bool,
+        typer.Option(
+            "--probabilities/--no-probabilities",
+            help="Say how probable each name is, its alternatives, and that something unknown "
+            "acts; it takes some seconds a minute of flight.",
+        ),
+    ] = True,
+    vehicle: LogVehicleOption = None,
+    out: Out = Path("results/diagnose"),
+) -> dict[str, Any]:
+    """Find effects that a vehicle's model lacks. From flight logs; write report.json, report.html
+    and vehicle.yaml.
+
+    Example: windwrench diagnose flight.csv --vehicle my_drone.yaml --out results/my_drone
+    """
+    if example:
+        from ..identification.logs.example import example_flight
+        from .example import conclude, introduce
+
+        given = {"LOGS": logs, "--vehicle": vehicle, "--reader": reader, "--map": map}
+        for option, value in {**given, "--test": test, "--rotor-faults": rotor_faults}.items():
+            if value:
+                raise InputError(f"--example: has a log of its own; expected it without {option}")
+        with example_flight() as flight:
+            introduce(flight)
+            read = read_flights([flight.log], None, flight.vehicle)
+            result = _diagnose(read, [flight.log], without, out, probabilities)
+        result["known"] = conclude(flight, result["effects"])
+        show_page(out / "report.html", not no_open)
+        return result
+    if not logs:
+        raise InputError("diagnose: expected at least one flight log, or --example")
+    if rotor_faults:
+        if test:
+            raise InputError("--rotor-faults: expected no --test with it")
+        return _rotor_faults(logs, reader, vehicle, out, map)
+    read = read_flights([*logs, *(test or [])], reader, vehicle, map)
+    return _diagnose(read, logs, without, out, probabilities)
+
+
+def _diagnose(
+    read: "tuple[list[FlightLog], Any]",
+    paths: Sequence[Path],
+    without: Sequence[str] | None,
+    out: Path,
+    probabilities: bool,
+) -> dict[str, Any]:
+    """Find the effects that a vehicle's model lacks; write the report.
+
+    Args:
+        read: flights and their vehicle; those after the paths' own are test flights.
+        paths: of the logs to which effects are fitted.
+        without: effects that are left out of the library.
+        out: folder for the report.
+        probabilities: state how probable each name is.
+    """
+    from ..identification.diagnosis import diagnose as run
+    from ..identification.report.files import report_data, write_report
+    from ..identification.report.words import error_sentences, headline, remainder_sentence
+
+    (every, model), count = read, len(paths)
+    folder = results_folder(out)
+    with working("looking at the logs") as progress:
+        found = run(
+            every[:count],
+            model,
+            every[count:],
+            without or (),
+            lambda text: progress(STAGES.get(text), text),
+            probabilities,
+        )
+    found = _with_rotor_faults(found, paths, every[:count])
+    # before a word is said: a reader who has read enough (a pipe to head) must not cost the results
+    written = write_report(found, folder, shlex.join(["windwrench", *sys.argv[1:]]))
+    log_notes(found.notes)
+    faults = [data["headline"] for data in found.rotor_faults if data["rotor"] is not None]
+    sentences = (headline(found), *error_sentences(found), remainder_sentence(found), *faults)
+    for sentence in (f"vehicle: {model.name}", *sentences):
+        console.print(sentence)
+    _show(found)
+    for line in found.advice:
+        console.print(line)
+    say(*written)
+    return report_data(found)
+
+
+def _show(found: "Diagnosis") -> None:
+    """Print the tables of effects and of the error before and after."""
+    from ..identification.report.words import name_in_words, percent
+
+    stated = found.probabilities.names if found.probabilities else {}
+    rows: list[tuple[str, ...]] = []
+    for effect in found.effects:
+        head = [name_in_words(effect), *([percent(stated[effect.name])] if stated else [])]
+        for name, value in effect.coefficients.items():
+            numbers = f"{value:.4g}", f"{effect.std[name]:.2g}", effect.units[name]
+            rows.append((head[0], name, *numbers, *head[1:]))
+            head = [""] * len(head)
+    if rows:
+        last = ("probability",) if stated else ()
+        show_table(("effect", "coefficient", "value", "+-", "unit", *last), rows)
+    before, after = found.before, found.after
+    torques = before.torque_rms, after.torque_rms
+    predicted = before.rollout_1s_position_rms, after.rollout_1s_position_rms
+    force = before.force_rms, after.force_rms, found.floor_force_rms
+    # torques of zero before and after: the logs do not show torques
+    torque = (*torques, found.floor_torque_rms) if any(torques) else (math.nan, math.nan, None)
+    lines = (("force (N)", force), ("torque (Nm)", torque), ("1 s prediction (m)", predicted))
+    show_table(
+        ("error on held-out data", "before", "after", "noise floor"),
+        [(name, *(_figure(x) for x in (*values, None)[:3])) for name, values in lines],
+    )
+
+
+def _figure(value: float | None) -> str:
+    """Return an error with three digits; a dash where the logs do not show the quantity."""
+    if value is None:
+        return ""
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def _with_rotor_faults(
+    found: "Diagnosis", paths: Sequence[Path], flights: "Sequence[FlightLog]"
+) -> "Diagnosis":
+    """Add whether a rotor lost thrust during a flight, for the logs that can show it."""
+    from ..identification.comparison.fault_channels import channels_of
+    from ..identification.comparison.fault_detection import find_fault
+    from ..identification.comparison.words import fault_data
+
+    faults = []
+    with working("looking for a rotor that lost thrust"):
+        for path, log in zip(paths, flights, strict=True):
+            try:
+                faults.append(fault_data(find_fault(channels_of(path, log))))
+            except InputError:
+                continue  # no gyro, no accelerometer, no command, or too little flight
+    notes = tuple(data["headline"] for data in faults if data["rotor"] is not None)
+    return replace(found, rotor_faults=tuple(faults), notes=(*found.notes, *notes))
+
+
+def _rotor_faults(
+    logs: Sequence[Path],
+    reader: str | None,
+    vehicle: str | None,
+    out: Path,
+    log_map: str | None,
+) -> dict[str, Any]:
+    """Look for rotors that lost thrust during flights; write rotor_faults.json and a picture."""
+    from ..dynamics.vehicle_file import load_vehicle
+    from ..identification.comparison.fault_channels import read_channels, sample
+    from ..identification.comparison.fault_detection import find_fault
+    from ..identification.comparison.words import fault_data, fault_headline, write_faults
+
+    model = None if vehicle is None else load_vehicle(vehicle)
+    read = [read_channels(path, reader, model, log_map) for path in logs]
+    folder = results_folder(out)
+    found = []
+    with working("looking for a rotor that lost thrust") as progress:
+        for i, (channels, _) in enumerate(read):
+            progress(i / len(read))
+            found.append((find_fault(channels), sample(channels)))
+    written = write_faults(found, folder)
+    log_notes(text for _, notes in read for text in notes)
+    for fault, samples in found:
+        ended = f"; nothing later: {samples.ended}" if samples.ended else ""
+        console.print(f"{fault.name}: {fault.seconds:.1f} s in flight{ended}")
+        console.print(fault_headline(fault))
+    say(*written)
+    return {"rotor_faults": [fault_data(fault) for fault, _ in found]}

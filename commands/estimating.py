@@ -1,0 +1,143 @@
+"""The external wrench on a logged flight."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..runtime.errors import InputError
+from .flight_logs import LogArgument, LogVehicleOption, log_notes, read_flights
+from .terminal import (
+    Gate,
+    MapOption,
+    Out,
+    ReaderOption,
+    checked_gate,
+    console,
+    note,
+    results_folder,
+    say,
+    show_table,
+    working,
+)
+
+
+def estimate(
+    log: LogArgument,
+    reader: ReaderOption = None,
+    map: MapOption = None,
+    vehicle: LogVehicleOption = None,
+    smooth: Annotated[
+        bool | None,
+        typer.Option(
+            "--smooth/--no-smooth",
+            help="Use the whole log for each time's estimate, or the past alone as on the vehicle; "
+            "default: smooth, unless the log has one of gyro and accelerometer only, which the "
+            "smoother does not take. A log without a pose is always smoothed, from both.",
+        ),
+    ] = None,
+    gate: Gate = None,
+    tune: Annotated[
+        bool,
+        typer.Option("--tune", help="Fit the filter's noise to this log first (some seconds)."),
+    ] = False,
+    film: Annotated[
+        bool,
+        typer.Option(
+            "--film",
+            help="Also draw the flight with its wrench as arrows: film.gif and the last frame.",
+        ),
+    ] = False,
+    video: Annotated[
+        bool, typer.Option("--video", help="Also write a video, film.mp4 (video extra).")
+    ] = False,
+    rrd: Annotated[
+        bool,
+        typer.Option(
+            "--rrd", help="Also write a recording for the Rerun viewer, film.rrd (rerun extra)."
+        ),
+    ] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
+    begin: Annotated[
+        float,
+        typer.Option("--from", min=0.0, help="Start of the film, s from the start of the log."),
+    ] = 0.0,
+    film_seconds: Annotated[
+        float, typer.Option(min=0.1, help="Longest duration of the film, s.")
+    ] = 30.0,
+    out: Out = Path("results/estimate"),
+) -> dict[str, Any]:
+    """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the
+    flight on request.
+
+    Example: windwrench estimate flight.csv --vehicle crazyflie --film
+    """
+    from ..identification.motion.inertial_signals import reads_imu
+    from ..identification.report.wrench_picture import plot_wrench
+    from ..identification.wrench_series import (
+        GATE,
+        counts,
+        estimate_log,
+        truth_rmse,
+        tune_to_log,
+        tuning_note_of,
+        write_wrench,
+    )
+    from .log_film import draw_film, shown_rows
+
+    level = GATE if gate is None else checked_gate(gate)
+    kinds = [kind for kind, wanted in (("mp4", video), ("gif", film)) if wanted]
+    if view and kinds:
+        raise InputError(
+            "--view shows the flight in a window; expected it without --film and --video"
+        )
+    (flight,), model = read_flights([log], reader, vehicle, map)
+    drawn = bool(kinds) or view or rrd
+    rows = shown_rows(flight, log, begin, film_seconds) if drawn else None
+    folder = results_folder(out)
+    if smooth is None:
+        smooth = (flight.gyro is None) == (flight.accelerometer is None)
+    smooth = smooth or reads_imu(flight)
+    fit = None
+    if tune:
+        with working("fitting the tuning"):
+            fit = tune_to_log(flight, model)
+    with working("estimating") as progress:
+        series = estimate_log(
+            flight, model, fit.tuning if fit else None, progress, smooth, level or None
+        )
+    written = [write_wrench(series, folder), plot_wrench(series, flight, folder / "wrench.png")]
+    if rows is not None:
+        written += draw_film(flight, model, series, rows, folder, kinds, view, rrd)
+    log_notes(series.notes)
+    seconds = float(flight.t[-1] - flight.t[0])
+    console.print(f"{flight.name}: {len(flight.t)} samples, {seconds:.1f} s, vehicle {model.name}")
+    result: dict[str, Any] = {
+        "log": flight.name,
+        "vehicle": model.name,
+        "samples": len(flight.t),
+        "seconds": seconds,
+        "smoothed": smooth,
+        "status": counts(series),
+        "restarts": int(series.restarts[-1]),
+    }
+    if fit is not None:
+        result["tuning"] = fit.as_dict()
+        console.print(str(fit))
+    elif unsuited := tuning_note_of(flight, model):
+        note(f"{unsuited} Use --tune to fit the tuning to this log.")
+    truth = truth_rmse(series, flight)
+    table = []
+    for i, (name, values, unit) in enumerate(
+        (("force", series.force, "N"), ("torque", series.torque, "Nm"))
+    ):
+        measures = {"mean": values.mean(axis=0), "std": values.std(axis=0)}
+        table += [(f"{name}, mean ({unit})", *(f"{v:+.4g}" for v in measures["mean"]))]
+        table += [(f"{name}, std ({unit})", *(f"{v:.4g}" for v in measures["std"]))]
+        if truth is not None:
+            measures["rmse_to_truth"] = truth[i]
+            table += [(f"{name}, RMSE to truth ({unit})", *(f"{v:.4g}" for v in truth[i]))]
+        result |= {f"{name}_{measure}_{unit}": value for measure, value in measures.items()}
+    show_table(("", "x", "y", "z"), table)
+    say(*written)
+    return result

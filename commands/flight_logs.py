@@ -1,0 +1,70 @@
+"""Flight logs of one vehicle, as several commands take them."""
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..runtime.errors import InputError
+from .terminal import note, offering, vehicle_names
+
+if TYPE_CHECKING:
+    from ..dynamics.vehicle import Vehicle
+    from ..identification.logs.flight_log import FlightLog
+
+LogArgument = Annotated[
+    Path, typer.Argument(help="Flight log: a table, or of an autopilot or a bag.")
+]
+LogVehicleOption = Annotated[
+    str | None,
+    typer.Option(
+        "--vehicle",
+        help="Vehicle that flew: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; "
+        "required unless the log names it.",
+        autocompletion=offering(vehicle_names),
+    ),
+]
+
+
+def read_flights(
+    paths: Sequence[Path], reader: str | None, vehicle: str | None, log_map: str | None = None
+) -> "tuple[list[FlightLog], Vehicle]":
+    """Read flights of one vehicle, the one given or the one that the logs name.
+
+    Raises:
+        InputError: a log cannot be read; or no vehicle is given, and the logs name none, none that
+            comes with the kit, or several.
+    """
+    from ..dynamics.vehicle_file import load_vehicle, preset_names
+    from ..identification.logs.reading import read_log
+
+    model = None if vehicle is None else load_vehicle(vehicle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the notes say the same
+        flights = [read_log(path, reader, model, log_map) for path in paths]
+    if model is not None:
+        return flights, model
+    expected = f"--vehicle {', '.join(preset_names())} or the path of a YAML file"
+    for path, flight in zip(paths, flights, strict=True):
+        if not flight.vehicle:
+            raise InputError(f"{path}: the log does not name its vehicle; expected {expected}")
+        if flight.vehicle != flights[0].vehicle:
+            raise InputError(
+                f"{path}: names the vehicle {flight.vehicle}, {paths[0]} names "
+                f"{flights[0].vehicle}; expected logs of one vehicle, or {expected}"
+            )
+        if flight.vehicle not in preset_names():
+            raise InputError(
+                f"{path}: names the vehicle {flight.vehicle}, which does not come with the kit; "
+                f"expected {expected}"
+            )
+    return flights, load_vehicle(flights[0].vehicle)
+
+
+def log_notes(texts: Iterable[str]) -> None:
+    """Print each note once on standard error, with its count where it came more than once."""
+    for text, count in Counter(texts).items():
+        note(text if count == 1 else f"{text} ({count} times)")

@@ -1,0 +1,144 @@
+"""A film of a logged flight, with the estimated wrench as arrows."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runtime.errors import InputError
+from .terminal import working
+
+if TYPE_CHECKING:
+    from ..dynamics.vehicle import Vehicle
+    from ..envs.replay import Flight
+    from ..identification.logs.flight_log import FlightLog
+    from ..identification.wrench_series import WrenchSeries
+
+Rows = NDArray[np.int64]
+
+
+def flight_to_draw(log: "FlightLog", series: "WrenchSeries") -> "Flight":
+    """Return the poses and wrenches that a film shows: where motion capture lost the vehicle, the
+    filter's own pose.
+    """
+    from ..envs.replay import Flight
+
+    return Flight(
+        series.t,
+        series.position,
+        series.quaternion,
+        series.force,
+        series.torque,
+        log.force,
+        log.torque,
+    )
+
+
+def shown_rows(log: "FlightLog", path: Path, begin: float, seconds: float) -> Rows:
+    """Return the rows of a log that a film shows.
+
+    Args:
+        log: the flight.
+        path: of the log, for errors.
+        begin: start of the film, s after that of the log.
+        seconds: longest duration.
+
+    Raises:
+        InputError: the log has fewer than two rows there.
+    """
+    since = log.t - log.t[0]
+    if begin >= since[-1]:
+        raise InputError(
+            f"--from {begin:g}: {path} ends after {since[-1]:.6g} s; expected a time before that"
+        )
+    rows = np.flatnonzero((since >= begin) & (since <= begin + seconds))
+    if len(rows) < 2:
+        raise InputError(
+            f"--film-seconds {seconds:g}: {path} has {len(rows)} sample(s) there; expected a "
+            f"longer duration"
+        )
+    return rows
+
+
+def draw_film(
+    log: "FlightLog",
+    model: "Vehicle",
+    series: "WrenchSeries",
+    rows: Rows,
+    folder: Path,
+    kinds: Sequence[str],
+    view: bool,
+    rrd: bool,
+) -> list[Path]:
+    """Draw a flight as films, in a window, or for the Rerun viewer; return the files.
+
+    Args:
+        log: the flight.
+        model: its vehicle.
+        series: the estimated wrench.
+        rows: of the log that are shown.
+        folder: for the files.
+        kinds: of films, ``gif`` and ``mp4``.
+        view: show the flight in a window instead.
+        rrd: also write a recording of the whole flight for the Rerun viewer.
+    """
+    from ..envs.captions import Caption
+    from ..envs.drawing import Viewer
+    from ..envs.replay import arrow_scales, drawn_arm, pictures
+    from ..envs.rerun_export import write_rrd
+    from ..envs.video import FPS
+    from .filming import SIZE, films, written
+
+    whole = flight_to_draw(log, series)
+    if rrd:
+        write_rrd(whole, model, folder / "film.rrd")
+    made = [folder / "film.rrd"] if rrd else []
+    if not kinds and not view:
+        return made
+    part = whole.part(rows)
+    arm = drawn_arm(part, model)
+    scales, larger = arrow_scales(part, arm), arm / model.arm_l
+    viewer = Viewer("human" if view else "rgb_array", *SIZE)
+    seconds = float(part.t[-1] - part.t[0])
+    total = max(1, int(seconds * FPS))
+
+    def caption(k: int) -> Caption:
+        """Return the words beside a sample."""
+        force, torque = part.true_force, part.true_torque
+        before = max(k - 1, 0)
+        speed = np.linalg.norm(part.position[k] - part.position[before])
+        speed /= max(part.t[k] - part.t[before], 1e-6)
+        return Caption(
+            f"{log.name}: {model.name}",
+            float(part.t[k] - log.t[0]),
+            part.force[k],
+            float(part.torque[k, 2]),
+            None if force is None else force[k],
+            None if torque is None else float(torque[k, 2]),
+            (
+                f"height {part.position[k, 2]:.2f} m",
+                f"speed {speed:.1f} m/s",
+                *([f"vehicle drawn {larger:.1f} times as large"] if larger > 1.05 else []),
+            ),
+            viewer.pixels_per_metre(part.position[k]),
+            scales,
+        )
+
+    try:
+        with (
+            working("drawing") as progress,
+            films(folder, "film", list(kinds), seconds + 1.0, still="png") as film,
+        ):
+            frames: Any = pictures(part, model, viewer, FPS)
+            for count, (k, picture) in enumerate(frames):
+                if view:
+                    time.sleep(1.0 / FPS)
+                else:
+                    film(lambda: picture, lambda: caption(k))  # noqa: B023 - called at once
+                progress(min(1.0, (count + 1) / total))
+    finally:
+        viewer.close()
+    return [*made, *written(folder, "film", list(kinds), "png")]
