@@ -1,4 +1,4 @@
-"""``windwrench diagnose --fleet``: every log gets its outcome, and none stops the others."""
+"""``windwrench fleet``: every log gets its outcome, and none stops the others."""
 
 import csv
 import json
@@ -49,7 +49,7 @@ def call(tmp_path, monkeypatch, capfd):
 
     def run_here(*arguments):
         monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["windwrench", "diagnose", *map(str, arguments)])
+        monkeypatch.setattr(sys, "argv", ["windwrench", "fleet", *map(str, arguments)])
         capfd.readouterr()
         with pytest.raises(SystemExit) as ended:
             main()
@@ -109,7 +109,7 @@ def outcomes_in(folder):
 
 
 def test_no_log_stops_the_others(call, here, logs, tmp_path):
-    arguments = ("logs", "--fleet", "--vehicle", "ardrone2", "--out", "out", "--limit", "1")
+    arguments = ("logs", "--vehicle", "ardrone2", "--out", "out", "--limit", "1")
     code, said, _ = call(*arguments, "--json")
     assert code == 0
     result = json.loads(said)["result"]
@@ -137,7 +137,7 @@ def test_no_log_stops_the_others(call, here, logs, tmp_path):
 
 
 def test_a_fleet_of_which_nothing_is_left_says_so(call, here, logs):
-    code, _, error = call("logs/alpha/flight2.csv", "--fleet", "--out", "other")
+    code, _, error = call("logs/alpha/flight2.csv", "--out", "other")
     assert code == 2
     assert "none of 1 logs could be diagnosed" in error
     assert "fleet.html" in error
