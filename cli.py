@@ -19,7 +19,6 @@ from .commands.fleets import fleet
 from .commands.flying import fly, record
 from .commands.identifying import identify
 from .commands.learning import train
-from .commands.library import effects
 from .commands.live import live
 from .commands.output import prepare_output
 from .commands.paper import reproduce
@@ -92,7 +91,6 @@ _COMMANDS: tuple[Callable[..., Any], ...] = (
     export_c,
     record,
     reproduce,
-    effects,
     train,
 )
 for command in _COMMANDS:

@@ -9,7 +9,6 @@ import math
 import platform
 import shlex
 import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from importlib import metadata
@@ -21,7 +20,6 @@ import typer
 from .. import __version__
 from ..runtime.compile_notice import notice
 from ..runtime.whole_files import replaced
-from .durations import expected_duration, keep_duration
 from .terminal import DryRun, console, errors, run
 
 Work = TypeVar("Work", bound=Callable[..., Any])
@@ -37,7 +35,7 @@ DryRunOption = Annotated[
     bool,
     typer.Option(
         "--dry-run",
-        help="Check the request; print the plan and how long it takes here; write nothing.",
+        help="Check the request; print the plan; write nothing.",
     ),
 ]
 
@@ -76,16 +74,12 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
         run.begin(dry_run)
         console.quiet, errors.quiet = as_json or quiet, quiet
         notice.quiet = quiet
-        begun = time.monotonic()
         try:
             outcome: dict[str, Any] = {"result": work(**options)}
-            if can_stop:
-                keep_duration(name, run.plan, time.monotonic() - begun)
             if run.record is not None:
                 write_run(run.record, name, options)
         except DryRun as stopped:
-            takes = stopped.takes or expected_duration(name, stopped.plan)
-            outcome = {"dry_run": True, "would": stopped.plan, "takes": takes, "out": stopped.out}
+            outcome = {"dry_run": True, "would": stopped.plan, "out": stopped.out}
             lines = [
                 f"  {key}: {_words(value)}"
                 for key, value in stopped.plan.items()
@@ -97,7 +91,6 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
                         f"{name} would do",
                         *lines,
                         f"  and write to {stopped.out}",
-                        f"  it takes: {takes}",
                     ]
                 ),
                 highlight=False,

@@ -53,7 +53,6 @@ class Run:
     """What the command that runs now has done so far."""
 
     dry: bool = False
-    plan: dict[str, Any] = field(default_factory=dict)  # what the work consists of
     written: list[Path] = field(default_factory=list)
     record: Path | None = None  # where it is noted how the results came about
     made: list[Path] = field(default_factory=list)  # folders, innermost first
@@ -62,7 +61,6 @@ class Run:
     def begin(self, dry: bool = False) -> None:
         """Forget the command before."""
         self.dry, self.written, self.record, self.made, self.code = dry, [], None, [], 0
-        self.plan = {}
 
     def undo(self) -> None:
         """Take the folders away again that were made for results and are empty."""
@@ -77,9 +75,9 @@ run = Run()
 class DryRun(Exception):  # noqa: N818 - the way out of a command whose request is good, no error
     """Ends a dry run where the work would begin."""
 
-    def __init__(self, plan: Mapping[str, Any], out: Path, takes: str | None = None) -> None:
+    def __init__(self, plan: Mapping[str, Any], out: Path) -> None:
         super().__init__("dry run")
-        self.plan, self.out, self.takes = plan, out, takes
+        self.plan, self.out = plan, out
 
 
 def offering(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
@@ -206,9 +204,7 @@ def checked_gate(gate: float) -> float:
     return gate
 
 
-def results_folder(
-    out: Path, *, takes: Callable[[], str | None] | None = None, **plan: object
-) -> Path:
+def results_folder(out: Path, **plan: object) -> Path:
     """Make the results' folder, before the work starts, so that no result is lost for want of it.
 
     Every command calls this once its request is checked and before its work begins: here a dry run
@@ -216,7 +212,6 @@ def results_folder(
 
     Args:
         out: the folder.
-        takes: says how long the work takes here, by a short sample of it; only a dry run asks.
         plan: what is about to be done, for a dry run.
 
     Raises:
@@ -224,9 +219,7 @@ def results_folder(
         DryRun: the command is not to do its work.
     """
     if run.dry:
-        sampled = takes() if takes is not None else None
-        raise DryRun(plan, out, sampled)
-    run.plan = run.plan or dict(plan)
+        raise DryRun(plan, out)
     try:
         run.made = [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)

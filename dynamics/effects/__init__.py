@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 _FOLDERS = "WINDWRENCH_EFFECTS"
-_NOT_EFFECTS = {"__init__", "base", "call", "declaration", "parts", "vanishing"}
+_NOT_EFFECTS = {"__init__", "__main__", "base", "call", "declaration", "parts", "vanishing"}
 
 
 def add_folder(folder: str | Path) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import pytest
 
 from tests.support.paths import ROOT
 from windwrench.cli import main
-from windwrench.dynamics.effects import names
+from windwrench.dynamics.effects.__main__ import effects_page
 
 COMMAND = Path(sys.executable).with_name("windwrench")
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -75,7 +75,7 @@ def log(tmp_path_factory):
     return folder / "flight.csv"
 
 
-@pytest.mark.parametrize("command", ["fly", "benchmark", "estimate", "record", "effects"])
+@pytest.mark.parametrize("command", ["fly", "benchmark", "estimate", "record"])
 def test_every_command_has_help(tmp_path, command):
     assert command in succeed(tmp_path, "--help")
     text = succeed(tmp_path, command, "--help")
@@ -200,24 +200,13 @@ def test_a_recording_repeats_with_its_seed(log, tmp_path):
     assert (tmp_path / "again.csv").read_bytes() == log.read_bytes()
 
 
-def test_effects_are_listed(tmp_path):
-    text = succeed(tmp_path, "effects")
-    for name in names():
-        assert name in text
-
-
-def test_the_page_of_effects_is_the_one_in_the_docs(tmp_path):
-    succeed(tmp_path, "effects", "--markdown", "effects.md")
-    committed = ROOT / "docs" / "effects.md"
-    assert (tmp_path / "effects.md").read_text(encoding="utf-8") == committed.read_text(
-        encoding="utf-8"
-    )
+def test_the_page_of_effects_is_the_one_in_the_docs():
+    assert (ROOT / "docs" / "effects.md").read_text(encoding="utf-8") == effects_page()
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("effects", "--markdown", "/dev/null/effects.md"), "cannot be written"),
         (("fly", "--scenario", "bas"), "Did you mean 'base'"),
         (("fly", "--controller", "admitance"), "Did you mean 'admittance'"),
         (("fly", "--vehicle", "ardrone"), "Did you mean 'ardrone2'"),

@@ -134,7 +134,6 @@ def test_a_dry_run_says_what_would_be_done_and_does_nothing(call, tmp_path, name
     said = json.loads(call(name, "--dry-run", "--json")[1])
     assert said["dry_run"] is True
     assert said["would"]
-    assert f"it takes: {said['takes'].split()[0]} " in text
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,6 +1,8 @@
-"""The effect library as a page of documentation, made from the library itself."""
+"""The effect library as a page of documentation, made from the library itself:
+``python -m windwrench.dynamics.effects`` prints the page.
+"""
 
-from ..dynamics.effects import Effect, get, model_in_words, names
+from . import Effect, get, model_in_words, names
 
 _HEAD = """# The effects
 
@@ -8,7 +10,7 @@ One effect, three uses: the simulator applies it, the estimator's model includes
 to the residual of a log. Each is one file in `dynamics/effects/`, which holds its model, the equation, once. This page is made from
 those files:
 
-    windwrench effects --markdown docs/effects.md
+    python -m windwrench.dynamics.effects > docs/effects.md
 
 A vehicle declares effects in its YAML file, `effects: [{name: rotor_drag, coefficients: {kdx: 1.2e-4, kdy: 1.2e-4}}]`;
 `windwrench record --effect rotor_drag:kdx=1.2e-4,kdy=1.2e-4` flies one that the vehicle does not declare. Coefficients not given are
@@ -74,3 +76,7 @@ def _span(minimum: float, maximum: float) -> str:
     if low and high:
         return f"{minimum:g} to {maximum:g}"
     return f"at least {minimum:g}" if low else f"at most {maximum:g}" if high else "any"
+
+
+if __name__ == "__main__":
+    print(effects_page(), end="")
