@@ -48,7 +48,8 @@ def run(play, vehicle=VEHICLE, text="crazyflie:fake://here", **settings):
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
-    while thread.is_alive() and not (FakeLink.opened and FakeLink.opened[0].started):
+    blocks = 2 if "imu=1" in text else 1
+    while thread.is_alive() and not (FakeLink.opened and len(FakeLink.opened[0].started) == blocks):
         thread.join(0.01)
     if thread.is_alive():
         play(FakeLink.opened[0], lambda n, kind="row": wait(session, n, thread, kind))
