@@ -56,7 +56,7 @@ def vehicle_of(
         if motors is not None:  # thrust against command by way of the speed
             steady = np.polynomial.polynomial.polypow(motors.speed, 2)
             curve = MotorCurve(tuple(k * steady))
-    late = "lag" in fit.names
+    late = "lag" in fit.model.free
     of_lag = effect_of(Role.LAG)
     if late:
         value = estimates[of_lag].value

@@ -55,6 +55,12 @@ class MotionPiece:
     command: Array | None  # (n, 4), 0 to 1
     voltage: Array | None  # (n,) V
 
+    def measured(self) -> Array:
+        """Return specific force, zero where none is known, and angular acceleration (n, 6)."""
+        force = self.specific_force
+        none = np.zeros_like(self.angular_acceleration)
+        return np.column_stack([none if force is None else force, self.angular_acceleration])
+
     def mapped(self, change: Callable[[Array], Array]) -> "MotionPiece":
         """Return the piece with each of its series changed."""
         series = {f.name: getattr(self, f.name) for f in fields(self)}

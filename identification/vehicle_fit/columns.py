@@ -6,13 +6,16 @@ A rotor's thrust is ``sum_j a_j phi_j``: of measured speeds ``phi = [W^2]``, of 
 time offset.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..motion.smoothing import derivative, lagged, low_pass
 from .channels import MotionPiece
+from .model import NONLINEAR
 from .spectra import SPECTRUM, Complex, Segment, segments_of
 
 Array = NDArray[np.float64]
@@ -34,6 +37,11 @@ class Drive:
     gamma: float = 0.0  # exponent of the voltage
     band: float = SPECTRUM.band  # Hz, up to which force and turning are compared
 
+    def at(self, values: Mapping[str, float]) -> "Drive":
+        """Return the drive with the lag, time offset and exponent among some values."""
+        changed: dict[str, Any] = {name: values[name] for name in NONLINEAR if name in values}
+        return replace(self, **changed)
+
 
 @dataclass(frozen=True, eq=False)
 class BalanceSpectra:
@@ -41,24 +49,19 @@ class BalanceSpectra:
     the nonlinear parameters.
     """
 
+    drive: Drive  # about which they are linear
     names: tuple[str, ...]  # of the columns
-    nonlinear: tuple[str, ...]  # "lag", "delay", "gamma"
+    nonlinear: tuple[str, ...]  # some of NONLINEAR
     segments: tuple[Segment, ...]
     seconds: float
-    band: float  # Hz
     noise: Array  # (4, c): standard deviation times root s, of each rotor's noise in each column
 
 
 def balance(
     pieces: list[MotionPiece], drive: Drive, nonlinear: tuple[str, ...], rotor_noise: float = 0.0
 ) -> BalanceSpectra:
-    """Return the transforms of all pieces at a drive's lag, delay and exponent.
-
-    Args:
-        pieces: of the logs.
-        drive: where to linearise.
-        nonlinear: which of ``lag``, ``delay`` and ``gamma`` are fitted.
-        rotor_noise: rad/s, standard deviation of one measured rotor speed.
+    """Return the transforms of all pieces, linear about a drive in its ``nonlinear`` parameters;
+    ``rotor_noise`` (rad/s) is the standard deviation of one measured rotor speed.
     """
     segments: list[Segment] = []
     names: tuple[str, ...] = ()
@@ -67,7 +70,7 @@ def balance(
         here = rotor_columns(piece, drive)
         air = air_columns(piece)
         names = (*here, *air)
-        base = np.column_stack([*_measured(piece), *here.values(), *air.values()])
+        base = np.column_stack([piece.measured(), *here.values(), *air.values()])
         parts, count = [base], len(names)
         for name in nonlinear:
             if name == "delay":
@@ -84,15 +87,8 @@ def balance(
     mean = np.sqrt(np.average(np.square(noise), axis=0, weights=weights))
     signs = np.sign(np.sum(noise, axis=0))
     return BalanceSpectra(
-        names, nonlinear, tuple(segments), float(weights.sum()), drive.band, mean * signs
+        drive, names, nonlinear, tuple(segments), float(weights.sum()), mean * signs
     )
-
-
-def _measured(piece: MotionPiece) -> list[Array]:
-    force = piece.specific_force
-    if force is None:
-        force = np.zeros_like(piece.angular_velocity)
-    return [*force.T, *piece.angular_acceleration.T]
 
 
 def basis(piece: MotionPiece, drive: Drive) -> Array:

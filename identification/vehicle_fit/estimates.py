@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import t as student
 
 from ...dynamics.effects import Role, get
@@ -28,34 +29,21 @@ class Intervals:
 
     def __init__(self, fit: VehicleFit) -> None:
         self.fit = fit
-        count = len(fit.balance.segments)
-        self.width = float(student.ppf(0.975, max(count - 1, 3)))
-        n = len(fit.model.free)
-        self._theta = np.concatenate(
-            [fit.theta[:n], [getattr(fit.drive, name) for name in fit.names[n:]]]
-        )
-        self._covariance = fit.covariance
+        self.width = float(student.ppf(0.975, max(len(fit.balance.segments) - 1, 3)))
 
     def of(self, what: Function, logarithm: bool = True) -> Interval:
         """Return value, low and high of a function of the parameters in SI units; of a positive
         quantity as a ratio.
         """
-        here = float(what(self._at(0, 0.0)))
-        slope = np.empty(len(self._theta))
-        for i in range(len(slope)):
-            slope[i] = (what(self._at(i, 1e-5)) - what(self._at(i, -1e-5))) / 2e-5
-        size = self.width * math.sqrt(max(float(slope @ self._covariance @ slope), 0.0))
+        theta, values = self.fit.theta, self.fit.model.values
+        here = float(what(values(theta)))
+        steps = 1e-5 * np.eye(len(theta))
+        slope = np.array([what(values(theta + e)) - what(values(theta - e)) for e in steps]) / 2e-5
+        size = self.width * math.sqrt(max(float(slope @ self.fit.covariance @ slope), 0.0))
         if logarithm and here > 0.0:
             factor = math.exp(min(size / here, 50.0))
             return here, here / factor, here * factor
         return here, here - size, here + size
-
-    def _at(self, i: int, step: float) -> dict[str, float]:
-        theta = self._theta.copy()
-        theta[i] += step
-        n = len(self.fit.model.free)
-        named = zip(self.fit.names[n:], theta[n:], strict=True)
-        return {**self.fit.model.values(theta[:n]), **{name: float(x) for name, x in named}}
 
 
 def thrust_of(values: Values, exponents: Sequence[int], u: float) -> float:
@@ -144,8 +132,17 @@ class _Estimates:
                 "N",
                 *((how, IDENTIFIED) if low <= u <= high else (beyond, ASSUMED)),
             )
-        self.say("hover command", lambda v: _hover(v, exponents, weight), "1", how)
-        if "gamma" in self.fit.names:
+
+        def excess(u: float, values: Values) -> float:
+            return 4.0 * thrust_of(values, exponents, u) - weight
+
+        def hover(values: Values) -> float:
+            return (
+                float(brentq(excess, 0.0, 2.0, args=(values,))) if excess(2.0, values) > 0 else 2.0
+            )
+
+        self.say("hover command", hover, "1", how)
+        if "gamma" in self.fit.model.free:
             known = self.intervals.of(lambda v: v["gamma"], False)
             self.add("voltage_exponent", known, "1", how + " and voltage")
 
@@ -228,7 +225,7 @@ class _Estimates:
 
     def say_lag(self) -> None:
         name = effect_of(Role.LAG)
-        if "lag" in self.fit.names:
+        if "lag" in self.fit.model.free:
             how = f"force and turning {self.rotors}"
             if not self.fit.drive.commands:
                 how += ", which therefore are commanded, not measured"
@@ -298,14 +295,3 @@ class _Estimates:
         if not set(drags) & set(self.kept):
             known = (0.0, math.nan, math.nan)
             self.add("drag", known, "N/(m/s)", "none stands out of the disturbances", NOTHING)
-
-
-def _hover(values: Values, exponents: Sequence[int], weight: float) -> float:
-    low, high = 0.0, 2.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if 4.0 * thrust_of(values, exponents, middle) < weight:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)

@@ -24,9 +24,9 @@ from .effect_settings import effect_of
 from .estimates import Intervals, estimates_of, thrust_of
 from .geometry import SPIN, USUAL, Geometry
 from .motors import MotorResponse, motor_response
-from .parameters import DELAY, FORCE_BIAS, OPTIONAL, POSITIVE, first_model, with_more
+from .parameters import FORCE_BIAS, OPTIONAL, POSITIVE, first_model
 from .result import ESTIMATES, IDENTIFIED, NOTHING, Estimate, Identified, told
-from .solve import VehicleFit, fall_with, solve, step_with
+from .solve import VehicleFit, fall_with, lag_with, solve
 from .spectra import SPECTRUM
 
 Array = NDArray[np.float64]
@@ -112,9 +112,9 @@ def identify(
     estimates = estimates_of(
         fit, sources, geometry, pieces, (reasons, instead), kept, mass * gravity
     )
-    if "lag" in fit.names:
+    if "lag" in fit.model.free:
         estimates.append(_lag_alone(pieces, fit))
-    motors = None if commands or "lag" in fit.names else motor_response(pieces)
+    motors = None if commands or "lag" in fit.model.free else motor_response(pieces)
     if motors is not None:
         estimates = [_lag_of(motors) if e.name == effect_of(Role.LAG) else e for e in estimates]
     named = {e.name: e for e in estimates}
@@ -141,9 +141,9 @@ def _lag_of(motors: MotorResponse) -> Estimate:
 
 def _lag_alone(pieces: list[MotionPiece], fit: VehicleFit) -> Estimate:
     """Return the lag of a model that has no time offset, which then is in the lag."""
-    nonlinear = tuple(name for name in fit.names[len(fit.model.free) :] if name != "delay")
-    drive = replace(fit.drive, delay=0.0)
-    alone = solve(pieces, drive, fit.model, fit.theta[: len(fit.model.free)], nonlinear)
+    place = fit.model.free.index("delay")
+    model = replace(fit.model, free=(*fit.model.free[:place], *fit.model.free[place + 1 :]))
+    alone = solve(pieces, replace(fit.drive, delay=0.0), model, np.delete(fit.theta, place))
     known = Intervals(alone).of(lambda v: v["lag"])
     how = "of a model without a time offset: what other tools call the lag"
     return Estimate("lag without offset", *known, "s", IDENTIFIED if told(known) else NOTHING, how)
@@ -168,17 +168,16 @@ def _first_fit(
     noise: float,
 ) -> tuple[VehicleFit, bool]:
     """Return the fit of the basic model, and whether the rotors turn the other way."""
-    prior = {"delay": DELAY}
+    known = (pieces, sources, drive, mass, gravity)
     if not drive.commands:
-        model, start, drive, turned = first_model(pieces, sources, drive, mass, gravity)
-        plain = solve(pieces, drive, model, start, ("delay",), noise, prior)
+        model, start, drive, turned = first_model(*known, ("delay",))
+        plain = solve(pieces, drive, model, start, noise)
         # do the logged speeds lead the motion as commands do?
-        step, size = step_with(pieces, plain, ("lag", "delay"))
-        if step["lag"] < IDENTIFY.least_lag * size["lag"]:
+        if lag_with(pieces, plain) < IDENTIFY.least_lag:
             return plain, turned
-        late = replace(plain.drive, lag=IDENTIFY.lags[0])
-        theta = plain.theta[: len(model.free)]
-        other = solve(pieces, late, model, theta, ("lag", "delay"), 0.0, prior)
+        model, start = model.with_more(plain.theta, "lag")
+        start[-1] = IDENTIFY.lags[0]
+        other = solve(pieces, drive, model, start)
         enough = IDENTIFY.penalty * math.log(_frequencies(plain))
         sure = other.drive.lag > IDENTIFY.least_lag * other.deviation("lag")
         return (other if sure and plain.loss - other.loss > enough else plain), turned
@@ -187,15 +186,12 @@ def _first_fit(
     # from the richest curve down: a fit that starts poor takes its own misfit for noise
     for exponents in ((0, 1, 2), (1, 2), (2,)):
         here = replace(drive, exponents=exponents)
-        model, start, here, turned = first_model(pieces, sources, here, mass, gravity)
-        lags = IDENTIFY.lags if best is None else (best[1].drive.lag,)
-        fit = min(
-            (
-                solve(pieces, replace(here, lag=lag), model, start, nonlinear, 0.0, prior)
-                for lag in lags
-            ),
-            key=lambda f: f.loss,
-        )
+        model, start, here, turned = first_model(pieces, sources, here, mass, gravity, nonlinear)
+        fits = []
+        for lag in IDENTIFY.lags if best is None else (best[1].drive.lag,):
+            start[model.free.index("lag")] = lag
+            fits.append(solve(pieces, here, model, start))
+        fit = min(fits, key=lambda f: f.loss)
         cost = fit.loss + IDENTIFY.penalty * math.log(_frequencies(fit)) * len(exponents)
         if _rises(fit) and (best is None or cost < best[0]):
             best = cost, fit, turned
@@ -212,14 +208,9 @@ def _agreeing(
     """Return the fit up to the widest frequency at which thrust is what slower motion alone says
     (Hausman's test), and no sensor's bias is beyond belief.
     """
-    n = len(fit.model.free)
-    nonlinear = fit.names[n:]
     rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
     for band in IDENTIFY.bands:
-        drive = replace(fit.drive, band=band)
-        slow = solve(
-            pieces, drive, fit.model, fit.theta[:n], nonlinear, rotor_noise, {"delay": DELAY}
-        )
+        slow = solve(pieces, replace(fit.drive, band=band), fit.model, fit.theta, rotor_noise)
         wide, narrow = _hover_thrust(fit, weight), _hover_thrust(slow, weight)
         apart = abs(math.log(narrow[0] / wide[0])) if min(narrow[0], wide[0]) > 0.0 else math.inf
         bias = abs(fit.values.get("force bias z", 0.0))
@@ -263,28 +254,20 @@ def _with_optional(
 ) -> tuple[VehicleFit, list[str]]:
     """Return a fit with those further effects that make the logs much likelier, and which."""
     kept: list[str] = []
-    nonlinear = fit.names[len(fit.model.free) :]
     for name, parameters in OPTIONAL.items():
-        if not _has_columns(fit, parameters):
+        air = {p for p in parameters if "drag" in p or p == "lift"}
+        of_speeds = name in ("rotor drag", "inflow")
+        if not air <= set(fit.balance.names) or (fit.drive.commands and of_speeds):
             continue
-        if fit.drive.commands and name in ("rotor drag", "inflow"):
-            continue  # of speeds
-        model, start = with_more(fit.model, fit.theta[: len(fit.model.free)], parameters)
+        model, start = fit.model.with_more(fit.theta, *parameters)
         least = IDENTIFY.penalty * len(parameters) * math.log(_frequencies(fit))
         if fall_with(fit, model, start) > least:
             rotor_noise = 0.0 if fit.drive.lag > 0.0 else noise
-            richer = solve(
-                pieces, fit.drive, model, start, nonlinear, rotor_noise, {"delay": DELAY}
-            )
+            richer = solve(pieces, fit.drive, model, start, rotor_noise)
             if all(richer.values[p] > 0.0 for p in richer.model.free if p in POSITIVE):
                 fit = richer
                 kept.append(name)
     return fit, kept
-
-
-def _has_columns(fit: VehicleFit, parameters: Sequence[str]) -> bool:
-    air = [p for p in parameters if "drag" in p or p == "lift"]
-    return all(p in fit.balance.names for p in air)
 
 
 def _not_told(fit: VehicleFit, geometry: Geometry) -> tuple[dict[str, str], dict[str, float]]:

@@ -4,44 +4,52 @@ Specific force, body axes, at the sensor (or the pose's point), which lies at ``
 of mass: ``f = (T e3 + drag) / m + w' x r + w x (w x r) + bias``, with the thrust axis tilted a
 little. Angular acceleration: ``w' = J^-1 (torque - w x J w) + bias``.
 
-Parameters (``theta``) are numbers near 1 or 0: what they multiply is in ``Scales``.
+Parameters (``theta``) are numbers near 1 or 0; ``Model.scale`` holds the unit of each. Lag, time
+offset and voltage exponent change the columns themselves, and stand in SI units.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-LEVERS = ("rx", "ry", "rz")
 _AXES = "xyz"
+NONLINEAR = ("lag", "delay", "gamma")  # s, s, 1
+# inertia in logarithms: positive, and with intervals of ratios
+LOGARITHMIC = ("Jx", "Jy", "Jz")
+# e_ijk of a cross product
+_CROSS = np.zeros((3, 3, 3))
+_CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]], _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0, -1.0
 
 
 @dataclass(frozen=True)
 class Model:
-    """Which parameters are fitted, their sizes, and those that are fixed."""
+    """Which parameters are fitted, and their sizes."""
 
     mass: float  # kg
     powers: int
     free: tuple[str, ...]
-    scale: Mapping[str, float]  # what one unit of a parameter is, in SI units
-    fixed: Mapping[str, float] = field(default_factory=dict)  # SI units
-    prior: Mapping[str, float] = field(default_factory=dict)  # standard deviation about 0, SI units
+    scale: Mapping[str, float]  # one unit of a parameter in SI units; 1 where none is given
+    prior: Mapping[str, float]  # standard deviation about 0, SI units
 
     def values(self, theta: Array) -> dict[str, float]:
-        """Return all parameters in SI units; those neither free nor fixed are zero."""
-        out = dict(self.fixed)
-        for name, x in zip(self.free, theta, strict=True):
-            scale = self.scale[name]
-            out[name] = float(scale * np.exp(x)) if name in LOGARITHMIC else float(scale * x)
-        return out
+        """Return the free parameters in SI units."""
+        return {
+            name: float(self.scale.get(name, 1.0) * (np.exp(x) if name in LOGARITHMIC else x))
+            for name, x in zip(self.free, theta, strict=True)
+        }
 
+    @property
+    def nonlinear(self) -> tuple[str, ...]:
+        """Names of the parameters that change the columns themselves."""
+        return tuple(name for name in self.free if name in NONLINEAR)
 
-# inertia in logarithms: positive, and with intervals of ratios
-LOGARITHMIC = ("Jx", "Jy", "Jz")
+    def with_more(self, theta: Array, *names: str) -> tuple["Model", Array]:
+        """Return the model with further parameters, which start at nothing, and the start."""
+        return replace(self, free=(*self.free, *names)), np.append(theta, np.zeros(len(names)))
 
 
 def inertia_of(p: Mapping[str, float]) -> Array:
@@ -52,12 +60,17 @@ def inertia_of(p: Mapping[str, float]) -> Array:
 
 def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, powers: int) -> Array:
     """Return the coefficients (6, c) of the columns for parameters in SI units."""
-    place, lever, gyroscopic = _structure(names)
-    get = p.get
-    inertia = inertia_of(p)
-    out = np.empty((6, len(names)))
-    out[:3] = np.tensordot([get(n, 0.0) for n in LEVERS], lever, 1)
-    moment = np.tensordot(inertia.ravel(), gyroscopic, 1)  # torque about the centre of mass
+    place, get = {name: i for i, name in enumerate(names)}, p.get
+    inertia, lever = inertia_of(p), np.array([get(f"r{a}", 0.0) for a in _AXES])
+    out, moment = np.zeros((6, len(names))), np.zeros((3, len(names)))  # moment: about the centre
+    for i, axis in enumerate(_AXES):
+        out[:3, place[f"dw{axis}"]] = _CROSS[:, i] @ lever
+        for j, other in enumerate(_AXES[i:], i):
+            products = np.zeros((3, 3))  # of the angular velocities, in this column
+            products[i, j] = products[j, i] = 1.0
+            column = place[f"w{axis}w{other}"]
+            out[:3, column] = products @ lever - np.trace(products) * lever
+            moment[:, column] = -np.einsum("ijk,kj", _CROSS, inertia @ products)
     for j in range(powers):
         a = get(f"a{j}", 0.0)
         thrust = place[f"T{j}"]
@@ -85,30 +98,6 @@ def coefficients(p: Mapping[str, float], names: tuple[str, ...], mass: float, po
     for i, axis in enumerate(_AXES):
         out[3 + i, place["1"]] += get(f"turn bias {axis}", 0.0)
     return out
-
-
-@lru_cache(maxsize=16)
-def _structure(names: tuple[str, ...]) -> tuple[dict[str, int], Array, Array]:
-    """Return the columns' places; the force's coefficients (3, 3, c) for each part of the lever,
-    ``w' x r + w x (w x r)``; and the torque's (9, 3, c) for each part of the inertia, ``-w x J w``.
-    """
-    place = {name: i for i, name in enumerate(names)}
-
-    def product(a: int, b: int) -> int:
-        first, second = sorted((a, b))
-        return place[f"w{_AXES[first]}w{_AXES[second]}"]
-
-    lever, gyroscopic = np.zeros((3, 3, len(names))), np.zeros((9, 3, len(names)))
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        lever[k, i, place[f"dw{_AXES[j]}"]] += 1.0
-        lever[j, i, place[f"dw{_AXES[k]}"]] -= 1.0
-        for n in range(3):
-            lever[n, i, product(i, n)] += 1.0
-            lever[i, i, product(n, n)] -= 1.0
-            gyroscopic[3 * k + n, i, product(j, n)] -= 1.0
-            gyroscopic[3 * j + n, i, product(k, n)] += 1.0
-    return place, lever, gyroscopic
 
 
 def jacobian(model: Model, theta: Array, names: tuple[str, ...]) -> tuple[Array, Array]:

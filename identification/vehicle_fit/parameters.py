@@ -25,21 +25,8 @@ TILT = 0.02
 DELAY = 0.02
 
 BASE = (
-    "Jx",
-    "Jy",
-    "Jz",
-    "reach",
-    "cx",
-    "cy",
-    "Jr",
-    "tilt x",
-    "tilt y",
-    "rx",
-    "ry",
-    "rz",
-    "turn bias x",
-    "turn bias y",
-    "turn bias z",
+    *("Jx", "Jy", "Jz", "reach", "cx", "cy", "Jr", "tilt x", "tilt y", "rx", "ry", "rz"),
+    *("turn bias x", "turn bias y", "turn bias z"),
 )
 BIASES = ("force bias x", "force bias y", "force bias z")
 # of these a negative value is no physics, but another fault of the model
@@ -60,102 +47,83 @@ OPTIONAL: dict[str, tuple[str, ...]] = {
 
 
 def first_model(
-    pieces: list[MotionPiece], sources: Sources, drive: Drive, mass: float, gravity: float
+    pieces: list[MotionPiece],
+    sources: Sources,
+    drive: Drive,
+    mass: float,
+    gravity: float,
+    nonlinear: Sequence[str],
 ) -> tuple[Model, Array, Drive, bool]:
     """Return the model, where it starts, the drive with the turning senses that yaw shows, and
-    whether they are the opposite of the drive's.
+    whether they are the opposite of the drive's; ``nonlinear`` of its parameters start as the
+    drive has them.
 
     Raises:
         InputError: roll or pitch turn against their rotors.
     """
-    each = first_thrust(pieces, drive, mass * gravity)
+    columns = [rotor_columns(piece, drive) for piece in pieces]
+    # a basis coefficient at which it alone would carry the weight
+    totals = [np.concatenate([c[f"T{j}"] for c in columns]) for j in range(len(drive.exponents))]
+    each = [mass * gravity / max(float(np.mean(total)), 1e-12) for total in totals]
     share = 1.0 / len(each)
-    thrust = [share * a for a in each]
-    gains = first_gains(pieces, drive, thrust)
-    check_order(gains)
+    gains = _first_gains(pieces, columns, [share * a for a in each])
+    for axis, gain in zip(("roll", "pitch"), gains, strict=False):
+        if gain < 0.0:
+            raise InputError(
+                f"{axis} turns against the torque of its rotors; expected rotors in the order "
+                "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
+            )
     arm = float(np.mean(np.abs(drive.positions[:, :2])))
     # what hardly turns starts at the inertia that such a vehicle usually has
     usual = USUAL.gyration * mass * arm**2
     inertia = np.array([1.0 / g if 1e-2 / usual < g < 1e2 / usual else usual for g in gains[:2]])
     flat = USUAL.flat * float(inertia.sum())
-    reach = abs(float(gains[2])) * flat
-    reach = float(np.clip(reach, 1e-3 * arm, 10.0 * arm))
+    source = [p.command if drive.commands else p.rotor_speeds for p in pieces]
+    speed = max(float(np.mean(np.concatenate([x for x in source if x is not None]))), 1e-6)
     size = {
         **{f"a{j}": a for j, a in enumerate(each)},
-        "Jx": inertia[0],
-        "Jy": inertia[1],
-        "Jz": flat,
-        "Jxy": 0.1 * inertia[0],
-        "Jxz": 0.1 * inertia[0],
-        "Jyz": 0.1 * inertia[0],
-        "reach": reach,
-        "cx": 0.01 * arm,
-        "cy": 0.01 * arm,
-        "Jr": 0.01 * inertia[0] / _mean_speed(pieces, drive) * _rate(gravity, arm),
-        **dict.fromkeys(("tilt x", "tilt y"), 0.01),
-        **dict.fromkeys(("rx", "ry", "rz"), 0.01),
-        **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z"), 0.1),
-        **dict.fromkeys(BIASES, 0.1),
-        **{f"rotor drag {a}": 0.05 * mass / _mean_speed(pieces, drive) for a in "xyz"},
+        **dict(zip(("Jx", "Jy", "Jz"), (*inertia, flat), strict=True)),
+        **dict.fromkeys(("Jxy", "Jxz", "Jyz"), 0.1 * inertia[0]),
+        "reach": float(np.clip(abs(float(gains[2])) * flat, 1e-3 * arm, 10.0 * arm)),
+        **dict.fromkeys(("cx", "cy"), 0.01 * arm),
+        "Jr": 0.01 * inertia[0] / speed * float(np.sqrt(gravity / arm)),
+        **dict.fromkeys(("tilt x", "tilt y", "rx", "ry", "rz"), 0.01),
+        **dict.fromkeys(("turn bias x", "turn bias y", "turn bias z", *BIASES), 0.1),
+        **{f"rotor drag {a}": 0.05 * mass / speed for a in "xyz"},
         **{f"linear drag {a}": 0.1 * mass for a in "xyz"},
         **{f"quadratic drag {a}": 0.03 * mass for a in "xyz"},
         "lift": 0.03 * mass,
         **{f"damping {a}": inertia[0] for a in "xyz"},
     }
     free = (*(f"a{j}" for j in range(len(each))), *BASE)
-    prior: dict[str, float] = {}
+    prior = {"delay": DELAY}
     if sources.force == "accelerometer":
         free = (*free, *BIASES)
-        prior = {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
-    model = Model(mass, len(each), free, size, prior=prior)
-    start = np.zeros(len(free))
-    start[: len(each)] = share
-    start[free.index("reach")] = 1.0
+        prior |= {**dict.fromkeys(BIASES, FORCE_BIAS), "tilt x": TILT, "tilt y": TILT}
+    known = {**{f"a{j}": share for j in range(len(each))}, "reach": 1.0}
+    known |= {name: getattr(drive, name) for name in nonlinear}
+    model = Model(mass, len(each), (*free, *nonlinear), size, prior)
     turned = bool(gains[2] < 0.0)
     if turned:
         drive = replace(drive, spin=-drive.spin)
-    return model, start, drive, turned
+    return model, np.array([known.get(name, 0.0) for name in model.free]), drive, turned
 
 
-def with_more(model: Model, start: Array, names: Sequence[str]) -> tuple[Model, Array]:
-    """Return a model with further parameters, which start at nothing."""
-    return replace(model, free=(*model.free, *names)), np.concatenate([start, np.zeros(len(names))])
-
-
-def _mean_speed(pieces: list[MotionPiece], drive: Drive) -> float:
-    source = [p.command if drive.commands else p.rotor_speeds for p in pieces]
-    return max(float(np.mean(np.concatenate([x for x in source if x is not None]))), 1e-6)
-
-
-def _rate(gravity: float, arm: float) -> float:
-    return float(np.sqrt(gravity / arm))  # 1/s: of a vehicle's own motion
-
-
-def first_thrust(pieces: list[MotionPiece], drive: Drive, weight: float) -> list[float]:
-    """Return the size of each basis coefficient at which it alone would carry the weight."""
-    totals = [rotor_columns(piece, drive) for piece in pieces]
-    return [
-        weight / max(float(np.mean(np.concatenate([t[f"T{j}"] for t in totals]))), 1e-12)
-        for j in range(len(drive.exponents))
-    ]
-
-
-def first_gains(pieces: list[MotionPiece], drive: Drive, thrust: list[float]) -> Array:
+def _first_gains(
+    pieces: list[MotionPiece], columns: list[dict[str, Array]], thrust: list[float]
+) -> Array:
     """Return the angular acceleration per torque (3,) in 1/(kg m2), roughly: about x and y the
     inertia's inverse, about z that times torque over thrust (m).
     """
     gains = []
     for i, letter in enumerate("XYZ"):
         cross = power = 0.0
-        for piece in pieces:
-            columns = rotor_columns(piece, drive)
-            torque = sum(a * columns[f"{letter}{j}"] for j, a in enumerate(thrust))
-            assert isinstance(torque, np.ndarray)
+        for piece, column in zip(pieces, columns, strict=True):
+            torque = np.sum([a * column[f"{letter}{j}"] for j, a in enumerate(thrust)], axis=0)
             # turning is the integral of torque: compared where neither is differentiated
-            spin = np.cumsum(torque - torque.mean()) * piece.period
-            rate = piece.angular_velocity[:, i]
-            cross += float(np.sum(_swing(spin, piece.period) * _swing(rate, piece.period)))
-            power += float(np.sum(np.square(_swing(spin, piece.period))))
+            spin = _swing(np.cumsum(torque - torque.mean()) * piece.period, piece.period)
+            cross += float(np.sum(spin * _swing(piece.angular_velocity[:, i], piece.period)))
+            power += float(np.sum(np.square(spin)))
         gains.append(cross / power if power > 0.0 else 0.0)
     return np.array(gains)
 
@@ -164,13 +132,3 @@ def _swing(x: Array, period: float) -> Array:
     """Return what of ``x`` (n,) is faster than about 0.5 Hz."""
     sections = butter(2, [1.0 * period, min(0.9, 16.0 * period)], btype="bandpass", output="sos")
     return np.asarray(sosfiltfilt(sections, x))
-
-
-def check_order(gains: Array) -> None:
-    """Raise InputError where roll and pitch turn against their rotors."""
-    for axis, gain in zip(("roll", "pitch"), gains, strict=False):
-        if gain < 0.0:
-            raise InputError(
-                f"{axis} turns against the torque of its rotors; expected rotors in the order "
-                "front-left, rear-left, rear-right, front-right, and body axes forward, left, up"
-            )

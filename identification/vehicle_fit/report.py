@@ -95,10 +95,9 @@ def fitted(found: Identified, piece: MotionPiece) -> tuple[Array, Array]:
     }
     columns = np.column_stack([*late.values(), *air.values()])
     model = columns @ coefficients(fit.values, names, fit.model.mass, fit.model.powers).T
-    force = piece.specific_force
-    if force is None:
-        force = np.full_like(piece.angular_acceleration, np.nan)
-    measured = np.column_stack([force, piece.angular_acceleration])
+    measured = piece.measured()
+    if piece.specific_force is None:
+        measured[:, :3] = np.nan
     return (
         low_pass(measured, _SHOWN_HZ, piece.period),
         low_pass(model, _SHOWN_HZ, piece.period),

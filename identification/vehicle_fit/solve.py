@@ -6,14 +6,15 @@ is taken away before the normal equations are solved, so that it does not shrink
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .channels import MotionPiece
 from .columns import BalanceSpectra, Drive, balance
-from .model import LOGARITHMIC, Model, jacobian
+from .model import LOGARITHMIC, NONLINEAR, Model, jacobian
 from .spectra import SPECTRUM, residual_spectra
 
 Array = NDArray[np.float64]
@@ -26,9 +27,10 @@ class SolveSettings:
     rounds: int = 12  # of a new spectrum and a new linearisation
     steps: int = 2  # of Gauss-Newton in each
     close: float = 0.02  # of a standard deviation: a change that ends it
-    most_lag: float = 0.5  # s
-    most_delay: float = 0.1  # s
-    most_gamma: float = 4.0
+    lag: tuple[float, float] = (0.0, 0.5)  # s
+    delay: tuple[float, float] = (-0.1, 0.1)  # s
+    gamma: tuple[float, float] = (-4.0, 4.0)
+    most_change: float = 0.05  # of one of these in a round
     # of one frequency: where the parameters explain nearly all of it, its noise is not seen
     most_leverage: float = 0.8
 
@@ -41,16 +43,19 @@ class VehicleFit:
     """Parameters that fit best."""
 
     model: Model
-    drive: Drive  # with its lag, delay and exponent fitted
-    names: tuple[str, ...]  # of the parameters: the model's free ones, then the nonlinear ones
     theta: Array  # (p,)
-    information: Array  # (p, p), of the model's parameters with priors
+    information: Array  # (p, p), with priors
     scores: Array  # (s, p): each segment's gradient
     loss: float  # twice the negative log-likelihood, up to a constant
     balance: BalanceSpectra
     spectra: list[Array]  # of each segment (m, 6)
 
     @property
+    def drive(self) -> Drive:
+        """The rotors' columns with the fitted lag, time offset and exponent."""
+        return self.balance.drive
+
+    @cached_property
     def covariance(self) -> Array:
         """Covariance (p, p), the larger of what the noise's spectrum says and what the segments'
         own scatter says (White's sandwich), parameter by parameter.
@@ -70,105 +75,72 @@ class VehicleFit:
     @property
     def values(self) -> dict[str, float]:
         """All parameters in SI units."""
-        n = len(self.model.free)
-        return {
-            **self.model.values(self.theta[:n]),
-            **{name: getattr(self.drive, name) for name in self.names[n:]},
-        }
+        return self.model.values(self.theta)
 
     def deviation(self, name: str) -> float:
-        """Return a parameter's standard deviation in theta's units: SI units for the nonlinear
-        ones, a share of the value for those in logarithms.
+        """Return a parameter's standard deviation in SI units; a share of the value for those in
+        logarithms.
         """
-        i = self.names.index(name)
-        size = float(np.sqrt(self.covariance[i, i]))
-        free = i < len(self.model.free) and name not in LOGARITHMIC
-        return size * self.model.scale[name] if free else size
+        i = self.model.free.index(name)
+        unit = 1.0 if name in LOGARITHMIC else self.model.scale.get(name, 1.0)
+        return unit * float(np.sqrt(self.covariance[i, i]))
 
 
 def solve(
-    pieces: list[MotionPiece],
-    drive: Drive,
-    model: Model,
-    start: Array,
-    nonlinear: tuple[str, ...],
-    rotor_noise: float = 0.0,
-    nonlinear_prior: dict[str, float] | None = None,
+    pieces: list[MotionPiece], drive: Drive, model: Model, start: Array, rotor_noise: float = 0.0
 ) -> VehicleFit:
-    """Return the fit that Gauss-Newton reaches from ``start`` (p,) and the drive's own lag, delay
-    and exponent.
-    """
+    """Return the fit that Gauss-Newton reaches from ``start`` (p,)."""
     theta = start.copy()
-    prior = nonlinear_prior or {}
-    made = balance(pieces, drive, nonlinear, rotor_noise)
+
+    def linear() -> BalanceSpectra:
+        return balance(pieces, drive.at(model.values(theta)), model.nonlinear, rotor_noise)
+
+    made = linear()
     powers = [np.mean(np.abs(s.columns[:, :, :6]) ** 2, axis=0) for s in made.segments]
     spectra = residual_spectra(made.segments, powers)
-    zero = np.zeros(len(nonlinear))
     for number in range(SOLVE.rounds):
-        total = np.sum(_grams(made, spectra), axis=0)
-        shift, moved = zero.copy(), 0.0
+        total, moved = np.sum(_grams(made, spectra), axis=0), 0.0
         for _ in range(SOLVE.steps):
-            step, information, *_ = _newton(made, total, model, theta, shift, drive, prior)
-            theta += np.clip(step[: len(theta)], -1.0, 1.0)
-            shift = _bounded(shift + step[len(theta) :], drive, nonlinear)
+            step, information, *_ = _newton(made, total, model, theta)
+            theta = _bounded(theta + np.clip(step, -1.0, 1.0), model, made.drive)
             size = np.abs(step) * np.sqrt(np.maximum(np.diag(information), 0.0))
             moved = max(moved, float(size.max()))
-        drive = replace(
-            drive,
-            **{n: getattr(drive, n) + float(d) for n, d in zip(nonlinear, shift, strict=True)},
-        )
-        if nonlinear:
-            made = balance(pieces, drive, nonlinear, rotor_noise)
+        made = linear() if model.nonlinear else made
         if number >= 2 and moved < SOLVE.close:
             break
         powers = _powers(made, spectra, model, theta, information)
         spectra = residual_spectra(made.segments, powers)
     grams = _grams(made, spectra)
-    _, information, slopes, v = _newton(
-        made, np.sum(grams, axis=0), model, theta, zero, drive, prior
-    )
+    _, information, slopes, v = _newton(made, np.sum(grams, axis=0), model, theta)
     scores = np.array([np.einsum("iac,acd,ad->i", slopes, g, v, optimize=True) for g in grams])
-    return VehicleFit(
-        model,
-        drive,
-        (*model.free, *nonlinear),
-        theta,
-        information,
-        scores,
-        _loss(made, spectra),
-        made,
-        spectra,
+    # twice the negative log-likelihood of a noise that has the residual's spectrum
+    logs = (
+        np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
+        for s, p in zip(made.segments, spectra, strict=True)
     )
+    loss = float(SPECTRUM.tapers * sum(logs))
+    return VehicleFit(model, theta, information, scores, loss, made, spectra)
 
 
 def fall_with(fit: VehicleFit, model: Model, start: Array) -> float:
     """Return by how much twice the negative log-likelihood would fall with a model that has further
     parameters than a fit's, by the score test: one step from where they are nothing.
     """
-    made, zero = fit.balance, np.zeros(len(fit.balance.nonlinear))
-    total = np.sum(_grams(made, fit.spectra), axis=0)
-    step, information, *_ = _newton(made, total, model, start, zero, fit.drive, {})
-    current = fit.theta[: len(fit.model.free)]
-    own_step, own_information, *_ = _newton(made, total, fit.model, current, zero, fit.drive, {})
-    return float(step @ information @ step - own_step @ own_information @ own_step)
+    total = np.sum(_grams(fit.balance, fit.spectra), axis=0)
+    falls = []
+    for tried, theta in ((model, start), (fit.model, fit.theta)):
+        step, information, *_ = _newton(fit.balance, total, tried, theta)
+        falls.append(float(step @ information @ step))
+    return falls[0] - falls[1]
 
 
-def step_with(
-    pieces: list[MotionPiece], fit: VehicleFit, nonlinear: tuple[str, ...]
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the step that further nonlinear parameters would take from a fit, and its standard
-    deviation, by name.
-    """
-    made = balance(pieces, fit.drive, nonlinear)
+def lag_with(pieces: list[MotionPiece], fit: VehicleFit) -> float:
+    """Return the lag that one step from a fit without one would take, in standard deviations."""
+    model, start = fit.model.with_more(fit.theta, "lag")
+    made = balance(pieces, fit.drive, model.nonlinear)
     total = np.sum(_grams(made, fit.spectra), axis=0)
-    n = len(fit.model.free)
-    zero = np.zeros(len(nonlinear))
-    step, information, *_ = _newton(made, total, fit.model, fit.theta[:n], zero, fit.drive, {})
-    size = np.sqrt(np.diag(np.linalg.inv(information)))[n:]
-    return (
-        dict(zip(nonlinear, step[n:].tolist(), strict=True)),
-        dict(zip(nonlinear, size.tolist(), strict=True)),
-    )
+    step, information, *_ = _newton(made, total, model, start)
+    return float(step[-1] / np.sqrt(np.linalg.inv(information)[-1, -1]))
 
 
 def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
@@ -180,7 +152,7 @@ def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
     for s, spectrum in zip(made.segments, spectra, strict=True):
         columns = s.columns[:, :, 6:]
         gram = np.empty((6, 1 + columns.shape[2], 1 + columns.shape[2]))
-        gain = 1.0 / (1.0 + (s.frequency / made.band) ** 4) ** 2
+        gain = 1.0 / (1.0 + (s.frequency / made.drive.band) ** 4) ** 2
         for axis in range(6):
             weight = s.weight / spectrum[:, axis]
             both = np.concatenate([s.columns[:, :, axis : axis + 1], columns], axis=2)
@@ -194,61 +166,43 @@ def _grams(made: BalanceSpectra, spectra: Sequence[Array]) -> list[Array]:
 
 
 def _newton(
-    made: BalanceSpectra,
-    grams: Array,
-    model: Model,
-    theta: Array,
-    shift: Array,
-    drive: Drive,
-    prior: dict[str, float],
+    made: BalanceSpectra, grams: Array, model: Model, theta: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Return a Gauss-Newton step (p,), the information (p, p), the residual's slopes (p, 6, 1 + c +
     nc) and the residual (6, 1 + c + nc), as combinations of measurement and columns.
     """
     here, slopes = jacobian(model, theta, made.names)
-    c, count = len(made.names), len(made.nonlinear)
-    width = 1 + c * (1 + count)
-    v = np.zeros((6, width))
-    v[:, 0] = 1.0
-    v[:, 1 : 1 + c] = -here
-    rows = np.zeros((len(theta) + count, 6, width))
-    rows[: len(theta), :, 1 : 1 + c] = -slopes
-    for n in range(count):
-        block = slice(1 + c * (1 + n), 1 + c * (2 + n))
-        v[:, block] = -here * shift[n]
-        rows[: len(theta), :, block] = -slopes * shift[n]
-        rows[len(theta) + n, :, block] = -here
+    # columns, and their derivatives times the distance from where they are linear
+    far = [theta[model.free.index(n)] - getattr(made.drive, n) for n in made.nonlinear]
+    factors = np.array([1.0, *far])
+    v = np.column_stack([np.ones(6), -np.kron(factors, here)])
+    rows = np.zeros((len(theta), *v.shape))
+    rows[:, :, 1:] = -np.kron(factors, slopes)
+    for n, name in enumerate(made.nonlinear, 1):
+        block = slice(1 + n * here.shape[1], 1 + (n + 1) * here.shape[1])
+        rows[model.free.index(name), :, block] = -here
     weighted = np.einsum("iac,acd->iad", rows, grams)
     information = np.einsum("iad,jad->ij", weighted, rows)
     gradient = np.einsum("iad,ad->i", weighted, v)
-    for i, name in enumerate((*model.free, *made.nonlinear)):
-        if name in prior and i >= len(theta):
-            current = getattr(drive, name) + shift[i - len(theta)]
-            information[i, i] += prior[name] ** -2
-            gradient[i] += current * prior[name] ** -2
-        elif i < len(theta) and name in model.prior:
-            strength = (model.scale[name] / model.prior[name]) ** 2
+    for i, name in enumerate(model.free):
+        if name in model.prior:
+            strength = (model.scale.get(name, 1.0) / model.prior[name]) ** 2
             information[i, i] += strength
             gradient[i] += theta[i] * strength
     # what the flight does not excite at all stays where it is
-    floor = 1e-8 * np.eye(len(information))
-    step = np.linalg.solve(information + floor, -gradient)
-    return step, information + floor, rows, v
+    information += 1e-8 * np.eye(len(information))
+    return np.linalg.solve(information, -gradient), information, rows, v
 
 
-def _bounded(shift: Array, drive: Drive, nonlinear: tuple[str, ...]) -> Array:
-    out = shift.copy()
-    for i, name in enumerate(nonlinear):
-        current = getattr(drive, name)
-        low, high = {
-            "lag": (0.0, SOLVE.most_lag),
-            "delay": (-SOLVE.most_delay, SOLVE.most_delay),
-            "gamma": (-SOLVE.most_gamma, SOLVE.most_gamma),
-        }[name]
-        out[i] = (
-            np.clip(current + out[i], max(low, current - 0.05), min(high, current + 0.05)) - current
-        )
-    return out
+def _bounded(theta: Array, model: Model, drive: Drive) -> Array:
+    """Return parameters of which the nonlinear ones stay near the drive's, and in their range."""
+    low, high = np.full((2, len(theta)), [[-np.inf], [np.inf]])
+    for i, name in enumerate(model.free):
+        if name in NONLINEAR:
+            least, most = getattr(SOLVE, name)
+            low[i] = max(least, getattr(drive, name) - SOLVE.most_change)
+            high[i] = min(most, getattr(drive, name) + SOLVE.most_change)
+    return np.clip(theta, low, high)
 
 
 def _powers(
@@ -258,29 +212,18 @@ def _powers(
     their share: they follow the noise most where they are told from few frequencies.
     """
     here, slopes = jacobian(model, theta, made.names)
-    c, count = len(made.names), len(made.nonlinear)
-    inverse = np.linalg.inv(information)
+    c, inverse = len(made.names), np.linalg.inv(information)
     out = []
     for s, spectrum in zip(made.segments, spectra, strict=True):
         columns = s.columns[:, :, 6 : 6 + c]
         residual = s.columns[:, :, :6] - columns @ here.T
         moves = np.einsum("kmc,pac->pakm", columns, slopes, optimize=True)
-        late = [
-            np.moveaxis(s.columns[:, :, 6 + c * (1 + n) : 6 + c * (2 + n)] @ here.T, 2, 0)[None]
-            for n in range(count)
-        ]
-        moves = np.concatenate([moves, *late]).reshape(len(information), -1)
+        for n, name in enumerate(made.nonlinear, 1):
+            late = s.columns[:, :, 6 + c * n : 6 + c * (n + 1)] @ here.T
+            moves[model.free.index(name)] = np.moveaxis(late, 2, 0)
+        moves = moves.reshape(len(information), -1)
         share = np.einsum("ix,ij,jx->x", moves.conj(), inverse, moves, optimize=True).real
         leverage = np.mean(share.reshape(6, *residual.shape[:2]), axis=1).T / spectrum
         power = np.mean(np.abs(residual) ** 2, axis=0)
         out.append(power / (1.0 - np.minimum(leverage, SOLVE.most_leverage)))
     return out
-
-
-def _loss(made: BalanceSpectra, spectra: Sequence[Array]) -> float:
-    """Return twice the negative log-likelihood of a noise that has the residual's spectrum."""
-    logs = (
-        np.sum(s.weight[:, None] * np.log(np.where(np.isinf(p), 1.0, p)))
-        for s, p in zip(made.segments, spectra, strict=True)
-    )
-    return float(SPECTRUM.tapers * sum(logs))
