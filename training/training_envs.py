@@ -177,7 +177,3 @@ def make_training_envs(
         return TimeLimit(Repeat(env, repeat) if repeat > 1 else env, DECISIONS // repeat)
 
     return SyncVectorEnv([make] * count, autoreset_mode=AutoresetMode.DISABLED)
-
-
-# their older names
-check_world, make_world, make_worlds = check_training_env, make_training_env, make_training_envs

@@ -78,7 +78,7 @@ def test_data_is_compact(tracked):
 
 
 def test_every_picture_and_data_file_is_used(tracked):
-    """By a page or README with its name, or as a whole folder by a command."""
+    """By a page or README with its name."""
     pages = [ROOT / "README.md", *(path for path in tracked if path.suffix == ".md")]
     linked = {
         (page.parent / target).resolve()
@@ -88,14 +88,10 @@ def test_every_picture_and_data_file_is_used(tracked):
     }
     site = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     linked |= {ROOT / "docs" / name for name in re.findall(r"[\w/]+\.css", site)}
-    folders = {ROOT / "docs" / "results" / "learning"}  # `python -m studies.learning` reads it
     unused = [
         path.relative_to(ROOT).as_posix()
         for path in tracked
-        if path.suffix not in (".md", ".py")
-        and path not in linked
-        and path.parent not in folders
-        and not belongs(path, linked)
+        if path.suffix not in (".md", ".py") and path not in linked and not belongs(path, linked)
     ]
     assert not unused
 

@@ -11,7 +11,7 @@ from windwrench.studies import pages as rendering
 from windwrench.studies import quotes as quoting
 from windwrench.studies.pages import missing_sources
 
-SLOW = {"leaderboard", "diagnosis-trials"}  # bootstraps thousands of episodes, judges 768 diagnoses
+SLOW = {"diagnosis-trials"}  # judges 768 diagnoses
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
 

@@ -1,1 +1,0 @@
-"""The learning study: policies trained and compared, and the leaderboard page."""
