@@ -197,12 +197,21 @@ def test_a_recording_that_is_killed_is_a_log_up_to_its_last_second(tmp_path):
     reader.start()
     running.stdin.write("".join(text[:1201]).encode())
     running.stdin.flush()
-    while len(lines) < 1201 and running.poll() is None:
+    wanted = 0.005 * 1199 - 1.0  # s, the end of the stream but for its last second
+    for _ in range(1500):  # what is recorded follows what is printed
+        if running.poll() is not None or (len(lines) == 1201 and _last_time(log) > wanted):
+            break
         time.sleep(0.02)
     os.kill(running.pid, signal.SIGKILL)
     running.wait()
     reader.join()
-    assert read_log(log).t[-1] > 0.005 * 1199 - 1.0
+    assert read_log(log).t[-1] > wanted
+
+
+def _last_time(log):
+    """Return the time of the last whole line of a log that is being written, s."""
+    rows = log.read_bytes().split(b"\n")[1:-1] if log.exists() else []
+    return float(rows[-1].split(b",")[0]) if rows else 0.0
 
 
 @pytest.mark.parametrize("text", ["t,px,py\n1,2,3\n", ""])
