@@ -211,7 +211,10 @@ class Session:
     def _out(self, output: Output) -> None:
         self.estimates += 1
         self.output = output
-        self.source.send(output)
+        try:
+            self.source.send(output)
+        except OSError:
+            self.tallies.counts["not sent"] += 1
         self._tell(output)
         if self._recent is not None and output.t - self._shown_t >= 1.0 / _VIEWED - 1e-6:
             self._recent.append(output)

@@ -76,7 +76,7 @@ class Tallies:
     ``lost`` (missing in the sender's own count, or in its regular times), ``malformed``, ``clock
     jumps``, ``implausible times``, ``waiting`` (poses that came while no rotor speeds were known),
     ``stops`` (times that the source was silent and came back), ``refused`` (poses that the gate
-    took for outliers), ``not recorded``.
+    took for outliers), ``not recorded``, ``not sent`` (estimates that the link did not take).
     """
 
     def __init__(self) -> None:

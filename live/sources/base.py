@@ -1,71 +1,131 @@
 """What a source of messages is, and how its address is read."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Protocol
 from urllib.parse import parse_qsl, urlsplit
 
+from ...dynamics.vehicle import Vehicle
+from ...identification.logs.log_map import LogMap
 from ...runtime.errors import InputError
+from ...runtime.extras import need
 from ..filtering import Output
 from ..messages import Sample
 from ..tallies import Tallies
 
+_RESTARTED = 1_000  # messages; a count that falls by more has begun again
+_MOST_LOST = 1_000_000  # messages; a count that rises by more is another
 
-class Source(Protocol):
-    """A stream of messages."""
 
-    name: str  # for people
-    paced: bool  # messages arrive at the vehicle's own pace
+class Source(ABC):
+    """A stream of messages, listened to at an address.
 
+    Args:
+        text: the address.
+        vehicle: that flies.
+        tallies: where messages are counted that are lost or say nothing.
+        log_map: what the fields of its messages mean, where a source takes a map; None: this kit's.
+
+    Raises:
+        InputError: the address is none, or a library is not installed.
+    """
+
+    kind = ""  # with which an address begins
+    options: tuple[str, ...] = ()  # of an address
+    library = ""  # that the extra of the kind's name brings
+    paced = True  # messages arrive at the vehicle's own pace
+
+    def __init__(
+        self, text: str, vehicle: Vehicle, tallies: Tallies, log_map: LogMap | None = None
+    ) -> None:
+        if self.library:
+            need(self.library, self.kind)
+        self.name = text  # for people
+        self.address = read_address(text, self.kind, self.options)
+        self.vehicle, self.tallies, self.log_map = vehicle, tallies, log_map
+        self._understood = False  # a message was
+        self._numbers: dict[object, int] = {}  # the newest of each sender's own count
+        self._prepare()
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Read the options of the address.
+
+        Raises:
+            InputError: one is wrong.
+        """
+
+    @abstractmethod
     def open(self) -> None:
         """Begin to listen.
 
         Raises:
             InputError: there is no such source, or it cannot be opened.
         """
-        ...
 
+    @abstractmethod
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return what has come, after at most ``timeout`` s; None: the stream has ended.
 
         Raises:
             InputError: what comes is none of this source's messages.
         """
-        ...
 
-    def send(self, output: Output) -> None:
-        """Tell the sender the estimate, where it wants to know."""
-        ...
-
-    def close(self) -> None:
-        """Listen no more."""
-        ...
-
+    @abstractmethod
     def expected(self) -> str:
         """Return what must come and has not, for an error."""
-        ...
 
-
-class Malformed:
-    """Counts messages that say nothing. The first of a stream ends it: it is of another kind than
-    the user thinks. Later ones are counted.
-    """
-
-    def __init__(self, where: str, tallies: Tallies) -> None:
-        self._where, self._tallies = where, tallies
-        self.good = False  # one has been understood
-        self.first = ""  # what was wrong with the first that was counted
-
-    def take(self, why: str) -> None:
-        """Count one.
+    def send(self, output: Output) -> None:  # noqa: B027 - most senders want to know nothing
+        """Tell the sender the estimate, where it wants to know.
 
         Raises:
-            InputError: none was good before.
+            OSError: the link takes no more now.
         """
-        if not self.good:
-            raise InputError(f"{self._where}: {why}")
-        self._tallies.counts["malformed"] += 1
-        self.first = self.first or why
+
+    def close(self) -> None:  # noqa: B027 - there may be nothing to close
+        """Listen no more."""
+
+    def take_sound(self, sample: Sample) -> Sample:
+        """Return a message that was understood: from now on others are only counted."""
+        self._understood = True
+        return sample
+
+    def malformed(self, why: str) -> None:
+        """Count a message that says nothing.
+
+        Raises:
+            InputError: none was understood before: the stream is of another kind than its user
+                thinks.
+        """
+        if not self._understood:
+            raise InputError(f"{self.name}: {why}")
+        self.tallies.counts["malformed"] += 1
+
+    def count_lost(self, sender: object, number: int, wraps: int = 0) -> None:
+        """Count what is missing before a message in its sender's own count.
+
+        Args:
+            sender: whose count it is.
+            number: of the message.
+            wraps: the count begins at 0 again after so many; 0: never.
+        """
+        last = self._numbers.get(sender, number - 1)
+        number = unwrapped(number, last, wraps) if wraps else number
+        missing = number - last - 1
+        if -_RESTARTED < missing < 0:  # late, or once more
+            if missing < -1 and self.tallies.counts["lost"] > 0:
+                self.tallies.counts["lost"] -= 1
+            return
+        if 0 < missing < _MOST_LOST:
+            self.tallies.counts["lost"] += missing
+        self._numbers[sender] = number
+
+
+def unwrapped(count: int, last: int, wraps: int) -> int:
+    """Return the number nearest to the last of all that a count stands for, which begins at 0 again
+    after ``wraps``.
+    """
+    return last + (count - last + wraps // 2) % wraps - wraps // 2
 
 
 @dataclass(frozen=True)
@@ -73,7 +133,6 @@ class Address:
     """``KIND:REST?option=value``, or ``KIND://HOST:PORT?option=value``."""
 
     text: str
-    kind: str
     scheme: str  # within: udp, tcp, radio; or nothing
     host: str
     port: int | None
@@ -97,13 +156,13 @@ class Address:
             raise InputError(f"{self.text}: {name}={text}: expected a number of at least {least:g}")
         return value
 
-    def choice(self, name: str, known: tuple[str, ...], default: str) -> str:
-        """Return an option that is one of several words.
+    def choice(self, name: str, known: tuple[str, ...]) -> str:
+        """Return an option that is one of several words, the first of which it is unless stated.
 
         Raises:
             InputError: it is none of them.
         """
-        value = self.options.get(name, default)
+        value = self.options.get(name, known[0])
         if value not in known:
             raise InputError(f"{self.text}: {name}={value}: expected one of {', '.join(known)}")
         return value
@@ -129,4 +188,4 @@ def read_address(text: str, kind: str, options: tuple[str, ...]) -> Address:
     repeated = [name for name, count in Counter(name for name, _ in given).items() if count > 1]
     if repeated:
         raise InputError(f"{text}: option {repeated[0]} stands there more than once")
-    return Address(text, kind, split.scheme, split.hostname or "", port, split.path, dict(given))
+    return Address(text, split.scheme, split.hostname or "", port, split.path, dict(given))

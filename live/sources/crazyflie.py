@@ -20,14 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
 from ...runtime.errors import InputError
-from ...runtime.extras import need
-from ..filtering import Output
 from ..messages import Sample
-from ..tallies import Tallies
-from .base import read_address
+from .base import Source, unwrapped
 
 _ORDER = [motor - 1 for motor in ORDERS["crazyflie"]]
 _FULL = 65_535.0  # PWM
@@ -44,24 +40,15 @@ _LONGEST = 1000  # rows that wait for us, 10 s
 _CONNECTS = 20.0  # s
 
 
-class CrazyflieLog:
-    """Rows of a Crazyflie's log.
+class CrazyflieLog(Source):
+    """Rows of a Crazyflie's log."""
 
-    Args:
-        text: the address.
-        vehicle: that flies.
-        tallies: where rows are counted that are lost or say nothing.
+    kind, options = "crazyflie", ("period", "imu")
 
-    Raises:
-        InputError: the address is none, or cflib is not installed.
-    """
+    library = "cflib"
 
-    paced = True
-
-    def __init__(self, text: str, vehicle: Vehicle, tallies: Tallies) -> None:
-        need("cflib", "crazyflie")
-        address = read_address(text, "crazyflie", ("period", "imu"))
-        self.name = text
+    def _prepare(self) -> None:
+        text, address = self.name, self.address
         self._uri = text.removeprefix("crazyflie:").partition("?")[0]
         if not address.scheme or not (address.host or address.path):
             raise InputError(
@@ -69,8 +56,7 @@ class CrazyflieLog:
                 "crazyflie:radio://0/80/2M/E7E7E7E7E7"
             )
         self._period = int(address.number("period", 10.0, least=10.0)) // 10 * 10
-        self._imu = address.choice("imu", ("0", "1"), "0") == "1"
-        self._vehicle, self._tallies = vehicle, tallies
+        self._imu = address.choice("imu", ("0", "1")) == "1"
         self._rows: queue.SimpleQueue[Sample] = queue.SimpleQueue()
         self._problem = ""
         self._over = threading.Event()
@@ -139,11 +125,10 @@ class CrazyflieLog:
     def _stamp(self, kind: str, milliseconds: int) -> int:
         """Return a block's time in ns: its stamp begins at 0 again after 4.7 h."""
         last = self._stamps.get(kind, milliseconds)
-        # the nearest of all times that such a stamp stands for
-        now = last + (milliseconds - last + _WRAP // 2) % _WRAP - _WRAP // 2
+        now = unwrapped(milliseconds, last, _WRAP)
         missed = round((now - last) / self._period) - 1
         if missed > 0:
-            self._tallies.counts["lost"] += missed
+            self.tallies.counts["lost"] += missed
         self._stamps[kind] = max(now, last)
         return 1_000_000 * now
 
@@ -157,7 +142,7 @@ class CrazyflieLog:
         volts = float(data["pm.vbat"])
         good = 0.9 < length < 1.1 and bool(np.isfinite(position).all())
         if not good:
-            self._tallies.counts["malformed"] += 1
+            self.tallies.counts["malformed"] += 1
             return
         sample = Sample(
             "row",
@@ -174,7 +159,7 @@ class CrazyflieLog:
         if measured:
             sample.rotor_speeds = motors * (math.pi / 30.0)
         else:
-            curve = self._vehicle.motor_curve
+            curve = self.vehicle.motor_curve
             low, high = (0.0, _FULL) if curve is None else curve.command
             if high <= 1.0:  # of a curve whose command is a share
                 low, high = 0.0, _FULL
@@ -185,7 +170,7 @@ class CrazyflieLog:
         arrival = time.monotonic_ns()
         values = np.array([data[name] for name, _ in _IMU], dtype=np.float64)
         if not np.isfinite(values).all():
-            self._tallies.counts["malformed"] += 1
+            self.tallies.counts["malformed"] += 1
             return
         self._put(
             Sample(
@@ -199,7 +184,7 @@ class CrazyflieLog:
 
     def _put(self, sample: Sample) -> None:
         if self._rows.qsize() > _LONGEST:
-            self._tallies.counts["lost"] += 1
+            self.tallies.counts["lost"] += 1
             return
         self._rows.put(sample)
 
@@ -215,9 +200,6 @@ class CrazyflieLog:
         if not samples and self._over.is_set():
             return None
         return samples
-
-    def send(self, output: Output) -> None:
-        """Say nothing: the vehicle is only listened to."""
 
     def close(self) -> None:
         """Close the link, without the set point that cflib sends there."""

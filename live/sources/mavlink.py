@@ -24,19 +24,18 @@ import importlib
 import time
 from typing import Any
 
-from ...dynamics.vehicle import Vehicle
-from ...runtime.extras import need
 from ..filtering import Output
 from ..messages import Sample
-from ..tallies import Tallies
-from .base import read_address
+from .base import Source
 from .esc_status import add_esc_status
+from .links import make_link
 from .mavlink_answer import WrenchSender
-from .mavlink_links import make_link
-from .mavlink_messages import POSES, MavlinkSettings, MessageReader
+from .mavlink_messages import POSES, MessageReader
 
 _AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 _OURS = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+_BAUD = 57_600  # of telemetry radios
+_SECOND = 1_000_000_000  # ns, between heartbeats
 _WANTED = (
     *POSES,
     "ATTITUDE_QUATERNION",
@@ -48,48 +47,29 @@ _WANTED = (
 )
 
 
-class Mavlink:
-    """Messages of an autopilot.
+class Mavlink(Source):
+    """Messages of an autopilot."""
 
-    Args:
-        text: the address.
-        vehicle: that flies.
-        tallies: where messages are counted that are lost or say nothing.
+    kind, options = "mavlink", ("baud", "rate", "pose")
 
-    Raises:
-        InputError: the address is none, or pymavlink is not installed.
-    """
+    library = "pymavlink"
 
-    paced = True
-
-    def __init__(
-        self,
-        text: str,
-        vehicle: Vehicle,
-        tallies: Tallies,
-        settings: MavlinkSettings | None = None,
-    ) -> None:
-        need("pymavlink", "mavlink")
-        self._settings = settings or MavlinkSettings()
-        self._address = read_address(text, "mavlink", ("baud", "rate", "pose"))
-        self.name = text
-        self._link = make_link(self._address, self._settings.baud)
-        self._rate = self._address.number("rate", 0.0)
-        self._tallies = tallies
+    def _prepare(self) -> None:
+        self.link = make_link(self.address, _BAUD)
+        self._rate = self.address.number("rate", 0.0)
         self._reader = MessageReader(
-            vehicle, tallies, self._settings, self._address.choice("pose", ("", *POSES), "")
+            self.vehicle, self.tallies, self.address.choice("pose", ("", *POSES))
         )
-        self._sender = WrenchSender(vehicle, self._settings.plotted)
+        self._sender = WrenchSender(self.vehicle)
         self._mav: Any = None
-        self._sequences: dict[tuple[int, int], int] = {}
         self._requested = False
         self._due_heartbeat = 0  # ns
 
     def open(self) -> None:
         """Open the link."""
         dialect: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
-        self._link.open()
-        self._mav = dialect.MAVLink(self._link, srcSystem=1, srcComponent=_OURS)
+        self.link.open()
+        self._mav = dialect.MAVLink(self.link, srcSystem=1, srcComponent=_OURS)
         self._mav.robust_parsing = True
         add_esc_status(dialect)
         self._dialect = dialect
@@ -97,45 +77,30 @@ class Mavlink:
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return what the messages that are there hold."""
         now = time.monotonic_ns()
-        if now >= self._due_heartbeat and self._link.connected:
-            self._due_heartbeat = now + round(self._settings.heartbeat * 1e9)
+        if now >= self._due_heartbeat and self.link.connected:
+            self._due_heartbeat = now + _SECOND
             d = self._dialect
             self._mav.heartbeat_send(
                 d.MAV_TYPE_ONBOARD_CONTROLLER, d.MAV_AUTOPILOT_INVALID, 0, 0, 0
             )
-        data = self._link.read(timeout)
+        data = self.link.read(timeout)
         arrival = time.monotonic_ns()
-        samples = []
-        for message in (self._mav.parse_buffer(data) if data else None) or []:
-            sample = self._take(message, arrival)
-            if sample is not None:
-                samples.append(sample)
-        return samples
+        messages = (self._mav.parse_buffer(data) if data else None) or []
+        samples = [self._take(message, arrival) for message in messages]
+        return [sample for sample in samples if sample is not None]
 
     def _take(self, message: Any, arrival: int) -> Sample | None:
         kind = message.get_type()
         if kind == "BAD_DATA":
-            self._tallies.counts["malformed"] += 1
+            self.tallies.counts["malformed"] += 1
             return None
-        self._count(message)
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        self.count_lost(sender, int(message.get_seq()), 256)
         if message.get_srcComponent() == _OURS:
             return None
         if kind == "HEARTBEAT":
             self._request(message)
         return self._reader.read(message, arrival)
-
-    def _count(self, message: Any) -> None:
-        """Count what is missing in the sender's own count, which is a byte."""
-        sender = (message.get_srcSystem(), message.get_srcComponent())
-        sequence = int(message.get_seq())
-        last = self._sequences.get(sender)
-        missing = 0 if last is None else (sequence - last - 1) % 256
-        if missing < 128:
-            self._sequences[sender] = sequence
-            if missing:
-                self._tallies.counts["lost"] += missing
-        elif missing != 255 and self._tallies.counts["lost"] > 0:
-            self._tallies.counts["lost"] -= 1  # it was only late
 
     def _request(self, heartbeat: Any) -> None:
         """Ask the autopilot for the messages, once, at the rate that the user wants."""
@@ -152,25 +117,17 @@ class Mavlink:
                 0,
                 number,
                 1e6 / self._rate,
-                0,
-                0,
-                0,
-                0,
-                0,
+                *[0] * 5,
             )
 
     def send(self, output: Output) -> None:
         """Send the wrench back, in north, east, down."""
-        if not self._link.connected or not output.row.has_pose:
-            return
-        try:
+        if self.link.connected and output.row.has_pose:
             self._sender.send(self._mav, output)
-        except OSError:
-            self._tallies.counts["not sent"] += 1
 
     def close(self) -> None:
         """Close the link."""
-        self._link.close()
+        self.link.close()
 
     def expected(self) -> str:
         """Return what must come."""

@@ -1,14 +1,26 @@
-"""The wrench on its way back to an autopilot, in north, east, down."""
+"""The wrench on its way back to an autopilot, in north, east, down; and the steady wind whose drag
+the force would be, of a vehicle that declares rotor drag.
+
+The declared drag is that of still air. In a horizontal wind w it grows by
+``sum_i W_i R diag(kdx, kdy, 0) R' w`` (``dynamics.effects.rotor_drag``), which the filter sees as
+external force. The wind is solved for in that linear equation: any other force counts as wind too.
+"""
 
 import math
 import time
 from typing import Any
 
+import numpy as np
+
+from ...dynamics.rotation import matrix_of
 from ...dynamics.vehicle import Vehicle
 from ...estimator.estimate import STATUSES
 from ..filtering import Output
+from ..messages import Array
 from .mavlink_messages import HALF_TURN, WRAP
-from .wind import Wind
+
+_PLOTTED = 100_000_000  # ns between values for plots
+_TILTED = 0.2  # of the drag of a level vehicle, below which the rest is no measure of wind
 
 
 class WrenchSender:
@@ -16,12 +28,10 @@ class WrenchSender:
 
     Args:
         vehicle: that flies; its declared drag makes a wind of the force.
-        plotted: s between values for plots.
     """
 
-    def __init__(self, vehicle: Vehicle, plotted: float) -> None:
+    def __init__(self, vehicle: Vehicle) -> None:
         self._wind = Wind(vehicle)
-        self._plotted = plotted
         self._due_plot = 0  # ns
 
     def send(self, mav: Any, output: Output) -> None:
@@ -40,7 +50,7 @@ class WrenchSender:
         now = time.monotonic_ns()
         if now < self._due_plot:
             return
-        self._due_plot = now + round(self._plotted * 1e9)
+        self._due_plot = now + _PLOTTED
         milliseconds = (microseconds // 1000) % WRAP
         for name, values in (("force", force), ("torque", torque)):
             for axis, value in zip("ned", values, strict=True):
@@ -58,3 +68,34 @@ class WrenchSender:
                 horizontal,
                 float(std[2]),
             )
+
+
+class Wind:
+    """From a wrench to a wind.
+
+    Args:
+        vehicle: that may declare ``rotor_drag``.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        given = next((e.coefficients for e in vehicle.effects if e.name == "rotor_drag"), {})
+        self._drag = np.array([given.get("kdx", 0.0), given.get("kdy", 0.0), 0.0])
+
+    def of(self, output: Output) -> tuple[Array, Array] | None:
+        """Return the wind (3,) in m/s, world, and its standard deviation (3,), of which the
+        vertical ones are zero: none is assumed; None where the vehicle declares no drag.
+        """
+        if not np.all(self._drag[:2] > 0.0):
+            return None
+        R = matrix_of(output.estimate.quaternion)
+        total = float(np.sum(output.row.rotor_speeds))
+        drag = (total * (R * self._drag) @ R.T)[:2, :2]
+        level = total * float(np.min(self._drag[:2]))
+        if not level > 0.0 or float(np.linalg.eigvalsh(drag)[0]) < _TILTED * level:
+            return None
+        inverse = np.linalg.inv(drag)
+        wind, std = np.zeros(3), np.zeros(3)
+        wind[:2] = inverse @ output.estimate.force[:2]
+        covariance = inverse @ output.estimate.covariance[15:17, 15:17] @ inverse.T
+        std[:2] = np.sqrt(np.diagonal(covariance))
+        return wind, std

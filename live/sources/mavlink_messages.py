@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from ...dynamics.vehicle import Vehicle
 from ...identification.logs.rotor_orders import ORDERS
 from ..messages import Array, Sample
 from ..tallies import Tallies
+from .base import unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
 _TURNED = np.array([1.0, 1.0, -1.0, -1.0])  # of a quaternion
@@ -24,18 +24,11 @@ WRAP = 2**32  # us, of SERVO_OUTPUT_RAW
 POSES = ("ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "ODOMETRY", "LOCAL_POSITION_NED")
 
 
-@dataclass(frozen=True)
-class MavlinkSettings:
-    """What is taken for a pose, and how often things are sent."""
-
-    # s that better poses are waited for once one comes: at 5 Hz and more each kind has come by then
-    choosing: float = 0.5
-    attitude_age: float = 0.1  # s over which an attitude is carried by its rates; it turns 1 rad
-    norm: float = 0.02  # by which a quaternion's length may differ from 1
-    heartbeat: float = 1.0  # s
-    plotted: float = 0.1  # s between values for plots
-    baud: int = 57_600  # of telemetry radios
-    pulses: tuple[float, float] = (1000.0, 2000.0)  # us, where the motor curve states no range
+# s that better poses are waited for once one comes: at 5 Hz and more each kind has come by then
+_CHOOSING = 0.5
+_ATTITUDE_AGE = 0.1  # s over which an attitude is carried by its rates; it turns 1 rad
+_NORM_TOLERANCE = 0.02  # of a quaternion's length
+_PULSES = 1000.0, 2000.0  # us, where the motor curve states no range
 
 
 class MessageReader:
@@ -44,20 +37,16 @@ class MessageReader:
     Args:
         vehicle: that flies.
         tallies: where messages are counted that say nothing.
-        settings: what is taken for a pose.
         forced: the message that is read for the pose; empty: the best that comes.
     """
 
-    def __init__(
-        self, vehicle: Vehicle, tallies: Tallies, settings: MavlinkSettings, forced: str
-    ) -> None:
-        self._vehicle, self._tallies = vehicle, tallies
-        self._settings, self._forced = settings, forced
+    def __init__(self, vehicle: Vehicle, tallies: Tallies, forced: str) -> None:
+        self._vehicle, self._tallies, self._forced = vehicle, tallies, forced
         self._pose = ""  # the kind that is read
         self._poses: dict[str, int] = {}  # kinds that have come, and when first, ns
         self._attitude: tuple[int, Array, Array] | None = None  # stamp, quaternion, rates
         self.seen: set[str] = set()  # kinds of messages
-        self._servo_wraps, self._servo_last = 0, 0
+        self._servo_time: int | None = None  # us, of the newest
         self._readers: dict[str, Callable[[Any, int], Sample | None]] = {
             "ODOMETRY": self._odometry,
             "ATT_POS_MOCAP": self._mocap,
@@ -93,7 +82,7 @@ class MessageReader:
         if self._pose:
             return kind == self._pose
         self._poses.setdefault(kind, arrival)
-        if arrival - min(self._poses.values()) < self._settings.choosing * 1e9:
+        if arrival - min(self._poses.values()) < _CHOOSING * 1e9:
             return False
         self._pose = min(self._poses, key=POSES.index)
         return kind == self._pose
@@ -119,7 +108,7 @@ class MessageReader:
             return None
         at, quaternion, rates = self._attitude
         age = 1e-9 * (stamp - at)
-        if abs(age) > self._settings.attitude_age:
+        if abs(age) > _ATTITUDE_AGE:
             return None
         turn = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(rates * age)
         place = (m.x, m.y, m.z)
@@ -128,7 +117,7 @@ class MessageReader:
 
     def _take_attitude(self, m: Any, arrival: int) -> Sample | None:
         quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
-        if abs(float(np.linalg.norm(quaternion)) - 1.0) <= self._settings.norm:
+        if abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE:
             rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
             self._attitude = 1_000_000 * m.time_boot_ms, quaternion, rates
         return None
@@ -141,7 +130,7 @@ class MessageReader:
             return None
         turn = np.array(quaternion, dtype=np.float64)
         length = float(np.linalg.norm(turn))
-        if not abs(length - 1.0) <= self._settings.norm:
+        if not abs(length - 1.0) <= _NORM_TOLERANCE:
             self._tallies.counts["malformed"] += 1
             return None
         position = np.array(place, dtype=np.float64) * HALF_TURN
@@ -177,19 +166,16 @@ class MessageReader:
         if m.port != 0:
             return None
         stamp = int(m.time_usec)
-        if stamp < self._servo_last - WRAP // 2:
-            self._servo_wraps += 1
-        self._servo_last = stamp
+        self._servo_time = unwrapped(stamp, self._servo_time or stamp, WRAP)
         raw = _motors((m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
-        stamp = 1000 * (stamp + self._servo_wraps * WRAP)
-        return self._commanded("SERVO_OUTPUT_RAW", stamp, arrival, raw)
+        return self._commanded("SERVO_OUTPUT_RAW", 1000 * self._servo_time, arrival, raw)
 
     def _commanded(self, kind: str, stamp: int, arrival: int, raw: Array) -> Sample | None:
         """Return motor commands, 0 to 1 within the range that the motor curve states."""
         curve = self._vehicle.motor_curve
         low, high = (0.0, 1.0) if curve is None else curve.command
         if high <= 1.5 < float(np.max(raw)):
-            low, high = self._settings.pulses
+            low, high = _PULSES
         command = np.clip((raw - low) / (high - low), 0.0, 1.0)
         return Sample(kind, stamp, arrival, command=command)
 

@@ -13,13 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ...dynamics.vehicle import Vehicle
 from ...identification.logs.readers.topic_map import topic_map
 from ...runtime.errors import InputError
 from ..filtering import Output
 from ..messages import Sample
-from ..tallies import Tallies
-from .base import read_address
+from .base import Source
 from .ros_conversions import (
     ACCELERATION,
     BUILT,
@@ -35,23 +33,14 @@ _FOUND = 10.0  # s that topics are waited for
 _AT_ONCE = 64  # messages taken before their estimates are out
 
 
-class Ros2:
-    """Messages of topics.
+class Ros2(Source):
+    """Messages of topics."""
 
-    Args:
-        text: the address.
-        vehicle: that flies.
-        tallies: where messages are counted that say nothing.
+    kind, options = "ros2", (*_PARTS, "frame")
 
-    Raises:
-        InputError: rclpy is not there, or no topics are named.
-    """
-
-    paced = True
-
-    def __init__(self, text: str, vehicle: Vehicle, tallies: Tallies) -> None:
-        address = read_address(text, "ros2", (*_PARTS, "frame"))
-        self.name, self._frame = text, address.options.get("frame", "world")
+    def _prepare(self) -> None:
+        text, address = self.name, self.address
+        self._frame = address.options.get("frame", "world")
         settings: dict[str, dict[str, Any]] = {}
         if address.path:
             settings, _ = topic_map(Path("."), address.path)
@@ -68,7 +57,7 @@ class Ros2:
                 f"{text}: rclpy is not there; expected a ROS 2 installation whose setup.bash was "
                 "sourced in this shell (it is not on PyPI)"
             )
-        self._settings, self._vehicle, self._tallies = settings, vehicle, tallies
+        self._settings = settings
         self._node: Any = None
         self._executor: Any = None
         self._rclpy: Any = None
@@ -125,7 +114,7 @@ class Ros2:
     def _take(self, converter: Converter, message: Any) -> None:
         sample = converter.sample(message, time.monotonic_ns())
         if sample is None:
-            self._tallies.counts["malformed"] += 1
+            self.tallies.counts["malformed"] += 1
         else:
             self._samples.append(sample)
 
@@ -148,7 +137,7 @@ class Ros2:
             return
         wrench, acceleration = self._publishers
         wrench.publish(wrench_message(self._types, output, self._frame))
-        acceleration.publish(acceleration_message(self._types, output, self._frame, self._vehicle))
+        acceleration.publish(acceleration_message(self._types, output, self._frame, self.vehicle))
 
     def close(self) -> None:
         """Take the node down."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...controllers import make_controller
-from ...dynamics.vehicle import Mocap, Vehicle
+from ...dynamics.vehicle import Mocap
 from ...envs.closed_loop import ClosedLoop
 from ...envs.fan import Fan
 from ...envs.fan_tracking import DECISION_TICKS, DISTANCE
@@ -21,35 +21,25 @@ from ...envs.scenarios import draw_fan_path, get_scenario
 from ...envs.task import SETTLE_TICKS
 from ...estimator import UKFTuning
 from ...runtime.errors import InputError
-from ..filtering import Output
 from ..messages import Array, Sample
-from .base import read_address
+from .base import Source
 
 _SECOND = 1_000_000_000  # ns
 _AT_ONCE = 0.05  # s of flight that are made up for at once, at most
 _BEHIND = 1.0  # s: a machine that is further behind flies on from now
 
 
-class Simulated:
-    """A vehicle that flies in this process.
+class Simulated(Source):
+    """A vehicle that flies in this process."""
 
-    Args:
-        text: the address.
-        vehicle: that flies.
-        controller: that holds it in the jet, one of the kit's.
+    kind, options = "sim", ("seed", "speed")
 
-    Raises:
-        InputError: no scenario has this name, or an option is none.
-    """
-
-    def __init__(self, text: str, vehicle: Vehicle, controller: str = "admittance") -> None:
-        address = read_address(text, "sim", ("seed", "speed"))
-        self.name = text
-        self._scenario = get_scenario(address.path or "base")
-        self._speed = address.number("speed", 1.0)
+    def _prepare(self) -> None:
+        self._scenario = get_scenario(self.address.path or "base")
+        self._speed = self.address.number("speed", 1.0)
         self.paced = self._speed == 1.0
-        self._seed = int(address.number("seed", 0.0))
-        self._vehicle, self._controller = vehicle, make_controller(controller)
+        self._seed = int(self.address.number("seed", 0.0))
+        self._controller = make_controller("admittance")
         self._rng = np.random.default_rng(self._seed)
         self._loop: ClosedLoop | None = None
         self._ticks = 0
@@ -61,7 +51,7 @@ class Simulated:
         """Take off."""
         scenario = self._scenario
         mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        declared = replace(self._vehicle, mocap=mocap)
+        declared = replace(self.vehicle, mocap=mocap)
         tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
         fan = replace(Fan(), turbulence=scenario.turbulence)
         self._loop = ClosedLoop(declared, None, tuning, fan, PlantSettings.for_vehicle(declared))
@@ -98,11 +88,11 @@ class Simulated:
         before, external = loop.unrounded.copy(), loop.external.copy()
         loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
         if not loop.healthy():
-            raise InputError(f"{self.name}: the simulated {self._vehicle.name} crashed")
+            raise InputError(f"{self.name}: the simulated {self.vehicle.name} crashed")
         # a rotor speed as it is at the instant of the pose: see ``envs.recording``
         speeds = 0.25 * before + 0.75 * loop.unrounded
-        if self._vehicle.omega_lsb > 0:
-            speeds = self._vehicle.omega_lsb * np.round(speeds / self._vehicle.omega_lsb)
+        if self.vehicle.omega_lsb > 0:
+            speeds = self.vehicle.omega_lsb * np.round(speeds / self.vehicle.omega_lsb)
         seen, battery = loop.seen, loop.battery
         sample = Sample(
             "row",
@@ -129,13 +119,6 @@ class Simulated:
         observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
         self._command = float(self._controller(observation, None)[0])
         loop.setpoint[4] = self._command
-
-    def send(self, output: Output) -> None:
-        """Say nothing: its controller has its own filter."""
-
-    def close(self) -> None:
-        """Land."""
-        self._loop = None
 
     def expected(self) -> str:
         """Return what must come."""

@@ -10,42 +10,30 @@ import sys
 import time
 from typing import Any
 
-from ...dynamics.vehicle import Vehicle
-from ...identification.logs.log_map import LogMap
 from ...identification.logs.text_layout import MISSING_WORDS, TextLayout, without_mark
 from ...runtime.errors import InputError
 from ..field_map import FieldMap, Malformed
-from ..filtering import Output
 from ..messages import Sample
-from ..tallies import Tallies
-from .base import Malformed as MalformedMessages
+from .base import Source
 
 _PIECE = 65_536  # bytes
 _LONGEST = 65_536  # bytes of one line
 
 
-class TextStream:
-    """Rows of a table that comes on a file descriptor.
+class TextStream(Source):
+    """Rows of a table that comes on standard input."""
 
-    Args:
-        vehicle: that flies.
-        log_map: what the columns mean; None: this kit's.
-        tallies: where lines are counted that are none.
-        descriptor: of the stream; None: standard input.
-    """
+    kind, paced = "csv", False
 
-    name, paced = "standard input", False
-
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        log_map: LogMap | None,
-        tallies: Tallies,
-        descriptor: int | None = None,
-    ) -> None:
-        self._map = FieldMap(log_map, vehicle, "standard input")
-        self._malformed = MalformedMessages(self.name, tallies)
-        self._descriptor = descriptor
+    def _prepare(self) -> None:
+        if self.address.path != "-":
+            raise InputError(
+                f"{self.name}: expected csv:- or -, a table on standard input; windwrench estimate "
+                "reads files"
+            )
+        self.name = "standard input"
+        self._map = FieldMap(self.log_map, self.vehicle, self.name)
+        self.descriptor: int | None = None  # None: that of standard input
         self._rest = b""
         self._ended = False
         self._layout = TextLayout()
@@ -57,23 +45,23 @@ class TextStream:
         Raises:
             InputError: a person sits there, or nothing does.
         """
-        if self._descriptor is not None:
+        if self.descriptor is not None:
             return
         if sys.stdin is None or sys.stdin.closed or sys.stdin.isatty():
             raise InputError(
                 "-: standard input is a terminal; expected a table, such as: windwrench live - "
                 "--vehicle V < flight.csv"
             )
-        self._descriptor = sys.stdin.fileno()
+        self.descriptor = sys.stdin.fileno()
 
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return the rows of the lines that are there."""
-        assert self._descriptor is not None
+        assert self.descriptor is not None
         if self._ended:
             return None
-        if not select.select([self._descriptor], [], [], timeout)[0]:
+        if not select.select([self.descriptor], [], [], timeout)[0]:
             return []
-        piece = os.read(self._descriptor, _PIECE)
+        piece = os.read(self.descriptor, _PIECE)
         arrival = time.monotonic_ns()
         *lines, self._rest = (self._rest + piece).split(b"\n")
         if not piece:
@@ -83,12 +71,8 @@ class TextStream:
             raise InputError(
                 f"{self.name}: a line of more than {_LONGEST} bytes; expected a table of text"
             )
-        samples = []
-        for line in lines:
-            sample = self._line(line, arrival)
-            if sample is not None:
-                samples.append(sample)
-        return samples
+        samples = [self._line(line, arrival) for line in lines]
+        return [sample for sample in samples if sample is not None]
 
     def _line(self, line: bytes, arrival: int) -> Sample | None:
         text = line.decode("utf-8-sig" if not self._header else "utf-8", "replace").strip()
@@ -101,7 +85,7 @@ class TextStream:
         if len(fields) == len(self._header) + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != len(self._header):
-            self._malformed.take(
+            self.malformed(
                 f"a row of {len(fields)} field(s); expected {len(self._header)}, as many as the "
                 "header"
             )
@@ -114,11 +98,10 @@ class TextStream:
             }
             sample = self._map.sample("row", values, arrival)
         except Malformed as error:
-            self._malformed.take(str(error))
+            self.malformed(str(error))
             return None
-        self._malformed.good = True
         sample.whole = True
-        return sample
+        return self.take_sound(sample)
 
     def _begin(self, text: str) -> None:
         """Take the header."""
@@ -127,12 +110,6 @@ class TextStream:
         self._layout = TextLayout(separator)
         self._header = self._layout.names(self._layout.fields(text))
         self._map.check(self._header)
-
-    def send(self, output: Output) -> None:
-        """Say nothing: a table cannot be told."""
-
-    def close(self) -> None:
-        """Leave standard input as it is."""
 
     def expected(self) -> str:
         """Return what must come."""

@@ -49,7 +49,7 @@ class Autopilot:
         )
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
-        while source._link._socket is None and self.thread.is_alive():
+        while source.link.opened is None and self.thread.is_alive():
             self.thread.join(0.005)
         self.link = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{self.port}", source_system=7, source_component=1, dialect="common"

@@ -16,8 +16,6 @@ from windwrench.identification.logs.reading import read_log
 from windwrench.live.field_map import FieldMap, Malformed
 from windwrench.live.session import Session, SessionSettings
 from windwrench.live.sources.open import make_source
-from windwrench.live.sources.text_stream import TextStream
-from windwrench.live.sources.udp_json import UdpJson
 from windwrench.live.tallies import Tallies
 
 
@@ -35,7 +33,8 @@ def run_text(text, log_map=None, pieces=1, **settings):
     thread = threading.Thread(target=feed, daemon=True)
     thread.start()
     tallies, outputs = Tallies(), []
-    source = TextStream(VEHICLE, log_map, tallies, read)
+    source = make_source("-", VEHICLE, log_map, tallies)
+    source.descriptor = read
     session = Session(
         source, VEHICLE, tallies, settings=SessionSettings(**settings), tell=outputs.append
     )
@@ -140,7 +139,9 @@ class Sender:
         probe.bind(("127.0.0.1", 0))
         self.port = probe.getsockname()[1]
         probe.close()
-        source = UdpJson(f"udp-json://127.0.0.1:{self.port}?reply=1", VEHICLE, None, self.tallies)
+        source = make_source(
+            f"udp-json://127.0.0.1:{self.port}?reply=1", VEHICLE, None, self.tallies
+        )
         self.session = Session(
             source,
             VEHICLE,
@@ -193,7 +194,7 @@ def test_datagrams_with_faults_over_the_loopback():
     for i, one in enumerate(objects):
         one["seq"] = i
     sender = Sender()
-    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
+    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
     sent = [one for i, one in enumerate(objects) if i % 50 != 20]  # 10 are lost
     for one in sent:
         before = _rows(sender)
@@ -228,7 +229,7 @@ def test_datagrams_with_faults_over_the_loopback():
 )
 def test_a_first_datagram_that_is_none_ends_the_stream(data, said):
     sender = Sender()
-    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
+    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
     sender.send(data)
     sender.thread.join()
     sender.end()
@@ -244,8 +245,8 @@ def test_a_source_that_says_nothing_ends_in_what_was_expected():
 
 def test_two_streams_cannot_listen_at_one_address():
     sender = Sender()
-    wait_until(lambda: sender.session.source._socket is not None, sender.thread)
-    again = UdpJson(f"udp-json://127.0.0.1:{sender.port}", VEHICLE, None, Tallies())
+    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
+    again = make_source(f"udp-json://127.0.0.1:{sender.port}", VEHICLE, None, Tallies())
     with pytest.raises(InputError, match="cannot listen"):
         again.open()
     sender.end()

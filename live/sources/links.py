@@ -1,0 +1,163 @@
+"""What messages of bytes come by: datagrams, or a serial port."""
+
+import importlib
+import os
+import select
+import socket
+from abc import ABC, abstractmethod
+from typing import Any
+
+from ...runtime.errors import InputError
+from ...runtime.extras import need
+from .base import Address
+
+_LARGEST = 65_536  # bytes that are read at once
+_BUFFER = 4 * 2**20  # bytes that wait for us, of which the system gives what it allows
+
+
+class Link(ABC):
+    """A link that is not open yet.
+
+    Args:
+        text: its address, for errors.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self.opened: Any = None  # a socket or a port, once it is open
+
+    @property
+    @abstractmethod
+    def connected(self) -> bool:
+        """Whether there is someone to send to."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """Open it.
+
+        Raises:
+            InputError: it cannot be opened.
+        """
+
+    @abstractmethod
+    def write(self, data: bytes) -> None:
+        """Send, and do not wait.
+
+        Raises:
+            OSError: it does not take more now.
+        """
+
+    @abstractmethod
+    def _receive(self) -> bytes | None: ...
+
+    def read(self, timeout: float) -> bytes | None:
+        """Return what there is, waiting up to ``timeout`` s for it; None: nothing."""
+        return self._receive() if select.select([self.opened], [], [], timeout)[0] else None
+
+    def close(self) -> None:
+        """Close it."""
+        if self.opened is not None:
+            self.opened.close()
+            self.opened = None
+
+
+class Datagrams(Link):
+    """A link by UDP: listens, and answers whoever spoke last; or calls an address."""
+
+    def __init__(self, address: Address, host: str) -> None:
+        super().__init__(address.text)
+        self._host, self._port = address.host or host, address.port
+        self._calls = address.scheme == "udpout"
+        self._peer: Any = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is someone to send to."""
+        return self._peer is not None
+
+    def open(self) -> None:
+        """Listen, or call."""
+        flags = 0 if self._calls else socket.AI_PASSIVE
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(
+                self._host, self._port, type=socket.SOCK_DGRAM, flags=flags
+            )[0]
+            self.opened = socket.socket(family, kind, protocol)
+            self.opened.setblocking(False)
+            if self._calls:
+                self._peer = address
+            else:
+                self.opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+                self.opened.bind(address)
+        except (OSError, OverflowError, UnicodeError) as error:
+            self.close()
+            reason = getattr(error, "strerror", None) or error
+            does = "call" if self._calls else "listen at"
+            where = f"{self._host}:{self._port}"
+            raise InputError(f"{self._text}: cannot {does} {where}: {reason}") from error
+
+    def _receive(self) -> bytes | None:
+        try:
+            data, peer = self.opened.recvfrom(_LARGEST)
+        except (BlockingIOError, ConnectionError):
+            return None
+        self._peer = self._peer if self._calls else peer
+        return bytes(data)
+
+    def write(self, data: bytes) -> None:
+        """Send to whoever there is."""
+        if self.connected:
+            self.opened.sendto(data, self._peer)
+
+
+class SerialPort(Link):
+    """A link by a serial port, opened with pyserial."""
+
+    def __init__(self, address: Address, baud: int) -> None:
+        super().__init__(address.text)
+        self._path = address.path
+        self._baud = int(address.number("baud", baud, least=1.0))
+
+    @property
+    def connected(self) -> bool:
+        """Whether the port is open."""
+        return self.opened is not None
+
+    def open(self) -> None:
+        """Open the port."""
+        need("serial", "mavlink")
+        serial: Any = importlib.import_module("serial")
+        try:
+            self.opened = serial.Serial(self._path, self._baud, timeout=0, write_timeout=0)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{self._text}: cannot be opened: {error}") from error
+
+    def _receive(self) -> bytes:
+        try:
+            return bytes(self.opened.read(_LARGEST))
+        except OSError as error:
+            raise InputError(f"{self._text}: the port went away: {error}") from error
+
+    def write(self, data: bytes) -> None:
+        """Send by the port."""
+        self.opened.write(data)
+
+
+def make_link(address: Address, baud: int) -> Link:
+    """Return the link of an address; ``baud`` of a serial port that states none.
+
+    Raises:
+        InputError: the address is none, or there is no such port.
+    """
+    if address.scheme in ("udp", "udpin", "udpout"):
+        if address.port is None:
+            raise InputError(f"{address.text}: no port; expected mavlink:udp://HOST:PORT")
+        return Datagrams(address, "127.0.0.1" if address.scheme == "udpout" else "0.0.0.0")
+    if address.scheme or not address.path:
+        raise InputError(
+            f"{address.text}: expected mavlink:udp://HOST:PORT, mavlink:udpout://HOST:PORT or a "
+            "serial port such as mavlink:/dev/ttyUSB0"
+        )
+    if not os.path.exists(address.path):
+        raise InputError(f"{address.text}: no such port {address.path}")
+    return SerialPort(address, baud)
