@@ -77,6 +77,65 @@ def body_numbers(body: Record) -> tuple[float, ...]:
 
 
 @compiled_inline
+def angular_acceleration_of(
+    b: tuple[float, ...],
+    R: tuple[float, ...],
+    omega: tuple[float, float, float],
+    rotors: tuple[float, float, float, float],
+    torque: tuple[float, float, float],
+    effects: tuple[float, ...],
+) -> tuple[float, float, float]:
+    """Return the angular acceleration, rad/s2, body: (12). The arguments are those of
+    ``accelerations_of``.
+    """
+    wx, wy, wz = omega
+    t0, t1, t2 = torque
+    hx = b[0] * wx + b[1] * wy + b[2] * wz
+    hy = b[3] * wx + b[4] * wy + b[5] * wz
+    hz = b[6] * wx + b[7] * wy + b[8] * wz
+    # the world torque enters as R' tau
+    tx = rotors[1] + effects[3] + R[0] * t0 + R[3] * t1 + R[6] * t2 - (wy * hz - wz * hy)
+    ty = rotors[2] + effects[4] + R[1] * t0 + R[4] * t1 + R[7] * t2 - (wz * hx - wx * hz)
+    tz = rotors[3] + effects[5] + R[2] * t0 + R[5] * t1 + R[8] * t2 - (wx * hy - wy * hx)
+    return (
+        b[9] * tx + b[10] * ty + b[11] * tz,
+        b[12] * tx + b[13] * ty + b[14] * tz,
+        b[15] * tx + b[16] * ty + b[17] * tz,
+    )
+
+
+@compiled_inline
+def acceleration_of(
+    b: tuple[float, ...],
+    R: tuple[float, ...],
+    omega: tuple[float, float, float],
+    turning: tuple[float, float, float],
+    rotors: tuple[float, float, float, float],
+    force: tuple[float, float, float],
+    effects: tuple[float, ...],
+) -> tuple[float, float, float]:
+    """Return the acceleration of the geometric centre, m/s2, world: (4), and its acceleration about
+    the centre of mass. ``turning`` is the angular acceleration; the others are those of
+    ``accelerations_of``.
+    """
+    wx, wy, wz = omega
+    ax, ay, az = turning
+    cx, cy, cz, inverse_mass = b[18], b[19], b[20], b[21]
+    nx, ny, nz = wy * cz - wz * cy, wz * cx - wx * cz, wx * cy - wy * cx
+    px = ay * cz - az * cy + wy * nz - wz * ny
+    py = az * cx - ax * cz + wz * nx - wx * nz
+    pz = ax * cy - ay * cx + wx * ny - wy * nx
+    fx = R[2] * rotors[0] + force[0] + effects[0]
+    fy = R[5] * rotors[0] + force[1] + effects[1]
+    fz = R[8] * rotors[0] + force[2] + effects[2]
+    return (
+        fx * inverse_mass + (R[0] * px + R[1] * py + R[2] * pz),
+        fy * inverse_mass + (R[3] * px + R[4] * py + R[5] * pz),
+        fz * inverse_mass + (R[6] * px + R[7] * py + R[8] * pz) - b[22],
+    )
+
+
+@compiled_inline
 def accelerations_of(
     b: tuple[float, ...],
     R: tuple[float, ...],
@@ -89,31 +148,9 @@ def accelerations_of(
     """Return the accelerations (6) of ``accelerations`` from numbers: ``body_numbers`` and the rest
     of its arguments.
     """
-    wx, wy, wz = omega
-    t0, t1, t2 = torque
-    hx = b[0] * wx + b[1] * wy + b[2] * wz
-    hy = b[3] * wx + b[4] * wy + b[5] * wz
-    hz = b[6] * wx + b[7] * wy + b[8] * wz
-    # (12): the world torque enters as R' tau
-    tx = rotors[1] + effects[3] + R[0] * t0 + R[3] * t1 + R[6] * t2 - (wy * hz - wz * hy)
-    ty = rotors[2] + effects[4] + R[1] * t0 + R[4] * t1 + R[7] * t2 - (wz * hx - wx * hz)
-    tz = rotors[3] + effects[5] + R[2] * t0 + R[5] * t1 + R[8] * t2 - (wx * hy - wy * hx)
-    ax = b[9] * tx + b[10] * ty + b[11] * tz
-    ay = b[12] * tx + b[13] * ty + b[14] * tz
-    az = b[15] * tx + b[16] * ty + b[17] * tz
-    # (4), and the acceleration of the geometric centre about the centre of mass
-    cx, cy, cz, inverse_mass = b[18], b[19], b[20], b[21]
-    nx, ny, nz = wy * cz - wz * cy, wz * cx - wx * cz, wx * cy - wy * cx
-    px = ay * cz - az * cy + wy * nz - wz * ny
-    py = az * cx - ax * cz + wz * nx - wx * nz
-    pz = ax * cy - ay * cx + wx * ny - wy * nx
-    fx = R[2] * rotors[0] + force[0] + effects[0]
-    fy = R[5] * rotors[0] + force[1] + effects[1]
-    fz = R[8] * rotors[0] + force[2] + effects[2]
-    x = fx * inverse_mass + (R[0] * px + R[1] * py + R[2] * pz)
-    y = fy * inverse_mass + (R[3] * px + R[4] * py + R[5] * pz)
-    z = fz * inverse_mass + (R[6] * px + R[7] * py + R[8] * pz) - b[22]
-    return x, y, z, ax, ay, az
+    turning = angular_acceleration_of(b, R, omega, rotors, torque, effects)
+    x, y, z = acceleration_of(b, R, omega, turning, rotors, force, effects)
+    return x, y, z, turning[0], turning[1], turning[2]
 
 
 @compiled

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...dynamics.model import MODEL_FIELDS, apply_effects, drive, load_model
+from ...dynamics.motion import acceleration_of, angular_acceleration_of, body_numbers
 from ...dynamics.vehicle import Vehicle
 from ...runtime.compiled import Record, compiled
 from .signals import Signals
@@ -17,7 +18,7 @@ _MODEL = np.dtype(MODEL_FIELDS)
 
 
 @compiled
-def _run_model(
+def _accelerations(
     models: Record,
     period: float,
     speeds: Array,
@@ -26,71 +27,27 @@ def _run_model(
     rotation: Array,
     velocity: Array,
     rate: Array,
-    rotors: Array,
-    effects: Array,
+    turning: Array,
+    out: Array,
 ) -> None:
-    """Write thrust and torques (n, 4) and the effects' wrench (n, 6) of a whole flight."""
+    """Write the acceleration without gravity (m/s2, world) and the angular acceleration (rad/s2,
+    body) that a model gives at each sample (n, 6). Where the centre of mass is off the pose's
+    point, the measured angular acceleration ``turning`` moves that point.
+    """
     f = models[0]
+    b, nothing = body_numbers(f.body), (0.0, 0.0, 0.0)
     for k in range(len(speeds)):
         drive(f, speeds[k], period, voltage[k])
         apply_effects(f, position[k], rotation[k], velocity[k], rate[k])
         f.time += period
-        for i in range(4):
-            rotors[k, i] = f.rotor_wrench[i]
-        for i in range(6):
-            effects[k, i] = f.effect_wrench[i]
-
-
-def model_wrench(signals: Signals, vehicle: Vehicle) -> tuple[Array, Array, Vehicle]:
-    """Return what a model says of a flight: thrust (N) and torques (Nm) of the rotors (n, 4), and
-    the effects' wrench (n, 6).
-
-    Thrust is along body z; torques are about the centre of mass in the body frame, the effects'
-    force (N) is in the world frame. The vehicle that is returned with them has its body effects
-    applied.
-    """
-    models = np.zeros(1, dtype=_MODEL)
-    body = load_model(models[0], vehicle)
-    count = len(signals.t)
-    rotors, effects = np.empty((count, 4)), np.empty((count, 6))
-    _run_model(models, signals.period, *signals.columns(), rotors, effects)
-    return rotors, effects, body
-
-
-@compiled
-def _balance(
-    rotors: Array,
-    effects: Array,
-    rotation: Array,
-    rate: Array,
-    turning: Array,
-    com: Array,
-    inertia: Array,
-    mass: float,
-    share: float,
-    turn: Array,
-    out: Array,
-) -> None:
-    """Write what rotors and effects give, and a centre of mass off the pose's point needs, as by
-    another mass and inertia.
-    """
-    needed, moment, spin = np.empty(3), np.empty(3), np.empty(3)
-    for k in range(len(rotors)):
-        w, a = rate[k], turning[k]
-        along = w[0] * com[0] + w[1] * com[1] + w[2] * com[2]
-        square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-        for i in range(3):
-            spin[i] = inertia[i, 0] * w[0] + inertia[i, 1] * w[1] + inertia[i, 2] * w[2]
-        for i in range(3):
-            x, y = (i + 1) % 3, (i + 2) % 3  # of a cross product
-            needed[i] = a[x] * com[y] - a[y] * com[x] + along * w[i] - square * com[i]
-            moment[i] = rotors[k, 1 + i] + effects[k, 3 + i] - (w[x] * spin[y] - w[y] * spin[x])
-        for i in range(3):
-            r = rotation[k, i]
-            out[k, i] = share * (r[2] * rotors[k, 0] + effects[k, i]) - mass * (
-                r[0] * needed[0] + r[1] * needed[1] + r[2] * needed[2]
-            )
-            out[k, 3 + i] = turn[i, 0] * moment[0] + turn[i, 1] * moment[1] + turn[i, 2] * moment[2]
+        R, w, a, r, e = rotation[k], rate[k], turning[k], f.rotor_wrench, f.effect_wrench
+        turn = (R[0, 0], R[0, 1], R[0, 2], R[1, 0], R[1, 1], R[1, 2], R[2, 0], R[2, 1], R[2, 2])
+        omega, measured = (w[0], w[1], w[2]), (a[0], a[1], a[2])
+        rotors, effects = (r[0], r[1], r[2], r[3]), (e[0], e[1], e[2], e[3], e[4], e[5])
+        x, y, z = acceleration_of(b, turn, omega, measured, rotors, nothing, effects)
+        out[k, 0], out[k, 1], out[k, 2] = x, y, z + b[22]
+        x, y, z = angular_acceleration_of(b, turn, omega, rotors, nothing, effects)
+        out[k, 3], out[k, 4], out[k, 5] = x, y, z
 
 
 def acting_wrench(
@@ -102,22 +59,14 @@ def acting_wrench(
     Both are as if the vehicle had the mass and inertia of ``body``: the accelerations that the
     model says are right. By default it is the vehicle's own, with its body effects applied.
     """
-    rotors, effects, model_body = model_wrench(signals, vehicle)
-    body = body or model_body
-    out = np.empty_like(effects)
-    _balance(
-        rotors,
-        effects,
-        np.ascontiguousarray(signals.rotation),
-        np.ascontiguousarray(signals.angular_velocity),
-        np.ascontiguousarray(signals.angular_acceleration),
-        model_body.com,
-        model_body.inertia,
-        body.mass,
-        body.mass / model_body.mass,
-        body.inertia @ np.linalg.inv(model_body.inertia),
-        out,
-    )
+    models = np.zeros(1, dtype=_MODEL)
+    own = load_model(models[0], vehicle)
+    body = body or own
+    out = np.empty((len(signals.t), 6))
+    turning = np.ascontiguousarray(signals.angular_acceleration)
+    _accelerations(models, signals.period, *signals.columns(), turning, out)
+    out[:, :3] *= body.mass
+    out[:, 3:] = out[:, 3:] @ body.inertia.T
     return out, body
 
 

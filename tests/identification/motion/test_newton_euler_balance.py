@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from windwrench.dynamics import EffectSetting, load_vehicle
+from windwrench.dynamics.effects import compile_effects
 from windwrench.identification.motion.residual import (
     acting_wrench,
-    model_wrench,
     needed_wrench,
     residual_wrench,
 )
@@ -28,7 +28,8 @@ def flown():
 
 
 def test_the_residual_is_newton_and_euler(flown):
-    rotors, effects, body = model_wrench(flown, VEHICLE)
+    body = compile_effects(VEHICLE).vehicle
+    rotors = body.rotor_wrench(flown.rotor_speeds)
     R, omega, alpha = flown.rotation, flown.angular_velocity, flown.angular_acceleration
     centre = np.cross(alpha, body.com) + np.cross(omega, np.cross(omega, body.com))
     acceleration = (
@@ -36,13 +37,11 @@ def test_the_residual_is_newton_and_euler(flown):
         + np.array([0.0, 0.0, VEHICLE.gravity])
         + np.einsum("nij,nj->ni", R, centre)
     )
-    force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1] - effects[:, :3]
-    torque = (
-        alpha @ body.inertia.T
-        + np.cross(omega, omega @ body.inertia.T)
-        - rotors[:, 1:]
-        - effects[:, 3:]
-    )
+    force = body.mass * acceleration - R[:, :, 2] * rotors[:, :1]
+    momentum = omega @ body.inertia.T
+    thrust = rotors[:, :1] * [0.0, 0.0, 1.0]
+    torque = alpha @ body.inertia.T + np.cross(omega, momentum)
+    torque -= rotors[:, 1:] - np.cross(body.com, thrust)
     np.testing.assert_allclose(
         residual_wrench(flown, VEHICLE), np.column_stack([force, torque]), atol=1e-10
     )
@@ -51,7 +50,7 @@ def test_the_residual_is_newton_and_euler(flown):
 def test_by_the_declared_body_it_is_the_same_accelerations(flown):
     acting, by = acting_wrench(flown, VEHICLE, DECLARED)
     assert by is DECLARED
-    body = model_wrench(flown, VEHICLE)[2]
+    body = compile_effects(VEHICLE).vehicle
     r = residual_wrench(flown, VEHICLE)
     r = np.column_stack(
         [
