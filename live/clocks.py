@@ -9,7 +9,6 @@ on where the stream was, once enough messages agree that it did.
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 from .messages import Sample
 from .tallies import Tallies
@@ -17,32 +16,25 @@ from .tallies import Tallies
 _SECOND = 1_000_000_000  # ns
 
 
-@dataclass(frozen=True)
-class ClockSettings:
-    """What is taken for one clock, and for a jump of it."""
-
-    # s: clocks of two kinds of messages that read so much alike are one; far above transport's
-    # delays, far below what two devices that were switched on one after the other differ by
-    same: float = 1.0
-    # s: a stamp that is so much ahead of all before is no faster transport; and how far a stamp may
-    # lie in the past is the horizon
-    ahead: float = 1.0
-    # messages in a row, and s over which they come, that must agree that a clock has jumped; a
-    # burst of delayed messages is shorter
-    agreeing: int = 20
-    lasting: float = 0.2
-    window: int = 30  # s, over which the least delay is looked for
-    # s: stamps above it are counted from 1970, and the stream's time begins at zero
-    epoch: float = 1e8
-    remembered: int = 64  # stamps of a kind, among which one that comes again is a double
+# s: clocks of two kinds of messages that read so much alike are one; far above transport's delays,
+# far below what two devices that were switched on one after the other differ by
+_SAME = 1.0
+# s: a stamp that is so much ahead of all before is no faster transport; and how far a stamp may lie
+# in the past is the horizon
+_AHEAD = 1.0
+# messages in a row, and s over which they come, that must agree that a clock has jumped; a burst of
+# delayed messages is shorter
+_AGREEING, _LASTING = 20, 0.2
+_WINDOW = 30  # s, over which the least delay is looked for
+_EPOCH = 1e8  # s: stamps above it are counted from 1970, and the stream's time begins at zero
+_REMEMBERED = 64  # stamps of a kind, among which one that comes again is a double
 
 
 class _Offset:
     """How much earlier a clock reads than ours, at the least delay of the last seconds."""
 
-    def __init__(self, window: int) -> None:
-        self._window = window
-        self._seconds: deque[list[int]] = deque(maxlen=window)  # [second, least]
+    def __init__(self) -> None:
+        self._seconds: deque[list[int]] = deque(maxlen=_WINDOW)  # [second, least]
         self.first: tuple[int, int] | None = None  # arrival and offset, ns, at the beginning
         self.value = 0
 
@@ -57,7 +49,7 @@ class _Offset:
             if self.first is None and len(seconds) == 5:
                 self.first = arrival, min(least for _, least in seconds)
             seconds.append([second, offset])
-            while seconds[0][0] <= second - self._window:
+            while seconds[0][0] <= second - _WINDOW:
                 seconds.popleft()
         self.value = min(least for _, least in seconds)
 
@@ -76,19 +68,19 @@ class _Offset:
 class _Clock:
     """One sender's clock."""
 
-    def __init__(self, shift: int, stamp: int, arrival: int, window: int) -> None:
+    def __init__(self, shift: int, stamp: int, arrival: int) -> None:
         self.shift = shift  # ns, from stamps to the stream's time
         self.newest, self.newest_arrival = stamp, arrival
-        self.offset = _Offset(window)
+        self.offset = _Offset()
         self.odd: list[tuple[int, int]] = []  # stamps and arrivals that would be a jump
 
 
 class _Kind:
     """Messages of one kind."""
 
-    def __init__(self, clock: _Clock, remembered: int) -> None:
+    def __init__(self, clock: _Clock) -> None:
         self.clock = clock
-        self.recent: deque[int] = deque(maxlen=remembered)
+        self.recent: deque[int] = deque(maxlen=_REMEMBERED)
 
 
 class Clocks:
@@ -101,15 +93,8 @@ class Clocks:
             nothing by when it is read.
     """
 
-    def __init__(
-        self,
-        tallies: Tallies,
-        horizon: float,
-        paced: bool = True,
-        settings: ClockSettings | None = None,
-    ) -> None:
+    def __init__(self, tallies: Tallies, horizon: float, paced: bool = True) -> None:
         self._tallies, self._paced = tallies, paced
-        self._settings = settings or ClockSettings()
         self._horizon = round(horizon * _SECOND)
         self._clocks: list[_Clock] = []  # the first is the reference
         self._kinds: dict[str, _Kind] = {}
@@ -131,7 +116,7 @@ class Clocks:
         kind = self._kinds.get(sample.kind)
         if kind is None:
             clock = self._clock_of(sample.stamp, sample.arrival)
-            kind = self._kinds[sample.kind] = _Kind(clock, self._settings.remembered)
+            kind = self._kinds[sample.kind] = _Kind(clock)
         if sample.stamp in kind.recent:
             self._tallies.counts["doubled"] += 1
             return None
@@ -161,32 +146,30 @@ class Clocks:
 
     def _clock_of(self, stamp: int, arrival: int) -> _Clock:
         """Return the clock that a new kind of message is stamped by."""
-        s = self._settings
         if self._clocks and not self._paced:
             return self._clocks[0]
         for clock in self._clocks:
-            if abs(arrival - stamp - clock.offset.value) < s.same * _SECOND:
+            if abs(arrival - stamp - clock.offset.value) < _SAME * _SECOND:
                 return clock
-        shift = -stamp if not self._clocks and stamp > s.epoch * _SECOND else 0
-        clock = _Clock(shift, stamp, arrival, s.window)
+        shift = -stamp if not self._clocks and stamp > _EPOCH * _SECOND else 0
+        clock = _Clock(shift, stamp, arrival)
         clock.offset.add(arrival, arrival - stamp)
         self._clocks.append(clock)
         return clock
 
     def _goes_on(self, clock: _Clock, stamp: int, arrival: int) -> bool:
         """Return whether a stamp is taken: none is that would be a jump, until enough agree."""
-        s = self._settings
         late = stamp < clock.newest - self._horizon
-        ahead = self._paced and arrival - stamp < clock.offset.value - s.ahead * _SECOND
+        ahead = self._paced and arrival - stamp < clock.offset.value - _AHEAD * _SECOND
         if not late and not ahead:
             clock.odd.clear()
             return True
-        if clock.odd and not 0 < stamp - clock.odd[-1][0] < s.ahead * _SECOND:
+        if clock.odd and not 0 < stamp - clock.odd[-1][0] < _AHEAD * _SECOND:
             clock.odd.clear()
         clock.odd.append((stamp, arrival))
-        agree = len(clock.odd) >= s.agreeing
+        agree = len(clock.odd) >= _AGREEING
         if agree and self._paced:
-            agree = arrival - clock.odd[0][1] > s.lasting * _SECOND
+            agree = arrival - clock.odd[0][1] > _LASTING * _SECOND
         if not agree:
             self._tallies.counts["implausible times" if ahead else "too late"] += 1
             return False
@@ -196,6 +179,6 @@ class Clocks:
         passed = max(arrival - clock.newest_arrival, 1_000_000) if self._paced else 1_000_000
         clock.shift += clock.newest + passed - stamp
         clock.newest, clock.newest_arrival = stamp, arrival
-        clock.offset = _Offset(s.window)
+        clock.offset = _Offset()
         clock.odd.clear()
         return True

@@ -33,7 +33,6 @@ _SECOND = 1_000_000_000  # ns
 _NORM_TOLERANCE = 0.02  # of a quaternion's length, as in a log
 _OUTSIDE = 0.01  # of a command's range, beyond which it is none of that range
 _LARGEST = Magnitudes().largest
-_IDENTITY = np.eye(3)
 
 
 class Malformed(ValueError):  # noqa: N818 - of one message, not of the request
@@ -145,7 +144,7 @@ class FieldMap:
         if (found.position is None) != (found.quaternion is None):
             missing = "attitude" if found.quaternion is None else "position"
             raise Malformed(f"a pose without {missing}")
-        motors = found.rotor_speeds is not None or found.command is not None
+        motors = found.has_motors
         named = given.position is not None and any(x in fields for x in given.position.columns)
         found.whole = motors and (found.has_pose or named)  # named: the pose was lost
         return found

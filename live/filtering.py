@@ -8,15 +8,19 @@ filter's period, and its tuning follows from it.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..dynamics.vehicle import Vehicle
-from ..estimator import TimedFilter, UKFTuning, WrenchEstimate, WrenchUKF
+from ..estimator import TimedFilter, WrenchEstimate, WrenchUKF
 from ..estimator.row_steps import steps_between
 from ..identification.wrench_series import GATE
 from .messages import Array, Row
 from .tallies import Tallies
+
+_FIRST_ROWS = 21  # whose median step is the period
+_FIRST_SECONDS = 1.0  # after which fewer do, of a source that is slow
 
 
 @dataclass(frozen=True)
@@ -25,8 +29,6 @@ class LiveSettings:
 
     gate: float | None = GATE  # as of a log
     horizon: float = 0.3  # s that a row may lie in the past; later is too late
-    first_rows: int = 21  # whose median step is the period
-    first_seconds: float = 1.0  # after which fewer do, of a source that is slow
     rate_hz: float | None = None  # of rows, where it is known; then none are held back
 
 
@@ -38,7 +40,6 @@ class Output:
     t: float  # s, stream's time, of the estimate
     estimate: WrenchEstimate
     std: Array  # (6,) of force, N, and torque, Nm: the filter's own
-    late: bool = False  # the row lay in the past
 
 
 class LiveFilter:
@@ -63,11 +64,6 @@ class LiveFilter:
             self._start(1.0 / self.settings.rate_hz)
 
     @property
-    def tuning(self) -> UKFTuning | None:
-        """Of the filter; None before it has begun."""
-        return None if self._timed is None else self._timed.ukf.tuning
-
-    @property
     def restarts(self) -> int:
         """How often the filter restarted."""
         return 0 if self._timed is None else self._timed.estimate.restarts
@@ -76,8 +72,8 @@ class LiveFilter:
         """Return what a row leads to: nothing while rows are held back, then an estimate each."""
         if self._timed is None:
             self._held.append(row)
-            long = row.t - self._held[0].t > self.settings.first_seconds and len(self._held) > 2
-            if len(self._held) < self.settings.first_rows and not long:
+            long = row.t - self._held[0].t > _FIRST_SECONDS and len(self._held) > 2
+            if len(self._held) < _FIRST_ROWS and not long:
                 return []
             return self.begin()
         output = self._process(row)
@@ -121,7 +117,7 @@ class LiveFilter:
             return None
         if late:
             self._tallies.counts["late"] += 1
-        return self._output(row, estimate, late)
+        return self._output(row, estimate)
 
     def _carry(self, timed: TimedFilter, row: Row, now: float) -> WrenchEstimate:
         """Carry the filter to a row, and correct it there."""
@@ -144,37 +140,31 @@ class LiveFilter:
     def _correct(timed: TimedFilter, row: Row) -> WrenchEstimate | None:
         """Take in what a row measured, at its time; None where that is nothing, or too late."""
         estimate = None
-        if row.gyro is not None or row.accelerometer is not None:
+        if row.has_imu:
             estimate = timed.correct_imu(row.t, row.gyro, row.accelerometer)
         if row.has_pose:
             estimate = timed.correct(row.t, row.position, row.quaternion)
         return estimate
 
-    def _output(self, row: Row, estimate: WrenchEstimate, late: bool = False) -> Output:
+    def _output(self, row: Row, estimate: WrenchEstimate) -> Output:
         assert self._timed is not None
         std = np.concatenate([estimate.std_force, estimate.std_torque])
         if row.has_pose and estimate.status == "rejected":
             self._tallies.counts["refused"] += 1
-        return Output(row, self._timed.time, estimate, std, late)
+        return Output(row, self._timed.time, estimate, std)
 
 
 def warm_up(vehicle: Vehicle) -> None:
     """Have everything compiled that a stream of this vehicle calls."""
     live = LiveFilter(vehicle, Tallies())
-    speeds = np.full(4, vehicle.hover_rate)
-    still, upright = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])
+    hover: dict[str, Any] = {
+        "rotor_speeds": np.full(4, vehicle.hover_rate),
+        "position": np.array([0.0, 0.0, 1.0]),
+        "quaternion": np.array([1.0, 0.0, 0.0, 0.0]),
+    }
+    imu = {"gyro": np.zeros(3), "accelerometer": np.array([0.0, 0.0, vehicle.gravity])}
     for i in range(40):
-        live.take(Row(0.005 * i, 0, speeds, still, upright, voltage=vehicle.voltage_ref or None))
-    live.take(Row(0.0501, 0, speeds, still, upright))  # late
+        live.take(Row(0.005 * i, 0, **hover, voltage=vehicle.voltage_ref or None))
+    live.take(Row(0.0501, 0, **hover))  # late
     for i in range(40, 45):
-        live.take(
-            Row(
-                0.005 * i,
-                0,
-                speeds,
-                still,
-                upright,
-                gyro=np.zeros(3),
-                accelerometer=np.array([0.0, 0.0, vehicle.gravity]),
-            )
-        )
+        live.take(Row(0.005 * i, 0, **hover, **imu))

@@ -5,7 +5,7 @@ which it was measured on the sender's clock and that at which it arrived here. A
 filter and the recording take: a row of a flight log, on the stream's own time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-@dataclass(slots=True)
-class Sample:
-    """One message; what it does not hold is None."""
+@dataclass(slots=True, kw_only=True)
+class Measured:
+    """Quantities of one time; None: not measured."""
 
-    kind: str  # of message: those of one kind come from one clock
-    stamp: int | None  # ns, sender's clock, when it was measured; None: the message does not say
-    arrival: int  # ns, this machine's monotonic clock
-    whole: bool = False  # it is a row by itself: pose and rotor speeds of one time
     position: Array | None = None  # (3,) m, world
     quaternion: Array | None = None  # (4,) body to world, scalar first, of length 1
     rotor_speeds: Array | None = None  # (4,) rad/s
@@ -33,29 +29,36 @@ class Sample:
 
     @property
     def has_pose(self) -> bool:
-        """Whether it holds a whole pose."""
+        """Whether a whole pose was measured."""
         return self.position is not None and self.quaternion is not None
+
+    @property
+    def has_imu(self) -> bool:
+        """Whether an inertial sensor measured something."""
+        return self.gyro is not None or self.accelerometer is not None
+
+    @property
+    def has_motors(self) -> bool:
+        """Whether rotor speeds were measured, or commands given."""
+        return self.rotor_speeds is not None or self.command is not None
 
 
 @dataclass(slots=True)
-class Row:
-    """A row of the flight: all that is known of one time; fields as in ``Sample``."""
+class Sample(Measured):
+    """One message."""
+
+    kind: str  # of message: those of one kind come from one clock
+    stamp: int | None  # ns, sender's clock, when it was measured; None: the message does not say
+    arrival: int  # ns, this machine's monotonic clock
+    whole: bool = False  # it is a row by itself: pose and rotor speeds of one time
+
+
+@dataclass(slots=True)
+class Row(Measured):
+    """A row of the flight: all that is known of one time."""
 
     t: float  # s, stream's time
     arrival: int  # ns, of the message that completed it
-    rotor_speeds: Array
-    position: Array | None = None
-    quaternion: Array | None = None
-    command: Array | None = None
+    rotor_speeds: Array = field(kw_only=True)  # always known
     commanded: bool = False  # the rotor speeds are those that the commands give
-    voltage: float | None = None
-    gyro: Array | None = None
-    accelerometer: Array | None = None
-    force: Array | None = None
-    torque: Array | None = None
     stamp: int | None = None  # ns, sender's clock, of the message that completed it
-
-    @property
-    def has_pose(self) -> bool:
-        """Whether the pose was measured."""
-        return self.position is not None

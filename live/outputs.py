@@ -14,23 +14,20 @@ COLUMNS = (
 )
 
 
+def _values(output: Output) -> list[float]:
+    """Return an estimate by ``COLUMNS``, but the status."""
+    estimate = output.estimate
+    wrench = [*estimate.force.tolist(), *estimate.torque.tolist(), *output.std.tolist()]
+    return [round(output.t, 9), *wrench, estimate.nis]
+
+
 def as_fields(output: Output) -> dict[str, Any]:
     """Return an estimate by the names of ``COLUMNS``, JSON's numbers; the status in a word."""
-    values = [round(output.t, 9), *output.estimate.force.tolist(), *output.estimate.torque.tolist()]
-    nis = output.estimate.nis
-    values += [*output.std.tolist(), nis if nis == nis else None, output.estimate.status]
-    return dict(zip(COLUMNS, values, strict=True))
+    values = [x if x == x else None for x in _values(output)]
+    return dict(zip(COLUMNS, [*values, output.estimate.status], strict=True))
 
 
 def as_line(output: Output) -> str:
     """Return an estimate as a line of ``wrench.csv``."""
-    estimate = output.estimate
-    numbers = [
-        round(output.t, 9),
-        *estimate.force.tolist(),
-        *estimate.torque.tolist(),
-        *output.std.tolist(),
-        estimate.nis,
-        float(STATUSES.index(estimate.status)),
-    ]
-    return ",".join(map(repr, numbers)) + "\n"
+    status = float(STATUSES.index(output.estimate.status))
+    return ",".join(map(repr, [*_values(output), status])) + "\n"

@@ -9,8 +9,9 @@ the header, and the reader of logs leaves it out.
 import math
 import os
 from bisect import bisect_left
-from dataclasses import dataclass
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,17 +27,25 @@ from ..identification.logs.flight_log import (
     VEHICLE,
 )
 from ..runtime.errors import InputError
-from .messages import Array, Row
+from .messages import Row
 from .tallies import Tallies
 
-
-@dataclass(frozen=True)
-class RecorderSettings:
-    """When rows are written."""
-
-    settles: float = 1.0  # s of rows that are looked at to see which channels there are
-    written_every: float = 0.25  # s, stream's time
-    idle: float = 0.4  # s without a message after which everything is written
+_SETTLES = 1.0  # s of rows that are looked at to see which channels there are
+_WRITTEN_EVERY = 0.25  # s, stream's time
+_IDLE = 0.4  # s without a message after which everything is written
+# columns of each quantity of a row, in their order
+_CHANNELS = {
+    "position": POSE[:3],
+    "quaternion": POSE[3:],
+    "rotor_speeds": ROTORS,
+    "command": COMMANDS,
+    "voltage": ("vbat",),
+    "force": TRUTH[:3],
+    "torque": TRUTH[3:],
+    "accelerometer": ACCELEROMETER,
+    "gyro": GYRO,
+}
+_KEPT = ("voltage", "force", "torque")  # rows without one have the last before
 
 
 class Recorder:
@@ -62,7 +71,6 @@ class Recorder:
         tallies: Tallies,
         horizon: float,
         preset: bool = False,
-        settings: RecorderSettings | None = None,
     ) -> None:
         if path.suffix.lower() != ".csv":
             raise InputError(
@@ -73,17 +81,15 @@ class Recorder:
             raise InputError(f"--record {path}: exists already; expected the name of a new log")
         self.path, self.rows = path, 0
         self._tallies, self._horizon = tallies, horizon
-        self._settings = settings or RecorderSettings()
         named = preset or vehicle.name not in preset_names()
         name = f"vehicle={vehicle.name}"
         self._last = name if named and VEHICLE.fullmatch(name) else "whole"
         self._held: list[Row] = []  # by time
-        self._groups: dict[str, tuple[str, ...]] = {}
+        self._channels: dict[str, tuple[str, ...]] = {}  # those that are written, and their columns
+        self._latest: dict[str, Any] = {}  # values of ``_KEPT``
         self._file: int | None = None
         self._written = -math.inf  # s, time of the last row written
         self._due = -math.inf  # s, when to write next
-        self._volts: float | None = None
-        self._truth: dict[str, Array | None] = {}  # the last of each
 
     def add(self, row: Row) -> None:
         """Record a row; one of a time that there is already is joined with it.
@@ -104,14 +110,14 @@ class Recorder:
             else:
                 held.insert(where, row)
         newest = held[-1].t
-        begun = self._file is not None or newest - held[0].t > self._settings.settles
+        begun = self._file is not None or newest - held[0].t > _SETTLES
         if begun and newest >= self._due:
             self._write(newest - self._horizon)
-            self._due = newest + self._settings.written_every
+            self._due = newest + _WRITTEN_EVERY
 
     def idle(self, seconds: float) -> None:
         """Write what is held, if nothing has come for a while."""
-        if seconds > self._settings.idle and self._file is not None:
+        if seconds > _IDLE and self._file is not None:
             self._write(math.inf)
 
     def close(self) -> None:
@@ -123,11 +129,9 @@ class Recorder:
             self._file = None
 
     def _write(self, until: float) -> None:
-        count = (
-            sum(1 for row in self._held if row.t <= until) if until < math.inf else len(self._held)
-        )
         if self._file is None:
             self._begin()
+        count = sum(row.t <= until for row in self._held)
         if not count:
             return
         rows, self._held = self._held[:count], self._held[count:]
@@ -149,29 +153,22 @@ class Recorder:
 
     def _begin(self) -> None:
         """Choose the columns by what has come, and write their names."""
-        held = self._held
-        groups = {"t": ("t",), "pose": POSE}
-        if not all(row.commanded for row in held):
-            groups["rotors"] = ROTORS
-        if all(row.command is not None for row in held):
-            groups["commands"] = COMMANDS
-        elif "rotors" not in groups:  # the first rows had none yet
-            self._held = held = [row for row in held if row.command is not None]
-            groups["commands"] = COMMANDS
-        volts = [row.voltage for row in held if row.voltage is not None]
-        if volts:
-            groups["vbat"], self._volts = ("vbat",), volts[0]
-        for name, columns in (
-            ("force", TRUTH[:3]),
-            ("torque", TRUTH[3:]),
-            ("accelerometer", ACCELEROMETER),
-            ("gyro", GYRO),
-        ):
-            there = [getattr(row, name) is not None for row in held]
-            if any(there) if columns in (ACCELEROMETER, GYRO) else all(there):
-                groups[name] = columns
-        self._groups = groups
-        names = [name for columns in groups.values() for name in columns]
+        measured = not all(row.commanded for row in self._held)
+        commanded = all(row.command is not None for row in self._held)
+        if not measured and not commanded:  # the first rows had none yet
+            self._held = [row for row in self._held if row.command is not None]
+            commanded = True
+        there = {
+            name: [value for row in self._held if (value := getattr(row, name)) is not None]
+            for name in _CHANNELS
+        }
+        chosen = {name: bool(values) for name, values in there.items()}
+        chosen |= {name: len(there[name]) == len(self._held) for name in ("force", "torque")}
+        chosen |= {"position": True, "quaternion": True}
+        chosen |= {"rotor_speeds": measured, "command": commanded}
+        self._channels = {name: _CHANNELS[name] for name, taken in chosen.items() if taken}
+        self._latest = {name: there[name][0] for name in _KEPT if chosen[name]}
+        names = ["t", *(column for columns in self._channels.values() for column in columns)]
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -182,40 +179,19 @@ class Recorder:
         self._put(",".join([*names, self._last]) + "\n")
 
     def _line(self, row: Row) -> str:
-        fields = []
-        for name, columns in self._groups.items():
-            if name == "t":
-                fields.append(repr(round(row.t, 9)))
-            elif name == "vbat":
-                self._volts = self._volts if row.voltage is None else row.voltage
-                fields.append(repr(self._volts))
-            elif name == "pose":
-                fields += _fields(row.position, 3) + _fields(row.quaternion, 4)
-            elif name == "rotors":
-                fields += _fields(row.rotor_speeds, 4)
-            elif name == "commands":
-                fields += _fields(row.command, 4)
-            elif name in ("force", "torque"):
-                self._truth[name] = row_value = _or(getattr(row, name), self._truth.get(name))
-                fields += _fields(row_value, 3)
-            else:
-                fields += _fields(getattr(row, name), len(columns))
+        fields = [repr(round(row.t, 9))]
+        for name, columns in self._channels.items():
+            value = getattr(row, name)
+            if name in _KEPT:
+                value = self._latest[name] = self._latest[name] if value is None else value
+            numbers = [] if value is None else np.atleast_1d(value).tolist()
+            fields += map(repr, numbers) if numbers else [""] * len(columns)
         return ",".join([*fields, "1"]) + "\n"
-
-
-def _or(values: Array | None, before: Array | None) -> Array | None:
-    return before if values is None else values
-
-
-def _fields(values: Array | None, count: int) -> list[str]:
-    if values is None:
-        return [""] * count
-    return [repr(value) for value in np.asarray(values).tolist()]
 
 
 def _joined(row: Row, other: Row) -> Row:
     """Return a row with what another of the same time holds besides."""
-    for name in Row.__slots__:
+    for name in (field.name for field in fields(Row)):
         if getattr(row, name) is None:
             setattr(row, name, getattr(other, name))
     return row

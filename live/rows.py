@@ -6,7 +6,6 @@ were last. Where poses stop, rotor speeds alone make rows, so that the estimate 
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,17 +14,10 @@ from ..runtime.errors import InputError
 from .messages import Array, Row, Sample
 from .tallies import Tallies
 
-
-@dataclass(frozen=True)
-class JoiningSettings:
-    """Which rotor speeds belong to a pose."""
-
-    kept: float = 1.0  # s of rotor speeds that are kept; poses come much sooner
-    # s without a row from which on rotor speeds make rows: several poses at 30 Hz
-    silent: float = 0.15
-    # s that measured rotor speeds are waited for where commands come: an ESC reports at 10 Hz or
-    # more
-    measured: float = 1.0
+_KEPT = 1.0  # s of rotor speeds that are kept; poses come much sooner
+_SILENT = 0.15  # s without a row from which on rotor speeds make rows: several poses at 30 Hz
+# s that measured rotor speeds are waited for where commands come: an ESC reports at 10 Hz or more
+_MEASURED = 1.0
 
 
 class Joiner:
@@ -36,11 +28,8 @@ class Joiner:
         tallies: where poses are counted that came while no rotor speeds were known.
     """
 
-    def __init__(
-        self, vehicle: Vehicle, tallies: Tallies, settings: JoiningSettings | None = None
-    ) -> None:
+    def __init__(self, vehicle: Vehicle, tallies: Tallies) -> None:
         self._vehicle, self._tallies = vehicle, tallies
-        self._settings = settings or JoiningSettings()
         self._speeds: deque[tuple[float, Array]] = deque()  # by time
         self._command: Array | None = None
         self._voltage: float | None = None
@@ -60,15 +49,15 @@ class Joiner:
         if sample.command is not None:
             self._command = sample.command
         commanded = self._take_motors(sample, t)
-        moving = sample.has_pose or sample.gyro is not None or sample.accelerometer is not None
+        moving = sample.has_pose or sample.has_imu
         alone = not self._speeds or (
-            not moving and not (sample.whole or t - self._last_row > self._settings.silent)
+            not moving and not (sample.whole or t - self._last_row > _SILENT)
         )
         if alone:
             if sample.has_pose:
                 self._tallies.counts["waiting"] += 1
             return None
-        if not moving and sample.rotor_speeds is None and sample.command is None:
+        if not moving and not sample.has_motors:
             return None
         self._last_row = max(self._last_row, t)
         pose = sample.has_pose
@@ -98,7 +87,7 @@ class Joiner:
         elif sample.command is not None and not self._measured:
             if self._first_command is None:
                 self._first_command = t
-            wait = 0.0 if sample.whole else self._settings.measured
+            wait = 0.0 if sample.whole else _MEASURED
             if t - self._first_command >= wait:
                 self._keep(t, self._commanded(sample.command))
         return not self._measured
@@ -125,7 +114,7 @@ class Joiner:
             kept.extend(reversed(later))
         else:
             kept.append((t, speeds))
-        while len(kept) > 2 and kept[0][0] < kept[-1][0] - self._settings.kept:
+        while len(kept) > 2 and kept[0][0] < kept[-1][0] - _KEPT:
             kept.popleft()
 
     def _at(self, t: float) -> Array:

@@ -142,9 +142,6 @@ class Session:
             for output in self.filter.begin():
                 self._out(output)
             self._flush()
-            if self.recorder is not None and self.estimates:
-                self._record()
-                self.recorder.close()
             if not self.estimates and not self._stop.is_set():
                 raise self._nothing("before it ended")
         finally:

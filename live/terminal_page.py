@@ -92,17 +92,3 @@ def rates_words(snapshot: Snapshot) -> str:
 def counts_words(counts: dict[str, int]) -> str:
     """Return what was counted."""
     return ", ".join(f"{name} {n}" for name, n in sorted(counts.items()))
-
-
-def line(snapshot: Snapshot) -> str:
-    """Return a plain line of the same, for where nothing can be drawn."""
-    output = snapshot.output
-    if output is None:
-        return "waiting for messages"
-    force = " ".join(f"{x:+.3f}" for x in output.estimate.force)
-    torque = " ".join(f"{1e3 * x:+.2f}" for x in output.estimate.torque)
-    counts = counts_words(snapshot.counts)
-    return (
-        f"t {output.t:.1f} s: force {force} N, torque {torque} mNm, {output.estimate.status}, "
-        f"{rates_words(snapshot)}" + (f"; {counts}" if counts else "")
-    )

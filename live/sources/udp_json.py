@@ -93,8 +93,8 @@ def _kind(sample: Sample) -> str:
         return "row"
     parts = {
         "pose": sample.has_pose,
-        "motors": sample.rotor_speeds is not None or sample.command is not None,
-        "imu": sample.gyro is not None or sample.accelerometer is not None,
+        "motors": sample.has_motors,
+        "imu": sample.has_imu,
         "battery": sample.voltage is not None,
     }
     return "+".join(name for name, there in parts.items() if there) or "json"
