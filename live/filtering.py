@@ -162,7 +162,10 @@ def warm_up(vehicle: Vehicle) -> None:
         "position": np.array([0.0, 0.0, 1.0]),
         "quaternion": np.array([1.0, 0.0, 0.0, 0.0]),
     }
-    imu = {"gyro": np.zeros(3), "accelerometer": np.array([0.0, 0.0, vehicle.gravity])}
+    imu: dict[str, Any] = {
+        "gyro": np.zeros(3),
+        "accelerometer": np.array([0.0, 0.0, vehicle.gravity]),
+    }
     for i in range(40):
         live.take(Row(0.005 * i, 0, **hover, voltage=vehicle.voltage_ref or None))
     live.take(Row(0.0501, 0, **hover))  # late
