@@ -184,7 +184,7 @@ class TrainedPolicy(_Network):
                 )
             super().__init__(card, weights, self.features.size, MAX_COMMAND, name)
         except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError):
+            if isinstance(error, InputError) and str(error).startswith(name):
                 raise
             raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
         if weights[f"weight{layers_of(weights) - 1}"].shape[0] != 1:
@@ -236,7 +236,7 @@ class TaskPolicy(_Network):
                 raise InputError(f"{name}: scale must be a list of numbers")
             super().__init__(card, weights, len(self._scale), largest, name)
         except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError):
+            if isinstance(error, InputError) and str(error).startswith(name):
                 raise
             raise InputError(f"{name}: the card lacks or spoils an entry: {error}") from error
         self.reset()

@@ -40,6 +40,7 @@ class FileLimits:
         ulog_fields: fields of all topics that it subscribes to, those within fields written out;
             PX4's logs have some 10,000.
         ulog_texts: information and parameters in it; PX4's logs have some 2,000.
+        ulog_damages: places in it where no message can be read; each takes some 0.1 ms.
     """
 
     table_text: int = 2**29
@@ -65,6 +66,7 @@ class FileLimits:
     log_fields: int = 500
     ulog_fields: int = 200_000
     ulog_texts: int = 200_000
+    ulog_damages: int = 20_000
 
 
 LIMITS = FileLimits()

@@ -4,29 +4,31 @@ is done with it.
 
 import gzip
 import hashlib
+import io
 import json
 import math
-import random
 import shutil
 import struct
 import tempfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache, partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow
+from hypothesis import strategies as st
 from numpy.typing import NDArray
+from pyarrow import parquet
 
-from tests.fuzz.mutations import spoil_bytes, spoil_table, spoil_text
-from tests.fuzz.ulog_writer import ulog_bytes
+from tests.fuzz.spoiling import Draw, places, spoiled_bytes, spoiled_table, spoiled_text
 from tests.support.blackbox_writer import FIELDS as BLACKBOX_FIELDS
 from tests.support.blackbox_writer import blackbox
+from tests.support.converted_flights import write_bag
 from tests.support.dataflash_writer import dataflash
 from tests.support.paths import ROOT
+from tests.support.ulog_writer import ulog_bytes
 from windwrench.controllers import make_controller
 from windwrench.controllers.features import Features
 from windwrench.controllers.trained_policy import load_policy, save_policy
@@ -47,7 +49,7 @@ from windwrench.runtime.yaml_file import parse_yaml
 from windwrench.training.configuration import load_config
 
 Array = NDArray[np.float64]
-Way = Callable[[bytes, random.Random], bytes]
+Way = Callable[[bytes], st.SearchStrategy[bytes]]
 
 _COUNT = 60  # samples of a good log
 _PERIOD = 0.01  # s
@@ -65,6 +67,14 @@ class Form:
     use: Callable[[Path], object]  # reads the file and works with what it says
     command: tuple[str, ...] = ()  # of windwrench, which takes the file's path last
     beside: Callable[[], Mapping[str, bytes]] = dict  # files that must lie beside it
+
+    @property
+    def spoiled(self) -> st.SearchStrategy[bytes]:
+        """A strategy for inputs that are the good one, spoiled in one of the ways or by bytes after
+        it.
+        """
+        once = st.one_of([way(self.good()) for way in self.ways])
+        return once | once.flatmap(spoiled_bytes)
 
 
 def _times() -> Array:
@@ -102,48 +112,74 @@ def _own_log(name: str) -> bytes:
     return _written(lambda path: write_log(log, path), name)
 
 
-def _text_table(columns: Mapping[str, Array]) -> bytes:
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return (
-        "\n".join(
-            [",".join(columns), *(",".join(f"{x:.17g}" for x in row) for row in rows)]
-        ).encode()
-        + b"\n"
-    )
+def _text_table(columns: Mapping[str, Array | float]) -> bytes:
+    whole = np.broadcast_arrays(*map(np.asarray, columns.values()))
+    lines = [",".join(f"{x:.17g}" for x in row) for row in np.stack(whole, axis=1).tolist()]
+    return "\n".join([",".join(columns), *lines, ""]).encode()
 
 
-def _nanobench() -> bytes:
+def _table(reader: str) -> bytes:
+    """Return a table that a reader knows by its columns."""
     t = _times()
-    pose = dict.fromkeys(("px", "py", "qx", "qy", "qz"), 0.0 * t) | {
-        "pz": 1.0 + 0.0 * t,
-        "qw": 1.0 + 0.0 * t,
-    }
-    motors = {f"motor_motor_m{i}": np.full(_COUNT, 36000.0) for i in range(1, 5)}
-    return _text_table({"t": 1e9 + t, **pose, **motors, "pwr_pm_vbat": np.full(_COUNT, 3.9)})
-
-
-def _crazyswarm2() -> bytes:
-    t = _times()
-    zero = (
-        "est_x_m",
-        "est_y_m",
-        "est_vx_mps",
-        "roll_rad",
-        "pitch_rad",
-        "yaw_rad",
-        "mocap_x_m",
-        "mocap_y_m",
-        *(f"torque_cmd_{axis}_Nm" for axis in "xyz"),
-    )
-    return _text_table(
-        {
+    crazyflie = {f"motor.m{i}": 40_000.0 for i in range(1, 5)}
+    places = ("rear_right", "front_right", "rear_left", "front_left")
+    columns: dict[str, Array | float] = {
+        "nanobench": {
+            "t": 1e9 + t,
+            **dict.fromkeys(("px", "py", "qx", "qy", "qz"), 0.0),
+            "pz": 1.0,
+            "qw": 1.0,
+            "pwr_pm_vbat": 3.9,
+            **{f"motor_motor_m{i}": 36_000.0 for i in range(1, 5)},
+        },
+        "crazyswarm2": {
             "t_s": t,
-            **dict.fromkeys(zero, 0.0 * t),
-            "est_z_m": 1.0 + 0.0 * t,
+            **dict.fromkeys(("est_x_m", "est_y_m", "est_vx_mps"), 0.0),
+            **dict.fromkeys(("roll_rad", "pitch_rad", "yaw_rad", "mocap_x_m", "mocap_y_m"), 0.0),
+            **{f"torque_cmd_{axis}_Nm": 0.0 for axis in "xyz"},
+            "est_z_m": 1.0,
             "mocap_z_m": 1.0 + 0.001 * t,
-            "thrust_cmd_N": np.full(_COUNT, 0.33),
-        }
-    )
+            "thrust_cmd_N": 0.33,
+        },
+        "racer": {
+            "timestamp_s": t,
+            "pos_x": 0.0,
+            "pos_y": 0.0,
+            "pos_z": 1.0,
+            "quat_w": 1.0,
+            **{f"{name}_{axis}": 0.0 for name in ("quat", "gyro", "vel_body") for axis in "xyz"},
+            "spec_force_x": 0.0,
+            "spec_force_y": 0.0,
+            "spec_force_z": 9.81,
+            "battery_v": 11.1,
+            **{f"rpm_{place}": 3600.0 for place in places},
+        },
+        "cflib": {
+            "timestamp": 1e3 * t,
+            "acc.x": 0.0,
+            "acc.y": 0.0,
+            "acc.z": 1.0,
+            "pm.vbat": 3.9,
+            **{f"stateEstimate.{name}": 0.0 for name in ("x", "y", "qx", "qy", "qz")},
+            "stateEstimate.z": 1.0 + 0.01 * t,
+            "stateEstimate.qw": 1.0,
+            **crazyflie,
+            **{f"gyro.{axis}": 0.0 for axis in "xyz"},
+        },
+        "betaflight": {
+            "loopIteration": np.arange(_COUNT, dtype=np.float64),
+            "time (us)": 1e6 * t,
+            **{f"{name}[{i}]": 0.0 for name in ("gyroADC", "accSmooth") for i in range(3)},
+            "accSmooth[2]": 2048.0,
+            "vbatLatest (V)": 11.1,
+            **{f"motor[{i}]": 1500.0 for i in range(4)},
+            **{f"eRPM[{i}]": 420.0 for i in range(4)},
+        },
+    }[reader]
+    return _text_table(columns)
+
+
+_nanobench, _crazyswarm2 = partial(_table, "nanobench"), partial(_table, "crazyswarm2")
 
 
 @cache
@@ -182,43 +218,19 @@ def _ulog() -> bytes:
 
 @cache
 def _bag(kind: str) -> dict[str, bytes]:
-    """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a
-    folder's of ROS 2."""
-    from rosbags import rosbag1, rosbag2
-    from rosbags.typesys import Stores, get_typestore
-
-    ros1 = kind == "bag"
-    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-    types, begin = store.types, 1_700_000_000
+    """Return the files of a bag with a pose and rotor speeds: one of ROS 1, or a folder's of ROS 2,
+    by the ending of the file that holds the messages."""
+    count = len(_times())
+    still = FlightLog(
+        _times(),
+        np.tile([0.0, 0.0, 1.0], (count, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        np.full((count, 4), 376.0),
+    )
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / ("flight.bag" if ros1 else "flight")
-        plugin = rosbag2.StoragePlugin.MCAP if kind == "mcap" else rosbag2.StoragePlugin.SQLITE3
-        writer = (
-            rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=9, storage_plugin=plugin)
-        )
-        with writer:
-            pose_name, rotor_name = (
-                "geometry_msgs/msg/PoseStamped",
-                "std_msgs/msg/Float32MultiArray",
-            )
-            pose_topic = writer.add_connection("/pose", pose_name, typestore=store)
-            rotor_topic = writer.add_connection("/motors", rotor_name, typestore=store)
-            for k in range(_COUNT):
-                nanoseconds = round(1e9 * _PERIOD) * k
-                stamp = types["builtin_interfaces/msg/Time"](begin, nanoseconds)
-                header = types["std_msgs/msg/Header"](*([0] if ros1 else []), stamp, "world")
-                pose = types["geometry_msgs/msg/Pose"](
-                    types["geometry_msgs/msg/Point"](0.0, 0.0, 1.0),
-                    types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
-                )
-                rotors = types[rotor_name](
-                    types["std_msgs/msg/MultiArrayLayout"]([], 0), np.full(4, 376.0, np.float32)
-                )
-                serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
-                at = begin * 10**9 + nanoseconds
-                writer.write(pose_topic, at, serialize(types[pose_name](header, pose), pose_name))
-                writer.write(rotor_topic, at, serialize(rotors, rotor_name))
-        found = [path] if ros1 else sorted(path.iterdir())
+        path = Path(folder) / ("flight.bag" if kind == "bag" else "flight")
+        write_bag(still, path, kind, "/pose")
+        found = [path] if kind == "bag" else sorted(path.iterdir())
         return {p.name: p.read_bytes() for p in found}
 
 
@@ -270,11 +282,6 @@ def _folder_bag(path: Path) -> None:
     _log(path.parent, "rosbag:" + str(path.parent / "map.yaml"))
 
 
-def _beside_bag(kind: str) -> dict[str, bytes]:
-    name = "flight.bag" if kind == "bag" else f"flight.{kind}"
-    return {"flight.topics.yaml": TOPIC_MAP, name: _bag(kind)[name]}
-
-
 def _use_vehicle(path: Path) -> None:
     """Load a vehicle, write it and read it back, and let a filter know it."""
     vehicle = load_vehicle(path)
@@ -311,6 +318,10 @@ def _use_tuning(path: Path) -> None:
     ukf = WrenchUKF(_vehicle("ardrone2"), UKFTuning(**given))
     ukf.reset([0, 0, 1], [1, 0, 0, 0])
     ukf.step([376] * 4, [0, 0, 1], [1, 0, 0, 0])
+
+
+def _configuration() -> bytes:
+    return (ROOT / "training" / "configs" / "sac.yaml").read_bytes()
 
 
 def _use_configuration(path: Path) -> None:
@@ -426,305 +437,118 @@ def _sd_card() -> bytes:
     return out
 
 
-def _racer() -> bytes:
-    t = _times()
-    zero = (
-        *("pos_x", "pos_y", "quat_x", "quat_y", "quat_z", "spec_force_x", "spec_force_y"),
-        *("gyro_x", "gyro_y", "gyro_z", "vel_body_x", "vel_body_y", "vel_body_z"),
-    )
-    places = ("rear_right", "front_right", "rear_left", "front_left")
-    return _text_table(
-        {
-            "timestamp_s": t,
-            **dict.fromkeys(zero, 0.0 * t),
-            "pos_z": 1.0 + 0.0 * t,
-            "quat_w": 1.0 + 0.0 * t,
-            "spec_force_z": 9.81 + 0.0 * t,
-            **{f"rpm_{place}": 3600.0 + 0.0 * t for place in places},
-            "battery_v": 11.1 + 0.0 * t,
-        }
-    )
-
-
-def _cflib() -> bytes:
-    t = _times()
-    zero = [f"stateEstimate.{name}" for name in ("x", "y", "qx", "qy", "qz")]
-    zero += ["acc.x", "acc.y", "gyro.x", "gyro.y", "gyro.z"]
-    return _text_table(
-        {
-            "timestamp": 1e3 * t,
-            **dict.fromkeys(zero, 0.0 * t),
-            "stateEstimate.z": 1.0 + 0.01 * t,
-            "stateEstimate.qw": 1.0 + 0.0 * t,
-            "acc.z": 1.0 + 0.0 * t,
-            **{f"motor.m{i}": np.full(_COUNT, 40_000.0) for i in range(1, 5)},
-            "pm.vbat": np.full(_COUNT, 3.9),
-        }
-    )
-
-
-def _decoded_blackbox() -> bytes:
-    t = _times()
-    sensors = {f"{name}[{i}]": 0.0 * t for name in ("gyroADC", "accSmooth") for i in range(3)}
-    return _text_table(
-        {
-            "loopIteration": np.arange(_COUNT, dtype=np.float64),
-            "time (us)": 1e6 * t,
-            **sensors,
-            "accSmooth[2]": np.full(_COUNT, 2048.0),
-            **{f"motor[{i}]": 1500.0 + 0.0 * t for i in range(4)},
-            **{f"eRPM[{i}]": 420.0 + 0.0 * t for i in range(4)},
-            "vbatLatest (V)": 11.1 + 0.0 * t,
-        }
-    )
-
-
 def _zipped(spoiled: Way) -> Way:
     """Return a way to spoil what a gzip file holds."""
-
-    def way(data: bytes, rng: random.Random) -> bytes:
-        try:
-            return gzip.compress(spoiled(gzip.decompress(data), rng), 1)
-        except (OSError, EOFError, zlib.error):
-            return spoil_bytes(data, rng)
-
-    return way
+    return lambda data: spoiled(gzip.decompress(data)).map(lambda text: gzip.compress(text, 1))
 
 
-def _spoil_parquet(data: bytes, rng: random.Random) -> bytes:
-    """Return a Parquet file with a column of another type, with holes, away, twice, or of another
-    length.
-    """
-    import io
+KINDS: tuple[Any, ...] = ("a", None, True, [1.0], b"\xff", math.nan, math.inf, 1e308, 2**62)
 
-    import pyarrow
-    from pyarrow import parquet
 
-    try:
-        table = parquet.read_table(io.BytesIO(data))
-    except (OSError, pyarrow.ArrowException):
-        return spoil_bytes(data, rng)
-    i = rng.randrange(max(table.num_columns, 1))
-    if table.num_columns == 0:
-        return spoil_bytes(data, rng)
+@st.composite
+def _spoiled_parquet(draw: Draw, data: bytes) -> bytes:
+    """Take a column of a Parquet file away, give it twice, cut it or change its type."""
+    table = parquet.read_table(io.BytesIO(data))
+    i = draw(places(table.column_names))
     name, count = table.column_names[i], table.num_rows
-    kinds: list[Any] = [
-        ["a"] * count,
-        [None] * count,
-        [True] * count,
-        [[1.0]] * count,
-        [b"\xff"] * count,
-        [math.nan] * count,
-        [math.inf] * count,
-        [1e308] * count,
-        [2**62] * count,
-        [{"a": 1}] * count,
-    ]
-    how = rng.randrange(5)
-    if how == 0:
+    how = draw(st.sampled_from(("away", "twice", "cut", "type")))
+    if how == "away":
         table = table.remove_column(i)
-    elif how == 1:
+    elif how == "twice":
         table = table.append_column(name, table.column(i))
-    elif how == 2:
-        table = table.slice(0, rng.choice((0, 1, 2, max(count - 1, 0))))
+    elif how == "cut":
+        table = table.slice(0, draw(st.sampled_from((0, 1, 2, count - 1))))
     else:
-        table = table.set_column(i, name, pyarrow.array(rng.choice(kinds)))
+        value = draw(st.sampled_from((*KINDS, {"a": 1})))
+        table = table.set_column(i, name, pyarrow.array([value] * count))
     out = io.BytesIO()
-    parquet.write_table(table, out, row_group_size=rng.choice((7, 1000)))
+    parquet.write_table(table, out, row_group_size=draw(st.sampled_from((7, 1000))))
     return out.getvalue()
 
 
-def forms() -> dict[str, Form]:
-    """Return the forms whose libraries are installed."""
-    table, text = (
-        (spoil_table, spoil_table, spoil_bytes),
-        (spoil_text, spoil_text, spoil_text, spoil_bytes),
+_BYTES = (spoiled_bytes,)
+_CELLS, _WORDS = (spoiled_table, spoiled_bytes), (spoiled_text, spoiled_bytes)
+_PARQUET = (_spoiled_parquet, spoiled_bytes)
+_BAGS = {"rosbag 1": "bag", "rosbag 2, SQLite": "db3", "rosbag 2, MCAP": "mcap"}
+_TUNING = b"torque_walk: 0.001\nposition_noise: [0.1, 0.1, 0.2]\nkappa: 2.0\n"
+
+
+def _form_of_log(
+    name: str,
+    file: str,
+    good: Callable[[], bytes],
+    ways: tuple[Way, ...],
+    reader: str | None = None,
+    vehicle: str = "ardrone2",
+    beside: Callable[[], Mapping[str, bytes]] = dict,
+) -> Form:
+    """Return the form of a log that is read, and estimated, by a reader or the file's content."""
+    named = () if reader is None else ("--reader", reader)
+    command = ("estimate", "--out", "out", "--vehicle", vehicle, *named)
+    return Form(
+        name, file, good, ways, partial(_log, reader=reader, vehicle=vehicle), command, beside
     )
-    estimate = ("estimate", "--out", "out", "--vehicle", "ardrone2")
+
+
+def forms() -> dict[str, Form]:
+    """Return every form of input by its name."""
+    log, flown = _form_of_log, ("record", "--seconds", "1", "--out", "out", "--vehicle")
+    own, packed = partial(_own_log, "log.csv"), (_zipped(spoiled_table), spoiled_bytes)
+    scored = ("benchmark", "--episodes", "1", "--out", "out", "--controllers")
     found = [
-        Form("CSV", "log.csv", partial(_own_log, "log.csv"), table, _log, estimate),
+        log("CSV", "log.csv", own, _CELLS),
+        log("gzipped CSV", "log.csv.gz", partial(_own_log, "log.csv.gz"), packed),
+        log("nanobench", "log.csv", _nanobench, _CELLS, "nanobench", "crazyflie"),
+        log("crazyswarm2", "log.csv", _crazyswarm2, _CELLS, "crazyswarm2", "crazyflie"),
+        log("racer", "log.csv", partial(_table, "racer"), _CELLS),
+        log("crazyflie_csv", "log.csv", partial(_table, "cflib"), _CELLS, None, "crazyflie"),
+        log("betaflight_csv", "log.csv", partial(_table, "betaflight"), _CELLS),
+        log("ardupilot_bin", "log.BIN", _dataflash, _BYTES, "ardupilot_bin"),
+        log("betaflight", "log.bbl", _blackbox, _BYTES, "betaflight"),
+        log("crazyflie_sd", "log00", _sd_card, _BYTES, "crazyflie_sd", "crazyflie"),
+        Form("vehicle", "v.yaml", _preset, _WORDS, _use_vehicle, flown),
+        Form("vehicle with effects", "v.yaml", _effects_of_vehicle, _WORDS, _use_vehicle, flown),
         Form(
-            "gzipped CSV",
-            "log.csv.gz",
-            partial(_own_log, "log.csv.gz"),
-            (_zipped(spoil_table), spoil_bytes),
-            _log,
-            estimate,
-        ),
-        Form(
-            "nanobench",
-            "log.csv",
-            _nanobench,
-            table,
-            partial(_log, reader="nanobench", vehicle="crazyflie"),
-            (*estimate, "--reader", "nanobench", "--vehicle", "crazyflie"),
-        ),
-        Form(
-            "crazyswarm2",
-            "log.csv",
-            _crazyswarm2,
-            table,
-            partial(_log, reader="crazyswarm2", vehicle="crazyflie"),
-            (*estimate, "--reader", "crazyswarm2", "--vehicle", "crazyflie"),
-        ),
-        Form("racer", "log.csv", _racer, table, _log, estimate),
-        Form("crazyflie_csv", "log.csv", _cflib, table, partial(_log, vehicle="crazyflie")),
-        Form("betaflight_csv", "log.csv", _decoded_blackbox, table, _log, estimate),
-        Form(
-            "ardupilot_bin",
-            "log.BIN",
-            _dataflash,
-            (spoil_bytes,),
-            partial(_log, reader="ardupilot_bin"),
-            (*estimate, "--reader", "ardupilot_bin"),
-        ),
-        Form(
-            "betaflight",
-            "log.bbl",
-            _blackbox,
-            (spoil_bytes,),
-            partial(_log, reader="betaflight"),
-            (*estimate, "--reader", "betaflight"),
-        ),
-        Form(
-            "crazyflie_sd",
-            "log00",
-            _sd_card,
-            (spoil_bytes,),
-            partial(_log, reader="crazyflie_sd", vehicle="crazyflie"),
-            (*estimate, "--reader", "crazyflie_sd", "--vehicle", "crazyflie"),
-        ),
-        Form(
-            "vehicle",
-            "v.yaml",
-            _preset,
-            text,
-            _use_vehicle,
-            ("record", "--seconds", "1", "--out", "out", "--vehicle"),
-        ),
-        Form(
-            "vehicle with effects",
-            "v.yaml",
-            _effects_of_vehicle,
-            text,
-            _use_vehicle,
-            ("record", "--seconds", "1", "--out", "out", "--vehicle"),
-        ),
-        Form(
-            "log map",
-            "map.yaml",
-            lambda: _MAP,
-            text,
-            _use_map,
+            *("log map", "map.yaml", lambda: _MAP, _WORDS, _use_map),
             ("check", "log.csv", "--out", "out", "--map"),
-            lambda: {"log.csv": _own_log("log.csv")},
+            lambda: {"log.csv": own()},
         ),
         Form(
-            "table of other columns",
-            "log.csv",
-            _foreign_table,
-            table,
-            _use_foreign,
+            *("table of other columns", "log.csv", _foreign_table, _CELLS, _use_foreign),
             ("check", "--out", "out", "--vehicle", "ardrone2"),
         ),
-        Form("effect settings", "effects.txt", _effects, text, _use_effect),
-        Form("names", "names.txt", lambda: b"base\nadmittance\nardrone2", text, _use_names),
+        Form("effect settings", "effects.txt", _effects, _WORDS, _use_effect),
+        Form("names", "names.txt", lambda: b"base\nadmittance\nardrone2", _WORDS, _use_names),
+        Form("tuning", "tuning.yaml", lambda: _TUNING, _WORDS, _use_tuning),
+        Form("training configuration", "sac.yaml", _configuration, _WORDS, _use_configuration),
         Form(
-            "tuning",
-            "tuning.yaml",
-            lambda: b"torque_walk: 0.001\nposition_noise: [0.1, 0.1, 0.2]\nkappa: 2.0\n",
-            text,
-            _use_tuning,
+            *("policy, weights", "policy.npz", lambda: _policy()["policy.npz"], _BYTES),
+            *(_use_policy, scored, lambda: {"policy.json": _policy()["policy.json"]}),
         ),
         Form(
-            "training configuration",
-            "sac.yaml",
-            lambda: (ROOT / "training" / "configs" / "sac.yaml").read_bytes(),
-            text,
-            _use_configuration,
+            *("policy, card", "policy.json", lambda: _policy()["policy.json"], _WORDS),
+            *(_use_policy, scored, lambda: {"policy.npz": _policy()["policy.npz"]}),
+        ),
+        log("Parquet", "log.parquet", partial(_own_log, "log.parquet"), _PARQUET),
+        log("px4_ulog", "log.ulg", _ulog, _BYTES, "px4_ulog"),
+        *(
+            log(
+                *(name, f"flight.{kind}", lambda kind=kind: _bag(kind)[f"flight.{kind}"], _BYTES),
+                *("rosbag", "ardrone2", lambda: {"flight.topics.yaml": TOPIC_MAP}),
+            )
+            for name, kind in _BAGS.items()
         ),
         Form(
-            "policy, weights",
-            "policy.npz",
-            lambda: _policy()["policy.npz"],
-            (spoil_bytes,),
-            _use_policy,
-            ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
-            lambda: {"policy.json": _policy()["policy.json"]},
+            *("rosbag 2, metadata", "metadata.yaml", lambda: _bag("db3")["metadata.yaml"], _WORDS),
+            *(_folder_bag, ()),
+            lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP},
         ),
         Form(
-            "policy, card",
-            "policy.json",
-            lambda: _policy()["policy.json"],
-            text,
-            _use_policy,
-            ("benchmark", "--episodes", "1", "--out", "out", "--controllers"),
-            lambda: {"policy.npz": _policy()["policy.npz"]},
+            *("topic map", "flight.topics.yaml", lambda: TOPIC_MAP, _WORDS),
+            lambda path: _log(path.with_name("flight.bag"), "rosbag"),
+            beside=lambda: {"flight.bag": _bag("bag")["flight.bag"]},
         ),
     ]
-    if find_spec("pyarrow"):
-        found.append(
-            Form(
-                "Parquet",
-                "log.parquet",
-                partial(_own_log, "log.parquet"),
-                (_spoil_parquet, spoil_bytes),
-                _log,
-                estimate,
-            )
-        )
-    if find_spec("pyulog"):
-        found.append(
-            Form(
-                "px4_ulog",
-                "log.ulg",
-                _ulog,
-                (spoil_bytes,),
-                partial(_log, reader="px4_ulog"),
-                (*estimate, "--reader", "px4_ulog"),
-            )
-        )
-    if find_spec("rosbags"):
-        reader = (*estimate, "--reader", "rosbag")
-        for title, kind in (
-            ("rosbag 1", "bag"),
-            ("rosbag 2, SQLite", "db3"),
-            ("rosbag 2, MCAP", "mcap"),
-        ):
-            name = f"flight.{kind}"
-            found.append(
-                Form(
-                    title,
-                    name,
-                    lambda kind=kind, name=name: _bag(kind)[name],
-                    (spoil_bytes,),  # type: ignore[misc]
-                    partial(_log, reader="rosbag"),
-                    reader,
-                    lambda: {"flight.topics.yaml": TOPIC_MAP},
-                )
-            )
-        found.append(
-            Form(
-                "rosbag 2, metadata",
-                "metadata.yaml",
-                lambda: _bag("db3")["metadata.yaml"],
-                text,
-                _folder_bag,
-                (),
-                lambda: {"flight.db3": _bag("db3")["flight.db3"], "map.yaml": TOPIC_MAP},
-            )
-        )
-        found.append(
-            Form(
-                "topic map",
-                "flight.topics.yaml",
-                lambda: TOPIC_MAP,
-                text,
-                lambda path: _log(path.with_name("flight.bag"), "rosbag"),
-                (),
-                lambda: _beside_bag("bag"),
-            )
-        )
     return {form.name: form for form in found}
 
 

@@ -22,7 +22,7 @@ def counting(parser: Any) -> Any:
     """Return pyulog's class ``ULog`` as one that raises TooMuchError where a file has more than
     ``FileLimits`` allows.
     """
-    fields = texts = 0
+    fields = texts = damages = 0
 
     class AddLogged(parser._MessageAddLogged):  # type: ignore[misc]
         def _parse_format(self, message_formats: Mapping[str, Any]) -> None:
@@ -52,6 +52,14 @@ def counting(parser: Any) -> Any:
         MessageLogging = _forgotten(parser.MessageLogging)
         MessageLoggingTagged = _forgotten(parser.MessageLoggingTagged)
         MessageDropout = _forgotten(parser.MessageDropout)
+
+        def _check_packet_corruption(self, header: Any) -> bool:
+            nonlocal damages
+            is_damaged = bool(super()._check_packet_corruption(header))
+            damages += is_damaged
+            if damages > LIMITS.ulog_damages:
+                raise TooMuchError(f"more than {LIMITS.ulog_damages} places hold no message")
+            return is_damaged
 
     return Counting
 
