@@ -23,7 +23,7 @@ import numpy as np
 from ...identification.logs.rotor_orders import ORDERS
 from ...runtime.errors import InputError
 from ..messages import Sample
-from .base import Source, unwrapped
+from .base import Source, command_of, unwrapped
 
 _ORDER = [motor - 1 for motor in ORDERS["crazyflie"]]
 _FULL = 65_535.0  # PWM
@@ -159,11 +159,7 @@ class CrazyflieLog(Source):
         if measured:
             sample.rotor_speeds = motors * (math.pi / 30.0)
         else:
-            curve = self.vehicle.motor_curve
-            low, high = (0.0, _FULL) if curve is None else curve.command
-            if high <= 1.0:  # of a curve whose command is a share
-                low, high = 0.0, _FULL
-            sample.command = np.clip((motors - low) / (high - low), 0.0, 1.0)
+            sample.command = command_of(motors, self.vehicle, (0.0, _FULL))
         self._put(sample)
 
     def _take_imu(self, stamp: int, data: dict[str, Any], block: Any) -> None:

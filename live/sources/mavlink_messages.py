@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...dynamics.vehicle import Vehicle
+from ...identification.logs.readers.streams import from_ned
 from ...identification.logs.rotor_orders import ORDERS
-from ..messages import Array, Sample
+from ..messages import Array, Measured, Sample
 from ..tallies import Tallies
-from .base import unwrapped
+from .base import LARGEST_SHARE, command_of, unwrapped
 
 HALF_TURN = np.array([1.0, -1.0, -1.0])  # of a vector
-_TURNED = np.array([1.0, 1.0, -1.0, -1.0])  # of a quaternion
 _ORDER = [motor - 1 for motor in ORDERS["px4-x"]]
 _RPM = math.pi / 30.0  # rad/s
 _Z_DOWN = (1, 20)  # MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
@@ -22,13 +23,12 @@ _GYRO, _ACCELEROMETER = 0b111000, 0b111  # bits of HIGHRES_IMU's fields_updated
 _MISSING_CELL = 65_535  # mV
 WRAP = 2**32  # us, of SERVO_OUTPUT_RAW
 POSES = ("ATT_POS_MOCAP", "VISION_POSITION_ESTIMATE", "ODOMETRY", "LOCAL_POSITION_NED")
-
-
 # s that better poses are waited for once one comes: at 5 Hz and more each kind has come by then
 _CHOOSING = 0.5
 _ATTITUDE_AGE = 0.1  # s over which an attitude is carried by its rates; it turns 1 rad
 _NORM_TOLERANCE = 0.02  # of a quaternion's length
 _PULSES = 1000.0, 2000.0  # us, where the motor curve states no range
+_STAMPS = (("time_usec", 1_000), ("usec", 1_000), ("time_boot_ms", 1_000_000))  # fields, their ns
 
 
 class MessageReader:
@@ -42,21 +42,21 @@ class MessageReader:
 
     def __init__(self, vehicle: Vehicle, tallies: Tallies, forced: str) -> None:
         self._vehicle, self._tallies, self._forced = vehicle, tallies, forced
-        self._pose = ""  # the kind that is read
         self._poses: dict[str, int] = {}  # kinds that have come, and when first, ns
         self._attitude: tuple[int, Array, Array] | None = None  # stamp, quaternion, rates
         self.seen: set[str] = set()  # kinds of messages
         self._servo_time: int | None = None  # us, of the newest
-        self._readers: dict[str, Callable[[Any, int], Sample | None]] = {
+        # each puts what a message holds into a sample, and returns whether it is to be used
+        self._readers: dict[str, Callable[[Any, Sample], bool]] = {
             "ODOMETRY": self._odometry,
-            "ATT_POS_MOCAP": self._mocap,
+            "ATT_POS_MOCAP": lambda m, sample: self._pose(m, sample, m.q),
             "VISION_POSITION_ESTIMATE": self._vision,
             "LOCAL_POSITION_NED": self._local_position,
             "ATTITUDE_QUATERNION": self._take_attitude,
             "HIGHRES_IMU": self._imu,
-            "ESC_STATUS": self._esc_status,
-            "ESC_TELEMETRY_1_TO_4": self._esc_telemetry,
-            "ACTUATOR_OUTPUT_STATUS": self._actuator_outputs,
+            "ESC_STATUS": self._rpm,
+            "ESC_TELEMETRY_1_TO_4": self._rpm,
+            "ACTUATOR_OUTPUT_STATUS": lambda m, sample: self._command(sample, m.actuator),
             "SERVO_OUTPUT_RAW": self._servo_outputs,
             "BATTERY_STATUS": self._battery,
             "SYS_STATUS": self._system_status,
@@ -69,126 +69,97 @@ class MessageReader:
         reader = self._readers.get(kind)
         if reader is None:
             return None
-        sample = reader(message, arrival)
-        if sample is not None and not _finite(sample):
+        stamps = [ns * getattr(message, name) for name, ns in _STAMPS if hasattr(message, name)]
+        sample = Sample(kind, stamps[0] if stamps else None, arrival)
+        try:
+            return sample if reader(message, sample) and _check_finite(sample) else None
+        except ValueError:
             self._tallies.counts["malformed"] += 1
             return None
-        return sample
 
     def _chosen(self, kind: str, arrival: int) -> bool:
         """Return whether poses of a kind are read: the best of those that come."""
-        if self._forced:
-            return kind == self._forced
-        if self._pose:
-            return kind == self._pose
-        self._poses.setdefault(kind, arrival)
-        if arrival - min(self._poses.values()) < _CHOOSING * 1e9:
+        if not self._forced:
+            self._poses.setdefault(kind, arrival)
+            if arrival - min(self._poses.values()) < _CHOOSING * 1e9:
+                return False
+            self._forced = min(self._poses, key=POSES.index)
+        return kind == self._forced
+
+    def _pose(self, m: Any, sample: Sample, quaternion: Any) -> bool:
+        """Take a pose of north, east, down, if its kind is read."""
+        if not self._chosen(sample.kind, sample.arrival):
             return False
-        self._pose = min(self._poses, key=POSES.index)
-        return kind == self._pose
-
-    def _odometry(self, m: Any, arrival: int) -> Sample | None:
-        if m.frame_id not in _Z_DOWN:
-            self._tallies.counts["malformed"] += 1
-            return None
-        return self._posed("ODOMETRY", 1000 * m.time_usec, arrival, (m.x, m.y, m.z), m.q)
-
-    def _mocap(self, m: Any, arrival: int) -> Sample | None:
-        return self._posed("ATT_POS_MOCAP", 1000 * m.time_usec, arrival, (m.x, m.y, m.z), m.q)
-
-    def _vision(self, m: Any, arrival: int) -> Sample | None:
-        turn = Rotation.from_euler("ZYX", (m.yaw, m.pitch, m.roll))
-        quaternion = turn.as_quat(scalar_first=True)
-        place = (m.x, m.y, m.z)
-        return self._posed("VISION_POSITION_ESTIMATE", 1000 * m.usec, arrival, place, quaternion)
-
-    def _local_position(self, m: Any, arrival: int) -> Sample | None:
-        stamp = 1_000_000 * m.time_boot_ms
-        if self._attitude is None:
-            return None
-        at, quaternion, rates = self._attitude
-        age = 1e-9 * (stamp - at)
-        if abs(age) > _ATTITUDE_AGE:
-            return None
-        turn = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(rates * age)
-        place = (m.x, m.y, m.z)
-        turned = turn.as_quat(scalar_first=True)
-        return self._posed("LOCAL_POSITION_NED", stamp, arrival, place, turned)
-
-    def _take_attitude(self, m: Any, arrival: int) -> Sample | None:
-        quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
-        if abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE:
-            rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
-            self._attitude = 1_000_000 * m.time_boot_ms, quaternion, rates
-        return None
-
-    def _posed(
-        self, kind: str, stamp: int, arrival: int, place: Any, quaternion: Any
-    ) -> Sample | None:
-        """Return a pose in this kit's frames, if its kind is read."""
-        if not self._chosen(kind, arrival):
-            return None
         turn = np.array(quaternion, dtype=np.float64)
         length = float(np.linalg.norm(turn))
         if not abs(length - 1.0) <= _NORM_TOLERANCE:
-            self._tallies.counts["malformed"] += 1
-            return None
-        position = np.array(place, dtype=np.float64) * HALF_TURN
-        return Sample(kind, stamp, arrival, position=position, quaternion=turn * _TURNED / length)
+            raise ValueError("no quaternion")
+        position = np.array((m.x, m.y, m.z), dtype=np.float64)
+        sample.position, sample.quaternion = from_ned(position, turn / length)
+        return True
 
-    def _imu(self, m: Any, arrival: int) -> Sample | None:
-        updated = int(m.fields_updated)
-        gyro = np.array([m.xgyro, m.ygyro, m.zgyro], dtype=np.float64) * HALF_TURN
-        force = np.array([m.xacc, m.yacc, m.zacc], dtype=np.float64) * HALF_TURN
-        return Sample(
-            "HIGHRES_IMU",
-            1000 * m.time_usec,
-            arrival,
-            gyro=gyro if updated & _GYRO else None,
-            accelerometer=force if updated & _ACCELEROMETER else None,
-        )
+    def _odometry(self, m: Any, sample: Sample) -> bool:
+        if m.frame_id not in _Z_DOWN:
+            raise ValueError("an unknown frame")
+        return self._pose(m, sample, m.q)
 
-    def _esc_status(self, m: Any, arrival: int) -> Sample | None:
-        if m.index != 0 or not any(m.rpm):
-            return None
-        return Sample("ESC_STATUS", 1000 * m.time_usec, arrival, rotor_speeds=_motors(m.rpm) * _RPM)
+    def _vision(self, m: Any, sample: Sample) -> bool:
+        turn = Rotation.from_euler("ZYX", (m.yaw, m.pitch, m.roll))
+        return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _esc_telemetry(self, m: Any, arrival: int) -> Sample | None:
-        if not any(m.rpm):
-            return None
-        return Sample("ESC_TELEMETRY_1_TO_4", None, arrival, rotor_speeds=_motors(m.rpm) * _RPM)
+    def _local_position(self, m: Any, sample: Sample) -> bool:
+        if self._attitude is None or sample.stamp is None:
+            return False
+        at, quaternion, rates = self._attitude
+        age = 1e-9 * (sample.stamp - at)
+        if abs(age) > _ATTITUDE_AGE:
+            return False
+        turn = Rotation.from_quat(quaternion, scalar_first=True) * Rotation.from_rotvec(rates * age)
+        return self._pose(m, sample, turn.as_quat(scalar_first=True))
 
-    def _actuator_outputs(self, m: Any, arrival: int) -> Sample | None:
-        raw = _motors(m.actuator)
-        return self._commanded("ACTUATOR_OUTPUT_STATUS", 1000 * m.time_usec, arrival, raw)
+    def _take_attitude(self, m: Any, sample: Sample) -> bool:
+        """Keep an attitude for the positions that come without one."""
+        quaternion = np.array([m.q1, m.q2, m.q3, m.q4], dtype=np.float64)
+        good = abs(float(np.linalg.norm(quaternion)) - 1.0) <= _NORM_TOLERANCE
+        if good and sample.stamp is not None:
+            rates = np.array([m.rollspeed, m.pitchspeed, m.yawspeed], dtype=np.float64)
+            self._attitude = sample.stamp, quaternion, rates
+        return False
 
-    def _servo_outputs(self, m: Any, arrival: int) -> Sample | None:
+    def _imu(self, m: Any, sample: Sample) -> bool:
+        if m.fields_updated & _GYRO:
+            sample.gyro = np.array([m.xgyro, m.ygyro, m.zgyro], dtype=np.float64) * HALF_TURN
+        if m.fields_updated & _ACCELEROMETER:
+            sample.accelerometer = np.array([m.xacc, m.yacc, m.zacc], dtype=np.float64) * HALF_TURN
+        return True
+
+    def _rpm(self, m: Any, sample: Sample) -> bool:
+        if getattr(m, "index", 0) != 0 or not any(m.rpm):  # of other ESCs, or of none
+            return False
+        sample.rotor_speeds = _motors(m.rpm) * _RPM
+        return True
+
+    def _servo_outputs(self, m: Any, sample: Sample) -> bool:
         if m.port != 0:
-            return None
-        stamp = int(m.time_usec)
-        self._servo_time = unwrapped(stamp, self._servo_time or stamp, WRAP)
-        raw = _motors((m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
-        return self._commanded("SERVO_OUTPUT_RAW", 1000 * self._servo_time, arrival, raw)
+            return False
+        self._servo_time = unwrapped(m.time_usec, self._servo_time or m.time_usec, WRAP)
+        sample.stamp = 1000 * self._servo_time
+        return self._command(sample, (m.servo1_raw, m.servo2_raw, m.servo3_raw, m.servo4_raw))
 
-    def _commanded(self, kind: str, stamp: int, arrival: int, raw: Array) -> Sample | None:
-        """Return motor commands, 0 to 1 within the range that the motor curve states."""
-        curve = self._vehicle.motor_curve
-        low, high = (0.0, 1.0) if curve is None else curve.command
-        if high <= 1.5 < float(np.max(raw)):
-            low, high = _PULSES
-        command = np.clip((raw - low) / (high - low), 0.0, 1.0)
-        return Sample(kind, stamp, arrival, command=command)
+    def _command(self, sample: Sample, values: Any) -> bool:
+        raw = _motors(values)
+        counts = _PULSES if float(np.max(raw)) > LARGEST_SHARE else None
+        sample.command = command_of(raw, self._vehicle, counts)
+        return True
 
-    def _battery(self, m: Any, arrival: int) -> Sample | None:
+    def _battery(self, m: Any, sample: Sample) -> bool:
         cells = [v for v in m.voltages if 0 < v < _MISSING_CELL]
-        if not cells or m.id != 0:
-            return None
-        return Sample("BATTERY_STATUS", None, arrival, voltage=1e-3 * sum(cells))
+        sample.voltage = 1e-3 * sum(cells)
+        return bool(cells) and m.id == 0
 
-    def _system_status(self, m: Any, arrival: int) -> Sample | None:
-        if not 0 < m.voltage_battery < _MISSING_CELL or "BATTERY_STATUS" in self.seen:
-            return None
-        return Sample("SYS_STATUS", None, arrival, voltage=1e-3 * m.voltage_battery)
+    def _system_status(self, m: Any, sample: Sample) -> bool:
+        sample.voltage = 1e-3 * m.voltage_battery
+        return 0 < m.voltage_battery < _MISSING_CELL and "BATTERY_STATUS" not in self.seen
 
 
 def _motors(values: Any) -> Array:
@@ -196,13 +167,13 @@ def _motors(values: Any) -> Array:
     return np.abs(np.array([values[i] for i in _ORDER], dtype=np.float64))
 
 
-def _finite(sample: Sample) -> bool:
-    parts = (
-        sample.position,
-        sample.quaternion,
-        sample.rotor_speeds,
-        sample.command,
-        sample.gyro,
-        sample.accelerometer,
-    )
-    return all(part is None or bool(np.isfinite(part).all()) for part in parts)
+def _check_finite(sample: Sample) -> bool:
+    """Return whether there is something in a sample.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    parts = [getattr(sample, field.name) for field in fields(Measured)]
+    if not all(np.isfinite(part).all() for part in parts if part is not None):
+        raise ValueError("not finite")
+    return True

@@ -9,11 +9,12 @@ frame ``?frame=world``.
 
 import importlib
 import time
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ...identification.logs.readers.topic_map import topic_map
+from ...identification.logs.readers.topic_map import Topic, topic_map
 from ...runtime.errors import InputError
 from ..filtering import Output
 from ..messages import Sample
@@ -22,9 +23,9 @@ from .ros_conversions import (
     ACCELERATION,
     BUILT,
     WRENCH,
-    Converter,
     acceleration_message,
-    make_converter,
+    sample_of,
+    topic_of,
     wrench_message,
 )
 
@@ -81,11 +82,11 @@ class Ros2(Source):
         names = {part: setting["topic"] for part, setting in self._settings.items()}
         kinds = self._kinds(set(names.values()))
         for part, topic in names.items():
-            converter = make_converter(part, topic, kinds[topic], self._settings[part])
+            read = topic_of(part, topic, kinds[topic], self._settings[part])
             self._node.create_subscription(
                 get_message(kinds[topic]),
                 topic,
-                lambda message, converter=converter: self._take(converter, message),
+                partial(self._take, read),
                 qos.qos_profile_sensor_data,
             )
         self._types = {name: get_message(name) for name in BUILT}
@@ -111,8 +112,8 @@ class Ros2(Source):
                 )
             self._executor.spin_once(timeout_sec=0.1)
 
-    def _take(self, converter: Converter, message: Any) -> None:
-        sample = converter.sample(message, time.monotonic_ns())
+    def _take(self, topic: Topic, message: Any) -> None:
+        sample = sample_of(topic, message, time.monotonic_ns())
         if sample is None:
             self.tallies.counts["malformed"] += 1
         else:

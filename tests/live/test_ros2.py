@@ -24,7 +24,8 @@ from windwrench.live.sources.ros_conversions import (
     ACCELERATION,
     WRENCH,
     acceleration_message,
-    make_converter,
+    sample_of,
+    topic_of,
     wrench_message,
 )
 
@@ -34,27 +35,27 @@ def test_a_pose_that_goes_over_the_wire():
     message = pose(1_700_000_000_123_456_789, flown["position"][7], flown["quaternion"][7])
     data = STORE.serialize_cdr(message, "geometry_msgs/msg/PoseStamped")
     again = STORE.deserialize_cdr(data, "geometry_msgs/msg/PoseStamped")
-    converter = make_converter("pose", "/p", "geometry_msgs/msg/PoseStamped", {})
-    sample = converter.sample(again, 5)
+    topic = topic_of("pose", "/p", "geometry_msgs/msg/PoseStamped", {})
+    sample = sample_of(topic, again, 5)
     assert sample.stamp == 1_700_000_000_123_456_789
     np.testing.assert_array_equal(sample.position, flown["position"][7])
     np.testing.assert_allclose(sample.quaternion, flown["quaternion"][7], rtol=1e-15)
-    turned = make_converter("pose", "/p", "geometry_msgs/msg/PoseStamped", {"frame": "ned"})
-    ned = turned.sample(again, 5)
+    turned = topic_of("pose", "/p", "geometry_msgs/msg/PoseStamped", {"frame": "ned"})
+    ned = sample_of(turned, again, 5)
     np.testing.assert_array_equal(ned.position, flown["position"][7] * [1, -1, -1])
 
 
 def test_rotors_of_a_multi_array_need_a_unit():
     kind = "std_msgs/msg/Float64MultiArray"
     with pytest.raises(InputError, match="does not say its unit"):
-        make_converter("rotors", "/m", kind, {})
-    converter = make_converter("rotors", "/m", kind, {"unit": "rpm", "order": [4, 3, 2, 1]})
-    sample = converter.sample(array([10, 20, 30, 40]), 0)
+        topic_of("rotors", "/m", kind, {})
+    topic = topic_of("rotors", "/m", kind, {"unit": "rpm", "order": [4, 3, 2, 1]})
+    sample = sample_of(topic, array([10, 20, 30, 40]), 0)
     np.testing.assert_allclose(sample.rotor_speeds, np.array([40, 30, 20, 10]) * np.pi / 30)
     assert sample.stamp is None
-    assert converter.sample(array([1.0, 2.0]), 0) is None
+    assert sample_of(topic, array([1.0, 2.0]), 0) is None
     with pytest.raises(InputError, match="unknown type"):
-        make_converter("pose", "/m", kind, {})
+        topic_of("pose", "/m", kind, {})
 
 
 def test_the_wrench_and_its_twin_as_ros_writes_them():

@@ -55,19 +55,17 @@ from ....runtime.errors import InputError, unknown_name
 from ....runtime.file_limits import LIMITS
 from ....runtime.regular_files import check_regular, open_regular
 from ..flight_log import FlightLog
-from ..rotor_orders import ORDERS
 from .ros_messages import (
     ARRAYS,
     COMMAND_UNITS,
     PARTS,
     SPEED_UNITS,
     VARIANTS,
-    Kind,
     definitions,
     stamp,
 )
-from .streams import Stream, flight_log, from_ned
-from .topic_map import topic_map
+from .streams import Stream, flight_log
+from .topic_map import Topic, topic_map
 from .unpacking import check_bag_files, limited_unpacking, refuse_packed_files
 
 Array = NDArray[np.float64]
@@ -101,29 +99,6 @@ class _Bag:
     messages: Callable[[str], Iterator[tuple[int, Any]]]  # topic to (recorded at ns, message)
 
 
-@dataclass(frozen=True)
-class _Choice:
-    """A topic that was chosen for a part."""
-
-    topic: str
-    kind: Kind
-    setting: Mapping[str, Any]
-    why: str = ""  # where it was not the only one
-
-    @property
-    def order(self) -> list[int]:
-        """Elements of the message, from 1, that are the kit's rotors."""
-        return list(self.setting.get("order") or ORDERS[self.kind.order])
-
-    @property
-    def unit(self) -> str:
-        return str(self.setting.get("unit", self.kind.unit))
-
-    @property
-    def frame(self) -> str:
-        return str(self.setting.get("frame", self.kind.frame))
-
-
 def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> FlightLog:
     """Read a bag; ``option`` is the path of a topic map, the default ``NAME.topics.yaml`` beside
     the bag if it is there.
@@ -145,8 +120,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
                 doubts.append(f"no {part}: {error}")  # nobody asked for it
     notes = [
         *(
-            f"{part}: topic {chosen[part].topic} ({bag.types[chosen[part].topic]})"
-            + chosen[part].why
+            f"{part}: topic {chosen[part].name} ({bag.types[chosen[part].name]})" + chosen[part].why
             for part in streams
         ),
         *(_part_note(part, chosen[part]) for part in streams if part != "voltage"),
@@ -157,7 +131,7 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
         raise InputError(f"{path}: {doubts[0] if doubts else 'nothing in it can be read'}")
     origin = min(int(nanoseconds[0]) for nanoseconds, _, _ in streams.values())
     made = {
-        part: Stream(chosen[part].topic, 1e-9 * (nanoseconds - origin).astype(np.float64), values)
+        part: Stream(chosen[part].name, 1e-9 * (nanoseconds - origin).astype(np.float64), values)
         for part, (nanoseconds, values, _) in streams.items()
     }
     return flight_log(
@@ -173,13 +147,13 @@ def read(path: Path, vehicle: Vehicle | None = None, option: str = "") -> Flight
     )
 
 
-def _part_note(part: str, choice: _Choice) -> str:
+def _part_note(part: str, choice: Topic) -> str:
     """Return what was assumed of a part's frame or order."""
     if part in ("rotors", "command"):
         states = "" if "order" in choice.setting else _order_source(choice)
         pulses = ""
         if part == "command" and choice.unit == "us":
-            low, high = choice.setting.get("range", choice.kind.range)
+            low, high = choice.range
             pulses = f"; pulses of {low:g} to {high:g} us are the commands 0 to 1"
         return (
             f"{part}: rotors 1, 2, 3, 4 are elements {', '.join(map(str, choice.order))} of the "
@@ -193,7 +167,7 @@ def _part_note(part: str, choice: _Choice) -> str:
     return f"{part}: turned half a turn about x, from z down to z up"
 
 
-def _order_source(choice: _Choice) -> str:
+def _order_source(choice: Topic) -> str:
     named = choice.kind.order
     return "" if named == "windwrench" else f", as on {named}, which the bag does not state"
 
@@ -321,13 +295,13 @@ def _decoded(raw: Any, kind: str, stores: list[Any], ros1: bool) -> Any:
 
 def _choices(
     bag: _Bag, settings: Mapping[str, Mapping[str, Any]], where: str
-) -> tuple[dict[str, _Choice], list[str]]:
+) -> tuple[dict[str, Topic], list[str]]:
     """Return the topic of each part, and notes on parts that are not there.
 
     Raises:
         InputError: a part that is needed is missing or ambiguous.
     """
-    chosen: dict[str, _Choice] = {}
+    chosen: dict[str, Topic] = {}
     refused: dict[str, InputError] = {}
     for part in PARTS:
         try:
@@ -350,7 +324,7 @@ def _choices(
     return chosen, doubts
 
 
-def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> _Choice | None:
+def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> Topic | None:
     """Return the topic of a part: the one named, or the one that the rules above leave; None: the
     bag has none.
 
@@ -373,7 +347,7 @@ def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> _Ch
                 f"{bag.path}: {part}: topic {topic} is a {kind}, which states no unit; expected "
                 f"unit: {', '.join(_units(part))} in {where}"
             )
-        return _Choice(topic, kinds[kind], setting)
+        return Topic(topic, part, kinds[kind], setting)
     # an array of numbers may be anything until somebody names its unit
     fitting = [kind for kind in kinds if kind not in ARRAYS or "unit" in setting]
     found = sorted(topic for topic, kind in bag.types.items() if kind in fitting)
@@ -390,7 +364,7 @@ def _choose(bag: _Bag, part: str, setting: Mapping[str, Any], where: str) -> _Ch
         if len(several) > 1:
             others = ", ".join(topic for topic in several if topic not in found)
             why = f", chosen by its name before {others}; a topic map says another"
-        return _Choice(found[0], kinds[bag.types[found[0]]], setting, why)
+        return Topic(found[0], part, kinds[bag.types[found[0]]], setting, why)
     if not found:
         return None
     raise InputError(
@@ -443,11 +417,11 @@ def _nothing(bag: _Bag, part: str, where: str) -> InputError:
     )
 
 
-def _stream(bag: _Bag, part: str, choice: _Choice) -> tuple[NDArray[np.int64], Array, list[str]]:
+def _stream(bag: _Bag, part: str, choice: Topic) -> tuple[NDArray[np.int64], Array, list[str]]:
     """Return times (N,) in ns, values (N, K) in the kit's frames, order and units, and notes of a
     topic.
     """
-    topic = choice.topic
+    topic = choice.name
     recorded, stamped, values = array("q"), array("q"), array("d")
     for index, (received, message) in enumerate(bag.messages(topic)):
         if index >= LIMITS.table_rows:
@@ -465,16 +439,7 @@ def _stream(bag: _Bag, part: str, choice: _Choice) -> tuple[NDArray[np.int64], A
         raise InputError(
             f"{bag.path}: {part}: topic {topic} has no messages; expected at least two"
         )
-    numbers = np.array(values).reshape(len(recorded), -1)
-    if part == "imu" and choice.frame == "ned":
-        numbers = numbers * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-    if part == "pose" and choice.frame == "ned":
-        numbers = np.column_stack(from_ned(numbers[:, :3], numbers[:, 3:]))
-    if part == "command":
-        numbers = np.nan_to_num(numbers, nan=0.0)  # NaN: the motor is off
-        if choice.unit == "us" or "range" in choice.setting:
-            low, high = choice.setting.get("range", choice.kind.range)
-            numbers = np.clip((numbers - low) / (high - low), 0.0, 1.0)
+    numbers = choice.in_kit_units(np.array(values).reshape(len(recorded), -1))
     received_at, sampled_at = np.array(recorded), np.array(stamped)
     if not np.any(sampled_at):
         return received_at, numbers, [f"{topic}: no time stamps; the times of recording were taken"]
@@ -490,8 +455,8 @@ def _stream(bag: _Bag, part: str, choice: _Choice) -> tuple[NDArray[np.int64], A
     return sampled_at, numbers, []
 
 
-def _four(found: Any, choice: _Choice, where: str, part: str) -> Array:
-    """Return rotor speeds (4,) in rad/s, or commands (4,), in the kit's order."""
+def _four(found: Any, choice: Topic, where: str, part: str) -> Array:
+    """Return rotor speeds (4,) or commands (4,) of a message, in the kit's order."""
     numbers: Array = np.asarray(found, dtype=np.float64)
     what = "rotor speed(s)" if part == "rotors" else "command(s)"
     order = choice.setting.get("order")
@@ -504,5 +469,4 @@ def _four(found: Any, choice: _Choice, where: str, part: str) -> Array:
             f"{where}: {len(numbers)} {what}; expected at least {max(choice.order)} by the order "
             f"{choice.order}"
         )
-    chosen: Array = numbers[np.array(choice.order) - 1]
-    return chosen * SPEED_UNITS[choice.unit] if part == "rotors" else chosen
+    return choice.four(numbers)

@@ -1,13 +1,21 @@
 """The topic map of a bag: a small YAML file that says which topic is what."""
 
 import os
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ....runtime.errors import InputError, unknown_name
 from ....runtime.yaml_file import read_yaml
 from ..rotor_orders import ORDERS
-from .ros_messages import COMMAND_UNITS, SPEED_UNITS
+from .ros_messages import COMMAND_UNITS, SPEED_UNITS, Kind
+from .streams import from_ned
+
+Array = NDArray[np.float64]
 
 _KEYS = {
     "pose": ("topic", "frame"),
@@ -17,6 +25,61 @@ _KEYS = {
     "imu": ("topic", "frame"),
 }
 _FRAMES = ("flu", "ned")
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic that holds a part, and how its numbers are read."""
+
+    name: str
+    part: str  # pose, rotors, command, voltage or imu
+    kind: Kind
+    setting: Mapping[str, Any]  # of the topic map
+    why: str = ""  # it was chosen, where it was not the only one
+
+    @property
+    def order(self) -> list[int]:
+        """Elements of the message, from 1, that are the kit's rotors."""
+        return list(self.setting.get("order") or ORDERS[self.kind.order])
+
+    @property
+    def unit(self) -> str:
+        """Of rotor speeds or commands; nothing: not known."""
+        return str(self.setting.get("unit", self.kind.unit))
+
+    @property
+    def frame(self) -> str:
+        """Of a pose or an inertial sensor: flu or ned."""
+        return str(self.setting.get("frame", self.kind.frame))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """What stands for the commands 0 and 1."""
+        usual = self.kind.range if self.unit == "us" else (0.0, 1.0)
+        low, high = self.setting.get("range", usual)
+        return float(low), float(high)
+
+    def four(self, values: Array) -> Array:
+        """Return the values of a message (K,) that belong to the kit's rotors (4,)."""
+        return np.asarray(values[np.array(self.order) - 1])
+
+    def in_kit_units(self, values: Array) -> Array:
+        """Return the values (N, K) of messages in the kit's units and frames.
+
+        A pose is position and scalar-first quaternion, an IMU's sample accelerometer and gyro. The
+        values of rotors are in the kit's order (``four``); a command of NaN is a motor that is off.
+        """
+        if self.part == "rotors":
+            return values * SPEED_UNITS[self.unit]
+        if self.part == "command":
+            low, high = self.range
+            share = (np.nan_to_num(values, nan=low) - low) / (high - low)
+            return np.asarray(np.clip(share, 0.0, 1.0))
+        if self.part in ("pose", "imu") and self.frame == "ned":
+            if self.part == "pose":
+                return np.column_stack(from_ned(values[:, :3], values[:, 3:]))
+            return np.asarray(values * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0]))
+        return values
 
 
 def topic_map(path: Path, option: str) -> tuple[dict[str, dict[str, Any]], str]:
