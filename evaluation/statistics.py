@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import bootstrap
 
 from ..runtime.errors import InputError
 
@@ -37,34 +38,6 @@ def score_matrix(scores: ArrayLike) -> Array:
 def mean(scores: ArrayLike) -> Any:
     """Return the mean over runs and tasks."""
     return score_matrix(scores).mean(axis=_LAST_TWO)
-
-
-def interquartile_mean(scores: ArrayLike) -> Any:
-    """Return the mean of the middle half of all scores, runs and tasks together; a quarter is cut
-    off at either end.
-
-    Of n scores, ``floor(n / 4)`` go at either end.
-    """
-    matrix = score_matrix(scores)
-    flat = np.sort(matrix.reshape(*matrix.shape[:-2], -1), axis=-1)
-    cut = flat.shape[-1] // 4
-    return flat[..., cut : flat.shape[-1] - cut].mean(axis=-1)
-
-
-def optimality_gap(scores: ArrayLike, target: float = 1.0) -> Any:
-    """Return by how much scores fall short of ``target`` on average; what is above counts as the
-    target.
-    """
-    return target - np.minimum(score_matrix(scores), target).mean(axis=_LAST_TWO)
-
-
-def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
-    """Return, for each of ``thresholds`` (n,), the share (..., n) of all scores
-    that are above it.
-    """
-    matrix = score_matrix(scores)
-    limits = np.atleast_1d(np.asarray(thresholds, dtype=np.float64))
-    return np.stack([(matrix > limit).mean(axis=_LAST_TWO) for limit in limits], axis=-1)
 
 
 def probability_of_improvement(x: ArrayLike, y: ArrayLike) -> Any:
@@ -101,50 +74,28 @@ def paired_wins(x: ArrayLike, y: ArrayLike) -> Any:
     return ((a < rival) + 0.5 * (a == rival)).mean(axis=_LAST_TWO)
 
 
-def stratified_bootstrap(
-    statistic: Callable[..., Any],
-    *matrices: ArrayLike,
-    resamples: int = _RESAMPLES,
-    seed: int = 0,
-    level: float = 0.95,
-    tasks: bool = False,
+def episode_bootstrap(
+    statistic: Callable[..., Any], scores: ArrayLike, resamples: int = _RESAMPLES
 ) -> tuple[float, float]:
-    """Return the percentile bootstrap interval of a statistic of one or more score matrices.
-
-    Runs are drawn anew with replacement for each task by itself (stratified by task). With
-    ``tasks``, which a paired comparison needs, tasks are drawn anew first, the same ones in every
-    matrix: the interval then speaks of other episodes, too, and not of other training seeds alone.
+    """Return the 95 % percentile bootstrap interval of a statistic over the tasks of one run.
 
     Args:
-        statistic: takes as many stacks (k, runs, tasks) as there are matrices; returns (k,).
-        *matrices: (runs, tasks).
-        resamples: how often everything is drawn.
-        seed: of the draws.
-        level: share of the draws inside the interval.
-        tasks: whether tasks are drawn, too.
-
-    Raises:
-        InputError: a level that is no share, or matrices that do not have the same tasks.
+        statistic: takes a stack (k, tasks) of scores; returns (k,).
+        scores: (tasks,), or (1, tasks).
+        resamples: how often tasks are drawn.
     """
-    given = [score_matrix(m) for m in matrices]
-    if not 0.0 < level < 1.0:
-        raise InputError(f"bootstrap: level must lie between 0 and 1, got {level}")
-    if tasks:
-        _same_tasks(*given)
-    rng = np.random.default_rng(seed)
-    count = given[0].shape[1]
-    step = max(_AT_ONCE // max(m.size for m in given), 1)
-    values = []
-    for first in range(0, resamples, step):
-        k = min(step, resamples - first)
-        columns = rng.integers(count, size=(k, 1, count)) if tasks else None
-        drawn = []
-        for m in given:
-            rows = rng.integers(len(m), size=(k, *m.shape))
-            drawn.append(m[rows, np.arange(m.shape[1]) if columns is None else columns])
-        values.append(np.asarray(statistic(*drawn)))
-    low, high = np.quantile(np.concatenate(values), [(1.0 - level) / 2.0, (1.0 + level) / 2.0])
-    return float(low), float(high)
+    (run,) = score_matrix(scores)
+    if len(run) == 1:  # scipy refuses a single number
+        return float(run[0]), float(run[0])
+    drawn = bootstrap(
+        (run,),
+        lambda x, axis: statistic(np.expand_dims(x, -2)),
+        n_resamples=resamples,
+        vectorized=True,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    )
+    return interval_of(drawn.bootstrap_distribution)
 
 
 def hierarchical_draws(
@@ -152,7 +103,6 @@ def hierarchical_draws(
     *matrices: ArrayLike,
     resamples: int = _RESAMPLES,
     seed: int = 0,
-    blocks: int = 1,
 ) -> Array:
     """Return a statistic of one or more score matrices over many draws of policies and episodes.
 
@@ -168,26 +118,20 @@ def hierarchical_draws(
         *matrices: (runs, tasks).
         resamples: how often everything is drawn.
         seed: of the draws.
-        blocks: how many blocks of the same tasks stand side by side in the columns: one for each
-            world in which they were flown. The same tasks are drawn in each.
 
     Returns:
         (resamples,).
 
     Raises:
-        InputError: matrices that do not have the same tasks, or not that many blocks of them.
+        InputError: matrices that do not have the same tasks.
     """
     given = _same_tasks(*matrices)
-    whole = given[0].shape[1]
-    if blocks < 1 or whole % blocks:
-        raise InputError(f"bootstrap: {whole} tasks do not make {blocks} equal blocks")
-    rng, count = np.random.default_rng(seed), whole // blocks
+    rng, count = np.random.default_rng(seed), given[0].shape[1]
     step = max(_AT_ONCE // max(m.size for m in given), 1)
     values = []
     for first in range(0, resamples, step):
         k = min(step, resamples - first)
         columns = rng.integers(count, size=(k, max(count - 1, 1)))
-        columns = np.concatenate([columns + b * count for b in range(blocks)], axis=1)
         drawn = []
         for m in given:
             rows = rng.integers(len(m), size=(k, max(len(m) - 1, 1)))
@@ -214,15 +158,12 @@ def hierarchical_bootstrap(
     resamples: int = _RESAMPLES,
     seed: int = 0,
     level: float = 0.95,
-    blocks: int = 1,
 ) -> tuple[float, float]:
     """Return the percentile interval of ``hierarchical_draws``; arguments and errors are its own,
     and those of ``interval_of``.
     """
-    return interval_of(
-        hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed, blocks=blocks),
-        level,
-    )
+    draws = hierarchical_draws(statistic, *matrices, resamples=resamples, seed=seed)
+    return interval_of(draws, level)
 
 
 def sign_probability(draws: ArrayLike, null: float = 0.0) -> float:

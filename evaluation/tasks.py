@@ -23,7 +23,7 @@ from ..envs.watched_fan_tracking import scenario_env
 from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
-from .statistics import hierarchical_bootstrap, stratified_bootstrap
+from .statistics import episode_bootstrap, hierarchical_bootstrap
 
 STANDARD_TASK = "FanTracking"
 
@@ -68,7 +68,7 @@ TASKS: dict[str, Task] = {
         ("static", "base"),
         shipped_policies,
         bounds=("hover", "limit", "oracle"),
-        interval=partial(stratified_bootstrap, tasks=True),
+        interval=episode_bootstrap,
     ),
     "FanTracking2D": Task(
         FanTracking2DEnv,
