@@ -149,7 +149,7 @@ def _learn(
 ) -> dict[str, Any]:
     from ..training.algorithms import run_training
     from ..training.configuration import load_config
-    from ..training.train import Progress, read_progress
+    from ..training.run import Progress, read_progress
 
     given = load_config(algorithm, overrides, config)
     folder = results_folder(

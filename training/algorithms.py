@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .configuration import Config
-from .train import Progress
+from .run import Progress
 
 
 def run_training(

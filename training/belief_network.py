@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from ..controllers.trained_policy import Weights, layers_of
-from .learners import ACTIVATIONS, array_of, dense_weights
+from .learners import cell_weights, dense_layers, dense_weights
 
 Array = NDArray[np.float32]
 
@@ -51,11 +51,7 @@ class BeliefNetwork(torch.nn.Module):
         if cell == "lstm":  # it begins by keeping what it has, or it never learns to keep it long
             with torch.no_grad():
                 self.cell.bias_ih_l0[state : 2 * state] = 1.0
-        layers: list[torch.nn.Module] = []
-        for width in net:
-            layers += [torch.nn.Linear(state, width), ACTIVATIONS[activation]()]
-            state = width
-        self.dense = torch.nn.Sequential(*layers, torch.nn.Linear(state, 2 * taught))
+        self.dense = dense_layers([state, *net, 2 * taught], activation)
 
     def forward(
         self, frames: torch.Tensor, state: Any = None
@@ -72,16 +68,7 @@ class BeliefNetwork(torch.nn.Module):
         """Return the weights of the policy that commands ``shares`` (taught,), or (commands,
         taught), of the means.
         """
-        weights: Weights = {
-            f"{self._name}_{name}": array_of(tensor)
-            for name, tensor in (
-                ("input", self.cell.weight_ih_l0),
-                ("hidden", self.cell.weight_hh_l0),
-                ("input_bias", self.cell.bias_ih_l0),
-                ("hidden_bias", self.cell.bias_hh_l0),
-            )
-        }
-        weights |= dense_weights(self.dense)
+        weights = cell_weights(self._name, self.cell) | dense_weights(self.dense)
         last = layers_of(weights) - 1
         for name in (f"weight{last}", f"bias{last}"):
             weights[name] = np.atleast_2d(shares) @ weights[name][: self.taught]

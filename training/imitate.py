@@ -5,9 +5,7 @@ and a network is fitted to all that was said so far. What remains of the error t
 observation does not hold, or the network cannot.
 """
 
-import time
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +15,13 @@ from numpy.typing import NDArray
 
 from ..controllers.fan_laws import Oracle
 from ..controllers.features import History
-from ..controllers.trained_policy import TrainedPolicy, Weights
+from ..controllers.trained_policy import TrainedPolicy
 from ..evaluation.episodes import DECISIONS
 from .configuration import Config, features_of
-from .learners import ACTIVATIONS, dense_weights
-from .seeds import training_seed, validation_seeds
-from .train import Progress, card_of, claim, read_progress, take_stock, write_json
-from .training_envs import check_training_env, make_training_env
+from .learners import dense_layers, dense_weights
+from .run import Progress, Run
+from .seeds import training_seed
+from .training_envs import make_training_env
 
 Array = NDArray[np.float32]
 
@@ -43,64 +41,31 @@ def imitate(
     Raises:
         InputError: as ``train``.
     """
-    check_training_env(scenario)
+    run = Run(config, scenario, seed, folder, report)
+    if run.is_finished():
+        return run.best
     features = features_of(config)
-    claim(folder, config, scenario, seed)
-    done = read_progress(folder)
-    if done is not None and done.steps and done.steps[-1] >= config["steps"]:
-        return folder / "best.npz"
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     env = make_training_env(scenario, config["estimator"], features.sources)
-    judge, seeds = (
-        make_training_env(scenario, sources=features.sources),
-        validation_seeds(config["validation"]["episodes"]),
-    )
-    network = _network(features.size, config)
+    network = dense_layers([features.size, *config["net"], 1], config["activation"])
     inputs: list[Array] = []
     labels: list[Array] = []
-    flown, episode, validated, began = 0, 0, 0, time.perf_counter()
-    progress = Progress()
+    flown, oracle, pilot = 0, Oracle(config["gain"]), None
     per_round = -(-config["steps"] // config["rounds"])
-    oracle = Oracle(config["gain"])
     while flown < config["steps"]:
-        pilot = (
-            None
-            if flown == 0
-            else TrainedPolicy(card_of(config, scenario, seed, flown, True), _weights(network))
-        )
         until = min(flown + per_round, config["steps"])
         while flown < until:
-            seen, said = _fly(env, pilot, oracle, config, training_seed(seed, 0, episode))
+            seen, said = _fly(env, pilot, oracle, config, training_seed(seed, 0, len(inputs)))
             inputs.append(seen)
             labels.append(said)
             flown += len(said)
-            episode += 1
             advance(flown)
         _fit(network, np.concatenate(inputs), np.concatenate(labels), config, seed + flown)
-        if flown // config["validation"]["every"] == validated and flown < config["steps"]:
-            continue
-        validated = flown // config["validation"]["every"]
-        card = card_of(config, scenario, seed, flown, True)
-        policy = TrainedPolicy(card, _weights(network))
-        take_stock(policy, card, progress, judge, seeds, folder)
-        progress.seconds = time.perf_counter() - began
-        write_json(asdict(progress), folder / "progress.json")
-        report(progress)
-    return folder / "best.npz"
-
-
-def _network(size: int, config: Config) -> torch.nn.Sequential:
-    act = ACTIVATIONS[config["activation"]]
-    layers: list[torch.nn.Module] = []
-    for width in config["net"]:
-        layers += [torch.nn.Linear(size, width), act()]
-        size = width
-    return torch.nn.Sequential(*layers, torch.nn.Linear(size, 1))
-
-
-def _weights(network: torch.nn.Sequential) -> Weights:
-    return dense_weights(network)
+        pilot = TrainedPolicy(run.card(flown), dense_weights(network))
+        if run.is_due(flown, flown >= config["steps"]):
+            run.take_stock(pilot)
+    return run.best
 
 
 def _fly(

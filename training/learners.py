@@ -2,10 +2,14 @@
 policy's weights.
 """
 
+import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
 from ..controllers.trained_policy import Weights
@@ -40,54 +44,26 @@ def make_learner(config: Config, env: VecEnv, seed: int) -> Any:
         "device": "cpu",
         "verbose": 0,
     }
-    learner = _LEARNERS[algorithm](config, env, policy, given)
-    return learner
-
-
-def _sac(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]) -> Any:
-    if config["activation"] == "relu":
+    kind: Any = {"sac": SAC, "td3": TD3, "ppo": PPO}.get(algorithm)
+    network: Any = "MlpPolicy"
+    if algorithm == "sac" and config["activation"] == "relu":
         from .fast_sac import FastSAC
 
-        return FastSAC("MlpPolicy", env, policy_kwargs=policy, **given)
-    from stable_baselines3 import SAC
+        kind = FastSAC
+    elif algorithm == "td3":
+        given["action_noise"] = NormalActionNoise(np.zeros(1), np.full(1, config["noise"]))
+    elif algorithm == "recurrent-ppo":
+        from sb3_contrib import RecurrentPPO
 
-    return SAC("MlpPolicy", env, policy_kwargs=policy, **given)
+        from .fast_lstm import FastLstmPolicy
 
-
-def _td3(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]) -> Any:
-    from stable_baselines3 import TD3
-    from stable_baselines3.common.noise import NormalActionNoise
-
-    noise = NormalActionNoise(np.zeros(1), np.full(1, config["noise"]))
-    return TD3("MlpPolicy", env, policy_kwargs=policy, action_noise=noise, **given)
-
-
-def _ppo(config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]) -> Any:
-    from stable_baselines3 import PPO
-
-    return PPO("MlpPolicy", env, policy_kwargs=_actor_critic(config, policy), **given)
-
-
-def _recurrent_ppo(
-    config: Config, env: VecEnv, policy: dict[str, Any], given: dict[str, Any]
-) -> Any:
-    from sb3_contrib import RecurrentPPO
-
-    from .fast_lstm import FastLstmPolicy
-
-    policy = {**_actor_critic(config, policy), "lstm_hidden_size": config["lstm"]}
-    return RecurrentPPO(FastLstmPolicy, env, policy_kwargs=policy, **given)
-
-
-def _actor_critic(config: Config, policy: dict[str, Any]) -> dict[str, Any]:
-    return {
-        **policy,
-        "log_std_init": config["log_std_init"],
-        "net_arch": {"pi": config["net"], "vf": config["net"]},
-    }
-
-
-_LEARNERS = {"sac": _sac, "td3": _td3, "ppo": _ppo, "recurrent-ppo": _recurrent_ppo}
+        kind, network = RecurrentPPO, FastLstmPolicy
+        policy["lstm_hidden_size"] = config["lstm"]
+    if algorithm in ("ppo", "recurrent-ppo"):
+        policy["log_std_init"] = config["log_std_init"]
+        policy["net_arch"] = {"pi": config["net"], "vf": config["net"]}
+    learner = kind(network, env, policy_kwargs=policy, **given)
+    return learner
 
 
 def weights_of(learner: Any, algorithm: str) -> Weights:
@@ -103,15 +79,26 @@ def weights_of(learner: Any, algorithm: str) -> Weights:
     else:
         layers = [*policy.mlp_extractor.policy_net, policy.action_net]
         if algorithm == "recurrent-ppo":
-            cell = policy.lstm_actor
-            for name, tensor in (
-                ("lstm_input", cell.weight_ih_l0),
-                ("lstm_hidden", cell.weight_hh_l0),
-                ("lstm_input_bias", cell.bias_ih_l0),
-                ("lstm_hidden_bias", cell.bias_hh_l0),
-            ):
-                arrays[name] = array_of(tensor)
+            arrays = cell_weights("lstm", policy.lstm_actor)
     return arrays | dense_weights(layers)
+
+
+def dense_layers(sizes: Sequence[int], activation: str) -> torch.nn.Sequential:
+    """Return linear layers between these sizes, with an activation after each but the last."""
+    layers: list[torch.nn.Module] = []
+    for inner, outer in itertools.pairwise(sizes):
+        layers += [torch.nn.Linear(inner, outer), ACTIVATIONS[activation]()]
+    return torch.nn.Sequential(*layers[:-1])
+
+
+def cell_weights(name: str, cell: Any) -> Weights:
+    """Return the weights of a recurrent cell, ``lstm`` or ``gru``, by a policy's names."""
+    return {
+        f"{name}_input": array_of(cell.weight_ih_l0),
+        f"{name}_hidden": array_of(cell.weight_hh_l0),
+        f"{name}_input_bias": array_of(cell.bias_ih_l0),
+        f"{name}_hidden_bias": array_of(cell.bias_hh_l0),
+    }
 
 
 def dense_weights(layers: Any) -> Weights:
@@ -126,8 +113,3 @@ def dense_weights(layers: Any) -> Weights:
 def array_of(tensor: torch.Tensor) -> Any:
     """Return a copy of a tensor's numbers."""
     return tensor.detach().cpu().numpy().astype(np.float32).copy()
-
-
-def squashes(algorithm: str) -> bool:
-    """Whether an algorithm's policy sends its output through a tanh."""
-    return algorithm in ("sac", "td3", "imitation")

@@ -11,9 +11,7 @@ cell with one output. Gain and damping are chosen on the validation episodes.
 """
 
 import itertools
-import time
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +23,7 @@ from ..controllers.trained_policy import TrainedPolicy
 from .belief_network import BeliefNetwork, fit
 from .configuration import Config, features_of
 from .flown_sequences import Flights
-from .seeds import validation_seeds
-from .train import Progress, card_of, claim, read_progress, take_stock, validate, write_json
-from .training_envs import check_training_env, make_training_env
+from .run import Progress, Run
 
 _LEAST_RATE = 0.1  # share of the learning rate that is left at the end of a round
 
@@ -48,12 +44,9 @@ def recurrent_imitation(
     Raises:
         InputError: as ``train``.
     """
-    check_training_env(scenario)
-    claim(folder, config, scenario, seed)
-    done = read_progress(folder)
-    if done is not None and done.steps and done.steps[-1] >= config["steps"]:
-        return folder / "best.npz"
-    began, progress = time.perf_counter(), Progress()
+    run = Run(config, scenario, seed, folder, report)
+    if run.is_finished():
+        return run.best
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     order, rng = torch.Generator().manual_seed(seed), np.random.default_rng(seed)
@@ -66,12 +59,10 @@ def recurrent_imitation(
         config["net"],
         config["activation"],
     )
-    judge = make_training_env(scenario)
-    seeds = validation_seeds(config["validation"]["episodes"])
     pairs = list(itertools.product(config["gains"], config["dampings"]))
     shares = _shares(config, *pairs[len(pairs) // 2])
     flights = Flights(config, scenario, seed, rng)
-    validated, rate = 0, config["learning_rate"]
+    rate = config["learning_rate"]
     for number in range(config["rounds"]):
         flying, fitting = _halves(advance, flights.decisions, flights.decisions_a_round)
         flights.fly(None if number == 0 else network, shares, flying)
@@ -86,21 +77,14 @@ def recurrent_imitation(
             features.mirrored,
             fitting,
         )
-        if not last and flights.decisions // config["validation"]["every"] == validated:
+        if not run.is_due(flights.decisions, last):
             continue
-        validated = flights.decisions // config["validation"]["every"]
-        card = card_of(config, scenario, seed, flights.decisions, squash=False)
+        card = run.card(flights.decisions)
         if last and taught > 1:
-            card["gain"], card["damping"] = best = _best_pair(
-                config, network, card, pairs, judge, seeds
-            )
+            card["gain"], card["damping"] = best = _best_pair(run, network, card, pairs)
             shares = _shares(config, *best)
-        policy = TrainedPolicy(card, network.policy_weights(shares))
-        take_stock(policy, card, progress, judge, seeds, folder)
-        progress.seconds = time.perf_counter() - began
-        write_json(asdict(progress), folder / "progress.json")
-        report(progress)
-    return folder / "best.npz"
+        run.take_stock(TrainedPolicy(card, network.policy_weights(shares)))
+    return run.best
 
 
 def _halves(
@@ -124,18 +108,15 @@ def _shares(config: Config, gain: float, damping: float) -> NDArray[np.float32]:
 
 
 def _best_pair(
-    config: Config,
+    run: Run,
     network: BeliefNetwork,
     card: dict[str, Any],
     pairs: list[tuple[float, float]],
-    judge: Any,
-    seeds: list[int],
 ) -> tuple[float, float]:
     """Return gain and damping with the smallest mean RMSE on the validation episodes."""
-    tried = {
-        pair: validate(
-            TrainedPolicy(card, network.policy_weights(_shares(config, *pair))), judge, seeds
-        )[0]
-        for pair in pairs
-    }
-    return min(tried, key=lambda pair: tried[pair])
+
+    def rmse(pair: tuple[float, float]) -> float:
+        weights = network.policy_weights(_shares(run.config, *pair))
+        return run.validate(TrainedPolicy(card, weights))[0]
+
+    return min(pairs, key=rmse)

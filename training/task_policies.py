@@ -22,20 +22,18 @@ from ..controllers.task_laws import make_task_law
 from ..controllers.trained_policy import TaskPolicy, save_policy
 from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_SCALES
 from ..envs.fan_tracking_2d import SCALES_2D
-from ..evaluation.episodes import fly_episode
 from ..evaluation.tasks import TASKS
 from .belief_network import BeliefNetwork, Sequences, fit
-from .learners import dense_weights
-from .seeds import training_seed, validation_seeds
-from .train import versions
+from .learners import weights_of
+from .run import origin, validate
+from .seeds import training_seed
 
 Array = NDArray[np.float32]
 
 _STATE, _NET, _ACTIVATION = 48, [32], "tanh"  # of the GRU and the layer after it
-_WANDER, _KEEP = (
-    0.3,
-    0.9,
-)  # of the error added to half of the flights, a share of the largest action
+# of the error added to half of the flights: a share of the largest action, and what is kept of it
+# from decision to decision
+_WANDER, _KEEP = 0.3, 0.9
 _CUT = 125  # decisions of a sequence that is learned from
 # signs of a frame of FanTracking2D after half a turn about the jet's axis: it changes the sign of
 # all that is taught
@@ -66,9 +64,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
     env = known.environment(SCENARIO)
     env.preview = getattr(oracle, "preview", 0.0)
     of_fan = task == "FanTracking2D"
-    largest = MAX_COMMAND if of_fan else MAX_ACCELERATION
-    scale = np.array(SCALES_2D if of_fan else OBSERVATION_SCALES, dtype=np.float32)
-    taught = 4 if of_fan else 3
+    scale, taught = _scale(task), 4 if of_fan else 3
     torch.manual_seed(seed)
     rng, order = np.random.default_rng(seed), torch.Generator().manual_seed(seed)
     network = BeliefNetwork(len(scale), taught, "gru", _STATE, _NET, _ACTIVATION)
@@ -79,7 +75,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
         for k in range(episodes):
             flown = number * episodes + k
             student = _Student(network, scale, shares) if number else None
-            wander = _WANDER * largest * (k % 2)
+            wander = _WANDER * _largest(task) * (k % 2)
             parts += _flown(
                 env, oracle, student, training_seed(seed, 0, flown), known.decisions, wander, rng,
                 of_fan, cut, scale,
@@ -96,7 +92,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
             _TURNED if of_fan else None,
         )
         print(f"round {number}: {len(parts)} sequences, loss {loss:.4f}", flush=True)
-    card = card_of(task, "gru", seed, rounds * episodes * known.decisions, scale, largest, False)
+    card = card_of(task, "gru", seed, rounds * episodes * known.decisions, _ACTIVATION)
 
     def policy(gain: float) -> TaskPolicy:
         return TaskPolicy(
@@ -105,7 +101,7 @@ def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> Task
         )
 
     tried = [policy(gain) for gain in (_GAINS if of_fan else _GAINS[:1])]
-    return min(tried, key=lambda each: validate(each, task)[0])
+    return min(tried, key=lambda each: validate(each, env, VALIDATION, task)[0])
 
 
 def _shares(of_fan: bool, gain: float) -> Array:
@@ -172,39 +168,26 @@ def sac(task: str, seed: int, steps: int) -> TaskPolicy:
         device="cpu",
     )
     learner.learn(steps)
-    of_fan = task == "FanTracking2D"
-    scale = np.array(SCALES_2D if of_fan else OBSERVATION_SCALES, dtype=np.float32)
-    largest = MAX_COMMAND if of_fan else MAX_ACCELERATION
-    actor = learner.policy.actor
-    card = card_of(task, "sac", seed, steps, scale, largest, True) | {"activation": "relu"}
-    return TaskPolicy(card, dense_weights([*actor.latent_pi, actor.mu]))
+    return TaskPolicy(card_of(task, "sac", seed, steps, "relu"), weights_of(learner, "sac"))
 
 
-def card_of(
-    task: str, kind: str, seed: int, steps: int, scale: Array, largest: float, squash: bool
-) -> dict[str, Any]:
+def card_of(task: str, kind: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
     """Return the card of a policy."""
     return {
+        **origin(kind, SCENARIO, seed, steps, activation),
         "task": task,
-        "algorithm": kind,
-        "scenario": SCENARIO,
-        "seed": seed,
-        "steps": steps,
-        "scale": [float(f"{x:.6g}") for x in scale],
-        "largest": largest,
-        "activation": _ACTIVATION,
-        "squash": squash,
-        "versions": versions(),
+        "scale": [float(f"{x:.6g}") for x in _scale(task)],
+        "largest": _largest(task),
     }
 
 
-def validate(policy: TaskPolicy, task: str) -> tuple[float, int]:
-    """Return the mean RMSE (m) over the validation episodes, and how many were lost."""
-    known = TASKS[task]
-    env = known.environment(SCENARIO)
-    seeds = validation_seeds(VALIDATION)
-    flown = [fly_episode(env, policy, seed, decisions=known.decisions) for seed in seeds]
-    return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
+def _scale(task: str) -> Array:
+    scale = SCALES_2D if task == "FanTracking2D" else OBSERVATION_SCALES
+    return np.array(scale, dtype=np.float32)
+
+
+def _largest(task: str) -> float:
+    return MAX_COMMAND if task == "FanTracking2D" else MAX_ACCELERATION
 
 
 def main() -> None:
@@ -227,7 +210,8 @@ def main() -> None:
         policy = teach(given.task, given.seed, given.rounds, given.episodes, given.epochs)
     given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / f"{given.task}-{given.kind}-{given.seed}.npz"
-    rmse, lost = validate(policy, given.task)
+    env = TASKS[given.task].environment(SCENARIO)
+    rmse, lost = validate(policy, env, VALIDATION, given.task)
     policy.card |= {
         "validation": {"episodes": VALIDATION, "rmse_m": round(rmse, 5), "lost": lost},
         "training_cpu_s": round(time.process_time() - began),

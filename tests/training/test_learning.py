@@ -9,7 +9,8 @@ from windwrench.training.configuration import load_config
 pytest.importorskip(
     "stable_baselines3", reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'"
 )
-from windwrench.training.train import read_progress, train
+from windwrench.training.run import read_progress
+from windwrench.training.train import train
 
 
 def test_sac_learns_to_track_the_fan_in_four_thousand_decisions(tmp_path):

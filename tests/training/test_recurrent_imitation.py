@@ -20,8 +20,8 @@ import torch
 from windwrench.training.algorithms import run_training
 from windwrench.training.belief_network import BeliefNetwork, Sequences, fit
 from windwrench.training.flown_sequences import Flights
+from windwrench.training.run import card_of, read_progress
 from windwrench.training.seeds import training_seed
-from windwrench.training.train import card_of, read_progress
 
 SHORT = ["rounds=2", "epochs=1", "last_epochs=1", "state=4", "net=[8]", "gains=[2.0, 3.0]"]
 SHORT += ["dampings=[0.2]", "validation.episodes=1"]
@@ -37,7 +37,7 @@ def test_a_policy_commands_its_shares_of_what_the_network_says(cell):
     torch.manual_seed(1)
     network = BeliefNetwork(6, 3, cell, 5, [7], "relu")
     shares = np.array([2.0, 1.0, 0.3], dtype=np.float32)
-    policy = TrainedPolicy(card_of(config, "base", 0, 0, False), network.policy_weights(shares))
+    policy = TrainedPolicy(card_of(config, "base", 0, 0), network.policy_weights(shares))
     frames = np.random.default_rng(0).normal(size=(9, 6)).astype(np.float32)
     with torch.no_grad():
         means, _, _ = network(torch.from_numpy(frames)[:, None])

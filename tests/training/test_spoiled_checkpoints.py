@@ -18,7 +18,8 @@ import torch
 
 from windwrench.runtime.errors import InputError
 from windwrench.training.configuration import load_config
-from windwrench.training.train import read_progress, train
+from windwrench.training.run import read_progress
+from windwrench.training.train import train
 
 TINY = [
     "net=[8]",

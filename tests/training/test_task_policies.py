@@ -5,7 +5,9 @@ import pytest
 
 pytest.importorskip("torch", reason="torch is not installed: pip install 'windwrench[rl]'")
 
-from windwrench.training.task_policies import sac, teach, validate
+from windwrench.evaluation.tasks import TASKS
+from windwrench.training.run import validate
+from windwrench.training.task_policies import sac, teach
 
 pytestmark = pytest.mark.slow
 
@@ -21,4 +23,4 @@ def test_sac_trains_in_the_wind():
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     policy = sac("WindHover", 0, 1100)
     assert policy.card["squash"]
-    assert np.isfinite(validate(policy, "WindHover")[0])
+    assert np.isfinite(validate(policy, TASKS["WindHover"].environment("base"), 2, "WindHover")[0])

@@ -26,8 +26,9 @@ import torch
 from windwrench.training.checkpoint import load_checkpoint
 from windwrench.training.configuration import features_of
 from windwrench.training.imitate import imitate
-from windwrench.training.learners import make_learner, squashes, weights_of
-from windwrench.training.train import card_of, read_progress, train
+from windwrench.training.learners import make_learner, weights_of
+from windwrench.training.run import card_of, read_progress
+from windwrench.training.train import train
 from windwrench.training.training_envs import make_training_envs
 from windwrench.training.vec_env import FeatureVecEnv
 
@@ -144,9 +145,7 @@ def test_the_shipped_policy_does_what_the_learner_would(algorithm):
     env = make_env(config)
     learner = make_learner(config, env, 0)
     learner.learn(120)
-    policy = TrainedPolicy(
-        card_of(config, "base", 0, 120, squashes(algorithm)), weights_of(learner, algorithm)
-    )
+    policy = TrainedPolicy(card_of(config, "base", 0, 120), weights_of(learner, algorithm))
     policy.reset()
     rng, state = np.random.default_rng(0), None
     for _ in range(5):

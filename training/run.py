@@ -1,0 +1,240 @@
+"""A run of training in its folder: what the run is, how it goes, and the best policy so far."""
+
+import json
+import platform
+import re
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
+from ..evaluation.episodes import fly_episode
+from ..evaluation.tasks import STANDARD_TASK, TASKS
+from ..runtime.errors import InputError
+from ..runtime.forms import STRICT, checked
+from ..runtime.regular_files import read_json
+from ..runtime.whole_files import replaced
+from .configuration import Config, features_of
+from .seeds import FIRST_VALIDATION_SEED, validation_seeds
+from .training_envs import check_training_env, make_training_env
+
+_PACKAGES = ("stable-baselines3", "sb3-contrib", "torch", "numpy", "mujoco", "gymnasium", "numba")
+_SQUASHED = ("sac", "td3", "imitation")  # algorithms whose policy sends its output through a tanh
+
+
+@dataclass
+class Progress:
+    """How a run has gone so far; ``progress.json`` in its folder."""
+
+    __pydantic_config__ = STRICT
+
+    steps: list[int] = field(default_factory=list)  # of each validation
+    rmse_m: list[float] = field(default_factory=list)  # mean over the validation episodes
+    lost: list[int] = field(default_factory=list)  # episodes of each validation
+    best: int = -1  # index of the best
+    seconds: float = 0.0  # of all parts of the run, validation included
+
+    @property
+    def best_rmse(self) -> float:
+        """The smallest validation RMSE, m."""
+        return self.rmse_m[self.best]
+
+
+def progress_from(data: Any, path: Path) -> Progress:
+    """Return the progress that a file holds.
+
+    Raises:
+        InputError: the file holds something else.
+    """
+    try:
+        found = checked(Progress, data, str(path))
+    except InputError:
+        found = None
+    counts = {len(found.steps), len(found.rmse_m), len(found.lost)} if found else ()
+    if found is None or len(counts) > 1 or not -1 <= found.best < len(found.steps):
+        raise InputError(
+            f"{path}: does not hold the progress of a training "
+            f"({', '.join(f.name for f in fields(Progress))}); delete {path.parent} to start anew"
+        )
+    return found
+
+
+def read_progress(folder: Path) -> Progress | None:
+    """Return how a run in ``folder`` has gone; None where there is none.
+
+    Raises:
+        InputError: the file cannot be read, or holds something else.
+    """
+    path = folder / "progress.json"
+    if not path.exists():
+        return None
+    return progress_from(read_json(path, "the progress of a training"), path)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a policy was trained with."""
+    found = {"windwrench": __version__, "python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def origin(algorithm: str, scenario: str, seed: int, steps: int, activation: str) -> dict[str, Any]:
+    """Return the entries that the cards of all learned policies share."""
+    return {
+        "algorithm": algorithm,
+        "scenario": scenario,
+        "seed": seed,
+        "steps": steps,
+        "activation": activation,
+        "squash": algorithm in _SQUASHED,
+        "versions": versions(),
+    }
+
+
+def card_of(config: Config, scenario: str, seed: int, steps: int) -> dict[str, Any]:
+    """Return the card of a policy: all that is needed to fly the policy, and to train it again."""
+    last = FIRST_VALIDATION_SEED + config["validation"]["episodes"] - 1
+    return {
+        **origin(config["algorithm"], scenario, seed, steps, config["activation"]),
+        "features": asdict(features_of(config)),
+        "repeat": config["repeat"],
+        "seeds": {
+            "training": [0, FIRST_VALIDATION_SEED - 1],
+            "validation": [FIRST_VALIDATION_SEED, last],
+        },
+        "config": config,
+    }
+
+
+def validate(
+    policy: TrainedPolicy | TaskPolicy, env: Any, episodes: int, task: str = STANDARD_TASK
+) -> tuple[float, int]:
+    """Fly validation episodes with the full filter.
+
+    Returns:
+        The mean RMSE (m), and how many episodes were lost.
+    """
+    seeds, decisions = validation_seeds(episodes), TASKS[task].decisions
+    flown = [fly_episode(env, policy, seed, decisions=decisions) for seed in seeds]
+    return float(np.mean([e.rmse for e in flown])), sum(e.lost for e in flown)
+
+
+class Run:
+    """A run of training in its folder.
+
+    The folder holds ``training.json`` (what the run is), ``progress.json``, and the policies
+    ``last.npz`` and ``best.npz`` with their cards.
+
+    Args:
+        config: as of ``load_config``.
+        scenario: scenario or tier to train in.
+        seed: of the run.
+        folder: for its files.
+        report: called after each validation.
+
+    Raises:
+        InputError: a scenario that does not exist, or a folder with another run.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        scenario: str,
+        seed: int,
+        folder: Path,
+        report: Callable[[Progress], None],
+    ) -> None:
+        check_training_env(scenario)
+        self.config, self.scenario, self.seed, self.folder = config, scenario, seed, folder
+        self._claim()
+        self.progress, self._report = Progress(), report
+        self._began = time.perf_counter()
+        sources = features_of(config).sources
+        self.judge = make_training_env(scenario, sources=sources)
+        self.best = folder / "best.npz"
+
+    def _claim(self) -> None:
+        """Write what the run is into its folder."""
+        path = self.folder / "training.json"
+        run = {"config": self.config, "scenario": self.scenario, "seed": self.seed}
+        if path.exists():
+            kept = read_json(path, "what a training in this folder is")
+            if not isinstance(kept, dict):
+                raise InputError(
+                    f"{path}: does not say what the training in its folder is ({', '.join(run)}); "
+                    f"give another --out, or delete {self.folder}"
+                )
+            if {k: kept.get(k) for k in run} != run:
+                raise InputError(
+                    f"{self.folder}: holds a run with another configuration, scenario or seed; "
+                    "give another --out, or delete it"
+                )
+        write_json({**run, "versions": versions()}, path)
+
+    def is_finished(self) -> bool:
+        """Whether the folder already holds the whole run."""
+        done = read_progress(self.folder)
+        return bool(done and done.steps and done.steps[-1] >= self.config["steps"])
+
+    def resume(self, progress: Progress) -> None:
+        """Go on from the progress of an earlier part of the run."""
+        self.progress = progress
+        self._began -= progress.seconds
+
+    def is_due(self, steps: int, last: bool) -> bool:
+        """Whether a validation is due after ``steps`` decisions."""
+        every = self.config["validation"]["every"]
+        before = self.progress.steps[-1] if self.progress.steps else 0
+        return last or steps // every > before // every
+
+    def card(self, steps: int) -> dict[str, Any]:
+        """Return the card of the policy that ``steps`` decisions have taught."""
+        return card_of(self.config, self.scenario, self.seed, steps)
+
+    def validate(self, policy: TrainedPolicy) -> tuple[float, int]:
+        """Return a policy's mean RMSE (m) on validation episodes, and how many were lost."""
+        return validate(policy, self.judge, self.config["validation"]["episodes"])
+
+    def take_stock(self, policy: TrainedPolicy) -> tuple[float, int]:
+        """Validate a policy, save the policy as the last one, and as the best if it is.
+
+        Returns:
+            As ``validate``.
+        """
+        rmse, lost = self.validate(policy)
+        card, now = policy.card, self.progress
+        now.steps.append(card["steps"])
+        now.rmse_m.append(rmse)
+        now.lost.append(lost)
+        episodes = self.config["validation"]["episodes"]
+        card["validation"] = {"rmse_m": rmse, "lost": lost, "episodes": episodes}
+        save_policy(card, policy.weights, self.folder / "last.npz")
+        if now.best < 0 or rmse < now.best_rmse:
+            now.best = len(now.rmse_m) - 1
+            save_policy(card, policy.weights, self.best)
+        self.write_progress()
+        self._report(now)
+        return rmse, lost
+
+    def write_progress(self) -> None:
+        """Write how the run goes to ``progress.json``."""
+        self.progress.seconds = time.perf_counter() - self._began
+        write_json(asdict(self.progress), self.folder / "progress.json")
+
+
+def write_json(data: Any, path: Path) -> None:
+    """Write JSON at once or not at all, each list of numbers on a line of its own."""
+    text = json.dumps(data, indent=1, allow_nan=False)
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text)
+    with replaced(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
