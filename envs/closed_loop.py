@@ -59,7 +59,7 @@ from .plant import (
     sense,
 )
 from .suspended_load import SuspendedLoad, hang, pull, set_down
-from .wind.field import Wind, add_wind, check_wind
+from .wind.field import Calls, Sum, Wind, add_winds
 
 _C_FUNCTION = ctypes.CFUNCTYPE(None)
 FASTEST = 200.0  # m/s and rad/s; a vehicle is not
@@ -75,6 +75,11 @@ LOOP = np.dtype(
         ("flight", FLIGHT),
         ("fan", FAN),
         ("ticks", "i8"),  # since the start of the episode; below zero while the filter settles
+        ("winds", "i8"),  # how many blow
+        ("time", "f8", (1,)),  # s, of the winds
+        ("rotation", "f8", (3, 3)),  # of the vehicle, body to world, when the winds blew last
+        ("points", "f8", (3, STATIONS)),  # m, world, of the vehicle's stations then
+        ("air", "f8", (3, STATIONS)),  # m/s, world, of the winds there
         ("action", "f8", (3,)),  # m/s2, beside the flight loop's own
         ("model_in_loop", "i8"),  # whether the flight loop counters the effects of its model
         ("accelerometer_sigma", "f8"),  # m/s2, a tick
@@ -98,6 +103,7 @@ class World(NamedTuple):
     qvel: Array  # (6,) MuJoCo's velocity m/s, world, and angular velocity rad/s, body
     xfrc: Array  # (6,) force N and torque Nm, world, that MuJoCo applies
     reference: Array  # (n, REFERENCE_SIZE), a row a tick; (0, REFERENCE_SIZE): none
+    winds: Calls  # (n, 2) of the compiled winds
 
 
 @dataclass(frozen=True)
@@ -134,6 +140,25 @@ class Stage:
             raise InputError(f"stage {self.name!r}: run must be a function of the loop")
         if self.before not in STAGES:
             raise unknown_name("stage", self.before, STAGES, f"stage {self.name!r}: before")
+
+
+@compiled
+def _blow(record: Record, world: World, path: Array, noise: Array, k: int) -> None:
+    """Write the winds at the vehicle's stations into ``fan.air``, every second tick."""
+    loop, qpos = record[0], world.qpos
+    if loop.winds == 0 or loop.ticks % WIND_EVERY != 0:
+        return
+    R, s, points, air = loop.rotation, loop.fan.stations, loop.points, loop.air
+    quaternion_to_matrix(qpos[3:7], R)
+    for i in range(STATIONS):
+        for a in range(3):
+            air[a, i] = 0.0
+            points[a, i] = qpos[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+    loop.time[0] = max(loop.ticks, 0) * TICK
+    add_winds(world.winds, loop.time, points, air)
+    for i in range(STATIONS):
+        for a in range(3):
+            loop.fan.air[i, a] = air[a, i]
 
 
 @compiled
@@ -223,14 +248,14 @@ def _accelerate(loop: Record, xfrc: Array, noise: Array, k: int) -> None:
 
 
 @compiled
-def run_ticks(
-    record: Record, world: World, path: Array, noise: Array, first: int, last: int, move: int
-) -> None:
-    """Run ticks ``first`` to ``last - 1`` in one call: what flies without a user's own stages.
+def run_ticks(record: Record, world: World, path: Array, noise: Array, move: int) -> None:
+    """Run a tick for each row of ``noise`` in one call: what flies without a user's own stages and
+    winds.
 
     ``move`` is the address of a C function that calls MuJoCo's step.
     """
-    for k in range(first, last):
+    for k in range(len(noise)):
+        _blow(record, world, path, noise, k)
         _sense(record, world, path, noise, k)
         _estimate(record, world, path, noise, k)
         _steer(record, world, path, noise, k)
@@ -248,16 +273,12 @@ def is_healthy(state: Array, qvel: Array) -> bool:
 
 
 @compiled
-def _place_stations(record: Record, qpos: Array, R: Array, points: Array, air: Array) -> None:
-    """Write the places (3, STATIONS) m of the vehicle's stations in the world and the vehicle's
-    attitude (3, 3), and still air (3, STATIONS).
-    """
-    s = record[0].fan.stations
-    quaternion_to_matrix(qpos[3:7], R)
-    for i in range(STATIONS):
-        for a in range(3):
-            air[a, i] = 0.0
-            points[a, i] = qpos[a] + R[a, 0] * s[i, 0] + R[a, 1] * s[i, 1] + R[a, 2] * s[i, 2]
+def _mean_air(air: Array, mean: Array) -> None:
+    """Write the mean (3,) of winds (STATIONS, 3) at the stations."""
+    mean[:] = 0.0
+    for station in air:
+        for i in range(3):
+            mean[i] += station[i] / STATIONS
 
 
 def _compiled_stage(function: Callable[..., None]) -> Callable[["ClosedLoop"], None]:
@@ -366,28 +387,21 @@ class ClosedLoop:
         self.applied: Array = loop["plant"]["applied"]
         self.specific: Array = loop["specific"]
         self.thrust: Array = loop["thrust"]
-        self.points, self._air = np.zeros((3, STATIONS)), np.zeros((3, STATIONS))
-        self.winds: list[Wind] = []
-        self.attitude_of_points = np.eye(3)
+        self.points: Array = loop["points"]
+        self.attitude_of_points: Array = loop["rotation"]
+        self.winds = Sum()
         self.noise, self.row = np.zeros((1, self.noise_size)), 0  # normals of the run, and its tick
         self.fan_path = self._fan_at_rest = np.array([[0.0, float(loop["fan"]["height"])]])
         self.ticks = self._ticks_since_reset = 0
         self.stages = self._pipeline(stages)
         self._look_at_world(np.zeros((0, REFERENCE_SIZE)))
-        given = self.record, self.world, self.fan_path, self.noise, 0
+        given = self.record, self.world, self.fan_path, self.noise
         self._own_stages = bool(stages)
         self._move = _C_FUNCTION(partial(mujoco.mj_step, self.model, self.data, SUBSTEPS))
         self._move_address = int(ctypes.cast(self._move, ctypes.c_void_p).value or 0)
-        self._run_ticks = specialised(run_ticks, *given, 0, 0)
+        self._run_ticks = specialised(run_ticks, *given, 0)
         self._is_healthy = specialised(is_healthy, self.state, self.world.qvel)
-        self._place = specialised(
-            _place_stations,
-            self.record,
-            self.world.qpos,
-            self.attitude_of_points,
-            self.points,
-            self._air,
-        )
+        self._mean_air = specialised(_mean_air, self.air, np.empty(3))
 
     @staticmethod
     def _pipeline(own: Sequence[Stage]) -> dict[str, Callable[["ClosedLoop"], object]]:
@@ -407,7 +421,9 @@ class ClosedLoop:
         self._qpos: Array = self.data.qpos
         self._qvel: Array = self.data.qvel
         xfrc: Array = self.data.xfrc_applied[self.model.body("vehicle").id]
-        self.world = World(self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, reference)
+        self.world = World(
+            self.jet_table, self._qpos[:7], self._qvel[:6], xfrc, reference, self.winds.calls
+        )
 
     @property
     def motion(self) -> tuple[Array, Array]:
@@ -440,6 +456,13 @@ class ClosedLoop:
         return float(self.record[0]["plant"]["battery"])
 
     @property
+    def wind(self) -> Array:
+        """Mean (3,) m/s, world, of the winds at the stations."""
+        mean = np.empty(3)
+        self._mean_air(self.air, mean)
+        return mean
+
+    @property
     def time(self) -> float:
         """Time since the start of the episode, s."""
         return self.ticks * TICK
@@ -470,8 +493,7 @@ class ClosedLoop:
         Raises:
             InputError: something that is no wind, or another shape.
         """
-        for wind in winds:
-            check_wind(wind, "ClosedLoop")
+        blowing = Sum(*winds, where="ClosedLoop")
         rows = np.zeros((0, REFERENCE_SIZE))
         if reference is not None:
             rows = np.ascontiguousarray(reference, dtype=np.float64)
@@ -481,9 +503,10 @@ class ClosedLoop:
                     f"got shape {rows.shape}"
                 )
         mujoco.mj_resetData(self.model, self.data)
+        self.winds = blowing
         self._look_at_world(rows)
-        self.winds = list(winds)
         loop = self.record[0]
+        loop["winds"] = len(blowing.winds)
         self.action[:] = 0.0
         if self.accelerometer is not None:
             loop["accelerometer_sigma"], sigma = self.accelerometer
@@ -547,36 +570,22 @@ class ClosedLoop:
                 f"got shapes {noise.shape} and {path.shape}"
             )
         self.noise, self.fan_path = noise, path
-        if self._own_stages:
+        if self._own_stages or self.winds.own:
             for k in range(count):
                 self.row = k
                 for stage in self.stages.values():
                     stage(self)
         else:
-            self._run_compiled(path, noise)
-
-    def _run_compiled(self, path: Array, noise: Array) -> None:
-        """Do what the stages do, as many ticks in one call as the winds stay the same."""
-        count, first = len(noise), 0
-        while first < count:
-            last = count
-            if self.winds:
-                self.blow()
-                last = min(first + WIND_EVERY - self.ticks % WIND_EVERY, count)
-            self._run_ticks(self.record, self.world, path, noise, first, last, self._move_address)
-            self.ticks += last - first
-            first = last
-        self._ticks_since_reset += count
+            self._run_ticks(self.record, self.world, path, noise, self._move_address)
+            self.ticks += count
+            self._ticks_since_reset += count
 
     def blow(self) -> None:
         """Write the winds at the vehicle's stations into ``air``, every second tick."""
-        if not self.winds or self.ticks % WIND_EVERY:
-            return
-        points, air, time = self.points, self._air, max(self.ticks, 0) * TICK
-        self._place(self.record, self.world.qpos, self.attitude_of_points, points, air)
-        for wind in self.winds:
-            add_wind(wind, time, points, air)
-        self.air[:] = air.T
+        _blow(self.record, self.world, self.fan_path, self.noise, self.row)
+        if self.ticks % WIND_EVERY == 0:
+            for wind in self.winds.own:
+                self.air += wind.velocity(self.points.T, max(self.ticks, 0) * TICK)
 
     def move(self) -> None:
         """Let MuJoCo integrate the rigid body over the tick."""

@@ -24,8 +24,7 @@ from .closed_loop import ClosedLoop, Stage
 from .fan import STATIONS, Fan
 from .plant import TICK, PlantSettings
 from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
-from .wind import FanWall, Sum, Wind, winds_of
-from .wind.field import check_wind
+from .wind import FanWall, Sum, Wind
 from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, WindScenario, draw_reference, draw_winds
 
 WIND_DECISION_TICKS = 8  # 25 Hz
@@ -180,9 +179,7 @@ class WindHoverEnv(Task):
             scenario, render_mode, vehicle, effects, truth, settings, estimator, normalize,
             width, height, stages,
         )  # fmt: skip
-        self.winds = None if winds is None else list(winds)
-        for wind in self.winds or ():
-            check_wind(wind, f"{self.name}: winds")
+        self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
         scales = OBSERVATION_SCALES if normalize else np.ones(len(OBSERVATION_SCALES))
         self._scales = np.array(scales, dtype=np.float32)
@@ -191,7 +188,7 @@ class WindHoverEnv(Task):
         frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
         self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""
-        self.blowing: list[Wind] = []
+        self.blowing: Sequence[Wind] = []
         self.preview = 0.0  # s; above 0, ``info["force_ahead"]`` is the true force to come
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> ClosedLoop:
@@ -212,9 +209,8 @@ class WindHoverEnv(Task):
         self._draw_loop(Fan(speed=0.0, height=HEIGHT))
         rng = self.np_random
         for _ in range(_DRAWS):
-            given = draw_winds(self.scenario, rng, EPISODE_SECONDS)
-            winds = given if self.winds is None else self.winds
-            self.blowing = [part for wind in winds for part in winds_of(wind)]
+            drawn = draw_winds(self.scenario, rng, EPISODE_SECONDS)
+            self.blowing = drawn if self.winds is None else self.winds
             self.reference_name, self._reference = draw_reference(
                 rng, math.pi, EPISODE_SECONDS, self.moving
             )
@@ -241,8 +237,7 @@ class WindHoverEnv(Task):
         return frame / self._scales if self.normalize else frame
 
     def _get_info(self) -> dict[str, Any]:
-        loop, reference = self.loop, self._row()[:3]
-        position = loop.position.copy()
+        loop, reference, position = self.loop, self._row()[:3], self.loop.position.copy()
         error = math.sqrt(_square(position - reference))
         flying = self.is_flying() and position.item(2) > 0.0 and error <= LOST_OFFSET
         info = {
@@ -251,7 +246,7 @@ class WindHoverEnv(Task):
             "reference": reference.copy(),
             "force": loop.external[:3].copy(),
             "torque": loop.external[3:].copy(),
-            "wind": (loop.air / STATIONS).sum(axis=0),
+            "wind": loop.wind,
             "time": loop.time,
             "lost": not flying,
             "trajectory": self.reference_name,

@@ -5,12 +5,19 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from ...runtime.compiled import specialised
+from ...runtime.addresses import address_of, call_at
+from ...runtime.compiled import compiled, specialised
 from ...runtime.errors import InputError
 
 Array = NDArray[np.float64]
+Calls = NDArray[np.int64]
+
+# a compiled wind: the address of its record, a count of points, and the addresses of the time (1,)
+# in s, of the points (3, count) in m and of the velocities (3, count) in m/s, to which it adds
+SIGNATURE = types.void(*[types.int64] * 5)
 
 
 @runtime_checkable
@@ -24,23 +31,40 @@ class Wind(Protocol):
         ...
 
 
+@compiled
+def add_winds(calls: Calls, time: Array, points: Array, velocities: Array) -> None:
+    """Add compiled winds at points (3, n) m and a time (1,) s to velocities (3, n) m/s.
+
+    ``calls`` (winds, 2) are the addresses of each wind's function and of its record.
+    """
+    for k in range(len(calls)):
+        call_at(
+            calls[k, 0],
+            calls[k, 1],
+            points.shape[1],
+            time.ctypes.data,
+            points.ctypes.data,
+            velocities.ctypes.data,
+        )
+
+
 class CompiledWind:
     """A wind of this room: a compiled function adds the air's velocity at many points.
 
     Args:
-        function: compiled; takes ``given``, a time in s, points (3, n) m and velocities (3, n) m/s,
-            to which it adds.
-        *given: arrays, and records in arrays (1,).
+        function: a plain function of ``SIGNATURE``, compiled at its first use.
+        record: an array of whole numbers or (1,) of a structured type, which the function reads.
+        kept: arrays whose addresses ``record`` holds.
+
+    Attributes:
+        calls: as ``add_winds`` takes them.
     """
 
-    def __init__(self, function: Callable[..., None], *given: np.ndarray) -> None:
-        columns = np.zeros((3, 1))
-        self._given = given
-        self._function = specialised(function, *given, 0.0, columns, columns)
-
-    def add(self, time: float, points: Array, velocities: Array) -> None:
-        """Add the air's velocity at points (3, n) m to velocities (3, n) m/s."""
-        self._function(*self._given, time, points, velocities)
+    def __init__(
+        self, function: Callable[..., None], record: np.ndarray, kept: tuple[np.ndarray, ...] = ()
+    ) -> None:
+        self._kept = record, kept
+        self.calls = np.array([[address_of(function, SIGNATURE), record.ctypes.data]])
 
     def velocity(self, points: ArrayLike, time: float) -> Array:
         """Return the air's velocity (n, 3) m/s, world, at points (n, 3) m of the world and a time
@@ -49,9 +73,9 @@ class CompiledWind:
         Raises:
             InputError: points of another shape, or numbers that are not finite.
         """
-        rows = check_points(points, time)
+        rows, now = check_points(points, time), np.array([time], dtype=np.float64)
         out = np.zeros_like(rows)
-        self.add(float(time), rows, out)
+        specialised(add_winds, self.calls, now, rows, out)(self.calls, now, rows, out)
         return np.ascontiguousarray(out.T)
 
     def __add__(self, other: Wind) -> "Sum":
@@ -70,34 +94,31 @@ class CompiledWind:
 
 
 class Sum(CompiledWind):
-    """The sum of winds.
+    """The sum of winds: those of this room, and behind them ``own``, the user's own.
 
     Raises:
         InputError: one of them is no wind.
     """
 
-    def __init__(self, *winds: Wind) -> None:
+    def __init__(self, *winds: Wind, where: str = "Sum") -> None:
         for wind in winds:
-            check_wind(wind, "Sum")
+            check_wind(wind, where)
         self.winds = [part for wind in winds for part in winds_of(wind)]
+        calls = [wind.calls for wind in self.winds if isinstance(wind, CompiledWind)]
+        self.own = [wind for wind in self.winds if not isinstance(wind, CompiledWind)]
+        self.calls = np.concatenate([np.zeros((0, 2), dtype=np.int64), *calls])
 
-    def add(self, time: float, points: Array, velocities: Array) -> None:
-        """Add the air's velocity at points (3, n) m to velocities (3, n) m/s."""
-        for wind in self.winds:
-            add_wind(wind, time, points, velocities)
+    def velocity(self, points: ArrayLike, time: float) -> Array:
+        """Return the air's velocity (n, 3) m/s, as ``CompiledWind`` does."""
+        out = super().velocity(points, time)
+        for wind in self.own:
+            out += np.asarray(wind.velocity(points, time), dtype=np.float64)
+        return out
 
 
 def winds_of(wind: Wind) -> list[Wind]:
     """Return the parts of a sum, or the wind itself."""
     return wind.winds if isinstance(wind, Sum) else [wind]
-
-
-def add_wind(wind: Wind, time: float, points: Array, velocities: Array) -> None:
-    """Add any wind at points (3, n) m to velocities (3, n) m/s."""
-    if isinstance(wind, CompiledWind):
-        wind.add(time, points, velocities)
-    else:
-        velocities += np.asarray(wind.velocity(points.T, time), dtype=np.float64).T
 
 
 def check_wind(wind: object, where: str) -> None:

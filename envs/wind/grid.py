@@ -11,23 +11,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike
 
+from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.archives import check_archive
-from ...runtime.compiled import compiled
 from ...runtime.errors import InputError
 from ...runtime.regular_files import read_bytes
 from ...runtime.whole_files import replaced
-from .field import Array, CompiledWind, Wind
+from .field import CompiledWind, Wind
 
 AXES = ("t", "x", "y", "z")
 _LARGEST = 400_000_000  # bytes of a grid in memory
 
 
-@compiled
-def _grid(first: Array, step: Array, field: Array, now: float, p: Array, out: Array) -> None:
+def _grid(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w, now = carray(pointer_to(record), 7, np.int64), numbers_at(time, (1,))[0]
+    first, step = numbers_at(w[0], (4,)), numbers_at(w[1], (4,))
+    field = numbers_at(w[2], (w[3], w[4], w[5], w[6], 3))
+    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
     low, part = np.zeros(4, dtype=np.int64), np.zeros(4)
-    for j in range(p.shape[1]):
+    for j in range(count):
         for a in range(4):
             value = now if a == 0 else p[a - 1, j]
             at = min(max((value - first[a]) / step[a], 0.0), float(field.shape[a] - 1))
@@ -82,10 +86,12 @@ class GridWind(CompiledWind):
         if not np.all(np.isfinite(self.wind)):
             raise InputError(f"{where}: wind must be finite numbers in m/s")
         first = np.array([axis[0] for axis in self.axes])
-        step = [
+        sizes = [
             (axis[-1] - axis[0]) / (len(axis) - 1) if len(axis) > 1 else 1.0 for axis in self.axes
         ]
-        super().__init__(_grid, first, np.array(step), self.wind)
+        kept = first, np.array(sizes), self.wind
+        record = np.array([*[array.ctypes.data for array in kept], *shape[:4]])
+        super().__init__(_grid, record, kept)
 
 
 def on_grid(

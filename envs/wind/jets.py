@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike
 
 from ...dynamics.mean_jet import (
@@ -20,7 +21,7 @@ from ...dynamics.mean_jet import (
     STEP_X,
     jet_table,
 )
-from ...runtime.compiled import compiled
+from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError
 from .field import Array, CompiledWind, number, vector
 from .turbulence import add_modes, waves
@@ -29,37 +30,30 @@ _PERIOD = 0.02  # s, of the tables of places and speeds
 _SLOWEST = 1e-3  # m/s, at which a jet counts as off
 
 
-@compiled
-def _jets(
-    axial: Array,
-    radial: Array,
-    places: Array,
-    speeds: Array,
-    modes: Array,
-    R: Array,
-    advection: Array,
-    now: float,
-    p: Array,
-    out: Array,
-) -> None:
-    """Add jets to velocities.
+JETS = np.dtype(
+    [
+        # addresses of the jet's tables (COUNT_X, COUNT_R), of the rotors' places (place_steps,
+        # jets, 3) m and speeds (steps, jets) m/s, and of the gusts' plane waves (waves, 7)
+        *[(name, "i8") for name in ("axial", "radial", "places", "speeds", "modes")],
+        *[(name, "i8") for name in ("place_steps", "steps", "jets", "waves")],
+        ("axes", "f8", (3, 3)),  # rows: the jets' axes in the world, the one along the jets first
+        ("advection", "f8", (3,)),  # m/s, of the gusts
+    ]
+)
 
-    Args:
-        axial: (COUNT_X, COUNT_R) of the jet's table.
-        radial: likewise.
-        places: (steps, jets, 3) m, of the rotors.
-        speeds: (steps, jets) m/s.
-        modes: (waves, 7), of the gusts.
-        R: (3, 3) rows: the jets' axes in the world, the one along the jets first.
-        advection: (3,) m/s, of the gusts.
-        now: s.
-        p: (3, n) m, points.
-        out: (3, n) m/s, velocities.
-    """
-    count = p.shape[1]
+
+def _jets(record: int, count: int, time: int, positions: int, velocities: int) -> None:
+    w, now = carray(pointer_to(record), 1, JETS)[0], numbers_at(time, (1,))[0]
+    axial, radial = (
+        numbers_at(w.axial, (COUNT_X, COUNT_R)),
+        numbers_at(w.radial, (COUNT_X, COUNT_R)),
+    )
+    places = numbers_at(w.places, (w.place_steps, w.jets, 3))
+    speeds, R = numbers_at(w.speeds, (w.steps, w.jets)), w.axes
+    p, out = numbers_at(positions, (3, count)), numbers_at(velocities, (3, count))
     gusts = np.zeros((3, count))
-    if len(modes) > 0:
-        add_modes(modes, advection, now, p, gusts)
+    if w.waves > 0:
+        add_modes(numbers_at(w.modes, (w.waves, 7)), w.advection, now, p, gusts)
     at = min(max(now / _PERIOD, 0.0), 1e9)
     share = at - int(at)
     k, kp = min(int(at), len(speeds) - 1), min(int(at), len(places) - 1)
@@ -126,17 +120,16 @@ class _Jets(CompiledWind):
         self.axes = _axes(direction)  # rows: along the jet, and two across
         self.places, self.speeds = np.ascontiguousarray(places), np.ascontiguousarray(speeds)
         self.radius = radius
+        record = np.zeros(1, dtype=JETS)
+        w = record[0]
+        kept = (*jet_table(radius, hub_radius), self.places, self.speeds, table)
+        for name, array in zip(JETS.names or (), kept, strict=False):
+            w[name] = array.ctypes.data
+        w["place_steps"], (w["steps"], w["jets"]) = len(self.places), self.speeds.shape
         # gusts travel with the shear layer's eddies, at half the speed of the jet
-        advection = 0.5 * float(self.speeds.max()) * self.axes[0]
-        super().__init__(
-            _jets,
-            *jet_table(radius, hub_radius),
-            self.places,
-            self.speeds,
-            table,
-            self.axes,
-            advection,
-        )
+        w["waves"], w["axes"] = len(table), self.axes
+        w["advection"] = 0.5 * float(self.speeds.max()) * self.axes[0]
+        super().__init__(_jets, record, kept)
 
 
 class FanWall(_Jets):

@@ -3,11 +3,12 @@
 import math
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike
 
-from ...runtime.compiled import Record, compiled
+from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError, unknown_name
-from .field import Array, CompiledWind, number, vector
+from .field import CompiledWind, number, vector
 
 _FOOT = 0.3048  # m
 # MIL-F-8785C 3.7.3.4: roughness length, ft, of flight phases near the ground (category C), and else
@@ -32,10 +33,10 @@ STEADY = np.dtype(
 )
 
 
-@compiled
-def _steady(record: Record, now: float, p: Array, out: Array) -> None:
-    w = record[0]
-    for j in range(p.shape[1]):
+def _steady(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w, now = carray(pointer_to(record), 1, STEADY)[0], numbers_at(time, (1,))[0]
+    p, out = numbers_at(points, (3, count)), numbers_at(velocities, (3, count))
+    for j in range(count):
         scale = 1.0
         if w.law > 0:
             height = max(p[2, j], w.floor)

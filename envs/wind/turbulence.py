@@ -14,8 +14,10 @@ one. It is frozen (Taylor's hypothesis): a point sees ``u(x - U t)``.
 import math
 
 import numpy as np
+from numba import carray
 from numpy.typing import ArrayLike, NDArray
 
+from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.compiled import compiled_for_vectors
 from ...runtime.errors import InputError, unknown_name
 from .field import Array, CompiledWind, number, vector
@@ -61,6 +63,17 @@ def add_modes(table: Array, advection: Array, time: float, p: Array, out: Array)
             out[0, j] += ax * c
             out[1, j] += ay * c
             out[2, j] += az * c
+
+
+def _turbulence(record: int, count: int, time: int, points: int, velocities: int) -> None:
+    w = carray(pointer_to(record), 3, np.int64)
+    add_modes(
+        numbers_at(w[0], (w[1], 7)),
+        numbers_at(w[2], (3,)),
+        numbers_at(time, (1,))[0],
+        numbers_at(points, (3, count)),
+        numbers_at(velocities, (3, count)),
+    )
 
 
 def spectrum(form: str, axis: str, wave_number: ArrayLike, sigma: float, length: float) -> Array:
@@ -188,7 +201,9 @@ class Turbulence(CompiledWind):
         c, s = math.cos(heading), math.sin(heading)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         table[:, :3], table[:, 4:] = table[:, :3] @ turn.T, table[:, 4:] @ turn.T
-        super().__init__(add_modes, table, carried)
+        table = np.ascontiguousarray(table)
+        record = np.array([table.ctypes.data, len(table), carried.ctypes.data])
+        super().__init__(_turbulence, record, (table, carried))
 
 
 def _three(value: ArrayLike, name: str, at_least_zero: bool) -> NDArray[np.float64]:
