@@ -40,12 +40,9 @@ def see(state: Array, command: float, frame: Frame) -> None:
     keep_within(frame, _LIMITS)
 
 
-def reward_terms(offset: Any, change: Any) -> dict[str, Any]:
-    """Return the terms of the reward for offsets in m and changes of the command in m/s."""
-    return {
-        "reward_tracking": 1.0 / (1.0 + (offset / TRACKING_WIDTH) ** 2),
-        "reward_change": -CHANGE_COST * change * change,
-    }
+def reward_terms(offset: float, change: float) -> tuple[float, float]:
+    """Return the rewards of tracking at an offset in m and of a change of the command in m/s."""
+    return 1.0 / (1.0 + (offset / TRACKING_WIDTH) ** 2), -CHANGE_COST * change * change
 
 
 class FanTrackingEnv(Task):
@@ -237,7 +234,8 @@ class FanTrackingEnv(Task):
         }
 
     def _get_reward(self, info: dict[str, Any], change: Array) -> dict[str, float]:
-        return reward_terms(info["offset"], float(change[0]))
+        tracking, steady = reward_terms(info["offset"], float(change[0]))
+        return {"reward_tracking": tracking, "reward_change": steady}
 
 
 __all__ = ["DECISION_TICKS", "EPISODE_SECONDS", "LOST_OFFSET", "FanTrackingEnv"]

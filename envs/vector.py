@@ -16,20 +16,18 @@ from .task import Frame
 Flags = NDArray[np.bool_]
 Infos = dict[str, Any]
 
-# entries of ``infos``: shape behind the environments, and type
-_ENTRIES: dict[str, tuple[tuple[int, ...], Any]] = {
-    "reward_tracking": ((), np.float64),
-    "reward_change": ((), np.float64),
-    "fan_y": ((), np.float64),
-    "fan_velocity": ((), np.float64),
-    "y": ((), np.float64),
-    "offset": ((), np.float64),
-    "force": ((3,), np.float64),
-    "torque": ((3,), np.float64),
-    "time": ((), np.float64),
-    "lost": ((), np.bool_),
-    "fan_motion": ((), object),
-}
+# entries of ``infos``, beside ``fan_motion``
+VALUES = np.dtype(
+    [
+        *[(name, "f8") for name in ("reward_tracking", "reward_change")],
+        *[(name, "f8") for name in ("fan_y", "fan_velocity", "y", "offset")],
+        ("force", "f8", (3,)),
+        ("torque", "f8", (3,)),
+        ("time", "f8"),
+        ("lost", "?"),
+    ],
+    align=True,
+)
 
 
 class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
@@ -86,10 +84,9 @@ class FanTrackingVectorEnv(gym.vector.VectorEnv[Frame, Frame, NDArray[Any]]):
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._over = np.zeros(num_envs, dtype=np.bool_)  # episodes that ended at the last step
         self._frames = np.zeros(self.observation_space.shape or (), dtype=np.float32)
-        self._values = {
-            name: np.zeros((num_envs, *shape), dtype=kind)
-            for name, (shape, kind) in _ENTRIES.items()
-        }
+        self._table = np.zeros(num_envs, dtype=VALUES)
+        self._values = {name: self._table[name] for name in VALUES.names or ()}
+        self._values["fan_motion"] = np.zeros(num_envs, dtype=object)
         self._all = np.ones(num_envs, dtype=np.bool_)
         self._pool: ThreadPoolExecutor | None = None
 

@@ -190,7 +190,7 @@ def fly_blocks(
         generators: (n,) of the loops; a typed list.
         flying: (n,) booleans; a loop that does not fly draws nothing.
         paths: (n, m) m, the fan's y.
-        first: (n,) columns of ``paths`` at the first tick.
+        first: (n,) columns of ``paths`` at the first tick; of a loop that flies, then the next.
         ticks: of ``TICK`` s.
     """
     last = paths.shape[1] - 1
@@ -209,6 +209,8 @@ def fly_blocks(
                     for i in range(NOISE):
                         noise[b, i, lane] = generator.standard_normal()
             tick_lanes(loop, work, step, jet[0], jet[1])
+        for n in members:
+            first[n] += ticks if flying[n] else 0
         put_down(block, work)
 
 
@@ -237,6 +239,7 @@ class Blocks:
             loops["plant"]["external"],
             self.filters["x"],
         )
+        self.commanded = loops["flight"]["setpoint"][:, 4]  # m/s, along y
         self.drawn = self.loops["noise"], self.loops["fan"]["y"]
 
     def __len__(self) -> int:
@@ -255,13 +258,6 @@ class Blocks:
             (columns(self.filters), columns(other.filters)),
         ):
             mine[block, :, lane] = theirs[source, :, lane]
-
-    @staticmethod
-    def write_lanes(field: np.ndarray, values: np.ndarray) -> None:
-        """Write values (n,) into the first lanes of a field (blocks, WIDTH)."""
-        for block in range(len(field)):
-            part = values[WIDTH * block : WIDTH * (block + 1)]
-            field[block, : len(part)] = part
 
 
 def _single(loop: ClosedLoop) -> dict[str, Any]:

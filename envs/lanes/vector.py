@@ -10,7 +10,7 @@ from gymnasium.utils.seeding import np_random
 from ...controllers.observation import OBSERVATION_SIZE
 from ...dynamics.motion import Array
 from ...estimator.ukf_lanes import estimates_of, new_work, step_address
-from ...runtime.compiled import compiled_without_gil, specialised
+from ...runtime.compiled import compiled, compiled_without_gil, specialised
 from ...runtime.errors import InputError, unknown_name
 from ...runtime.vector_lanes import WIDTH
 from ..closed_loop import ClosedLoop, is_healthy
@@ -70,10 +70,12 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._views = [View(view.observe, view.normalize) for _ in range(num_envs)]
         self._ticks = np.zeros(num_envs, dtype=np.int64)  # since the start of the episode
         self._paths = np.zeros((num_envs, FAN_TIMES.size))  # m, the fan's y, a column a tick
-        self._distance, self._commands = np.zeros(num_envs), np.zeros((num_envs, 1))
-        self._seen = np.zeros((num_envs, OBSERVATION_SIZE), dtype=np.float32)
-        self._compiled: Callable[..., None] | None = None
-        self._compiled_look: Callable[..., None] | None = None
+        self._distance = np.zeros(num_envs)
+        self._commands, self._changes = np.zeros(num_envs), np.zeros(num_envs)  # m/s
+        self._seen = self._frames
+        if not view.is_plain:
+            self._seen = np.zeros((num_envs, OBSERVATION_SIZE), dtype=np.float32)
+        self._compiled: dict[Any, Callable[..., None]] = {}
 
     def _make_envs(self, kwargs: dict[str, Any]) -> list[FanTrackingEnv]:
         """Return one environment: it says what all are, and never flies."""
@@ -92,25 +94,24 @@ class FanTrackingLanes(FanTrackingVectorEnv):
                 first, last = part * count // parts, (part + 1) * count // parts
                 memory = *blocks.addresses, work.ctypes.data, self._step, self._like.jet_table
                 arguments = first, last, *memory, *blocks.drawn, *given
-                if self._compiled is None:
-                    self._compiled = specialised(fly_blocks, *arguments)
-                self._compiled(*arguments)
+                self._call(fly_blocks, *arguments)
             finally:
                 self._works.append(work)
 
         self._spread(fly, parts)
 
+    def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Call a compiled function, always with arguments of the same types."""
+        if function not in self._compiled:
+            self._compiled[function] = specialised(function, *arguments)
+        self._compiled[function](*arguments)
+
     def _fly(self, commands: np.ndarray, which: Flags) -> None:
         blocks, limit = self._flying, self._env.largest_action
-        change = -self._commands
-        self._commands[which] = np.minimum(np.maximum(commands[which], -limit), limit)
-        change += self._commands
-        blocks.write_lanes(blocks.loops["flight"]["setpoint"][:, 4], self._commands[:, 0])
-
+        self._call(command, which, commands, limit, self._commands, self._changes, blocks.commanded)
         given = self._generators, which, self._paths, self._ticks, DECISION_TICKS
         self._fly_blocks(blocks, len(blocks), *given)
-        self._ticks[which] += DECISION_TICKS
-        self._look(which, change[:, 0])
+        self._look(which)
 
     def _begin(self, which: list[int], seeds: Sequence[int | None] | None) -> None:
         places = _places(which)
@@ -131,11 +132,11 @@ class FanTrackingLanes(FanTrackingVectorEnv):
             self._flying.take(i // WIDTH, lane, settling, block)
         started = np.zeros(self.num_envs, dtype=np.bool_)
         started[which] = True
-        self._ticks[which], self._commands[which] = 0, 0.0
+        self._ticks[which], self._commands[which], self._changes[which] = 0, 0.0, 0.0
         states = estimates_of(self._flying.filters, self.num_envs)
         for i in which:
             self._views[i].restart(states[i])
-        self._look(started, np.zeros(self.num_envs))
+        self._look(started)
         for name in ("reward_tracking", "reward_change", "lost"):
             self._values[name][which] = 0
 
@@ -152,34 +153,36 @@ class FanTrackingLanes(FanTrackingVectorEnv):
         self._values["fan_motion"][i] = self._env.fan_motion
         return generator
 
-    def _look(self, which: Flags, change: np.ndarray) -> None:
+    def _look(self, which: Flags) -> None:
         """Write frames and values of some environments, as ``FanTrackingEnv`` has them."""
-        values, blocks, view = self._values, self._flying, self._env.view
-        names = "fan_y", "fan_velocity", "y", "offset", "force", "torque", "lost"
-        given = (
-            which,
-            self._ticks,
-            self._paths,
-            self._distance,
-            self._env.fan.height,
-            self._commands,
-            *blocks.seen,
-            self._seen,
-            *(values[name] for name in names),
-        )
-        if self._compiled_look is None:
-            self._compiled_look = specialised(look, *given)
-        self._compiled_look(*given)
-        values["time"][which] = self._ticks[which] * TICK
-        for name, terms in reward_terms(values["offset"], change).items():
-            values[name][which] = terms[which]
-        frames = self._seen
+        blocks, view, frames = self._flying, self._env.view, self._seen
+        height, moves = self._env.fan.height, (self._commands, self._changes)
+        episodes = which, self._ticks, self._paths, self._distance
+        self._call(look, *episodes, height, *moves, *blocks.seen, frames, self._table)
+        if view.is_plain:
+            return
         if view.is_of_a_frame:
-            self._frames[which] = frames[which] if view.is_plain else view.of_frames(frames[which])
+            self._frames[which] = view.of_frames(frames[which])
             return
         states = estimates_of(blocks.filters, self.num_envs)
         for i in np.flatnonzero(which).tolist():
             self._frames[i] = self._views[i].of(frames[i], states[i], int(self._ticks[i]))
+
+
+_reward_terms = compiled(reward_terms)
+
+
+@compiled
+def command(
+    which: Flags, wanted: Array, limit: float, commands: Array, changes: Array, setpoint: Array
+) -> None:
+    """Write the commands (n,) m/s of the environments ``which``, within ``limit``, their changes,
+    and the velocities (blocks, WIDTH) to fly at.
+    """
+    for n in np.flatnonzero(which):
+        value = min(max(wanted[n, 0], -limit), limit)
+        changes[n], commands[n] = value - commands[n], value
+        setpoint[n // WIDTH, n % WIDTH] = value
 
 
 @compiled_without_gil
@@ -190,18 +193,13 @@ def look(
     distance: Array,
     height: float,
     commands: Array,
+    changes: Array,
     qpos: Array,
     qvel: Array,
     external: Array,
     states: Array,
     frames: Frame,
-    fan_y: Array,
-    fan_velocity: Array,
-    y: Array,
-    offset: Array,
-    force: Array,
-    torque: Array,
-    lost: Flags,
+    values: np.ndarray,
 ) -> None:
     """Write frames and the truth of the environments ``which`` as ``FanTrackingEnv`` has them."""
     for n in np.flatnonzero(which):
@@ -212,17 +210,19 @@ def look(
             p[:], v[:] = 0.0, 0.0
             p[3] = 1.0
         state = states[b, :, lane].copy()
-        see(state, commands[n, 0], frames[n])
-        k = min(ticks[n], paths.shape[1] - 1)
-        fan_y[n] = paths[n, max(k - 1, 0)]
-        fan_velocity[n] = (paths[n, k] - fan_y[n]) / TICK
-        y[n], offset[n] = p[1], p[1] - fan_y[n]
-        force[n], torque[n] = external[b, :3, lane], external[b, 3:, lane]
+        see(state, commands[n], frames[n])
+        k, value = min(ticks[n], paths.shape[1] - 1), values[n]
+        value.time, value.fan_y = ticks[n] * TICK, paths[n, max(k - 1, 0)]
+        value.fan_velocity = (paths[n, k] - value.fan_y) / TICK
+        value.y, value.offset = p[1], p[1] - value.fan_y
+        value.force[:], value.torque[:] = external[b, :3, lane], external[b, 3:, lane]
+        terms = _reward_terms(value.offset, changes[n])
+        value.reward_tracking, value.reward_change = terms
         # written such that a number that is not finite counts as lost
-        lost[n] = broken or not (
+        value.lost = broken or not (
             is_healthy(state, v)
             and 1.0 - 2.0 * (p[4] * p[4] + p[5] * p[5]) >= UPRIGHT
-            and abs(offset[n]) <= LOST_OFFSET
+            and abs(value.offset) <= LOST_OFFSET
             and abs(p[0] - distance[n]) <= AWAY
             and abs(p[2] - height) <= AWAY
         )
