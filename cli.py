@@ -126,8 +126,6 @@ def _refused(error: Any) -> int:
     errors.print(
         f"error: {' '.join(printable(text).split())}",
         style="red",
-        highlight=False,
         soft_wrap=True,
-        markup=False,
     )
     return 2

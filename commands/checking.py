@@ -5,22 +5,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import box
-from rich.table import Table
-from rich.text import Text
 
 from ..runtime.errors import InputError
 from ..runtime.whole_files import replaced
 from .terminal import (
+    VEHICLES,
     MapOption,
     Out,
     ReaderOption,
     console,
     note,
-    offering,
     results_folder,
     say,
-    vehicle_names,
+    show_table,
     working,
 )
 
@@ -33,7 +30,7 @@ CheckVehicleOption = Annotated[
         "--vehicle",
         help="Vehicle that flew, a preset or a YAML file: with it commands become rotor speeds, "
         "and units and conventions are checked against its weight and rotors.",
-        autocompletion=offering(vehicle_names),
+        autocompletion=VEHICLES,
     ),
 ]
 
@@ -83,45 +80,41 @@ def check(
         written.append(write_map)
     flight = found.log
     seconds = float(flight.t[-1] - flight.t[0])
-    _print(f"{flight.name}: {len(flight.t)} rows, {seconds:.1f} s, read by {found.read_by}")
-    table = Table(
-        "channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit", box=box.SIMPLE_HEAD
-    )
-    for c in found.channels:
-        table.add_row(
-            c.name,
-            f"{c.rate_hz:.4g}",
-            str(c.gaps),
-            f"{c.longest_gap_s:.3g}",
-            f"{c.low:.4g}",
-            f"{c.high:.4g}",
-            c.unit,
-        )
-    console.print(table)
-    if found.guess is not None:
-        reasons = Table("field", "", "why", box=box.SIMPLE_HEAD)
-        for r in found.guess.reasons:
-            reasons.add_row(
-                Text(f"{r.section} {r.field}".strip()),
-                "certain" if r.certain else "GUESS",
-                Text(r.why),
+    console.print(f"{flight.name}: {len(flight.t)} rows, {seconds:.1f} s, read by {found.read_by}")
+    show_table(
+        ("channel", "rate (Hz)", "gaps", "longest (s)", "from", "to", "unit"),
+        [
+            (
+                c.name,
+                f"{c.rate_hz:.4g}",
+                str(c.gaps),
+                f"{c.longest_gap_s:.3g}",
+                f"{c.low:.4g}",
+                f"{c.high:.4g}",
+                c.unit,
             )
-        console.print(reasons)
+            for c in found.channels
+        ],
+    )
+    if found.guess is not None:
+        show_table(
+            ("field", "", "why"),
+            [
+                (f"{r.section} {r.field}".strip(), "certain" if r.certain else "GUESS", r.why)
+                for r in found.guess.reasons
+            ],
+        )
         if write_map is None:
-            console.print(found.map_text, highlight=False, markup=False, soft_wrap=True)
+            console.print(found.map_text, soft_wrap=True)
     for text in flight.notes:
         if not text.startswith("warning"):
-            _print(text)
+            console.print(text)
     for text in found.doubts:
         note(f"warning: {text.removeprefix('warning: ')}")
     for text in said:
         note(text)
     say(*written)
     return found.as_dict()
-
-
-def _print(text: str) -> None:
-    console.print(text, highlight=False, markup=False)
 
 
 def _write(flight: "FlightLog", log: Path, path: Path) -> list[str]:

@@ -17,11 +17,11 @@ from ..runtime.errors import InputError
 from ..runtime.workers import SINGLE_THREADED
 from .diagnosing import STAGES
 from .terminal import (
+    EFFECTS,
     Out,
+    SeedOption,
     VehicleOption,
     console,
-    effect_names,
-    offering,
     results_folder,
     say,
     show_page,
@@ -39,13 +39,13 @@ def demo(
         str,
         typer.Option(
             help="Effect that the vehicle has and its model lacks, NAME or NAME:coef=value,...",
-            autocompletion=offering(effect_names),
+            autocompletion=EFFECTS,
         ),
     ] = HIDDEN,
     episodes: Annotated[
         int, typer.Option(min=1, help="Episodes flown before and after, and of the leaderboard.")
     ] = 3,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    seed: SeedOption = 0,
     no_open: Annotated[
         bool, typer.Option("--no-open", help="Do not open the page in a browser.")
     ] = False,
@@ -64,7 +64,6 @@ def demo(
     console.print(
         "A vehicle flies in a fan's jet, is diagnosed, and flies better. The first start also "
         "compiles.",
-        highlight=False,
     )
     with working("loading", every=EVERY):
         from ..demo import story
@@ -113,13 +112,13 @@ def demo(
     best = [
         f"{row['controller']} {row['rmse_m']:.3f} m" for row in rows if row["scenario"] == "base"
     ]
-    console.print(f"6 of {count}: RMSE on base: {', '.join(best)}", highlight=False)
+    console.print(f"6 of {count}: RMSE on base: {', '.join(best)}")
     page = folder / "demo.html"
     command = shlex.join(["windwrench", *sys.argv[1:]])
     seconds = time.monotonic() - begun
     write_page(steps, diagnosed, compared, rows, command, seconds, page)
     say(*reports, *(s.picture for s in steps if s.picture is not None), page)
-    console.print(f"{seconds:.0f} s in all", highlight=False)
+    console.print(f"{seconds:.0f} s in all")
     show_page(page, not no_open)
     return {
         "effect": request.effect_words,
@@ -135,9 +134,7 @@ def demo(
 
 def _tell(number: int, count: int, step: Any) -> None:
     words = " ".join(step.sentences[1:])
-    console.print(
-        f"{number} of {count}: {step.title}. {words}", highlight=False, markup=False, soft_wrap=True
-    )
+    console.print(f"{number} of {count}: {step.title}. {words}", soft_wrap=True)
 
 
 def _board_command(episodes: int, seed: int, out: Path) -> str:

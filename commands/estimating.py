@@ -8,10 +8,14 @@ import typer
 from ..runtime.errors import InputError
 from .flight_logs import LogArgument, LogVehicleOption, log_notes, read_flights
 from .terminal import (
+    FilmSeconds,
     Gate,
     MapOption,
     Out,
     ReaderOption,
+    RrdOption,
+    VideoOption,
+    ViewOption,
     checked_gate,
     console,
     note,
@@ -48,23 +52,14 @@ def estimate(
             help="Also draw the flight with its wrench as arrows: film.gif and the last frame.",
         ),
     ] = False,
-    video: Annotated[
-        bool, typer.Option("--video", help="Also write a video, film.mp4 (video extra).")
-    ] = False,
-    rrd: Annotated[
-        bool,
-        typer.Option(
-            "--rrd", help="Also write a recording for the Rerun viewer, film.rrd (rerun extra)."
-        ),
-    ] = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
+    video: VideoOption = False,
+    rrd: RrdOption = False,
+    view: ViewOption = False,
     begin: Annotated[
         float,
         typer.Option("--from", min=0.0, help="Start of the film, s from the start of the log."),
     ] = 0.0,
-    film_seconds: Annotated[
-        float, typer.Option(min=0.1, help="Longest duration of the film, s.")
-    ] = 30.0,
+    film_seconds: FilmSeconds = 30.0,
     out: Out = Path("results/estimate"),
 ) -> dict[str, Any]:
     """Estimate the wrench on a logged flight. Write wrench.csv and a picture, and a film of the

@@ -2,36 +2,24 @@
 
 import shlex
 import sys
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ..runtime.errors import InputError
-from .terminal import VehicleOption, console, offering, results_folder, say, working
+from .terminal import (
+    Gate,
+    VehicleOption,
+    checked_gate,
+    console,
+    offering,
+    results_folder,
+    say,
+    working,
+)
 
 _EFFECTS = ("declared", "none")
-
-
-def _estimators() -> list[str]:
-    from ..live.export_c import ESTIMATORS
-
-    return list(ESTIMATORS)
-
-
-def _precisions() -> list[str]:
-    from ..live.export_c import PRECISIONS
-
-    return list(PRECISIONS)
-
-
-def _policies() -> list[str]:
-    from ..live.export_c.policies import LAWS
-
-    folder = resources.files("windwrench.training").joinpath("policies")
-    shipped = [file.name[:-4] for file in folder.iterdir() if file.name.endswith(".npz")]
-    return [*LAWS, *sorted(shipped)]
 
 
 def _policy_path(name: str) -> Path | None:
@@ -40,19 +28,20 @@ def _policy_path(name: str) -> Path | None:
     Raises:
         InputError: there is none of this name.
     """
+    from ..controllers.shipped import shipped_policies
     from ..live.export_c.policies import LAWS
 
+    shipped = shipped_policies()
     if name in LAWS:
         return None
     if name.endswith((".npz", ".json")):
         return Path(name)
-    path = Path(str(resources.files("windwrench.training"))) / "policies" / f"{name}.npz"
-    if name not in _policies():
+    if name not in shipped:
         raise InputError(
-            f"--policy {name}: no such policy; expected {', '.join(_policies())}, or the path of "
-            "a trained one"
+            f"--policy {name}: no such policy; expected {', '.join((*LAWS, *shipped))}, or the "
+            "path of a trained one"
         )
-    return path
+    return shipped[name]
 
 
 def export_c(
@@ -61,7 +50,7 @@ def export_c(
         str,
         typer.Option(
             help="constant-gain (the least work), ekf or ukf.",
-            autocompletion=offering(_estimators),
+            autocompletion=offering("live.export_c:ESTIMATORS"),
         ),
     ] = "ekf",
     effects: Annotated[
@@ -69,7 +58,7 @@ def export_c(
         typer.Option(
             help="declared: the effects in the vehicle file are part of the filter's model; none: "
             "they are left out.",
-            autocompletion=offering(lambda: _EFFECTS),
+            autocompletion=offering("commands.exporting:_EFFECTS"),
         ),
     ] = "declared",
     policy: Annotated[
@@ -77,7 +66,9 @@ def export_c(
         typer.Option(
             help="Also a policy that tracks a fan: lead, tracker, the name of a trained one "
             "(sac-0), or its path.",
-            autocompletion=offering(_policies),
+            autocompletion=offering(
+                "live.export_c.policies:LAWS", "controllers.shipped:shipped_policies"
+            ),
         ),
     ] = None,
     rate: Annotated[
@@ -87,17 +78,12 @@ def export_c(
     rise_time: Annotated[
         float, typer.Option(help="Rise time of force and torque, 10-90 %, s.")
     ] = 1.0,
-    gate: Annotated[
-        float,
-        typer.Option(
-            help="Refuse poses that jump and are less likely than 1 minus this; 0: refuse none."
-        ),
-    ] = 0.9999,
+    gate: Gate = None,
     precision: Annotated[
         str,
         typer.Option(
             help="single (float), or double, where the processor has a unit for it.",
-            autocompletion=offering(_precisions),
+            autocompletion=offering("live.export_c:PRECISIONS"),
         ),
     ] = "single",
     out: Annotated[
@@ -127,8 +113,6 @@ def export_c(
         raise unknown_name("precision", precision, PRECISIONS)
     if effects not in _EFFECTS:
         raise InputError(f"--effects {effects}: expected {' or '.join(_EFFECTS)}")
-    if gate != 0.0 and not 0.5 <= gate < 1.0:
-        raise InputError(f"--gate {gate:g}: expected a probability from 0.5 to below 1, or 0")
     model = load_vehicle(vehicle)
     if effects == "none":
         model = replace(model, effects=())
@@ -142,7 +126,7 @@ def export_c(
             estimator,
             rate,
             rise_time,
-            gate or None,
+            0.9999 if gate is None else checked_gate(gate) or None,
             flown,
             shlex.join(["windwrench", *sys.argv[1:]]),
             precision,
@@ -154,8 +138,6 @@ def export_c(
     console.print(
         f"{estimator} of {model.name} for {1.0 / found.filter.period:g} poses a second, with "
         f"{', '.join(found.effects) or 'no effects'}.",
-        highlight=False,
-        markup=False,
     )
     say(*(out / name for name in found.files))
     return {

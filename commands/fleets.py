@@ -11,16 +11,18 @@ import typer
 from ..runtime.errors import InputError
 from .flight_logs import LogVehicleOption
 from .terminal import (
+    ClusterOption,
+    JobsOption,
     MapOption,
     Out,
     ReaderOption,
     Without,
     console,
     note,
-    progress_bar,
     results_folder,
     say,
     show_table,
+    working,
 )
 
 _MOST_ROWS = 20  # of the table in the terminal
@@ -41,12 +43,8 @@ def fleet(
     reader: ReaderOption = None,
     map: MapOption = None,
     without: Without = None,
-    cluster: Annotated[
-        str | None, typer.Option(help="Address of a Ray cluster to work on, or local.")
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
-    ] = None,
+    cluster: ClusterOption = None,
+    jobs: JobsOption = None,
     limit: Annotated[
         float | None,
         typer.Option(
@@ -87,12 +85,11 @@ def fleet(
     for text in doubts:
         note(text)
     with closing(Outcomes(folder / OUTCOMES)) as outcomes:
-        with progress_bar() as progress:
-            task = progress.add_task("diagnosing logs", total=len(found))
+        with working("diagnosing logs", len(found)) as progress:
 
             def report(counts: Any) -> None:
                 text = f"diagnosing logs ({counts['refused']} refused)"
-                progress.update(task, completed=sum(counts.values()), description=text)
+                progress(sum(counts.values()), text)
 
             done = run_fleet(
                 found, outcomes, tuple(without or ()), limit or LIMIT_S, jobs, cluster, report

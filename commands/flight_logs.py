@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..runtime.errors import InputError
-from .terminal import note, offering, vehicle_names
+from .terminal import VEHICLES, note
 
 if TYPE_CHECKING:
     from ..dynamics.vehicle import Vehicle
@@ -24,7 +24,7 @@ LogVehicleOption = Annotated[
         "--vehicle",
         help="Vehicle that flew: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; "
         "required unless the log names it.",
-        autocompletion=offering(vehicle_names),
+        autocompletion=VEHICLES,
     ),
 ]
 

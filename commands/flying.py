@@ -4,43 +4,38 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich import box
-from rich.table import Table
 
 from ..runtime.errors import InputError
 from .terminal import (
+    CONTROLLERS,
+    SCENARIOS,
+    VEHICLES,
+    EffectOption,
+    FilmSeconds,
     Out,
+    RrdOption,
+    SeedOption,
+    TaskOption,
     VehicleOption,
+    VideoOption,
+    ViewOption,
     console,
-    controller_names,
-    effect_names,
-    offering,
-    progress_bar,
     results_folder,
     run,
     say,
-    scenario_names,
-    task_names,
-    vehicle_names,
+    show_table,
     working,
 )
 
 
 def fly(
-    task: Annotated[
-        str,
-        typer.Option(
-            help="Task: FanTracking, FanTracking2D, WindHover or WindTrajectory; each has "
-            "controllers and scenarios of its own.",
-            autocompletion=offering(task_names),
-        ),
-    ] = "FanTracking",
+    task: TaskOption = "FanTracking",
     scenario: Annotated[
         str,
         typer.Option(
             help="Scenario: static, base, fast, slow-filter, noisy, gusty, far or varied; of a "
             "wind task base, turbulent and so on (docs/tasks.md).",
-            autocompletion=offering(scenario_names),
+            autocompletion=SCENARIOS,
         ),
     ] = "base",
     controller: Annotated[
@@ -48,50 +43,31 @@ def fly(
         typer.Option(
             help="Controller; default: admittance, or pid-force in the wind. Others: lead, "
             "tracker, sac-0 ..., the path of a trained policy, or FILE.py:CLASS.",
-            autocompletion=offering(controller_names),
+            autocompletion=CONTROLLERS,
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    seed: SeedOption = 0,
     vehicle: VehicleOption = "ardrone2",
     truth: Annotated[
         str | None,
         typer.Option(
             help="Simulated vehicle, where it is another than the model of --vehicle: an amended "
             "model flies the vehicle that it was made for.",
-            autocompletion=offering(vehicle_names),
+            autocompletion=VEHICLES,
         ),
     ] = None,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Effect of the simulated vehicle that its model does not declare, "
-            "NAME:coef=value,...; may be repeated.",
-            autocompletion=offering(effect_names),
-        ),
-    ] = None,
-    video: Annotated[
-        bool,
-        typer.Option(
-            "--video", help="Also write a video, fly.mp4 (video extra), and its last frame."
-        ),
-    ] = False,
+    effect: EffectOption = None,
+    video: VideoOption = False,
     gif: Annotated[
         bool, typer.Option("--gif", help="Also write an animation, fly.gif, and its last frame.")
     ] = False,
-    film_seconds: Annotated[
-        float, typer.Option(min=0.1, help="Longest duration of video or animation, s.")
-    ] = 20.0,
-    rrd: Annotated[
-        bool,
-        typer.Option(
-            "--rrd", help="Also write a recording for the Rerun viewer, fly.rrd (rerun extra)."
-        ),
-    ] = False,
+    film_seconds: FilmSeconds = 20.0,
+    rrd: RrdOption = False,
     csv: Annotated[
         bool,
         typer.Option("--csv", help="Also write the flight's time series, fly.csv."),
     ] = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the flight in a window.")] = False,
+    view: ViewOption = False,
     out: Out = Path("results/fly"),
 ) -> dict[str, Any]:
     """Fly one episode in the jet or in the wind. Write a picture of it.
@@ -132,13 +108,12 @@ def fly(
     every = max(1, round(rate / FPS))
     tally = Tally()
     with (
-        progress_bar() as progress,
+        working("flying", known.decisions) as progress,
         films(folder, "fly", kinds, film_seconds, every, rate) as film,
     ):
-        bar = progress.add_task("flying", total=known.decisions)
 
         def each(info: dict[str, Any]) -> None:
-            progress.advance(bar)
+            progress(more=1)
             if kinds:
                 tally.add(info)
                 film(env.render, lambda: caption_of(loop_of(env), env.viewer, title, info, tally))
@@ -168,18 +143,15 @@ def fly(
         )
         write_rrd(flight, env.truth, folder / "fly.rrd")
         paths.append(folder / "fly.rrd")
-    table = Table(
-        *("controller", "scenario", "motion", "RMSE (m)", "lost", "reward"), box=box.SIMPLE_HEAD
-    )
-    table.add_row(
-        shown,
-        scenario,
-        episode.motion,
-        f"{episode.rmse:.3f}",
-        "yes" if episode.lost else "no",
-        f"{episode.total_reward:.1f}",
-    )
-    console.print(table)
+    columns = {
+        "controller": shown,
+        "scenario": scenario,
+        "motion": episode.motion,
+        "RMSE (m)": f"{episode.rmse:.3f}",
+        "lost": "yes" if episode.lost else "no",
+        "reward": f"{episode.total_reward:.1f}",
+    }
+    show_table(tuple(columns), [tuple(columns.values())])
     say(*paths)
     return {
         "task": task,
@@ -197,14 +169,7 @@ def record(
         Path, typer.Option("--out", help="Flight log to write: .csv, .csv.gz or .parquet.")
     ] = Path("results/flight.csv"),
     vehicle: VehicleOption = "ardrone2",
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Effect of the simulated vehicle that its model does not declare, NAME or "
-            "NAME:coef=value,...; may be repeated.",
-            autocompletion=offering(effect_names),
-        ),
-    ] = None,
+    effect: EffectOption = None,
     trajectory: Annotated[
         str,
         typer.Option(
@@ -213,7 +178,7 @@ def record(
         ),
     ] = "excite",
     seconds: Annotated[float, typer.Option(help="Duration of the flight, s.")] = 60.0,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    seed: SeedOption = 0,
 ) -> dict[str, Any]:
     """Simulate a flight and write its log. The vehicle may have effects that its model does not
     declare.
@@ -251,7 +216,6 @@ def record(
     console.print(
         f"{len(columns['t'])} samples of {trajectory} by {model.name} with "
         f"{', '.join(e.name for e in effects) or 'no undeclared effect'}",
-        highlight=False,
     )
     say(out)
     return {

@@ -6,22 +6,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import box
-from rich.table import Table
 
 from ..runtime.errors import InputError, unknown_name
-from .terminal import MapOption, ReaderOption, console, note, offering, run, say, working
+from .terminal import (
+    MapOption,
+    ReaderOption,
+    console,
+    note,
+    offering,
+    run,
+    say,
+    show_table,
+    working,
+)
 
 if TYPE_CHECKING:
     from ..identification.logs.flight_log import FlightLog
 
 _WINDOW = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
-
-
-def _formats() -> list[str]:
-    from ..identification.vehicle_fit.exports import EXPORTS
-
-    return list(EXPORTS)
 
 
 def parse_window(text: str) -> tuple[Path, tuple[float, float]]:
@@ -78,7 +80,7 @@ def identify(
         typer.Option(
             help="Also print what another program takes: px4, ardupilot, rotorpy, drone-models or "
             "gazebo.",
-            autocompletion=offering(_formats),
+            autocompletion=offering("identification.vehicle_fit.exports:EXPORTS"),
         ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", help="Vehicle file to write, .yaml.")] = Path(
@@ -119,24 +121,29 @@ def identify(
         note(text)
     console.print(
         f"{found.seconds:.0f} s of flight, mass {mass:g} kg: {headline(found)}.",
-        highlight=False,
-        markup=False,
     )
-    table = Table("quantity", "value", "95 % interval", "unit", "", box=box.SIMPLE_HEAD)
-    for e in found.estimates:
-        interval = f"{e.low:.4g} to {e.high:.4g}" if math.isfinite(e.low) else ""
-        value = f"{e.value:.4g}" if math.isfinite(e.value) else "–"
-        table.add_row(e.name, value, interval, e.unit, e.status)
-    console.print(table)
+    show_table(
+        ("quantity", "value", "95 % interval", "unit", ""),
+        [
+            (
+                e.name,
+                f"{e.value:.4g}" if math.isfinite(e.value) else "–",
+                f"{e.low:.4g} to {e.high:.4g}" if math.isfinite(e.low) else "",
+                e.unit,
+                e.status,
+            )
+            for e in found.estimates
+        ],
+    )
     for e in found.estimates:
         if e.status in ("assumed", "not identifiable"):
-            console.print(f"{e.name}: {e.status}: {e.how}", highlight=False, markup=False)
+            console.print(f"{e.name}: {e.status}: {e.how}")
     for line in found.advice:
-        console.print(line, highlight=False, markup=False)
+        console.print(line)
     result = identified_data(found)
     if export is not None:
         text = EXPORTS[export](found)
-        console.print(text, highlight=False, markup=False, soft_wrap=True)
+        console.print(text, soft_wrap=True)
         result["export"] = {export: text}
     say(*written)
     return result

@@ -7,26 +7,21 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich import box
-from rich.table import Table
 
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.extras import need
 from .running import expensive
-from .terminal import Out, console, offering, progress_bar, results_folder, say
-
-
-def _algorithm_names() -> Sequence[str]:
-    from ..training.configuration import ALGORITHMS
-
-    return ALGORITHMS
-
-
-def _scenario_names() -> list[str]:
-    from ..envs.scenarios import SCENARIOS
-    from ..training.training_envs import TIERS
-
-    return [*SCENARIOS, *TIERS]
+from .terminal import (
+    ClusterOption,
+    Out,
+    SeedOption,
+    console,
+    offering,
+    results_folder,
+    say,
+    show_table,
+    working,
+)
 
 
 @expensive
@@ -37,17 +32,17 @@ def train(
             help="Learning algorithm: sac, ppo, recurrent-ppo, td3, imitation (of the oracle, from "
             "what a policy may observe) or recurrent-imitation; or tune: the gains of a designed "
             "controller.",
-            autocompletion=offering(_algorithm_names),
+            autocompletion=offering("training.configuration:ALGORITHMS"),
         ),
     ],
     scenario: Annotated[
         str,
         typer.Option(
             help="Training scenario, or wide: all scenarios mixed.",
-            autocompletion=offering(_scenario_names),
+            autocompletion=offering("envs.scenarios:SCENARIOS", "training.training_envs:TIERS"),
         ),
     ] = "base",
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    seed: SeedOption = 0,
     steps: Annotated[
         int | None,
         typer.Option(
@@ -76,9 +71,7 @@ def train(
         list[str] | None,
         typer.Option(help="Values to compare, KEY=VALUE|VALUE|..., one run each; may be repeated."),
     ] = None,
-    cluster: Annotated[
-        str | None, typer.Option(help="Address of a Ray cluster to train on, or local.")
-    ] = None,
+    cluster: ClusterOption = None,
     out: Out = Path("results/train"),
 ) -> dict[str, Any]:
     """Train a policy, or tune a designed controller. An interrupted run resumes from its last
@@ -86,8 +79,10 @@ def train(
 
     Example: windwrench train sac --scenario base --seed 0 --steps 60000 --out results/sac-0
     """
-    if algorithm not in _algorithm_names():
-        raise unknown_name("algorithm", algorithm, _algorithm_names())
+    from ..training.configuration import ALGORITHMS
+
+    if algorithm not in ALGORITHMS:
+        raise unknown_name("algorithm", algorithm, ALGORITHMS)
     need("stable_baselines3", "rl")
     if algorithm == "recurrent-ppo":
         need("sb3_contrib", "rl")
@@ -122,19 +117,22 @@ def _sweep(
         need("ray", "cluster")
     jobs = jobs_of(algorithm, scenario, seeds, overrides, search, config)
     folder = results_folder(out, runs=[job.name for job in jobs], cluster=cluster)
-    with progress_bar() as progress:
-        task = progress.add_task(f"{algorithm}, {scenario}", total=None if cluster else len(jobs))
+    with working(f"{algorithm}, {scenario}", len(jobs)) as progress:
         if cluster:
             found = run_jobs(jobs, folder, cluster)
         else:
             found = []
             for job in jobs:
                 found.append(run_job(job, folder))
-                progress.advance(task)
-    table = Table("run", "validation RMSE (m)", "minutes", box=box.SIMPLE_HEAD)
-    for one in sorted(found, key=lambda r: float(r["validation_rmse_m"])):
-        table.add_row(one["run"], f"{one['validation_rmse_m']:.3f}", f"{one['seconds'] / 60:.1f}")
-    console.print(table)
+                progress(more=1)
+    best_first = sorted(found, key=lambda run: float(run["validation_rmse_m"]))
+    show_table(
+        ("run", "validation RMSE (m)", "minutes"),
+        [
+            (run["run"], f"{run['validation_rmse_m']:.3f}", f"{run['seconds'] / 60:.1f}")
+            for run in best_first
+        ],
+    )
     say(*(Path(one["policy"]) for one in found))
     return {"runs": found}
 
@@ -160,29 +158,25 @@ def _learn(
         decisions=given["steps"],
         config=given,
     )
-    with progress_bar() as progress:
-        task = progress.add_task(f"{algorithm}, {scenario}", total=given["steps"])
+    with working(f"{algorithm}, {scenario}", given["steps"]) as progress:
 
         def report(now: Progress) -> None:
             told = f"validation RMSE {now.rmse_m[-1]:.3f} m"
-            progress.update(task, description=f"{algorithm}, {scenario}: {told}")
-            console.print(
-                f"{now.steps[-1]:8d} decisions: {told}, {now.lost[-1]} lost", highlight=False
-            )
+            progress(text=f"{algorithm}, {scenario}: {told}")
+            console.print(f"{now.steps[-1]:8d} decisions: {told}, {now.lost[-1]} lost")
 
         path = run_training(
             given,
             scenario,
             seed,
             folder,
-            lambda done: progress.update(task, completed=done),
+            progress,
             report,
         )
     done = read_progress(folder)
     assert done is not None
     console.print(
         f"best: {done.best_rmse:.3f} m at {done.steps[done.best]} decisions; {done.seconds:.0f} s",
-        highlight=False,
     )
     say(path, path.with_suffix(".json"), folder / "last.npz", folder / "progress.json")
     return {
@@ -209,23 +203,13 @@ def _tune(
     folder = results_folder(
         out, task=task, controller=law, scenario=scenario, trials=trials, episodes=episodes
     )
-    with progress_bar() as progress:
-        bar = progress.add_task(f"{law}, {scenario}", total=trials)
-        found = tune(
-            law,
-            scenario,
-            trials,
-            episodes,
-            seed,
-            lambda done: progress.update(bar, completed=done),
-            task,
-        )
+    with working(f"{law}, {scenario}", trials) as progress:
+        found = tune(law, scenario, trials, episodes, seed, progress, task)
     keep_gains(found, folder / "tuned.yaml", shlex.join(["windwrench", *sys.argv[1:]]))
     gains = ", ".join(f"{name} {value:.3g}" for name, value in found["gains"].items())
     console.print(
         f"{law} on {scenario}: {gains}: {found['rmse_m']:.3f} m over {episodes} validation "
         f"episodes (first gains: {found['default_rmse_m']:.3f} m)",
-        highlight=False,
     )
     say(folder / "tuned.yaml")
     return found

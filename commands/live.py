@@ -13,6 +13,7 @@ from rich.live import Live
 
 from ..runtime.errors import InputError
 from .terminal import (
+    VEHICLES,
     Gate,
     MapOption,
     Out,
@@ -20,9 +21,7 @@ from .terminal import (
     console,
     errors,
     note,
-    offering,
     run,
-    vehicle_names,
     working,
 )
 
@@ -39,7 +38,7 @@ LiveVehicleOption = Annotated[
         "--vehicle",
         help="Vehicle that flies: a preset (ardrone2, crazyflie, hummingbird) or a YAML file; with "
         "sim: ardrone2, unless another is given.",
-        autocompletion=offering(vehicle_names),
+        autocompletion=VEHICLES,
     ),
 ]
 
@@ -274,5 +273,5 @@ def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str
     torque = " ".join(f"{x:+.4g}" for x in means.mean[3:])
     lines.append(f"mean force {force} N, mean torque {torque} Nm")
     for text in lines:
-        errors.print(text, highlight=False, markup=False, soft_wrap=True)
+        errors.print(text, soft_wrap=True)
     return result

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from .running import expensive
-from .terminal import Out, console, results_folder, say, share_bars
+from .terminal import JobsOption, Out, console, results_folder, say, working
 
 
 @expensive
@@ -20,9 +20,7 @@ def reproduce(
         int | None,
         typer.Option(min=1, help="Number of seeds per figure; default: that of each figure."),
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Number of processes; default: one per core.")
-    ] = None,
+    jobs: JobsOption = None,
     page: Annotated[
         Path | None,
         typer.Option(help="Markdown file for the page; default: reproduction.md in the folder."),
@@ -47,12 +45,11 @@ def reproduce(
         kept=[name for name, n in numbers.items() if is_done(out, name, n)],
         jobs=jobs,
     )
-    with share_bars() as progress:
-        tasks = {name: progress.add_task(name, total=1.0) for name in names}
+    with working("figures") as progress:
 
         def report(shares: Mapping[str, float]) -> None:
-            for name, share in shares.items():
-                progress.update(tasks[name], completed=share)
+            left = ", ".join(name for name, share in shares.items() if share < 1.0)
+            progress(sum(shares.values()) / len(names), f"figures: {left}")
 
         fresh = run(names, folder, seeds, jobs, report)
     target = folder / "reproduction.md" if page is None else page
@@ -69,12 +66,9 @@ def reproduce(
         console.print(
             f"\n{kept['title']}" + ("" if fresh[name] else " (finished in an earlier run)"),
             style="bold",
-            highlight=False,
         )
         for row in kept["comparison"]:
             paper = f"; the paper: {row['paper']}" if row["paper"] != "-" else ""
-            console.print(
-                f"  {row['quantity']}: {row['here']}{paper}", highlight=False, markup=False
-            )
+            console.print(f"  {row['quantity']}: {row['here']}{paper}")
     say(*(folder / f"{name}.png" for name in names), target)
     return result

@@ -93,8 +93,6 @@ def as_command(work: Callable[..., Any]) -> Callable[..., None]:
                         f"  and write to {stopped.out}",
                     ]
                 ),
-                highlight=False,
-                markup=False,
                 soft_wrap=True,
             )
         except BaseException:

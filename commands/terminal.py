@@ -6,6 +6,7 @@ import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,9 +16,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
-    Progress,
     SpinnerColumn,
-    TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -44,8 +43,8 @@ class _Terminal(Console):
 
 
 # without emoji: an address such as crazyflie:radio://0/80 is no picture of a radio
-console = _Terminal(emoji=False, markup=False, highlight=False)
-errors = _Terminal(stderr=True, emoji=False, markup=False, highlight=False)
+console = _Terminal(emoji=False)
+errors = _Terminal(stderr=True, emoji=False)
 
 
 @dataclass
@@ -80,67 +79,31 @@ class DryRun(Exception):  # noqa: N818 - the way out of a command whose request 
         self.plan, self.out = plan, out
 
 
-def offering(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Return what completes a name, or the last of several with commas, in a shell; ``names`` is
-    only called there.
+def offering(*sources: str) -> Callable[[str], list[str]]:
+    """Return what completes a name, or the last of several with commas, in a shell.
+
+    Args:
+        sources: of names, ``module:attribute`` within the package: a collection, or a function that
+            returns one. A module is only imported in the shell.
     """
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")
-        return [f"{before}{comma}{name}" for name in names() if name.startswith(last)]
+        names: list[str] = []
+        for source in sources:
+            module, _, attribute = source.partition(":")
+            found = getattr(import_module(f"..{module}", __package__), attribute)
+            names += found() if callable(found) else found
+        return [f"{before}{comma}{name}" for name in names if name.startswith(last)]
 
     return complete
 
 
-def vehicle_names() -> list[str]:
-    """Return the vehicles that come with the kit."""
-    from ..dynamics.vehicle_file import preset_names
-
-    return preset_names()
-
-
-def effect_names() -> Iterable[str]:
-    """Return the effects of the library."""
-    from ..dynamics.effects import names
-
-    return names()
-
-
-def scenario_names() -> Iterable[str]:
-    """Return the scenarios of the task."""
-    from ..envs.scenarios import SCENARIOS
-
-    return SCENARIOS
-
-
-def controller_names() -> Iterable[str]:
-    """Return the controllers that come with the kit, trained policies among them."""
-    from ..controllers import CONTROLLERS
-    from ..controllers.shipped import shipped_policies
-
-    return [*CONTROLLERS, *shipped_policies()]
-
-
-def task_names() -> Iterable[str]:
-    """Return the tasks that have a leaderboard."""
-    from ..controllers.task_laws import TASK_LAWS
-
-    return ["FanTracking", *TASK_LAWS]
-
-
-def reader_names() -> Iterable[str]:
-    """Return the readers of other log formats."""
-    from ..identification.logs.readers import READERS
-
-    return READERS
-
-
-def map_names() -> Iterable[str]:
-    """Return the maps of tables that come with the kit."""
-    from ..identification.logs import log_map
-
-    return log_map.map_names()
-
+VEHICLES = offering("dynamics.vehicle_file:preset_names")
+EFFECTS = offering("dynamics.effects:names")
+SCENARIOS = offering("envs.scenarios:SCENARIOS")
+CONTROLLERS = offering("controllers:CONTROLLERS", "controllers.shipped:shipped_policies")
+TASKS = offering("evaluation.tasks:TASKS")
 
 Out = Annotated[
     Path, typer.Option("--out", help="Folder for the results; created if it does not exist.")
@@ -150,7 +113,7 @@ VehicleOption = Annotated[
     typer.Option(
         "--vehicle",
         help="Vehicle: a preset (ardrone2, crazyflie, hummingbird) or a YAML file.",
-        autocompletion=offering(vehicle_names),
+        autocompletion=VEHICLES,
     ),
 ]
 ReaderOption = Annotated[
@@ -160,7 +123,7 @@ ReaderOption = Annotated[
         help="Reader of the log, where another is wanted than what is in the file says: "
         "px4_ulog, ardupilot_bin, betaflight[:MAGNET_POLES], crazyflie_sd, rosbag[:TOPICS.yaml] "
         "and so on (docs/readers.md).",
-        autocompletion=offering(reader_names),
+        autocompletion=offering("identification.logs.readers:READERS"),
     ),
 ]
 MapOption = Annotated[
@@ -170,17 +133,54 @@ MapOption = Annotated[
         help="What the columns of another table mean: a YAML file, or a map that comes with the "
         "kit (betaflight, cflib, crazypad, euler-pwm, neurobem, rpm). windwrench check proposes "
         "one.",
-        autocompletion=offering(map_names),
+        autocompletion=offering("identification.logs.log_map:map_names"),
     ),
 ]
 
 
+EffectOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--effect",
+        help="Effect of the simulated vehicle that its model does not declare, NAME or "
+        "NAME:coef=value,...; may be repeated.",
+        autocompletion=EFFECTS,
+    ),
+]
+TaskOption = Annotated[
+    str,
+    typer.Option(
+        "--task",
+        help="Task: FanTracking, FanTracking2D, WindHover or WindTrajectory; each has controllers "
+        "and scenarios of its own.",
+        autocompletion=TASKS,
+    ),
+]
+SeedOption = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Random seed.")]
+VideoOption = Annotated[
+    bool,
+    typer.Option("--video", help="Also write a video (.mp4; video extra), and its last frame."),
+]
+RrdOption = Annotated[
+    bool,
+    typer.Option("--rrd", help="Also write a recording for the Rerun viewer (.rrd; rerun extra)."),
+]
+ViewOption = Annotated[bool, typer.Option("--view", help="Show the flight in a window.")]
+FilmSeconds = Annotated[
+    float, typer.Option("--film-seconds", min=0.1, help="Longest duration of a film, s.")
+]
+JobsOption = Annotated[
+    int | None, typer.Option("--jobs", min=1, help="Number of processes; default: one per core.")
+]
+ClusterOption = Annotated[
+    str | None, typer.Option("--cluster", help="Address of a Ray cluster to work on, or local.")
+]
 Without = Annotated[
     list[str] | None,
     typer.Option(
         "--without",
         help="Effect to leave out of the library; may be repeated.",
-        autocompletion=offering(effect_names),
+        autocompletion=EFFECTS,
     ),
 ]
 Gate = Annotated[
@@ -233,58 +233,23 @@ def results_folder(out: Path, **plan: object) -> Path:
     return out
 
 
-def progress_bar() -> Progress:
-    """Return a bar that counts what is done and says how long the rest will take; it goes when the
-    work is over.
-    """
-    return Bars(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-        console=errors,
-    )
-
-
-def share_bars() -> Progress:
-    """Return bars for shares of work between 0 and 1, with the time that is left; they go when the
-    work is over.
-    """
-    return Bars(
-        TextColumn("{task.description:18}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-        console=errors,
-    )
-
-
 @contextmanager
-def share_bars_by_part() -> Iterator[Callable[[str, float], None]]:
-    """Show a bar for each part of the work from when its first share is told: ``(part, share)``."""
-    with share_bars() as progress:
-        tasks: dict[str, TaskID] = {}
+def working(
+    text: str, total: float = 1.0, every: float = LINE_EVERY
+) -> Iterator[Callable[..., None]]:
+    """Show what is being done and how long the rest will take; give a function that takes how much
+    is done, another text, or how much more is done.
 
-        def report(part: str, share: float) -> None:
-            if part not in tasks:
-                tasks[part] = progress.add_task(part, total=1.0)
-            progress.update(tasks[part], completed=share)
-
-        yield report
-
-
-@contextmanager
-def working(text: str, every: float = LINE_EVERY) -> Iterator[Callable[..., None]]:
-    """Show what is being done; give a function that takes the share done so far, another text, or
-    both. Where there is no terminal a line comes ``every`` so many s.
+    Args:
+        text: says what is being done.
+        total: how much there is to do: 1 where shares are told.
+        every: s between two lines where there is no terminal.
     """
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
+        *([MofNCompleteColumn()] if total > 1.0 else []),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
@@ -292,10 +257,11 @@ def working(text: str, every: float = LINE_EVERY) -> Iterator[Callable[..., None
     with Bars(*columns, console=errors, every=every) as progress:
         task = progress.add_task(text, total=None)
 
-        def report(share: float | None = None, text: str | None = None) -> None:
-            if share is not None:
-                progress.update(task, total=1.0, completed=share)
-            progress.update(task, description=text)
+        def report(
+            done: float | None = None, text: str | None = None, more: float | None = None
+        ) -> None:
+            told = total if done is not None or more is not None else None
+            progress.update(task, total=told, completed=done, description=text, advance=more)
 
         yield report
 

@@ -4,6 +4,7 @@ completion, exit codes.
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from tests.support.paths import ROOT
 from windwrench.cli import app, main
 from windwrench.commands.running import plain, write_run
 from windwrench.commands.terminal import names_in, offering
@@ -197,11 +199,22 @@ def test_plain_values_are_strict_json():
 
 
 def test_completion_offers_names():
-    complete = offering(lambda: ["hover", "admittance", "ratio"])
-    assert complete("h") == ["hover"]
-    assert complete("hover,a") == ["hover,admittance"]
+    complete = offering("controllers:CONTROLLERS", "controllers.shipped:shipped_policies")
+    assert complete("hov") == ["hover"]
+    assert complete("hover,adm")[0] == "hover,admittance"
+    assert "sac-0" in complete("sac")
     assert complete("x") == []
     assert names_in("a, b,,a", "--x") == ["a", "b"]
+
+
+def test_every_source_of_completions_holds_names():
+    sources = set()
+    for path in (ROOT / "commands").glob("*.py"):
+        calls = re.findall(r"offering\(([^)]*)\)", path.read_text(encoding="utf-8"))
+        sources |= {name for call in calls for name in re.findall(r'"([a-z_.]+:\w+)"', call)}
+    assert len(sources) > 10
+    for source in sources:
+        assert offering(source)(""), source
 
 
 @pytest.mark.skipif(
