@@ -22,6 +22,7 @@ from ..estimator.estimate import (
     POSITION,
     QUATERNION,
     RATE,
+    STATE_SIZE,
     STATUS,
     TORQUE,
     TRACKING,
@@ -36,6 +37,7 @@ from .motion.inertial_signals import (
     pose_rate,
 )
 from .motion.residual import acting_wrench, needed_wrench
+from .motion.smoothing import continuous, resampled
 
 Array = NDArray[np.float64]
 
@@ -57,32 +59,26 @@ def inertial_wrench(
     Raises:
         InputError: no unbroken piece of IMU readings is longer than 3 s.
     """
-    noise = imu_noise(log)
-    count = len(log.t)
-    columns, numbers = np.zeros((count, 25)), np.zeros((count, WITHOUT_COVARIANCE))
-    numbers[:, STATUS], numbers[:, NIS] = COASTING, np.nan
+    noise, count = imu_noise(log), len(log.t)
+    numbers, std = np.zeros((count, WITHOUT_COVARIANCE)), np.full((count, 18), np.nan)
+    numbers[:, STATUS] = COASTING
     before = 0
     pieces = inertial_signals(log, vehicle.gravity)
     for number, s in enumerate(pieces):
-        found = _piece(s, vehicle, tuning, log.period, noise)
+        state, spread = _piece(s, vehicle, tuning, log.period, noise)
         # rows between two pieces hold the values of the nearer end of the one before
         end = count if number + 1 == len(pieces) else int(np.searchsorted(log.t, s.t[-1]) + 1)
-        rows = slice(before, end)
-        columns[rows] = np.column_stack([np.interp(log.t[rows], s.t, x) for x in found.T])
-        inside = (log.t[rows] >= s.t[0]) & (log.t[rows] <= s.t[-1] + log.period)
-        numbers[rows, STATUS] = np.where(inside, TRACKING, COASTING)
+        t = log.t[before:end]
+        numbers[before:end, :STATE_SIZE] = resampled(t, s.t, state)
+        std[before:end, 12:] = resampled(t, s.t, spread)
+        inside = (t >= s.t[0]) & (t <= s.t[-1] + log.period)
+        numbers[before:end, STATUS] = np.where(inside, TRACKING, COASTING)
         before = end
-    std = np.full((count, 18), np.nan)
-    numbers[:, FORCE], numbers[:, TORQUE] = columns[:, 0:3], columns[:, 3:6]
-    std[:, 15:18], std[:, 12:15] = columns[:, 6:9], columns[:, 9:12]
-    numbers[:, POSITION], numbers[:, VELOCITY] = columns[:, 12:15], columns[:, 15:18]
+    numbers[:, NIS] = np.nan
     if pose_rate(log) == 0.0:  # gyro and accelerometer alone drift away from them
         numbers[:, POSITION], numbers[:, VELOCITY] = np.nan, np.nan
-    quaternion = columns[:, 21:]
-    numbers[:, RATE] = columns[:, 18:21]
-    numbers[:, QUATERNION] = (
-        quaternion / np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
-    )
+    quaternion = numbers[:, QUATERNION]
+    quaternion /= np.maximum(np.linalg.norm(quaternion, axis=1), 1e-9)[:, None]
     return WrenchEstimate(numbers, std), _notes(log, pieces, vehicle)
 
 
@@ -92,9 +88,9 @@ def _piece(
     tuning: UKFTuning,
     period: float,
     noise: tuple[float, float],
-) -> Array:
-    """Return force, torque, their standard deviations, position, velocity, angular velocity and
-    quaternion (n, 25) of a piece.
+) -> tuple[Array, Array]:
+    """Return the state (n, STATE_SIZE) of a piece, laid out as an estimate's, and the standard
+    deviations of torque and force (n, 6).
     """
     acting, body = acting_wrench(s, vehicle)
     needed = needed_wrench(s, body)
@@ -102,10 +98,8 @@ def _piece(
     walk_force, walk_torque, miss_force, miss_torque = (
         np.broadcast_to(np.asarray(x, dtype=np.float64), 3)
         for x in (
-            tuning.force_walk,
-            tuning.torque_walk,
-            tuning.thrust_noise,
-            tuning.motor_torque_noise,
+            *(tuning.force_walk, tuning.torque_walk),
+            *(tuning.thrust_noise, tuning.motor_torque_noise),
         )
     )
     residual = needed[:, :3] - acting[:, :3]
@@ -115,11 +109,10 @@ def _piece(
     spread = np.empty(6)
     for i in range(3):
         variance = (body.mass * noise[1]) ** 2 + miss_force[i] ** 2 / steps
-        force[:, i], spread[i] = _smoothed_force(
-            residual[:, i], walk_force[i] ** 2 * steps, variance
-        )
+        walk = walk_force[i] ** 2 * steps
+        force[:, i], spread[i] = _smoothed_force(residual[:, i], walk, variance)
         own = inverse[i, i]
-        turned, spread[3 + i] = _smoothed_turning(
+        torque[:, i], spread[3 + i] = _smoothed_turning(
             s.angular_velocity[:, i],
             driven[:, i],
             s.period,
@@ -127,27 +120,17 @@ def _piece(
             (own * miss_torque[i] * s.period) ** 2 / steps,
             max(noise[0], 1e-6) ** 2,
         )
-        torque[:, i] = turned
         spread[3 + i] /= own
-    torque = torque @ body.inertia.T
-    world = np.einsum("nij,nj->ni", s.rotation, torque)
     off = body.mass * s.bias_std
     std_force = np.sqrt(spread[:3] ** 2 + np.einsum("nij,j->ni", np.square(s.rotation), off**2))
     std_torque = np.sqrt(np.einsum("nij,j->ni", np.square(s.rotation), spread[3:] ** 2))
-    quaternion = Rotation.from_matrix(s.rotation).as_quat(scalar_first=True)
-    signs = np.cumprod(np.sign(np.append(1.0, np.sum(quaternion[1:] * quaternion[:-1], axis=1))))
-    return np.column_stack(
-        [
-            force,
-            world,
-            std_force,
-            std_torque,
-            s.position,
-            s.velocity,
-            s.angular_velocity,
-            quaternion * signs[:, None],
-        ]
-    )
+    state = np.zeros((len(s.t), STATE_SIZE))
+    state[:, POSITION], state[:, VELOCITY] = s.position, s.velocity
+    state[:, RATE] = s.angular_velocity
+    state[:, QUATERNION] = continuous(Rotation.from_matrix(s.rotation).as_quat(scalar_first=True))
+    state[:, TORQUE] = np.einsum("nij,nj->ni", s.rotation, torque @ body.inertia.T)
+    state[:, FORCE] = force
+    return state, np.column_stack([std_torque, std_force])
 
 
 def _smoothed_force(y: Array, walk: float, variance: float) -> tuple[Array, float]:
@@ -207,19 +190,15 @@ def _two_sided(
 
 
 def _notes(log: FlightLog, pieces: list[InertialSignals], vehicle: Vehicle) -> tuple[str, ...]:
-    rate = pose_rate(log)
-    notes = []
-    if rate == 0.0:
-        bias = vehicle.mass * float(np.max([s.bias_std for s in pieces]))
-        notes.append(
-            "the log has no pose: the wrench is read from gyro and accelerometer. Its force is "
-            "along level axes, horizontal ones as the vehicle pointed at the start, which drift "
-            f"with the gyro; a steady force below {bias:.2g} N may be the accelerometer's bias. "
-            "Height, place and velocity are not known, and drag is part of the force"
-        )
-    else:
-        notes.append(
+    if pose_rate(log) > 0.0:
+        return (
             "gyro and accelerometer were smoothed together with the "
-            + ("poses" if log.valid.any() else "positions")
+            + ("poses" if log.valid.any() else "positions"),
         )
-    return tuple(notes)
+    bias = vehicle.mass * float(np.max([s.bias_std for s in pieces]))
+    return (
+        "the log has no pose: the wrench is read from gyro and accelerometer. Its force is "
+        "along level axes, horizontal ones as the vehicle pointed at the start, which drift "
+        f"with the gyro; a steady force below {bias:.2g} N may be the accelerometer's bias. "
+        "Height, place and velocity are not known, and drag is part of the force",
+    )

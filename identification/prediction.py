@@ -44,6 +44,7 @@ class PredictionSettings:
     # s at an end of unbroken pose, where a low-pass has but one side to go by
     start_margin: float = 0.5
     end_margin: float = 0.1  # s, the same for the position that a prediction is compared with
+    start_every: float = 0.25  # s, of an error's predictions
     most_starts: int = 2000  # of an error's predictions in a piece, spread over it
     longest_gap: float = 2.0  # s without a pose, after which the filter starts anew (estimate_log)
     step_tolerance: float = 0.1  # of a period: a step so little too long is still one step
@@ -109,7 +110,7 @@ def predict(log: FlightLog, vehicle: Vehicle, horizon_s: float = 0.5, every: int
 
 
 def rollout_error(
-    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float = 1.0, every: float = 0.25
+    log: FlightLog, vehicle: Vehicle, segments: Segments, horizon: float = 1.0
 ) -> float:
     """Return the RMS distance (m) between flight and model after ``horizon`` s of prediction, as
     ``predict`` makes them.
@@ -120,7 +121,6 @@ def rollout_error(
         segments: times (s) from and to; a prediction counts if it lies in one of them from its
             start to its end.
         horizon: s.
-        every: s.
 
     Returns:
         NaN where no segment holds an unbroken stretch of pose that is long enough.
@@ -136,7 +136,7 @@ def rollout_error(
     squares = []
     for piece in pieces:
         ahead = max(1, round(horizon / piece.period))
-        starts = _start_samples(piece, segments, horizon, every)
+        starts = _start_samples(piece, segments, horizon)
         starts = starts[starts + ahead < len(piece.t)]
         if starts.size:
             starts = starts[:: math.ceil(len(starts) / PREDICTION.most_starts)]
@@ -171,19 +171,15 @@ def _rolled_out(
     return states, path
 
 
-def _start_samples(
-    signals: Signals, segments: Segments, horizon: float, every: float
-) -> NDArray[np.intp]:
+def _start_samples(signals: Signals, segments: Segments, horizon: float) -> NDArray[np.intp]:
     """Return the samples at which predictions start that lie in a segment and well inside this
     piece.
     """
-    first, last = (
-        signals.t[0] + PREDICTION.start_margin,
-        signals.t[-1] - max(horizon + PREDICTION.end_margin, PREDICTION.start_margin),
-    )
-    times = np.concatenate(
-        [np.empty(0), *(np.arange(t0, t1 - horizon + 1e-9, every) for t0, t1 in segments)]
-    )
+    use = PREDICTION
+    first = signals.t[0] + use.start_margin
+    last = signals.t[-1] - max(horizon + use.end_margin, use.start_margin)
+    each = (np.arange(t0, t1 - horizon + 1e-9, use.start_every) for t0, t1 in segments)
+    times = np.concatenate([np.empty(0), *each])
     times = times[(times >= first) & (times <= last)]
     return np.unique(np.round((times - signals.t[0]) / signals.period).astype(np.intp))
 
@@ -232,14 +228,8 @@ def _integrate_angular_velocity(rate: Array, period: float, out: Array) -> None:
     """
     for k in range(1, len(rate)):
         a, b = rate[k - 1], rate[k]
-        turn_body(
-            out[k - 1],
-            0.5 * (a[0] + b[0]),
-            0.5 * (a[1] + b[1]),
-            0.5 * (a[2] + b[2]),
-            period,
-            out[k],
-        )
+        w = 0.5 * (a + b)
+        turn_body(out[k - 1], w[0], w[1], w[2], period, out[k])
 
 
 @compiled
@@ -336,26 +326,17 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     ukf = WrenchUKF(vehicle, tuning, period=period)
     voltage = np.full(len(log.t), vehicle.voltage_ref) if log.voltage is None else log.voltage
     # another memory layout would be another type, and compiled anew
-    t, speeds, voltage, position, quaternion = map(
-        np.ascontiguousarray, (log.t, log.rotor_speeds, voltage, log.position, log.quaternion)
-    )
-    valid = np.ascontiguousarray(log.valid)
+    columns = [
+        np.ascontiguousarray(x)
+        for x in (log.t, log.rotor_speeds, voltage, log.position, log.quaternion, log.valid)
+    ]
+    t, position, quaternion = columns[0], *columns[3:5]
     nis = np.full(len(t), np.nan)
     for rows in unbroken(log.t, seen, PREDICTION.longest_gap):
         piece = slice(int(rows[0]), int(rows[-1]) + 1)
         ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
         ukf.record[0]["time"] = t[rows[0]] - t[0]
-        _filter(
-            ukf.record,
-            t[piece],
-            speeds[piece],
-            voltage[piece],
-            position[piece],
-            quaternion[piece],
-            valid[piece],
-            period,
-            nis[piece],
-        )
+        _filter(ukf.record, *(x[piece] for x in columns), period, nis[piece])
         inside[rows[0]] = False  # the filter's start has nothing to compare with
     values = nis[inside & log.valid]
     return float(np.mean(values)) if values.size else math.nan

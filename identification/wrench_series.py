@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..dynamics.vehicle import Vehicle
 from ..estimator import NoiseFit, RecordingUKF, UKFTuning, WrenchEstimate, WrenchUKF, fit_noise
 from ..estimator.estimate import COASTING, NIS, REJECTED, STATUS, STATUSES, WITHOUT_COVARIANCE
-from ..estimator.noise_fit import NoiseFitSettings, tuning_note
+from ..estimator.noise_fit import tuning_note
 from ..estimator.row_steps import steps_between
 from ..runtime.errors import InputError
 from .inertial_wrench import inertial_wrench
@@ -88,8 +88,11 @@ def estimate_log(
             (``screen_for_estimate``), or its rotor speeds make the filter's numbers overflow.
     """
     log, doubts = screen_for_estimate(log, vehicle)
-    if reads_imu(log) or (smooth and smooths_imu(log)):
-        return _by_imu(log, vehicle, tuning, doubts)
+    both = log.gyro is not None and log.accelerometer is not None
+    if reads_imu(log) or (smooth and both):
+        tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
+        found, notes = inertial_wrench(log, vehicle, tuning)
+        return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes))
     first, count = int(np.flatnonzero(log.valid)[0]), len(log.t)
     ukf = (RecordingUKF if smooth else WrenchUKF)(vehicle, tuning, log.period, gate)
     numbers, std = np.empty((count, WITHOUT_COVARIANCE)), np.empty((count, 18))
@@ -124,20 +127,6 @@ def estimate_log(
     series = WrenchSeries(found, log.t, vehicle, ukf.tuning, (*log.notes, *doubts))
     series.notes += tuple(_notes(log, series, smooth))
     return series
-
-
-def smooths_imu(log: FlightLog) -> bool:
-    """Return whether a log has all of an IMU, whose readings can be smoothed."""
-    return log.gyro is not None and log.accelerometer is not None
-
-
-def _by_imu(
-    log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None, doubts: tuple[str, ...]
-) -> WrenchSeries:
-    """Return the wrench at every row, smoothed from gyro and accelerometer."""
-    tuning = tuning or UKFTuning.for_vehicle(vehicle, log.period)
-    found, notes = inertial_wrench(log, vehicle, tuning)
-    return WrenchSeries(found, log.t, vehicle, tuning, (*log.notes, *doubts, *notes))
 
 
 def pose_notes(log: FlightLog, vehicle: Vehicle) -> tuple[str, ...]:
@@ -177,19 +166,9 @@ def _notes(log: FlightLog, series: WrenchSeries, smooth: bool) -> Iterator[str]:
         yield ("the log has one of gyro and accelerometer only: the poses were smoothed without it")
 
 
-def tune_to_log(
-    log: FlightLog,
-    vehicle: Vehicle,
-    tuning: UKFTuning | None = None,
-    settings: NoiseFitSettings | None = None,
-) -> NoiseFit:
-    """Find the tuning that suits a log; see ``estimator.noise_fit``.
-
-    Args:
-        log: the flight.
-        vehicle: the declared vehicle.
-        tuning: to compare with; default ``UKFTuning.for_vehicle(vehicle, log.period)``.
-        settings: of the fit; default ``NoiseFitSettings()``.
+def tune_to_log(log: FlightLog, vehicle: Vehicle) -> NoiseFit:
+    """Find the tuning that suits a log, beside ``UKFTuning.for_vehicle(vehicle, log.period)``; see
+    ``estimator.noise_fit``.
 
     Raises:
         InputError: the log is none to estimate a wrench from (``screen_for_estimate``), or too few
@@ -202,13 +181,13 @@ def tune_to_log(
             "expected 50 poses a second, or leave --tune out"
         )
     try:
-        return fit_noise(vehicle, *_columns(screened), tuning, settings)
+        return fit_noise(vehicle, *_columns(screened))
     except InputError as error:
         raise InputError(f"{log.source or log.name}: {error}") from error
 
 
-def tuning_note_of(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = None) -> str | None:
-    """Return a sentence for the user if a log contradicts the tuning, else None; no fit.
+def tuning_note_of(log: FlightLog, vehicle: Vehicle) -> str | None:
+    """Return a sentence for the user if a log contradicts its vehicle's tuning, else None; no fit.
 
     Raises:
         InputError: the log is none to estimate a wrench from.
@@ -216,7 +195,7 @@ def tuning_note_of(log: FlightLog, vehicle: Vehicle, tuning: UKFTuning | None = 
     screened, _ = screen_for_estimate(log, vehicle)
     if reads_imu(screened):
         return None
-    return tuning_note(vehicle, *_columns(screened), tuning)
+    return tuning_note(vehicle, *_columns(screened))
 
 
 def _columns(log: FlightLog) -> tuple[Array, Array, Array, Array, Array | None]:
@@ -251,12 +230,11 @@ def write_wrench(series: WrenchSeries, out_dir: str | Path) -> Path:
         InputError: the file cannot be written.
     """
     columns = {"t": series.t}
-    for prefix, force, torque in (
-        ("", series.force, series.torque),
-        ("std_", series.std_force, series.std_torque),
+    for name, wrench in (
+        *(("f", series.force), ("t", series.torque)),
+        *(("std_f", series.std_force), ("std_t", series.std_torque)),
     ):
-        columns |= {f"{prefix}f{axis}": force[:, i] for i, axis in enumerate("xyz")}
-        columns |= {f"{prefix}t{axis}": torque[:, i] for i, axis in enumerate("xyz")}
+        columns |= {f"{name}{axis}": wrench[:, i] for i, axis in enumerate("xyz")}
     columns["nis"] = series.nis
     columns["status"] = series.numbers[:, STATUS]
     path = Path(out_dir) / "wrench.csv"

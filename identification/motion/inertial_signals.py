@@ -49,12 +49,15 @@ INERTIAL_SIGNALS = InertialSignalSettings()
 class InertialSignals(Signals):
     """Signals of an IMU, with what its sensors read and how well the rest is known."""
 
-    # (n, 6) unfiltered: acceleration (m/s2, world) and angular velocity (rad/s, body)
-    measured: Array
     attitude_std: Array  # (n, 3) rad, body
     velocity_std: Array  # (n, 3) m/s, world
     position_std: Array  # (n, 3) m, world
     bias_std: Array  # (3,) m/s2, of the accelerometer's bias that was taken out
+
+    @property
+    def measured(self) -> Array:
+        """Acceleration (m/s2, world) and angular velocity (rad/s, body), (n, 6)."""
+        return np.column_stack([self.acceleration, self.angular_velocity])
 
 
 def pose_rate(log: FlightLog) -> float:
@@ -106,16 +109,13 @@ def inertial_pieces(log: FlightLog) -> list[NDArray[np.intp]]:
     ]
 
 
-def inertial_signals(
-    log: FlightLog, gravity: float = 9.81, wide_hz: float = np.inf
-) -> list[InertialSignals]:
-    """Return the motion over each unbroken piece of a log's IMU.
+def inertial_signals(log: FlightLog, gravity: float = 9.81) -> list[InertialSignals]:
+    """Return the motion over each unbroken piece of a log's IMU. No low-pass smooths the readings,
+    as a pose's does, which is differentiated twice: 15 Hz would take a per cent at 5 Hz.
 
     Args:
         log: with gyro and accelerometer; positions and attitudes in it are used, however few.
         gravity: m/s2.
-        wide_hz: of a low-pass on gyro and specific force. Default: none. A pose needs one, as it is
-            differentiated twice; here it would take a per cent at 5 Hz, and that is a lag.
 
     Raises:
         InputError: no piece is longer than 3 s.
@@ -127,15 +127,11 @@ def inertial_signals(
             f"{SIGNALS.shortest_piece:g} s"
         )
     noise = imu_noise(log)
-    return [_piece(log, rows, gravity, wide_hz, noise) for rows in pieces]
+    return [_piece(log, rows, gravity, noise) for rows in pieces]
 
 
 def _piece(
-    log: FlightLog,
-    rows: NDArray[np.intp],
-    gravity: float,
-    wide_hz: float,
-    noise: tuple[float, float],
+    log: FlightLog, rows: NDArray[np.intp], gravity: float, noise: tuple[float, float]
 ) -> InertialSignals:
     assert log.gyro is not None
     assert log.accelerometer is not None
@@ -163,8 +159,6 @@ def _piece(
     gyro = gyro - at_samples(fused.gyro_bias)
     force = force - at_samples(fused.accelerometer_bias)
     rotation = _dense(t, gyro, fused)
-    angular_velocity = low_pass(gyro, wide_hz, period)
-    down = np.array([0.0, 0.0, gravity])
     voltage = None if log.voltage is None else np.interp(t, log.t, log.voltage)
     return InertialSignals(
         t,
@@ -172,12 +166,11 @@ def _piece(
         at_samples(fused.position),
         rotation,
         at_samples(fused.velocity),
-        np.einsum("nij,nj->ni", rotation, low_pass(force, wide_hz, period)) - down,
-        angular_velocity,
-        derivative(angular_velocity, period),
+        np.einsum("nij,nj->ni", rotation, force) - np.array([0.0, 0.0, gravity]),
+        gyro,
+        derivative(gyro, period),
         np.maximum(speeds, 0.0),
         voltage,
-        np.column_stack([np.einsum("nij,nj->ni", rotation, force) - down, gyro]),
         at_samples(fused.std[:, 0:3]),
         at_samples(fused.std[:, 3:6]),
         at_samples(fused.std[:, 6:9]),
@@ -198,28 +191,22 @@ def _fused(
     it.
     """
     thinned_noise = (noise[0] / np.sqrt(thin), noise[1] / np.sqrt(thin))
-    there: Mask = np.asarray(np.isfinite(log.position).all(axis=1))
-    placed = _measured(log, there, t)
-    whole: Mask = np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid)
-    turned = _measured(log, whole, t)
+    use = INERTIAL_SIGNALS
+    placed = _measured(log, np.asarray(np.isfinite(log.position).all(axis=1)), t)
+    turned = _measured(log, np.asarray(np.isfinite(log.quaternion).all(axis=1) & log.valid), t)
     positions = attitudes = None
     if len(placed) > 3:
-        positions = Readings(
-            log.t[placed], log.position[placed], INERTIAL_SIGNALS.first_position_std
-        )
+        positions = Readings(log.t[placed], log.position[placed], use.first_position_std)
     if len(turned) > 3:
-        attitudes = Readings(
-            log.t[turned],
-            Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix(),
-            INERTIAL_SIGNALS.first_attitude_std,
-        )
+        matrices = Rotation.from_quat(log.quaternion[turned], scalar_first=True).as_matrix()
+        attitudes = Readings(log.t[turned], matrices, use.first_attitude_std)
     fused = fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
     if positions is None:
         return fused
     off = positions.values - resampled(positions.t, fused.t, fused.position)
-    found = 1.3 * robust_std(off - np.median(off, axis=0))  # a smoother leaves less than the noise
-    std = max(found, INERTIAL_SIGNALS.least_position_std)
-    kept = np.linalg.norm(off - np.median(off, axis=0), axis=1) < INERTIAL_SIGNALS.outlier * std
+    off -= np.median(off, axis=0)
+    std = max(1.3 * robust_std(off), use.least_position_std)  # a smoother leaves less than noise
+    kept = np.linalg.norm(off, axis=1) < use.outlier * std
     positions = Readings(positions.t[kept], positions.values[kept], std)
     if attitudes is not None:
         kept = np.clip(np.searchsorted(fused.t, attitudes.t), 0, len(fused.t) - 1)  # within a knot
@@ -228,13 +215,8 @@ def _fused(
             off = Rotation.from_matrix(
                 np.swapaxes(fused.rotation[kept[at_knot]], 1, 2) @ attitudes.values[at_knot]
             ).as_rotvec()
-            attitudes = replace(
-                attitudes,
-                std=max(
-                    1.3 * robust_std(off - np.median(off, axis=0)),
-                    INERTIAL_SIGNALS.least_attitude_std,
-                ),
-            )
+            std = max(1.3 * robust_std(off - np.median(off, axis=0)), use.least_attitude_std)
+            attitudes = replace(attitudes, std=std)
     return fuse(t, gyro, force, gravity, thinned_noise, positions, attitudes)
 
 

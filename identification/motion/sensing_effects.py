@@ -84,12 +84,8 @@ def _settled(log: FlightLog, delay: float) -> np.ndarray:
     longer made up.
     """
     seen = np.flatnonzero(log.valid)
-    starts = (
-        seen[np.flatnonzero(np.diff(log.t[seen], prepend=-np.inf) > SENSING.longest_gap)]
-        if seen.size
-        else seen
-    )
-    last = np.searchsorted(starts, np.arange(len(log.t)), side="right") - 1
-    began = np.where(last >= 0, log.t[starts[last]] if starts.size else np.inf, np.inf)
-    settled: np.ndarray = log.t >= began + delay - 1e-9
+    broken = np.diff(log.t[seen], prepend=-np.inf) > SENSING.longest_gap
+    starts = np.append(-np.inf, log.t[seen[broken]])
+    began = starts[np.searchsorted(starts, log.t, side="right") - 1]
+    settled: np.ndarray = log.t >= np.where(np.isfinite(began), began + delay - 1e-9, np.inf)
     return settled

@@ -81,7 +81,7 @@ def with_noise(log: FlightLog, noise: SensorNoise, rng: np.random.Generator) -> 
 
 
 def noisy_logs(
-    logs: Sequence[FlightLog], vehicle: Vehicle, seed: int = 0, hidden: bool = False
+    logs: Sequence[FlightLog], vehicle: Vehicle, hidden: bool = False
 ) -> list[FlightLog]:
     """Return logs with their own noise added once more, so that the change of whatever is made of
     them is what noise makes.
@@ -89,7 +89,7 @@ def noisy_logs(
     ``hidden``: a filter took the noise out of the logs' upper band, and only a part of it shows.
     What the vehicle's file says of its motion capture is added then, if it is more.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     out = []
     for log in logs:
         noise = sensor_noise(log, vehicle)

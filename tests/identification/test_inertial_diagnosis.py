@@ -56,9 +56,9 @@ def test_a_log_is_fused_once_whatever_is_asked_of_it(monkeypatch) -> None:
     log = pose_removed(imu_flight(VEHICLE, seconds=5.0), 20)
     fused: list[str] = []
 
-    def counted(log: FlightLog, *more: float) -> list[InertialSignals]:
+    def counted(log: FlightLog, gravity: float) -> list[InertialSignals]:
         fused.append(log.name)
-        return inertial_signals(log, *more)
+        return inertial_signals(log, gravity)
 
     monkeypatch.setattr(regression, "inertial_signals", counted)
     flights = Flights([log], VEHICLE)
