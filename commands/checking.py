@@ -58,8 +58,8 @@ def check(
     Example: windwrench check theirs.csv --vehicle my_drone.yaml --write-map map.yaml
     """
     from ..dynamics.vehicle_file import load_vehicle
+    from ..identification.report.log_channels import plot_channels
     from ..identification.report.log_check import check_log
-    from ..identification.report.log_picture import plot_log
 
     model = None if vehicle is None else load_vehicle(vehicle)
     with working("reading"):
@@ -73,7 +73,7 @@ def check(
         said = _write(found.log, log, write)
         written.append(write)
     folder = results_folder(out)
-    written.append(plot_log(found.log, folder / "check.png"))
+    written.append(plot_channels(found.log.name, found.channels, folder / "check.png"))
     if write_map is not None:
         with replaced(write_map) as temporary:
             temporary.write_text(found.map_text, encoding="utf-8")

@@ -326,17 +326,17 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     ukf = WrenchUKF(vehicle, tuning, period=period)
     voltage = np.full(len(log.t), vehicle.voltage_ref) if log.voltage is None else log.voltage
     # another memory layout would be another type, and compiled anew
-    columns = [
-        np.ascontiguousarray(x)
-        for x in (log.t, log.rotor_speeds, voltage, log.position, log.quaternion, log.valid)
-    ]
-    t, position, quaternion = columns[0], *columns[3:5]
+    t, speeds, voltage, position, quaternion = map(
+        np.ascontiguousarray, (log.t, log.rotor_speeds, voltage, log.position, log.quaternion)
+    )
+    valid = np.ascontiguousarray(log.valid)
     nis = np.full(len(t), np.nan)
     for rows in unbroken(log.t, seen, PREDICTION.longest_gap):
         piece = slice(int(rows[0]), int(rows[-1]) + 1)
         ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
         ukf.record[0]["time"] = t[rows[0]] - t[0]
-        _filter(ukf.record, *(x[piece] for x in columns), period, nis[piece])
+        poses = position[piece], quaternion[piece], valid[piece]
+        _filter(ukf.record, t[piece], speeds[piece], voltage[piece], *poses, period, nis[piece])
         inside[rows[0]] = False  # the filter's start has nothing to compare with
     values = nis[inside & log.valid]
     return float(np.mean(values)) if values.size else math.nan

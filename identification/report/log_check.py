@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...dynamics.vehicle import Vehicle
 from ...dynamics.vehicle_file import load_vehicle, preset_names
@@ -24,24 +23,7 @@ from ..logs.readers import READERS
 from ..logs.reading import finished, missing_columns, read_log
 from ..logs.screening import screen_log
 from ..motion.noise_spectrum import noise_spectra
-
-Array = NDArray[np.float64]
-
-_GAP = 3.0  # of a channel's own median steps
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One channel of a log."""
-
-    name: str
-    unit: str
-    samples: int
-    rate_hz: float
-    gaps: int  # longer than 3 of its own steps
-    longest_gap_s: float
-    low: float
-    high: float
+from .log_channels import Channel, log_channels
 
 
 @dataclass(frozen=True)
@@ -50,7 +32,7 @@ class LogCheck:
 
     log: FlightLog
     read_by: str
-    channels: tuple[Channel, ...]
+    channels: list[Channel]
     doubts: tuple[str, ...]
     guess: Guess | None = None
     map_text: str = ""  # the map by which it was read, as a YAML file; empty where it needed none
@@ -132,7 +114,7 @@ def check_log(
     ]
     doubts += [note for note in log.notes if note.startswith("warning")]
     doubts += _doubts(log, vehicle)
-    return LogCheck(log, read_by, tuple(_channels(log)), tuple(doubts), guess, text)
+    return LogCheck(log, read_by, log_channels(log), tuple(doubts), guess, text)
 
 
 def _map_text(name: str) -> str:
@@ -163,53 +145,6 @@ def _guessed(path: Path, vehicle: Vehicle | None, error: InputError) -> tuple[Fl
     with np.errstate(over="ignore", invalid="ignore"):
         log = map_table(table, layout, guess.log_map, vehicle)
     return finished(log, vehicle), guess
-
-
-def _channels(log: FlightLog) -> list[Channel]:
-    """Return the channels that a log has."""
-    speeds = log.rotor_speeds if log.has_rotor_speeds else None
-    rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
-    given: list[tuple[str, str, Array | None]] = [
-        ("position", "m", log.position),
-        ("attitude (tilt)", "deg", _tilt(log)),
-        (rotors, "rad/s", speeds),
-        ("motor commands", "0 to 1", log.command),
-        ("battery", "V", None if log.voltage is None else log.voltage[:, None]),
-        ("accelerometer", "m/s2", log.accelerometer),
-        ("gyro", "rad/s", log.gyro),
-        ("true force", "N", log.force),
-        ("true torque", "Nm", log.torque),
-    ]
-    out = []
-    for name, unit, values in given:
-        if values is None:
-            continue
-        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
-        if len(rows) < 2:
-            continue
-        steps = np.diff(log.t[rows])
-        step = float(np.median(steps))
-        out.append(
-            Channel(
-                name,
-                unit,
-                len(rows),
-                1.0 / step,
-                int(np.sum(steps > _GAP * step)),
-                float(steps.max()),
-                float(values[rows].min()),
-                float(values[rows].max()),
-            )
-        )
-    return out
-
-
-def _tilt(log: FlightLog) -> Array:
-    """Return the angle (N, 1) between thrust axis and vertical, degrees; NaN without a pose."""
-    x, y = log.quaternion[:, 1], log.quaternion[:, 2]
-    up = np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)
-    angle = np.degrees(np.arccos(up))
-    return np.asarray(np.where(log.valid, angle, np.nan)[:, None])
 
 
 def _doubts(log: FlightLog, vehicle: Vehicle | None) -> list[str]:

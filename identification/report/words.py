@@ -299,13 +299,6 @@ def name_in_words(effect: NamedEffect) -> str:
     )
 
 
-def carried_by(effect: NamedEffect) -> str:
-    """Return which channels of the logs carried a finding, in one sentence; nothing where that is
-    not known.
-    """
-    return f"Carried by {in_words(effect.channels)}." if effect.channels else ""
-
-
 def confusion(effect: NamedEffect) -> str:
     """Return which other effects would explain these logs as well as this one."""
     return (
@@ -313,45 +306,6 @@ def confusion(effect: NamedEffect) -> str:
         f"{in_words(effect.indistinguishable_from, 'or')}, which explain "
         "them equally well."
     )
-
-
-def probability_sentences(diagnosis: Diagnosis) -> list[str]:
-    """Return how probable what was found is, in plain words; nothing where that was not asked."""
-    stated = diagnosis.probabilities
-    if stated is None:
-        return []
-    names = [
-        f"{e.name}: {percent(stated.names.get(e.name, 0.0))} that it acts."
-        for e in diagnosis.effects
-    ]
-    sets = [
-        f"{' and '.join(x.effects) or 'Nothing of the library'}, and nothing else: "
-        f"{percent(x.probability)}."
-        for x in stated.alternatives[:5]
-    ]
-    hidden = "" if diagnosis.ranking else ", or none that these logs can show"
-    return [
-        *names,
-        *sets,
-        f"Something acts that no effect of the library is{hidden}: {percent(stated.unknown)}.",
-        "A probability is how often such a finding was right on simulated flights of which the "
-        "truth is known, some of them with a cause outside the library.",
-    ]
-
-
-def evidence_sentence(effect: NamedEffect) -> str:
-    """Return what speaks for a named effect; nothing where its evidence is empty."""
-    names = {
-        "energy_explained": "share of the deviance explained",
-        "energy_explained_in_noise_units": "deviance explained",
-        "largest_coefficient_in_typical_sizes": "largest coefficient in typical sizes",
-    }
-    told = [
-        f"{names.get(key, key.replace('_', ' '))} "
-        f"{percent(value) if 'share' in key else rounded(value)}"
-        for key, value in effect.evidence.items()
-    ]
-    return f"Evidence: {', '.join(told)}." if told else ""
 
 
 def sureness_sentences(diagnosis: Diagnosis) -> list[str]:

@@ -1,0 +1,97 @@
+"""The channels of a log: rates, gaps and ranges, and a picture of them over time."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ...runtime.whole_files import replaced
+from ..logs.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+_GAP = 3.0  # of a channel's own median steps
+_COLOURS = ("#0072b2", "#d55e00", "#007f5f", "#cc79a7")
+_AXES = ("x", "y", "z")
+_ROTORS = ("1 front-left", "2 rear-left", "3 rear-right", "4 front-right")
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One channel of a log."""
+
+    name: str
+    unit: str
+    samples: int
+    rate_hz: float
+    gaps: int  # longer than 3 of its own steps
+    longest_gap_s: float
+    low: float
+    high: float
+    t: Array  # (n,) s
+    drawn: Array  # (n, k) what its picture shows
+    title: str  # of that picture
+    series: tuple[str, ...]  # names of its k lines
+
+
+def log_channels(log: FlightLog) -> list[Channel]:
+    """Return the channels that a log has."""
+    axis = np.full((len(log.t), 3), np.nan)  # of thrust, world
+    if log.valid.any():
+        turned = Rotation.from_quat(log.quaternion[log.valid], scalar_first=True)
+        axis[log.valid] = turned.apply([0.0, 0.0, 1.0])
+    tilt = np.degrees(np.arccos(np.clip(axis[:, 2:], -1.0, 1.0)))
+    rotors = "rotor speeds (from commands)" if log.commanded else "rotor speeds"
+    given: list[tuple[str, str, Array | None, tuple[str, ...]]] = [
+        ("position", "m", log.position, _AXES),
+        ("attitude (tilt)", "deg", tilt, _AXES[:2]),
+        (rotors, "rad/s", log.rotor_speeds if log.has_rotor_speeds else None, _ROTORS),
+        ("motor commands", "0 to 1", log.command, _ROTORS),
+        ("battery", "V", None if log.voltage is None else log.voltage[:, None], ("",)),
+        ("accelerometer", "m/s2", log.accelerometer, _AXES),
+        ("gyro", "rad/s", log.gyro, _AXES),
+        ("true force", "N", log.force, _AXES),
+        ("true torque", "Nm", log.torque, _AXES),
+    ]
+    out = []
+    for name, unit, values, series in given:
+        rows = [] if values is None else np.flatnonzero(np.isfinite(values).all(axis=1))
+        if values is None or len(rows) < 2:
+            continue
+        t, title, drawn = log.t[rows], f"{name}\n({unit})", values[rows]
+        low, high = float(drawn.min()), float(drawn.max())
+        if values is tilt:
+            drawn, title = axis[rows, :2], "thrust axis\n(x, y of 1)"
+        steps = np.diff(t)
+        step = float(np.median(steps))
+        gaps, longest = int(np.sum(steps > _GAP * step)), float(steps.max())
+        found = (len(rows), 1.0 / step, gaps, longest, low, high)
+        out.append(Channel(name, unit, *found, t, drawn, title, series))
+    return out
+
+
+def plot_channels(name: str, channels: list[Channel], path: Path) -> Path:
+    """Draw a log's channels over time, a panel each, into a PNG.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    # matplotlib takes half a second to import, and most of the kit never draws
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 1.2 + 1.7 * len(channels)), dpi=100, layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(channels), 1, sharex=True))
+    figure.suptitle(name)
+    for panel, channel in zip(panels, channels, strict=True):
+        for column, label, colour in zip(channel.drawn.T, channel.series, _COLOURS, strict=False):
+            panel.plot(channel.t, column, color=colour, lw=0.8, label=label)
+        panel.set_ylabel(channel.title, fontsize=8)
+        panel.grid(alpha=0.3)
+        if len(channel.series) > 1:
+            panel.legend(loc="upper right", fontsize=7, ncols=len(channel.series))
+    panels[-1].set_xlabel("time (s)")
+    with replaced(path) as temporary:
+        figure.savefig(temporary, format="png")
+    return path
