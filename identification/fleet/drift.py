@@ -22,6 +22,7 @@ from scipy.optimize import brentq
 from scipy.stats import false_discovery_control, mannwhitneyu, t
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,13 @@ class Series:
     stds: list[float] = field(default_factory=list)
     # neither tentative nor indistinguishable from another effect
     sure: list[bool] = field(default_factory=list)
+
+    def arrays(self) -> tuple[Array, Array, Array, Mask]:
+        """Return numbers of flights, values, their standard deviations and which are sure, (n,)
+        each.
+        """
+        x, y, s = (np.asarray(v, dtype=float) for v in (self.flights, self.values, self.stds))
+        return x, y, s, np.asarray(self.sure, dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -124,11 +132,10 @@ def meta_regression(
         coefficients: Array = covariance @ (design.T @ (weight * y))
         return coefficients, covariance, float(weight @ np.square(y - design @ coefficients))
 
-    variance = 0.0
-    if fit(0.0)[2] > freedom:
-        most = 1.0
-        while fit(most)[2] > freedom:
-            most *= 4.0
+    variance = most = 0.0
+    while fit(most)[2] > freedom:
+        most = 4.0 * most or 1.0
+    if most > 0.0:
         variance = float(brentq(lambda v: fit(v)[2] - freedom, 0.0, most, xtol=1e-9 * most))
     coefficients, covariance, deviance = fit(variance)
     inflation = deviance / freedom
@@ -141,8 +148,7 @@ def trend_of(series: Series, among: int) -> Trend:
 
     Flights that are sure of the effect's name count alone where there are enough of them.
     """
-    x, y, s = (np.asarray(v, dtype=float) for v in (series.flights, series.values, series.stds))
-    sure = np.asarray(series.sure, dtype=bool)
+    x, y, s, sure = series.arrays()
     tentative = int(sure.sum()) < DRIFT.least_flights
     good = np.isfinite(y) & np.isfinite(s) & (s > 0.0)
     if not tentative:
@@ -163,10 +169,7 @@ def trend_of(series: Series, among: int) -> Trend:
     design = np.column_stack([np.ones(len(y)), x - middle])
     line, covariance, _ = meta_regression(design, y, s, False)
     slope, error = float(line[1]), math.sqrt(covariance[1, 1])
-
-    def at(flight: int) -> float:
-        return float(line[0]) + slope * (flight - middle)
-
+    first, last = (float(line[0]) + slope * (series.flights[k] - middle) for k in (0, -1))
     half = float(t.ppf(0.975, len(y) - 2) * error)
     return Trend(
         series,
@@ -178,7 +181,7 @@ def trend_of(series: Series, among: int) -> Trend:
         (slope - half, slope + half),
         float(2.0 * t.sf(abs(slope) / error, len(y) - 2)) if error > 0.0 else 1.0,
         tentative=tentative,
-        ends=(at(series.flights[0]), at(series.flights[-1])),
+        ends=(first, last),
     )
 
 

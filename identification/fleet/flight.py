@@ -35,10 +35,10 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class LogTask:
-    """A log that is to be diagnosed."""
+    """A log that is diagnosed, and where its outcome lies."""
 
     log: FleetLog
-    key: str  # of its outcome
+    key: str
     without: tuple[str, ...] = ()  # effects taken out of the library
 
 

@@ -114,14 +114,13 @@ def read_manifest(path: Path) -> Manifest:
     Raises:
         InputError: it cannot be read, or a field is unknown, missing or malformed.
     """
-    order = "name"
+    order = _ORDERS[0]
     if path.suffix.lower() in (".yaml", ".yml"):
         given = read_yaml(path, "a fleet's manifest")
         if not isinstance(given, dict) or not isinstance(given.get("logs"), list):
             raise InputError(f"{path}: expected a mapping with a list named logs")
-        for key in given:
-            if key not in ("logs", "order"):
-                raise unknown_name("key", str(key), ("logs", "order"), str(path))
+        if unknown := given.keys() - {"logs", "order"}:
+            raise unknown_name("key", str(min(unknown, key=str)), ("logs", "order"), str(path))
         order = str(given.get("order", order))
         if order not in _ORDERS:
             raise unknown_name("order", order, _ORDERS, str(path))

@@ -149,10 +149,7 @@ def small_picture(one: Trend) -> dict[str, Any] | None:
     """Return the points, bars and line (pixels) of a coefficient over flights; None without a
     number.
     """
-    x, y, s = (
-        np.asarray(v, dtype=float) for v in (one.series.flights, one.series.values, one.series.stds)
-    )
-    sure = np.asarray(one.series.sure, dtype=bool)
+    x, y, s, sure = one.series.arrays()
     good = np.isfinite(y)
     x, y, s, sure = x[good], y[good], np.nan_to_num(s[good]), sure[good]
     if not len(y):

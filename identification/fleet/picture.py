@@ -52,8 +52,7 @@ def _draw(panel: "Axes", one: Trend) -> None:
     from matplotlib.ticker import MaxNLocator
 
     series, colour = one.series, _ORANGE if one.drifts else _BLUE
-    x, y, s = (np.asarray(v, dtype=float) for v in (series.flights, series.values, series.stds))
-    sure = np.asarray(series.sure, dtype=bool)
+    x, y, s, sure = series.arrays()
     panel.errorbar(x, y, 1.96 * np.nan_to_num(s), fmt="none", ecolor=_GREY, elinewidth=0.7)
     panel.plot(x[sure], y[sure], "o", color=colour, ms=3.5)
     panel.plot(x[~sure], y[~sure], "o", mfc="white", mec=colour, ms=3.5)

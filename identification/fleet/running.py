@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ...dynamics.vehicle_file import load_vehicle
@@ -18,14 +18,6 @@ OUTCOMES = "outcomes.jsonl"
 LIMIT_S = 600.0  # for one log; a minute of flight takes some seconds
 
 
-@dataclass(frozen=True)
-class Done:
-    """A log and where its outcome lies."""
-
-    log: FleetLog
-    key: str
-
-
 def run_fleet(
     logs: Sequence[FleetLog],
     outcomes: Outcomes,
@@ -34,7 +26,7 @@ def run_fleet(
     jobs: int | None = None,
     cluster: str | None = None,
     report: Callable[[Mapping[str, int]], None] = lambda counts: None,
-) -> list[Done]:
+) -> list[LogTask]:
     """Diagnose every log that has no outcome yet; return all logs with the keys of their outcomes.
 
     A refusal for want of time, or of a process that died, is tried again where the limit is higher
@@ -55,7 +47,7 @@ def run_fleet(
         InputError: an outcome cannot be written, or there is no such cluster.
     """
     counts = {"kept": 0, "diagnosed": 0, "refused": 0}
-    done: list[Done] = []
+    done: list[LogTask] = []
     first: dict[str, str] = {}  # the first log of each key: another one is its copy
     texts: dict[str, str] = {}
 
@@ -76,14 +68,14 @@ def run_fleet(
                 unread = f"{log.path}: the same flight as {first[key]}, byte for byte"
                 key = _key_of_name(log)
             first.setdefault(key, log.name)
-            done.append(Done(log, key))
+            done.append(LogTask(log, key, without))
             if unread is not None:
                 keep(refusal(key, "input", unread))
             elif key in outcomes and not _again(outcomes[key], limit_s):
                 counts["kept"] += 1
                 report(counts)
             else:
-                yield LogTask(log if cluster is None else _absolute(log), key, without)
+                yield done[-1] if cluster is None else LogTask(_absolute(log), key, without)
 
     for job, result in each(diagnose_one, pending(), limit_s, jobs, cluster):
         if isinstance(result, Lost):
@@ -117,22 +109,20 @@ def _absolute(log: FleetLog) -> FleetLog:
     return replace(log, path=path, vehicle=file(log.vehicle), reader=reader, map=file(log.map))
 
 
-def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
+def rows(done: Sequence[LogTask], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
     """Yield each flight: its log, the individual, its place among that one's flights, its outcome;
     one at a time, in the order of individuals and flights.
     """
     models: dict[str, str] = {}
     named = [(one.log.id or _vehicle_name(one, outcomes, models), one) for one in done]
-    timed: dict[str, bool] = {}
-    for name, one in named:
-        timed[name] = timed.get(name, True) and one.log.time is not None
-    named.sort(
-        key=lambda pair: (
-            natural(pair[0]),
-            (pair[1].log.time or 0.0) if timed[pair[0]] else 0.0,
-            natural(pair[1].log.name),
-        )
-    )
+    untimed = {name for name, one in named if one.log.time is None}
+
+    def place(pair: tuple[str, LogTask]) -> tuple[object, ...]:
+        name, one = pair
+        time = 0.0 if name in untimed else one.log.time or 0.0
+        return natural(name), time, natural(one.log.name)
+
+    named.sort(key=place)
     number, last = 0, ""
     for name, one in named:
         number = number + 1 if name == last else 1
@@ -147,7 +137,7 @@ def rows(done: Sequence[Done], outcomes: Outcomes) -> Iterator[dict[str, Any]]:
         }
 
 
-def _vehicle_name(one: Done, outcomes: Outcomes, models: dict[str, str]) -> str:
+def _vehicle_name(one: LogTask, outcomes: Outcomes, models: dict[str, str]) -> str:
     """Return the name of the vehicle that a log is diagnosed with."""
     if one.log.vehicle is None:
         return str(outcomes[one.key].get("vehicle", "unknown"))

@@ -21,6 +21,11 @@ from .smoothing import resampled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+# kind, knot, s behind the knot, vector (3,), matrix (3, 3) and variance of each
+Measurements = tuple[Index, Index, Array, Array, Array, Array]
+# s between knots, m/s2 of gravity; at each knot rotation (3, 3) and the twelve numbers behind the
+# attitude's; from each to the next the IMU's turn, velocity and way
+Nominal = tuple[float, float, Array, Array, Array, Array, Array]
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,14 @@ class FusedMotion:
 
 
 @compiled
+def _cross_matrix(x: Array) -> Array:
+    out = np.zeros((3, 3))
+    out[0, 1], out[0, 2], out[1, 2] = -x[2], x[1], -x[0]
+    out[1, 0], out[2, 0], out[2, 1] = x[2], -x[1], x[0]
+    return out
+
+
+@compiled
 def _exp(x: float, y: float, z: float) -> Array:
     """Return the rotation matrix of a rotation vector (rad)."""
     square = x * x + y * y + z * z
@@ -86,23 +99,8 @@ def _exp(x: float, y: float, z: float) -> Array:
         a, b = 1.0 - square / 6.0, 0.5 - square / 24.0
     else:
         a, b = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
-    out = np.empty((3, 3))
-    out[0, 0], out[0, 1], out[0, 2] = (
-        1.0 - b * (y * y + z * z),
-        b * x * y - a * z,
-        b * x * z + a * y,
-    )
-    out[1, 0], out[1, 1], out[1, 2] = (
-        b * x * y + a * z,
-        1.0 - b * (x * x + z * z),
-        b * y * z - a * x,
-    )
-    out[2, 0], out[2, 1], out[2, 2] = (
-        b * x * z - a * y,
-        b * y * z + a * x,
-        1.0 - b * (x * x + y * y),
-    )
-    return out
+    across = _cross_matrix(np.array([x, y, z]))
+    return np.eye(3) + a * across + b * (across @ across)
 
 
 @compiled
@@ -113,14 +111,6 @@ def _log(R: Array) -> Array:
     sine = 0.5 * math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
     angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
     out *= 0.5 if sine < 1e-9 else 0.5 * angle / sine
-    return out
-
-
-@compiled
-def _cross_matrix(x: Array) -> Array:
-    out = np.zeros((3, 3))
-    out[0, 1], out[0, 2], out[1, 2] = -x[2], x[1], -x[0]
-    out[1, 0], out[2, 0], out[2, 1] = x[2], -x[1], x[0]
     return out
 
 
@@ -160,21 +150,11 @@ def _levelled(gyro: Array, force: Array, dt: float, time: float, R: Array, out: 
 
 
 @compiled
-def _predict(
-    k: int,
-    T: float,
-    gravity: float,
-    rotation: Array,
-    linear: Array,
-    turns: Array,
-    ways: Array,
-    moves: Array,
-    F: Array,
-    defect: Array,
-) -> None:
+def _predict(k: int, nominal: Nominal, F: Array, defect: Array) -> None:
     """Write the step from knot ``k`` to the next about the nominal motion: its matrix, and what the
     IMU says the next knot lacks.
     """
+    T, gravity, rotation, linear, turns, ways, moves = nominal
     R, b, a = rotation[k], linear[k, 6:9], linear[k, 9:12]
     turn = turns[k] @ _exp(-b[0] * T, -b[1] * T, -b[2] * T)
     way, move = ways[k] - a * T, moves[k] - 0.5 * T * T * a
@@ -212,23 +192,12 @@ def _update(x: Array, P: Array, first: int, late: float, z: Array, variance: flo
 
 @compiled
 def _smooth(
-    T: float,
-    gravity: float,
-    rotation: Array,
-    linear: Array,
-    turns: Array,
-    ways: Array,
-    moves: Array,
+    nominal: Nominal,
     rates: Array,
     noise: Array,
     prior: Array,
     prior_std: Array,
-    kinds: Index,
-    knots: Index,
-    late: Array,
-    vectors: Array,
-    matrices: Array,
-    variances: Array,
+    measured: Measurements,
     change: Array,
     std: Array,
 ) -> None:
@@ -236,6 +205,8 @@ def _smooth(
 
     ``kinds`` of the measurements: 0 attitude, 1 velocity, 2 position; sorted by knot.
     """
+    rotation, linear = nominal[2], nominal[3]
+    kinds, knots, late, vectors, matrices, variances = measured
     m = len(rotation)
     means, covariances = np.empty((m, N)), np.empty((m, N, N))
     before, spreads = np.empty((m, N)), np.empty((m, N, N))
@@ -244,7 +215,7 @@ def _smooth(
     at = 0
     for k in range(m):
         if k > 0:
-            _predict(k - 1, T, gravity, rotation, linear, turns, ways, moves, F, defect)
+            _predict(k - 1, nominal, F, defect)
             x = F @ x + defect
             P = F @ P @ F.T
             for i in range(N):
@@ -270,7 +241,7 @@ def _smooth(
     for i in range(N):
         std[m - 1, i] = math.sqrt(max(P[i, i], 0.0))
     for k in range(m - 2, -1, -1):
-        _predict(k, T, gravity, rotation, linear, turns, ways, moves, F, defect)
+        _predict(k, nominal, F, defect)
         gain = np.linalg.solve(spreads[k + 1], F @ covariances[k]).T.copy()
         x = means[k] + gain @ (x - before[k + 1])
         P = covariances[k] + gain @ (P - spreads[k + 1]) @ gain.T
@@ -345,13 +316,11 @@ def fuse(
     )
     begun = linear[0].copy()
     begun[6:] = 0.0
-    change, std = np.zeros((count + 1, N)), np.zeros((count + 1, N))
+    nominal = (T, gravity, rotation, linear, turns, ways, moves)
+    change, std = np.zeros((2, count + 1, N))
     for _ in range(FUSION.iterations):
         prior = np.concatenate([_log(rotation[0].T @ started), begun - linear[0]])
-        _smooth(
-            T, gravity, rotation, linear, turns, ways, moves, rates, spread, prior, prior_std,
-            *measured, change, std,
-        )  # fmt: skip
+        _smooth(nominal, rates, spread, prior, prior_std, measured, change, std)
         if _fold(rotation, linear, change) < FUSION.settled:
             break
     if positions is None:
@@ -423,7 +392,7 @@ def _heading(
 
 def _measurements(
     times: Array, positions: Readings | None, attitudes: Readings | None
-) -> tuple[Index, Index, Array, Array, Array, Array]:
+) -> Measurements:
     """Return all measurements, sorted by knot: kind, knot, time behind it, vector, matrix and
     variance.
     """
@@ -438,15 +407,19 @@ def _measurements(
     t = np.concatenate([readings.t for _, readings in groups])
     knots = np.clip(np.rint((t - times[0]) / (times[1] - times[0])), 0, len(times) - 1)
     knots = knots.astype(np.int64)
-    kinds = np.repeat([kind for kind, _ in groups], counts)
+    kinds = np.repeat(np.array([kind for kind, _ in groups], dtype=np.int64), counts)
     variances = np.repeat([readings.std**2 for _, readings in groups], counts)
     vectors, matrices = np.zeros((len(t), 3)), np.tile(np.eye(3), (len(t), 1, 1))
     for kind, readings in groups:
         (vectors if kind else matrices)[kinds == kind] = readings.values
     order = np.argsort(knots, kind="stable")
     late = np.asarray(t - times[knots], dtype=np.float64)
-    numbered: list[Index] = [np.asarray(x[order], dtype=np.int64) for x in (kinds, knots)]
-    measured: list[Array] = [
-        np.asarray(x[order], dtype=np.float64) for x in (late, vectors, matrices, variances)
-    ]
-    return numbered[0], numbered[1], measured[0], measured[1], measured[2], measured[3]
+    sorted_late, sorted_variances = late[order], np.asarray(variances[order])
+    return (
+        kinds[order],
+        knots[order],
+        sorted_late,
+        vectors[order],
+        matrices[order],
+        sorted_variances,
+    )

@@ -57,8 +57,10 @@ def log_channels(log: FlightLog) -> list[Channel]:
     ]
     out = []
     for name, unit, values, series in given:
-        rows = [] if values is None else np.flatnonzero(np.isfinite(values).all(axis=1))
-        if values is None or len(rows) < 2:
+        if values is None:
+            continue
+        rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+        if len(rows) < 2:
             continue
         t, title, drawn = log.t[rows], f"{name}\n({unit})", values[rows]
         low, high = float(drawn.min()), float(drawn.max())

@@ -11,10 +11,11 @@ import pytest
 from tests.support.browser import look, needs_browser
 from windwrench.identification.fleet.drift import fleet_of
 from windwrench.identification.fleet.files import fleet_data, write_fleet
+from windwrench.identification.fleet.flight import LogTask
 from windwrench.identification.fleet.manifest import FleetLog
 from windwrench.identification.fleet.outcomes import Outcomes
 from windwrench.identification.fleet.page import change_in_words, changes, headline
-from windwrench.identification.fleet.running import Done, rows
+from windwrench.identification.fleet.running import rows
 
 HOSTILE = "<script>alert('x')</script>&\"=1+1"
 ERROR = {"force_rms_N": 0.5, "torque_rms_Nm": 0.01}
@@ -187,7 +188,7 @@ def test_flights_are_in_the_order_of_times_else_of_names(tmp_path):
     ):
         key = f"{i:032x}"
         outcomes.add({"key": key, "status": "refused", "kind": "input", "reason": "?", "cost": 1})
-        done.append(Done(FleetLog(name, name, "ardrone2", who, time=time), key))
+        done.append(LogTask(FleetLog(name, name, "ardrone2", who, time=time), key))
     found = [(row["id"], row["flight"], row["log"]) for row in rows(done, outcomes)]
     assert found == [
         ("a", 1, "a2"),
