@@ -75,14 +75,6 @@ class _Clock:
         self.odd: list[tuple[int, int]] = []  # stamps and arrivals that would be a jump
 
 
-class _Kind:
-    """Messages of one kind."""
-
-    def __init__(self, clock: _Clock) -> None:
-        self.clock = clock
-        self.recent: deque[int] = deque(maxlen=_REMEMBERED)
-
-
 class Clocks:
     """From stamps to the stream's time.
 
@@ -97,7 +89,7 @@ class Clocks:
         self._tallies, self._paced = tallies, paced
         self._horizon = round(horizon * _SECOND)
         self._clocks: list[_Clock] = []  # the first is the reference
-        self._kinds: dict[str, _Kind] = {}
+        self._kinds: dict[str, tuple[_Clock, deque[int]]] = {}  # and the last stamps
 
     @property
     def count(self) -> int:
@@ -113,17 +105,16 @@ class Clocks:
         """Return when a message was measured, s of the stream's time; None where it is left out."""
         if sample.stamp is None:
             return self._untimed(sample.arrival)
-        kind = self._kinds.get(sample.kind)
-        if kind is None:
-            clock = self._clock_of(sample.stamp, sample.arrival)
-            kind = self._kinds[sample.kind] = _Kind(clock)
-        if sample.stamp in kind.recent:
+        if sample.kind not in self._kinds:
+            found = self._clock_of(sample.stamp, sample.arrival)
+            self._kinds[sample.kind] = found, deque(maxlen=_REMEMBERED)
+        clock, recent = self._kinds[sample.kind]
+        if sample.stamp in recent:
             self._tallies.counts["doubled"] += 1
             return None
-        clock = kind.clock
         if not self._goes_on(clock, sample.stamp, sample.arrival):
             return None
-        kind.recent.append(sample.stamp)
+        recent.append(sample.stamp)
         if self._paced:
             clock.offset.add(sample.arrival, sample.arrival - sample.stamp)
         if sample.stamp > clock.newest:

@@ -5,7 +5,8 @@ rotor speeds of its time: between two that came, on a line between them, beyond 
 were last. Where poses stop, rotor speeds alone make rows, so that the estimate goes on.
 """
 
-from collections import deque
+from bisect import bisect_right
+from operator import itemgetter
 
 import numpy as np
 
@@ -18,6 +19,7 @@ _KEPT = 1.0  # s of rotor speeds that are kept; poses come much sooner
 _SILENT = 0.15  # s without a row from which on rotor speeds make rows: several poses at 30 Hz
 # s that measured rotor speeds are waited for where commands come: an ESC reports at 10 Hz or more
 _MEASURED = 1.0
+_time = itemgetter(0)
 
 
 class Joiner:
@@ -30,7 +32,7 @@ class Joiner:
 
     def __init__(self, vehicle: Vehicle, tallies: Tallies) -> None:
         self._vehicle, self._tallies = vehicle, tallies
-        self._speeds: deque[tuple[float, Array]] = deque()  # by time
+        self._speeds: list[tuple[float, Array]] = []  # by time
         self._command: Array | None = None
         self._voltage: float | None = None
         self._measured = False  # rotor speeds come, and commands are not asked for them
@@ -105,27 +107,17 @@ class Joiner:
 
     def _keep(self, t: float, speeds: Array) -> None:
         kept = self._speeds
-        if kept and t <= kept[-1][0]:  # out of order: where it belongs
-            later = []
-            while kept and kept[-1][0] > t:
-                later.append(kept.pop())
-            if not (kept and kept[-1][0] == t):
-                kept.append((t, speeds))
-            kept.extend(reversed(later))
-        else:
-            kept.append((t, speeds))
+        at = bisect_right(kept, t, key=_time)
+        if not (at and kept[at - 1][0] == t):
+            kept.insert(at, (t, speeds))
         while len(kept) > 2 and kept[0][0] < kept[-1][0] - _KEPT:
-            kept.popleft()
+            del kept[0]
 
     def _at(self, t: float) -> Array:
         """Return the rotor speeds at a time, s."""
         kept = self._speeds
-        if t >= kept[-1][0] or len(kept) == 1:
-            return kept[-1][1]
-        after = len(kept) - 1
-        while after > 0 and kept[after - 1][0] > t:
-            after -= 1
-        if after == 0:
-            return kept[0][1]
+        after = bisect_right(kept, t, key=_time)
+        if after in (0, len(kept)):
+            return kept[max(after - 1, 0)][1]
         (t0, a), (t1, b) = kept[after - 1], kept[after]
         return np.asarray(a + (b - a) * ((t - t0) / (t1 - t0)))

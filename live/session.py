@@ -267,25 +267,23 @@ class Means:
     """The mean wrench of a stream."""
 
     count: int = 0
-    sums: Any = field(default_factory=lambda: np.zeros(6))
-    squares: Any = field(default_factory=lambda: np.zeros(6))
+    sums: Any = field(default_factory=lambda: np.zeros((2, 6)))  # and of squares
 
     def add(self, output: Output) -> None:
         """Take in one estimate."""
         wrench = output.estimate.state[[16, 17, 18, 13, 14, 15]]
         self.count += 1
-        self.sums += wrench
-        self.squares += wrench * wrench
+        self.sums += wrench, wrench * wrench
 
     @property
     def mean(self) -> Any:
         """Of force, N, and torque, Nm (6,)."""
-        return self.sums / max(self.count, 1)
+        return self.sums[0] / max(self.count, 1)
 
     @property
     def deviation(self) -> Any:
         """Standard deviation over the stream, (6,)."""
-        return np.sqrt(np.maximum(self.squares / max(self.count, 1) - self.mean**2, 0.0))
+        return np.sqrt(np.maximum(self.sums[1] / max(self.count, 1) - self.mean**2, 0.0))
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 """What is counted while a stream runs, in memory that does not grow with it."""
 
 import math
+from bisect import bisect_left
 from collections import Counter, deque
+from itertools import accumulate
 
 _BINS_PER_OCTAVE = 16
 _LOWEST = 100.0  # ns; shorter counts as this
@@ -25,13 +27,10 @@ class Durations:
 
     def quantile(self, share: float) -> float:
         """Return the duration, ms, that a share of them does not exceed; NaN: there is none."""
-        wanted, seen = share * self.count, 0
-        for i, count in enumerate(self._bins):
-            seen += count
-            if count and seen >= wanted:
-                upper = _LOWEST * math.exp2((i + 1) / _BINS_PER_OCTAVE)
-                return 1e-6 * min(upper, float(self.longest))
-        return math.nan
+        if not self.count:
+            return math.nan
+        i = bisect_left(list(accumulate(self._bins)), share * self.count)
+        return 1e-6 * min(_LOWEST * math.exp2((i + 1) / _BINS_PER_OCTAVE), float(self.longest))
 
 
 class Rate:

@@ -25,9 +25,9 @@ from ...runtime.errors import InputError
 from ..messages import Sample
 from .base import Source, command_of, unwrapped
 
-_ORDER = [motor - 1 for motor in ORDERS["crazyflie"]]
 _FULL = 65_535.0  # PWM
 _G = 9.80665  # m/s2, of accelerometer readings in g
+_RPM = math.pi / 30.0  # rad/s
 _WRAP = 2**24  # ms, of a log's time stamps
 _POSE = (
     ("stateEstimate.x", "float"),
@@ -108,8 +108,7 @@ class CrazyflieLog(Source):
             block = log.LogConfig(name=kind, period_in_ms=self._period)
             for name, fetched in variables:
                 block.add_variable(name, fetched)
-            take = self._take_row if kind == "row" else self._take_imu
-            block.data_received_cb.add_callback(take)
+            block.data_received_cb.add_callback(self._take)
             try:
                 self._cf.log.add_config(block)
                 block.start()
@@ -132,57 +131,47 @@ class CrazyflieLog(Source):
         self._stamps[kind] = max(now, last)
         return 1_000_000 * now
 
-    def _take_row(self, stamp: int, data: dict[str, Any], block: Any) -> None:
-        """Take a row, in cflib's thread."""
+    def _take(self, stamp: int, data: dict[str, Any], block: Any) -> None:
+        """Take a block of the log, in cflib's thread."""
         arrival = time.monotonic_ns()
+        found = self._row(data) if block.name == "row" else self._imu_of(data)
+        if found is None:
+            self.tallies.counts["malformed"] += 1
+            return
+        at = self._stamp(block.name, stamp)
+        if self._rows.qsize() > _LONGEST:
+            self.tallies.counts["lost"] += 1
+        else:
+            self._rows.put(Sample(block.name, at, arrival, block.name == "row", **found))
+
+    def _row(self, data: dict[str, Any]) -> dict[str, Any] | None:
+        """Return the quantities of a row; None: it has no pose."""
         x, y, z, w = self._decompress(data["stateEstimateZ.quat"])
         quaternion = np.array([w, x, y, z], dtype=np.float64)
         length = float(np.linalg.norm(quaternion))
         position = np.array([data[name] for name, _ in _POSE[:3]], dtype=np.float64)
+        if not (0.9 < length < 1.1 and np.isfinite(position).all()):
+            return None
         volts = float(data["pm.vbat"])
-        good = 0.9 < length < 1.1 and bool(np.isfinite(position).all())
-        if not good:
-            self.tallies.counts["malformed"] += 1
-            return
-        sample = Sample(
-            "row",
-            self._stamp("row", stamp),
-            arrival,
-            whole=True,
-            position=position,
-            quaternion=quaternion / length,
-            voltage=volts if math.isfinite(volts) and volts > 0.0 else None,
-        )
-        measured = "rpm.m1" in data
-        group = "rpm" if measured else "motor"
-        motors = np.array([data[f"{group}.m{i}"] for i in range(1, 5)], dtype=np.float64)[_ORDER]
-        if measured:
-            sample.rotor_speeds = motors * (math.pi / 30.0)
-        else:
-            sample.command = command_of(motors, self.vehicle, (0.0, _FULL))
-        self._put(sample)
+        group = "rpm" if "rpm.m1" in data else "motor"
+        motors = np.array([data[f"{group}.m{i}"] for i in ORDERS["crazyflie"]], dtype=np.float64)
+        return {
+            "position": position,
+            "quaternion": quaternion / length,
+            "voltage": volts if math.isfinite(volts) and volts > 0.0 else None,
+            **(
+                {"rotor_speeds": motors * _RPM}
+                if group == "rpm"
+                else {"command": command_of(motors, self.vehicle, (0.0, _FULL))}
+            ),
+        }
 
-    def _take_imu(self, stamp: int, data: dict[str, Any], block: Any) -> None:
-        arrival = time.monotonic_ns()
+    def _imu_of(self, data: dict[str, Any]) -> dict[str, Any] | None:
+        """Return gyro and accelerometer; None: a number is not finite."""
         values = np.array([data[name] for name, _ in _IMU], dtype=np.float64)
         if not np.isfinite(values).all():
-            self.tallies.counts["malformed"] += 1
-            return
-        self._put(
-            Sample(
-                "imu",
-                self._stamp("imu", stamp),
-                arrival,
-                gyro=np.radians(values[:3]),
-                accelerometer=_G * values[3:],
-            )
-        )
-
-    def _put(self, sample: Sample) -> None:
-        if self._rows.qsize() > _LONGEST:
-            self.tallies.counts["lost"] += 1
-            return
-        self._rows.put(sample)
+            return None
+        return {"gyro": np.radians(values[:3]), "accelerometer": _G * values[3:]}
 
     def receive(self, timeout: float) -> list[Sample] | None:
         """Return the rows that have come."""
