@@ -107,14 +107,17 @@ def results(folder):
             continue
         if path.suffix == ".jsonl":
             lines = [json.loads(line) for line in path.read_text().splitlines()]
-            for line in lines:
-                line.pop("cost", None)
-                for part in (line, *line.get("diagnoses", [])):
-                    part.pop("seconds", None)
-            kept[path.name] = sorted(map(json.dumps, lines))
+            kept[path.name] = sorted(json.dumps(timeless(line)) for line in lines)
         elif path.name != "run.json":
             kept[path.name] = path.read_bytes()
     return kept
+
+
+def timeless(value):
+    """Return a kept value without the times that the work took."""
+    if isinstance(value, dict):
+        return {k: timeless(v) for k, v in value.items() if k not in ("cost", "seconds")}
+    return [timeless(v) for v in value] if isinstance(value, list) else value
 
 
 @pytest.fixture(scope="module")
