@@ -74,26 +74,6 @@ def test_a_flight_is_diagnosed_when_it_lands(tmp_path, capsys):
     assert (tmp_path / "found" / "report.json").exists()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("-",), "--vehicle: - does not say"),
-        (("udp-json://127.0.0.1:1",), "--vehicle"),
-        (("sim:base", "--diagnose-after"), "--diagnose-after: expected --record"),
-        (("sim:base", "--gate", "0.1"), "--gate"),
-        (("sim:base", "--record", "flight.parquet"), "--record"),
-        (("sim:base", "--map", "rpm"), "--map"),
-        (("nothing:there", "--vehicle", "ardrone2"), "unknown source"),
-        (("sim:base", "--vehicle", "ardron"), "Did you mean 'ardrone2'"),
-    ],
-)
-def test_what_cannot_be_is_refused(arguments, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=said):
-        app(["live", *arguments], standalone_mode=False)
-    assert not list(tmp_path.iterdir())
-
-
 def test_an_address_is_printed_as_it_is(capsys):
     """Not as a picture: ``:radio:`` is the name of one."""
     from windwrench.commands.terminal import errors
