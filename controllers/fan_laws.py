@@ -6,7 +6,8 @@ axis. (In the body frame of a vehicle that faces the fan, y and the sign turn ro
 """
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ Array = NDArray[np.floating[Any]]
 
 class FanLaw:
     """What the laws share: a command within its limits, and no memory unless a law says so."""
+
+    def __post_init__(self) -> None:
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -53,18 +57,13 @@ class Hover2D(FanLaw):
         return 0.0, 0.0
 
 
+@dataclass(eq=False)
 class Oracle(FanLaw):
-    """Sees the fan: moves with it and towards its axis. The upper bound, score 1.
+    """Sees the fan: moves with it and towards its axis. The upper bound, score 1."""
 
-    Args:
-        gain: 1/s, from the true offset to velocity.
-    """
-
+    gain: float = 2.0  # 1/s, from the true offset to velocity
     # entries of the environment's ``info``: the fan's place and velocity, and the vehicle's place
-    entries = "fan_y", "fan_velocity", "y"
-
-    def __init__(self, gain: float = 2.0) -> None:
-        self.gain = gain
+    entries: ClassVar[tuple[str, str, str]] = "fan_y", "fan_velocity", "y"
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return the fan's velocity, and a share of the true offset.
@@ -82,76 +81,59 @@ class Oracle(FanLaw):
 
 
 class Oracle2D(Oracle):
-    """Sees the fan: moves with it and towards its axis. The upper bound, score 1.
-
-    Args:
-        gain: 1/s, from the true offset to velocity.
-    """
+    """Sees the fan: moves with it and towards its axis. The upper bound, score 1."""
 
     entries = "fan", "fan_velocity", "position"
 
 
+@dataclass(eq=False)
 class Admittance(FanLaw):
     """The admittance controller of McKinnon and Schoellig (2016): velocity in proportion to the yaw
     torque.
 
-    Args:
-        gain: m/s per Nm; ``gain`` times the jet's largest torque bounds the speed of a fan that it
-            can follow.
+    ``gain`` times the jet's largest torque bounds the speed of a fan that the law can follow.
     """
 
-    def __init__(self, gain: float = 18.0) -> None:
-        self.gain = gain
+    gain: float = 18.0  # m/s per Nm
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z``."""
         return (-self.gain * o[TORQUE_Z],)
 
 
+@dataclass(eq=False)
 class Admittance2D(FanLaw):
-    """Velocities in proportion to the torques, as in McKinnon and Schoellig (2016) for one.
+    """Velocities in proportion to the torques, as in McKinnon and Schoellig (2016) for one."""
 
-    Args:
-        gain: m/s per Nm, sideways.
-        gain_z: up and down.
-    """
-
-    def __init__(self, gain: float = 18.0, gain_z: float = 18.0) -> None:
-        self.gain, self.gain_z = gain, gain_z
+    gain: float = 18.0  # m/s per Nm, sideways
+    gain_z: float = 18.0  # m/s per Nm, up and down
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z`` and ``gain_z tau_y``."""
         return -self.gain * float(o[TORQUE_Z]), self.gain_z * float(o[TORQUE_Y])
 
 
+@dataclass(eq=False)
 class Ratio(FanLaw):
     """Velocity in proportion to ``tau_z / f_x``, which grows with the offset where ``tau_z`` alone
     falls off again.
-
-    Args:
-        gain: 1/s per metre-like ratio, m/s per m.
-        least_force: N, below which the force is held to be no jet at all.
     """
 
-    def __init__(self, gain: float = 8.0, least_force: float = 0.1) -> None:
-        self.gain, self.least_force = gain, least_force
+    gain: float = 8.0  # m/s per m
+    least_force: float = 0.1  # N, below which the force is held to be no jet at all
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z / f_x``."""
         return (-self.gain * o[TORQUE_Z] / max(float(o[FORCE_X]), self.least_force),)
 
 
+@dataclass(eq=False)
 class Ratio2D(FanLaw):
-    """Velocities in proportion to the torques over the force along the jet.
+    """Velocities in proportion to the torques over the force along the jet."""
 
-    Args:
-        gain: 1/s per metre-like ratio, sideways.
-        gain_z: up and down.
-        least_force: N, below which the force is held to be no jet at all.
-    """
-
-    def __init__(self, gain: float = 8.0, gain_z: float = 8.0, least_force: float = 0.1) -> None:
-        self.gain, self.gain_z, self.least_force = gain, gain_z, least_force
+    gain: float = 8.0  # m/s per m, sideways
+    gain_z: float = 8.0  # m/s per m, up and down
+    least_force: float = 0.1  # N, below which the force is held to be no jet at all
 
     def command(self, o: Array, info: Mapping[str, Any] | None) -> tuple[float, ...]:
         """Return ``-gain tau_z / f_x`` and ``gain_z tau_y / f_x``."""
@@ -159,21 +141,17 @@ class Ratio2D(FanLaw):
         return -self.gain * float(o[TORQUE_Z]) / force, self.gain_z * float(o[TORQUE_Y]) / force
 
 
+@dataclass(eq=False)
 class Lead(FanLaw):
     """Ratio with derivative: ``x = tau_z / max(f_x, least_force)``, ``u = -(gain x + lead dx/dt)``.
 
     The rate is that from one decision to the next. The rate makes good for part of the filter's
     lag, and a vehicle that falls behind turns round earlier.
-
-    Args:
-        gain: 1/s.
-        lead: of the rate, m/s per m/s.
-        least_force: N, below which the force is held to be no jet at all.
     """
 
-    def __init__(self, gain: float = 11.35, lead: float = 2.79, least_force: float = 0.183) -> None:
-        self.gain, self.lead, self.least_force = gain, lead, least_force
-        self.reset()
+    gain: float = 11.35  # 1/s
+    lead: float = 2.79  # m/s per m/s
+    least_force: float = 0.183  # N, below which the force is held to be no jet at all
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -187,22 +165,18 @@ class Lead(FanLaw):
         return (-(self.gain * x + self.lead * rate),)
 
 
+@dataclass(eq=False)
 class AdmittancePID(FanLaw):
     """The admittance law with integral and lead: ``u = -(gain tau_z + integral S + lead
     dtau_z/dt)``, ``S`` the integral of ``tau_z``.
 
     The integral follows a fan that moves evenly without the steady offset that a proportional law
     needs. It stops while the command is at its bound and would grow further (no windup).
-
-    Args:
-        gain: m/s per Nm.
-        integral: m/s per Nm s.
-        lead: m/s per Nm/s.
     """
 
-    def __init__(self, gain: float = 20.0, integral: float = 0.4, lead: float = 7.0) -> None:
-        self.gain, self.integral, self.lead = gain, integral, lead
-        self.reset()
+    gain: float = 20.0  # m/s per Nm
+    integral: float = 0.4  # m/s per Nm s
+    lead: float = 7.0  # m/s per Nm/s
 
     def reset(self) -> None:
         """Forget the last episode."""

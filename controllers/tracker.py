@@ -11,7 +11,7 @@ anew with every episode.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,25 +33,22 @@ STOP, TURN = 1 / 3, 1 / 2
 _FEWEST = 8  # particles of a kind of motion whose covariance means something
 
 
+@dataclass(eq=False, kw_only=True)
 class _Belief(ABC):
     """What the trackers share: particles with weights, and the command that follows from them.
 
     After a decision ``mean`` holds what is believed: the fan's place from the vehicle (m) and its
     velocity (m/s); ``deviation`` is the standard deviation of the place (m).
-
-    Args:
-        gain: 1/s, from the offset to a velocity.
-        feed: share of the fan's expected velocity that is commanded at once.
-        damping: share of the difference between the fan's velocity and the vehicle's own.
-        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
-        particles: how many.
     """
 
-    def __init__(
-        self, gain: float, feed: float, damping: float, level: float, particles: int
-    ) -> None:
-        self.gain, self.feed, self.damping = gain, feed, damping
-        self.level, self.particles = level, int(particles)
+    gain: float  # 1/s, from the expected offset to a velocity
+    damping: float  # share of the difference between the fan's velocity and the vehicle's own
+    feed: float = 1.0  # share of the fan's expected velocity that is commanded at once
+    level: float = 0.0  # logarithmic spread of the noise's size; 0: as the briefing says
+    particles: int = 1000
+
+    def __post_init__(self) -> None:
+        self.particles = int(self.particles)
         self._briefing = Briefing()
         self.reset()
 
@@ -115,20 +112,15 @@ class _Belief(ABC):
         return np.array([np.clip(command, -MAX_COMMAND, MAX_COMMAND)], dtype=np.float32)
 
 
+@dataclass(frozen=True)
 class GenericMotion:
     """A fan of which nothing is known: it rests, or its velocity stays and drifts a little; now and
     then this changes at once, to none, to the opposite, or to any other.
-
-    Args:
-        acceleration: m/s, standard deviation of the velocity's drift over a second.
-        jumps: 1/s, how often it changes at once.
-        speed: m/s, standard deviation of a fresh velocity.
     """
 
-    def __init__(
-        self, acceleration: float = 0.025, jumps: float = 0.25, speed: float = 0.28
-    ) -> None:
-        self.acceleration, self.jumps, self.speed = acceleration, jumps, speed
+    acceleration: float = 0.025  # m/s, standard deviation of the velocity's drift over a second
+    jumps: float = 0.25  # 1/s, how often the velocity changes at once
+    speed: float = 0.28  # m/s, standard deviation of a fresh velocity
 
     def velocity_after(self, before: Array, rng: np.random.Generator) -> Array:
         """Return velocities (n,) m/s a decision later."""
@@ -143,50 +135,16 @@ class GenericMotion:
         return after
 
 
+@dataclass(eq=False, kw_only=True)
 class Tracker(_Belief):
-    """Knows nothing of how the fan moves: it rests, or its velocity stays and drifts a little; now
-    and then this changes at once, to none, to the opposite, or to any other.
+    """Knows nothing of how the fan moves: ``GenericMotion``."""
 
-    After a decision ``mean`` holds what it believes, the fan's place from the vehicle (m) and its
-    velocity (m/s), and ``deviation`` the standard deviation of the place (m).
-
-    Args:
-        gain: 1/s, from the expected offset to a velocity.
-        feed: share of the fan's expected velocity that is commanded at once.
-        damping: share of the difference between the fan's velocity and the vehicle's own.
-        acceleration: m/s, standard deviation of the velocity's drift over a second.
-        jumps: 1/s, how often it changes at once.
-        speed: m/s, standard deviation of a fresh velocity.
-        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
-        reach: m, on either side, where the fan may be at first.
-        particles: how many.
-    """
-
-    def __init__(
-        self,
-        gain: float = 2.5,
-        feed: float = 1.0,
-        damping: float = 0.4,
-        acceleration: float = 0.025,
-        jumps: float = 0.25,
-        speed: float = 0.28,
-        level: float = 0.0,
-        reach: float = 1.6,
-        particles: int = 1000,
-    ) -> None:
-        self.motion, self.speed = GenericMotion(acceleration, jumps, speed), speed
-        self.reach = reach
-        super().__init__(gain, feed, damping, level, particles)
-
-    @property
-    def acceleration(self) -> float:
-        """Standard deviation of the velocity's drift over a second, m/s."""
-        return self.motion.acceleration
-
-    @property
-    def jumps(self) -> float:
-        """How often the velocity changes at once, 1/s."""
-        return self.motion.jumps
+    gain: float = 2.5
+    damping: float = 0.4
+    acceleration: float = 0.025  # m/s, standard deviation of the velocity's drift over a second
+    jumps: float = 0.25  # 1/s, how often the velocity changes at once
+    speed: float = 0.28  # m/s, standard deviation of a fresh velocity
+    reach: float = 1.6  # m, on either side, where the fan may be at first
 
     def brief(self, briefing: Briefing) -> None:
         """Take what is known of vehicle, sensors and fan, but neither its motions nor its gusts."""
@@ -199,13 +157,15 @@ class Tracker(_Belief):
 
     def _move(self) -> None:
         before = self._velocity
-        self._velocity = self.motion.velocity_after(before, self._rng)
+        motion = GenericMotion(self.acceleration, self.jumps, self.speed)
+        self._velocity = motion.velocity_after(before, self._rng)
         self._place += 0.5 * DECISION_PERIOD * (before + self._velocity)
 
     def _choose(self, chosen: NDArray[np.int64]) -> None:
         self._place, self._velocity = self._place[chosen], self._velocity[chosen]
 
 
+@dataclass(eq=False, kw_only=True)
 class InformedTracker(_Belief):
     """Knows the family of the fan's motions (``briefing.Motions``) and learns which one it is: a
     particle is a motion with its speed, travel and place at the start.
@@ -213,33 +173,14 @@ class InformedTracker(_Belief):
     Drawn anew, particles of a kind are shrunk towards their mean and spread again, which keeps mean
     and covariance (Liu and West, *Combined parameter and state estimation in simulation-based
     filtering*, 2001).
-
-    Args:
-        gain: 1/s, from the expected offset to a velocity.
-        feed: share of the fan's expected velocity that is commanded at once.
-        damping: share of the difference between the fan's velocity and the vehicle's own.
-        ahead: s, over which the velocity that is commanded is that of the motion to come.
-        spread: of the particles that are drawn anew, as a share of their standard deviation.
-        level: logarithmic spread of the noise's size among particles; 0: as the briefing says.
-        particles: how many.
-        leave: 1/s, how often a particle leaves the family: from then on it moves as those of
-            ``Tracker`` do. 0: the family is all that there is.
     """
 
-    def __init__(
-        self,
-        gain: float = 1.429,
-        feed: float = 1.0,
-        damping: float = 0.407,
-        ahead: float = 0.08354,
-        spread: float = 0.1486,
-        level: float = 0.0,
-        particles: int = 1000,
-        leave: float = 0.03,
-    ) -> None:
-        self.ahead, self.spread, self.leave = ahead, spread, leave
-        self._generic = GenericMotion()
-        super().__init__(gain, feed, damping, level, particles)
+    gain: float = 1.429
+    damping: float = 0.407
+    ahead: float = 0.08354  # s, over which the commanded velocity is that of the motion to come
+    spread: float = 0.1486  # of particles drawn anew, as a share of their standard deviation
+    # 1/s, how often a particle leaves the family and moves as those of ``Tracker``; 0: never
+    leave: float = 0.03
 
     def brief(self, briefing: Briefing) -> None:
         """Take what is known of vehicle, sensors, fan and its motions, but not of its gusts."""
@@ -267,7 +208,7 @@ class InformedTracker(_Belief):
         self._free |= self._rng.random(len(place)) < self.leave * DECISION_PERIOD
         some = np.flatnonzero(self._free)
         before = velocity[some]
-        after = self._generic.velocity_after(before, self._rng)
+        after = GenericMotion().velocity_after(before, self._rng)
         self._velocity[some] = after
         self._place[some] = place[some] + 0.5 * DECISION_PERIOD * (before + after)
 
@@ -315,6 +256,7 @@ class InformedTracker(_Belief):
         )
 
 
+@dataclass(eq=False, kw_only=True)
 class Limit(InformedTracker):
     """What the best controller could reach from these measurements: the informed tracker with the
     true parameters of everything that is drawn at random, gusts included, and many particles.
@@ -323,16 +265,12 @@ class Limit(InformedTracker):
     scenario ``varied`` draws anew, and effects that nobody declared, it does not know either.
     """
 
-    def __init__(
-        self,
-        gain: float = 1.6,
-        feed: float = 1.0,
-        damping: float = 0.3,
-        ahead: float = 0.12,
-        spread: float = 0.15,
-        particles: int = 2000,
-    ) -> None:
-        super().__init__(gain, feed, damping, ahead, spread, 0.0, particles, leave=0.0)
+    gain: float = 1.6
+    damping: float = 0.3
+    ahead: float = 0.12
+    spread: float = 0.15
+    particles: int = 2000
+    leave: float = 0.0
 
     def brief(self, briefing: Briefing) -> None:
         """Take all that is known."""

@@ -7,6 +7,7 @@ the flight loop. They add to its proportional, derivative and weak integral acti
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,25 +31,24 @@ _GRAVITY = 9.81  # m/s2
 _MASS = 0.465  # kg, declared, of the tasks' standard vehicle
 
 
+@dataclass(eq=False)
 class WindLaw:
     """What the laws share: proportional, derivative and integral action on the position error.
 
     ``a = kp e + kd de/dt + ki (integral of e)``, beside the flight loop's own; the integral stops
     where the action is limited.
-
-    Args:
-        kp: 1/s2.
-        kd: 1/s.
-        ki: 1/s3.
     """
 
-    def __init__(self, kp: float = 0.0, kd: float = 0.0, ki: float = 0.0) -> None:
-        self.kp, self.kd, self.ki = kp, kd, ki
-        self._sum: Wide = np.zeros(3)
+    kp: float = 0.0  # 1/s2
+    kd: float = 0.0  # 1/s
+    ki: float = 0.0  # 1/s3
+
+    def __post_init__(self) -> None:
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
-        self._sum = np.zeros(3)
+        self._sum: Wide = np.zeros(3)
 
     def __call__(self, observation: Array, info: Mapping[str, Any] | None = None) -> Array:
         """Return the action (3,) m/s2 for an observation (27,)."""
@@ -81,34 +81,22 @@ class PID(WindLaw):
     """A PID position controller, which has to wait for the error."""
 
 
+@dataclass(eq=False)
 class PIDWithForce(WindLaw):
     """A PID controller with the estimated force fed forward: ``- gain f / m``.
 
     ``f`` is the external force as the unscented Kalman filter estimates it (McKinnon and
     Schoellig, IROS 2016).
-
-    Args:
-        gain: share of the force that is cancelled.
-        lead: s; the force's change over a decision, times this, is added, against the filter's lag.
     """
 
-    def __init__(
-        self,
-        kp: float = 0.0,
-        kd: float = 0.0,
-        ki: float = 0.0,
-        gain: float = 1.0,
-        lead: float = 0.0,
-        mass: float = _MASS,
-    ) -> None:
-        super().__init__(kp, kd, ki)
-        self.gain, self.lead, self.mass = gain, lead, mass
-        self._last: Wide | None = None
+    gain: float = 1.0  # share of the force that is cancelled
+    lead: float = 0.0  # s, by which the force's change over a decision is added
+    mass: float = _MASS  # kg
 
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._last = None
+        self._last: Wide | None = None
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return ``- gain (f + lead df/dt) / m``."""
@@ -119,6 +107,7 @@ class PIDWithForce(WindLaw):
         return against
 
 
+@dataclass(eq=False)
 class INDI(WindLaw):
     """Incremental nonlinear dynamic inversion of the position loop.
 
@@ -131,37 +120,30 @@ class INDI(WindLaw):
     difference of accelerometer and rotor model. Unlike there, the attitude loop is the flight
     loop's, not an INDI of angular acceleration, and measurements come as means over 40 ms.
 
-    Args:
-        cutoff: Hz, of the second-order Butterworth low-pass.
-        gain: share of the increment that is taken; 1 in the paper.
+    Raises:
+        InputError: ``cutoff`` lies beyond half the rate of decisions.
     """
 
-    def __init__(
-        self,
-        kp: float = 0.0,
-        kd: float = 0.0,
-        ki: float = 0.0,
-        cutoff: float = 5.0,
-        gain: float = 1.0,
-    ) -> None:
-        super().__init__(kp, kd, ki)
-        if not 0.0 < cutoff < 0.5 / WIND_PERIOD:
+    cutoff: float = 5.0  # Hz, of the second-order Butterworth low-pass
+    gain: float = 1.0  # share of the increment that is taken; 1 in the paper
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.cutoff < 0.5 / WIND_PERIOD:
             raise InputError(
-                f"INDI: cutoff must lie between 0 and {0.5 / WIND_PERIOD:g} Hz, got {cutoff:g}"
+                f"INDI: cutoff must lie between 0 and {0.5 / WIND_PERIOD:g} Hz, got {self.cutoff:g}"
             )
-        self.cutoff, self.gain = cutoff, gain
         # bilinear transform, warped to the cut-off
-        w = math.tan(math.pi * cutoff * WIND_PERIOD)
+        w = math.tan(math.pi * self.cutoff * WIND_PERIOD)
         scale = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)
         self._b = w * w * scale
         self._a1 = 2.0 * (w * w - 1.0) * scale
         self._a2 = (1.0 - math.sqrt(2.0) * w + w * w) * scale
-        self._states: tuple[Wide, Wide] | None = None
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._states = None
+        self._states: tuple[Wide, Wide] | None = None
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return the low-passed difference of rotor model and accelerometer."""
@@ -174,6 +156,7 @@ class INDI(WindLaw):
         return self.gain * y
 
 
+@dataclass(eq=False)
 class L1Adaptive(WindLaw):
     """L1 adaptive augmentation of the position loop.
 
@@ -185,35 +168,28 @@ class L1Adaptive(WindLaw):
     rotors' specific force by the declared model as its input; all three axes count as matched,
     since the flight loop turns the thrust to where it is wanted.
 
-    Args:
-        pole: -A_s, 1/s.
-        bandwidth: of C(s), rad/s.
+    Raises:
+        InputError: a number is not above zero.
     """
 
-    def __init__(
-        self,
-        kp: float = 0.0,
-        kd: float = 0.0,
-        ki: float = 0.0,
-        pole: float = 5.0,
-        bandwidth: float = 5.0,
-    ) -> None:
-        super().__init__(kp, kd, ki)
-        for name, value in (("pole", pole), ("bandwidth", bandwidth)):
-            if not value > 0.0:
-                raise InputError(f"L1: {name} must be above 0, got {value!r}")
-        self.pole, self.bandwidth = pole, bandwidth
-        decay = math.exp(-pole * WIND_PERIOD)
-        self._adapt = pole * decay / (1.0 - decay)  # Phi^-1 exp(A_s T), but for its sign
-        self._decay, self._phi = decay, (1.0 - decay) / pole
-        self._keep = math.exp(-bandwidth * WIND_PERIOD)
-        self._gap: Wide | None = None  # v^ - v
-        self._sigma = self._filtered = self._velocity = np.zeros(3)
+    pole: float = 5.0  # 1/s, -A_s
+    bandwidth: float = 5.0  # rad/s, of C(s)
+
+    def __post_init__(self) -> None:
+        for name in ("pole", "bandwidth"):
+            if not getattr(self, name) > 0.0:
+                raise InputError(f"L1: {name} must be above 0, got {getattr(self, name)!r}")
+        decay = math.exp(-self.pole * WIND_PERIOD)
+        self._adapt = self.pole * decay / (1.0 - decay)  # Phi^-1 exp(A_s T), but for its sign
+        self._decay, self._phi = decay, (1.0 - decay) / self.pole
+        self._keep = math.exp(-self.bandwidth * WIND_PERIOD)
+        self.reset()
 
     def reset(self) -> None:
         """Forget the last episode."""
         super().reset()
-        self._gap = None
+        self._gap: Wide | None = None  # v^ - v
+        self._sigma = self._filtered = self._velocity = np.zeros(3)
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Advance predictor and adaptation by a decision; return ``-C(s) sigma^``."""
@@ -230,29 +206,18 @@ class L1Adaptive(WindLaw):
         return -self._filtered
 
 
+@dataclass(eq=False)
 class WindOracle(WindLaw):
     """Knows the true external force, and the wind to come: ``- gain f(t + preview) / m``, so that
     motors and tilt have turned the thrust when it is needed. The upper end of the score, 1.
 
     ``f(t + preview)`` is the true force now, with the wind's part of it as the winds will blow at
     the place where the vehicle is.
-
-    Args:
-        gain: share of the force that is cancelled.
-        preview: s; the environment's ``preview`` is set to it.
     """
 
-    def __init__(
-        self,
-        kp: float = 0.0,
-        kd: float = 0.0,
-        ki: float = 0.0,
-        gain: float = 1.0,
-        preview: float = 0.15,
-        mass: float = _MASS,
-    ) -> None:
-        super().__init__(kp, kd, ki)
-        self.gain, self.preview, self.mass = gain, preview, mass
+    gain: float = 1.0  # share of the force that is cancelled
+    preview: float = 0.15  # s; the environment's ``preview`` is set to it
+    mass: float = _MASS  # kg
 
     def against_the_wind(self, o: Wide, info: Mapping[str, Any] | None) -> Wide:
         """Return ``- gain f / m`` of the force to come.
