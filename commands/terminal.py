@@ -102,7 +102,7 @@ def offering(*sources: str) -> Callable[[str], list[str]]:
 VEHICLES = offering("dynamics.vehicle_file:preset_names")
 EFFECTS = offering("dynamics.effects:names")
 SCENARIOS = offering("envs.scenarios:SCENARIOS")
-CONTROLLERS = offering("controllers:CONTROLLERS", "controllers.shipped:shipped_policies")
+CONTROLLERS = offering("controllers:CONTROLLERS", "controllers.registry:shipped_policies")
 TASKS = offering("evaluation.tasks:TASKS")
 
 Out = Annotated[

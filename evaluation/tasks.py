@@ -6,10 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..controllers import CONTROLLERS, make_controller
 from ..controllers.own_file import is_file_name, load_controller
-from ..controllers.shipped import shipped_policies
-from ..controllers.task_laws import TASK_LAWS, make_task_law
+from ..controllers.registry import STANDARD_TASK, TASK_LAWS, make_controller, shipped_policies
 from ..controllers.trained_policy import (
     TrainedPolicy,
     is_policy_path,
@@ -24,8 +22,6 @@ from ..envs.wind_scenarios import WIND_SCENARIOS
 from ..envs.wind_tasks import WindHoverEnv, WindTrajectoryEnv
 from ..runtime.errors import InputError, unknown_name
 from .statistics import episode_bootstrap, hierarchical_bootstrap
-
-STANDARD_TASK = "FanTracking"
 
 
 @dataclass(frozen=True)
@@ -61,7 +57,7 @@ TASKS: dict[str, Task] = {
     "FanTracking": Task(
         FanTrackingEnv,
         SCENARIOS,
-        CONTROLLERS,
+        TASK_LAWS["FanTracking"],
         "admittance",
         "admittance",
         ("hover", "admittance", "ratio", "oracle"),
@@ -130,11 +126,9 @@ def make_pilot(name: str, task: str = STANDARD_TASK) -> Any:
         if policy.task != task:
             raise InputError(f"{name}: a policy of {policy.task}, not of {task}")
         return policy
-    if task != STANDARD_TASK:
-        return make_task_law(name, task)
-    if name not in known.laws:
+    if task == STANDARD_TASK and name not in known.laws:
         raise unknown_name("controller", name, [*known.laws, *shipped])
-    return make_controller(name)
+    return make_controller(name, task)
 
 
 def make_environment(task: str, scenario: str, controller: Any = None) -> Any:

@@ -17,8 +17,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from ..controllers import make_controller
 from ..controllers.observation import MAX_COMMAND
-from ..controllers.task_laws import make_task_law
 from ..controllers.trained_policy import TaskPolicy, save_policy
 from ..controllers.wind_observation import MAX_ACCELERATION, OBSERVATION_SCALES
 from ..envs.fan_tracking_2d import SCALES_2D
@@ -60,7 +60,7 @@ class _Student:
 
 def teach(task: str, seed: int, rounds: int, episodes: int, epochs: int) -> TaskPolicy:
     """Return a GRU that was taught in rounds of DAgger of so many episodes each."""
-    known, oracle = TASKS[task], make_task_law("oracle", task)
+    known, oracle = TASKS[task], make_controller("oracle", task)
     env = known.environment(SCENARIO)
     env.preview = getattr(oracle, "preview", 0.0)
     of_fan = task == "FanTracking2D"

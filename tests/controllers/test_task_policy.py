@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers.shipped import shipped_policies
+from windwrench.controllers.registry import shipped_policies
 from windwrench.controllers.trained_policy import TaskPolicy, load_task_policy, save_policy
 from windwrench.dynamics import InputError
 from windwrench.evaluation.episodes import fly_episode

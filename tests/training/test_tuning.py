@@ -8,7 +8,7 @@ import yaml
 
 from windwrench.cli import main
 from windwrench.controllers import CONTROLLERS, LAWS, make_controller
-from windwrench.controllers.tuned import tuned_gains
+from windwrench.controllers.registry import tuned_gains
 from windwrench.dynamics import InputError
 from windwrench.evaluation.tasks import TASKS
 from windwrench.training.tune import RANGES, first_gains, keep_gains, tune

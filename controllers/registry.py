@@ -1,0 +1,140 @@
+"""The controllers of each task by their names: designed laws, the gains found for them by search
+(``tuned.yaml`` says for which scenario and how), and the trained policies that come with the kit.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from importlib import resources
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from ..runtime.errors import unknown_name
+from .fan_laws import (
+    Admittance,
+    Admittance2D,
+    AdmittancePID,
+    Hover,
+    Hover2D,
+    Lead,
+    Oracle,
+    Oracle2D,
+    Ratio,
+    Ratio2D,
+)
+from .tracker import InformedTracker, Limit, Tracker
+from .wind_laws import INDI, PID, FlightLoopAlone, L1Adaptive, PIDWithForce, WindOracle
+
+STANDARD_TASK = "FanTracking"
+STANDARD_SCENARIO = "base"  # of the gains of a law that is called no more than tuned
+
+
+class Controller(Protocol):
+    """From an observation to a command; ``info`` is the environment's, for those that may see the
+    truth.
+
+    One that also has ``brief(briefing)`` is told what its vehicle, its sensors and the fan are
+    (``controllers.briefing.Briefing``) before ``reset``.
+    """
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        ...
+
+    def __call__(
+        self, observation: NDArray[np.floating[Any]], info: Mapping[str, Any] | None = None
+    ) -> NDArray[np.floating[Any]]:
+        """Return the command (1,) m/s for an observation (8,)."""
+        ...
+
+
+Laws = dict[str, Callable[..., Any]]
+
+
+@cache
+def tuned_gains(task: str = STANDARD_TASK) -> dict[str, dict[str, Any]]:
+    """Return what is known of a task's gains: law, of FanTracking also scenario, and then ``gains``
+    and how they were found.
+    """
+    text = (resources.files(__package__) / "tuned.yaml").read_text(encoding="utf-8")
+    sections: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load(text)
+    if task != STANDARD_TASK:
+        return sections.get(task, {})
+    return {law: found for law, found in sections.items() if law in LAWS}
+
+
+def _tuned() -> Laws:
+    """Return ``LAW-tuned`` (for the scenario base) and ``LAW-tuned-SCENARIO`` of FanTracking."""
+    return {
+        f"{law}-tuned" + ("" if scenario == STANDARD_SCENARIO else f"-{scenario}"): partial(
+            LAWS[law], **found["gains"]
+        )
+        for law, scenarios in tuned_gains().items()
+        for scenario, found in scenarios.items()
+    }
+
+
+# designed laws of FanTracking with gains that can be tuned
+LAWS: Laws = {
+    "admittance": Admittance,
+    "ratio": Ratio,
+    "lead": Lead,
+    "admittance-pid": AdmittancePID,
+    "tracker": Tracker,
+    "tracker-informed": InformedTracker,
+}
+CONTROLLERS: Laws = {"hover": Hover, **LAWS, "limit": Limit, "oracle": Oracle, **_tuned()}
+_WIND: Laws = {
+    "hover": FlightLoopAlone,
+    "pid": PID,
+    "pid-force": PIDWithForce,
+    "indi": INDI,
+    "l1": L1Adaptive,
+    "oracle": WindOracle,
+}
+TASK_LAWS: dict[str, Laws] = {
+    STANDARD_TASK: CONTROLLERS,
+    "FanTracking2D": {
+        "hover": Hover2D,
+        "admittance": Admittance2D,
+        "ratio": Ratio2D,
+        "oracle": Oracle2D,
+    },
+    "WindHover": _WIND,
+    "WindTrajectory": _WIND,
+}
+# tasks that are flown with the gains of another where the file has none of their own
+_AS = {"WindTrajectory": "WindHover"}
+
+
+def make_controller(name: str, task: str = STANDARD_TASK) -> Any:
+    """Return a new ``Controller`` of a task by its name; where the name of a law of another task
+    than FanTracking has gains that were found, the law has these.
+
+    Raises:
+        InputError: no task or no controller has this name.
+    """
+    if task not in TASK_LAWS:
+        raise unknown_name("task", task, TASK_LAWS)
+    laws = TASK_LAWS[task]
+    if name not in laws:
+        raise unknown_name("controller", name, laws)
+    if task == STANDARD_TASK:
+        return laws[name]()
+    found = tuned_gains(task).get(name) or tuned_gains(_AS.get(task, task)).get(name, {})
+    return laws[name](**found.get("gains", {}))
+
+
+@cache
+def shipped_policies(task: str = STANDARD_TASK) -> dict[str, Path]:
+    """Return the file of each policy of a task that this installation has, sorted by name. A wheel
+    has one seed of each of ``FanTracking`` alone, a checkout all.
+    """
+    folder = Path(str(resources.files(__package__))).parent / "training" / "policies"
+    start = "" if task == STANDARD_TASK else f"{task}-"
+    found = (folder / "tasks" if start else folder).glob(f"{start}*.npz")
+    kept = (path for path in found if path.with_suffix(".json").exists())
+    return {path.stem.removeprefix(start): path for path in sorted(kept)}
