@@ -28,7 +28,7 @@ def _policy_path(name: str) -> Path | None:
     Raises:
         InputError: there is none of this name.
     """
-    from ..controllers.shipped import shipped_policies
+    from ..controllers.registry import shipped_policies
     from ..live.export_c.policies import LAWS
 
     shipped = shipped_policies()
@@ -67,7 +67,7 @@ def export_c(
             help="Also a policy that tracks a fan: lead, tracker, the name of a trained one "
             "(sac-0), or its path.",
             autocompletion=offering(
-                "live.export_c.policies:LAWS", "controllers.shipped:shipped_policies"
+                "live.export_c.policies:LAWS", "controllers.registry:shipped_policies"
             ),
         ),
     ] = None,

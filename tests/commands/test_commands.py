@@ -170,7 +170,7 @@ def test_plain_values_are_strict_json():
 
 
 def test_completion_offers_names():
-    complete = offering("controllers:CONTROLLERS", "controllers.shipped:shipped_policies")
+    complete = offering("controllers:CONTROLLERS", "controllers.registry:shipped_policies")
     assert complete("hov") == ["hover"]
     assert complete("hover,adm")[0] == "hover,admittance"
     assert "sac-0" in complete("sac")
