@@ -3,10 +3,11 @@
 import os
 from collections.abc import Callable, Iterable, Sequence
 
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.workers import workers
 from .episodes import Episode, benchmark_seeds, fly_episode
-from .tasks import STANDARD_TASK, TASKS, make_environment, make_pilot, task_of
+from .tasks import TASKS, make_environment, make_pilot, task_of
 
 _CHUNK = 5  # episodes that a worker flies at a time
 _SEEDS = 2**32  # of a benchmark

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..controllers.registry import STANDARD_TASK
 from ..runtime.whole_files import replaced
 from .benchmark import Results
 from .episodes import Episode
@@ -24,7 +25,7 @@ from .statistics import (
     relative_change,
     sign_probability,
 )
-from .tasks import STANDARD_TASK, TASKS, short_names
+from .tasks import TASKS, short_names
 
 _RESAMPLES = 4_000
 _CLEAR = 0.05  # p-value, corrected

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..controllers.registry import STANDARD_TASK
 from ..controllers.trained_policy import TaskPolicy, TrainedPolicy, save_policy
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import STANDARD_TASK, TASKS
+from ..evaluation.tasks import TASKS
 from ..runtime.errors import InputError
 from ..runtime.forms import STRICT, checked
 from ..runtime.regular_files import read_json

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from ..controllers.registry import STANDARD_TASK
 from ..evaluation.episodes import fly_episode
-from ..evaluation.tasks import STANDARD_TASK, TASKS, make_environment, task_of
+from ..evaluation.tasks import TASKS, make_environment, task_of
 from ..runtime.errors import InputError, unknown_name
 from ..runtime.whole_files import replaced
 from ..runtime.yaml_file import read_yaml
