@@ -22,13 +22,14 @@ from ..dynamics.vehicle import Vehicle
 from ..estimator import UKFTuning, WrenchUKF
 from ..estimator.estimate import NIS, STATE_SIZE
 from ..estimator.filter_record import propagate
-from ..estimator.ukf import default_covariance, step
+from ..estimator.ukf import default_covariance
 from ..runtime.compiled import Record, compiled
 from ..runtime.errors import InputError
 from .logs.flight_log import FlightLog
 from .motion.sensing_effects import undo_log_sensing
 from .motion.signals import Signals, log_signals
 from .motion.smoothing import CUTOFFS, continuous, low_pass, unbroken
+from .wrench_series import predict_to_row
 
 Array = NDArray[np.float64]
 Segments = Sequence[tuple[float, float]]
@@ -324,48 +325,16 @@ def nis_without_wrench_state(log: FlightLog, vehicle: Vehicle, segments: Segment
     covariance = default_covariance(vehicle, tuning)
     covariance[12:18, 12:18] *= PREDICTION.frozen_wrench_factor**2
     ukf = WrenchUKF(vehicle, tuning, period=period)
-    voltage = np.full(len(log.t), vehicle.voltage_ref) if log.voltage is None else log.voltage
-    # another memory layout would be another type, and compiled anew
-    t, speeds, voltage, position, quaternion = map(
-        np.ascontiguousarray, (log.t, log.rotor_speeds, voltage, log.position, log.quaternion)
-    )
-    valid = np.ascontiguousarray(log.valid)
-    nis = np.full(len(t), np.nan)
+    nis = np.full(len(log.t), np.nan)
     for rows in unbroken(log.t, seen, PREDICTION.longest_gap):
-        piece = slice(int(rows[0]), int(rows[-1]) + 1)
-        ukf.reset(position[rows[0]], quaternion[rows[0]], covariance)
-        ukf.record[0]["time"] = t[rows[0]] - t[0]
-        poses = position[piece], quaternion[piece], valid[piece]
-        _filter(ukf.record, t[piece], speeds[piece], voltage[piece], *poses, period, nis[piece])
-        inside[rows[0]] = False  # the filter's start has nothing to compare with
+        first = int(rows[0])
+        ukf.reset(log.position[first], log.quaternion[first], covariance)
+        ukf.record[0]["time"] = log.t[first] - log.t[0]
+        inside[first] = False  # the filter's start has nothing to compare with
+        for k in range(first + 1, int(rows[-1]) + 1):
+            predict_to_row(ukf, log, k)
+            if log.valid[k]:
+                ukf.correct(log.position[k], log.quaternion[k])
+                nis[k] = ukf.record[0]["x"][NIS]
     values = nis[inside & log.valid]
     return float(np.mean(values)) if values.size else math.nan
-
-
-@compiled
-def _filter(
-    record: Record,
-    t: Array,
-    speeds: Array,
-    voltage: Array,
-    position: Array,
-    quaternion: Array,
-    seen: np.ndarray,
-    period: float,
-    nis: Array,
-) -> None:
-    """Run a filter from its first row on and write the NIS (n,) of the rows that have a pose."""
-    f = record[0]
-    z = np.zeros(11)
-    for k in range(1, len(t)):
-        dt = t[k] - t[k - 1]
-        steps = max(1, math.ceil(dt / period - _STEP_TOLERANCE))
-        for i in range(4):
-            z[i] = 0.5 * (speeds[k - 1, i] + speeds[k, i])
-        for _ in range(steps):
-            step(f, z, 0, dt / steps, 0.5 * (voltage[k - 1] + voltage[k]))
-        if seen[k]:
-            z[4:7] = position[k]
-            z[7:11] = quaternion[k]
-            step(f, z, 3, 0.0, voltage[k])
-            nis[k] = f.x[NIS]

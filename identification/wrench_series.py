@@ -105,7 +105,7 @@ def estimate_log(
             if k % _REPORTED == 0:
                 report(k / count)
             if k > first:
-                _predict(ukf, log, k)
+                predict_to_row(ukf, log, k)
                 if not smooth:
                     _take_in_imu(ukf, log, k)
                 if log.valid[k]:
@@ -203,7 +203,7 @@ def _columns(log: FlightLog) -> tuple[Array, Array, Array, Array, Array | None]:
     return log.t, log.rotor_speeds, position, log.quaternion, log.voltage
 
 
-def _predict(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
+def predict_to_row(ukf: WrenchUKF, log: FlightLog, k: int) -> None:
     """Carry the filter from row ``k - 1`` to row ``k`` in equal steps of at most one period."""
     dt = float(log.t[k] - log.t[k - 1])
     speeds = 0.5 * (log.rotor_speeds[k - 1] + log.rotor_speeds[k])

@@ -18,7 +18,7 @@ _MODEL = np.dtype(MODEL_FIELDS)
 
 
 @compiled
-def _accelerations(
+def _act(
     models: Record,
     period: float,
     speeds: Array,
@@ -28,10 +28,12 @@ def _accelerations(
     velocity: Array,
     rate: Array,
     turning: Array,
+    mass: float,
+    J: Array,
     out: Array,
 ) -> None:
-    """Write the acceleration without gravity (m/s2, world) and the angular acceleration (rad/s2,
-    body) that a model gives at each sample (n, 6). Where the centre of mass is off the pose's
+    """Write the force (N, world) and the torque (Nm, body) that a model's accelerations mean to a
+    body of this mass and inertia at each sample (n, 6). Where the centre of mass is off the pose's
     point, the measured angular acceleration ``turning`` moves that point.
     """
     f = models[0]
@@ -45,9 +47,10 @@ def _accelerations(
         omega, measured = (w[0], w[1], w[2]), (a[0], a[1], a[2])
         rotors, effects = (r[0], r[1], r[2], r[3]), (e[0], e[1], e[2], e[3], e[4], e[5])
         x, y, z = acceleration_of(b, turn, omega, measured, rotors, nothing, effects)
-        out[k, 0], out[k, 1], out[k, 2] = x, y, z + b[22]
+        out[k, 0], out[k, 1], out[k, 2] = mass * x, mass * y, mass * (z + b[22])
         x, y, z = angular_acceleration_of(b, turn, omega, rotors, nothing, effects)
-        out[k, 3], out[k, 4], out[k, 5] = x, y, z
+        for i in range(3):
+            out[k, 3 + i] = J[i, 0] * x + J[i, 1] * y + J[i, 2] * z
 
 
 def acting_wrench(
@@ -64,9 +67,7 @@ def acting_wrench(
     body = body or own
     out = np.empty((len(signals.t), 6))
     turning = np.ascontiguousarray(signals.angular_acceleration)
-    _accelerations(models, signals.period, *signals.columns(), turning, out)
-    out[:, :3] *= body.mass
-    out[:, 3:] = out[:, 3:] @ body.inertia.T
+    _act(models, signals.period, *signals.columns(), turning, body.mass, body.inertia, out)
     return out, body
 
 
