@@ -8,18 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import InputError, load_vehicle
+from windwrench.dynamics import InputError
 from windwrench.dynamics.effects import names
 from windwrench.envs.recording import TRAJECTORIES
-from windwrench.identification.motion.residual import residual_wrench
-from windwrench.identification.motion.signals import log_signals
-from windwrench.identification.motion.smoothing import low_pass
 from windwrench.studies.pages import render
 from windwrench.studies.scoring import EQUIVALENTS, match
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK
 from windwrench.studies.trials.outsiders import OUTSIDERS
 from windwrench.studies.trials.page import page as shown_of
-from windwrench.studies.trials.practice_flights import practise_held_back
 from windwrench.studies.trials.scores import (
     FAILED,
     RIGHT,
@@ -98,10 +94,6 @@ def outcome(group, truth, *diagnoses, outsider=None, size="typical", vehicle="ar
     }
 
 
-def outcomes_of(*diagnoses, truth, group="typical", outsider=None):
-    return [j.outcome for j in judge(outcome(group, truth, *diagnoses, outsider=outsider))]
-
-
 def rule(judged, start):
     (one,) = (r for r in rules(judged) if r.subject.startswith(start))
     return one
@@ -140,26 +132,26 @@ def test_a_run_flies_everything_and_the_quick_one_a_part_of_it():
         plan(first=-1)
 
 
-def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell():
-    assert outcomes_of(found(name("mass", dm=0.041)), truth=MASS) == [RIGHT]
-    assert outcomes_of(found(name("mass", tentative=True, dm=0.041)), truth=MASS) == [
-        RIGHT_TENTATIVE
-    ]
-    assert outcomes_of(found(name("thrust_scale", like=["mass"], s=-0.08)), truth=MASS) == [RIGHT]
-    assert outcomes_of(found(name("thrust_scale", s=-0.08)), truth=MASS) == [WRONG]
-    assert outcomes_of(found(name("thrust_scale", tentative=True, s=-0.08)), truth=MASS) == [
-        TENTATIVE
-    ]
-    assert outcomes_of(found(name("mass", dm=0.04), name("wind", wx=1.0)), truth=MASS) == [WRONG]
-    assert outcomes_of(
-        found(name("mass", dm=0.04), name("wind", tentative=True, wx=1.0)), truth=MASS
-    ) == [TENTATIVE]
-    assert outcomes_of(found(), truth=MASS) == [SILENT]
-    assert outcomes_of(found(remainder="random"), truth=MASS) == [UNEXPLAINED]
-    assert outcomes_of({"without": [], "error": "ValueError: no", "seconds": 1.0}, truth=MASS) == [
-        FAILED
-    ]
-    # one name cannot stand for two effects
+@pytest.mark.parametrize(
+    ("diagnosis", "expected"),
+    [
+        (found(name("mass", dm=0.041)), RIGHT),
+        (found(name("mass", tentative=True, dm=0.041)), RIGHT_TENTATIVE),
+        (found(name("thrust_scale", like=["mass"], s=-0.08)), RIGHT),
+        (found(name("thrust_scale", s=-0.08)), WRONG),
+        (found(name("thrust_scale", tentative=True, s=-0.08)), TENTATIVE),
+        (found(name("mass", dm=0.04), name("wind", wx=1.0)), WRONG),
+        (found(name("mass", dm=0.04), name("wind", tentative=True, wx=1.0)), TENTATIVE),
+        (found(), SILENT),
+        (found(remainder="random"), UNEXPLAINED),
+        ({"without": [], "error": "ValueError: no", "seconds": 1.0}, FAILED),
+    ],
+)
+def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell(diagnosis, expected):
+    assert [j.outcome for j in judge(outcome("typical", MASS, diagnosis))] == [expected]
+
+
+def test_one_name_cannot_stand_for_two_effects():
     assert match([name("motor_lag", like=["latency", "mass"])], list(PAIR)) is None
     assert match([name("mass"), name("motor_lag", like=["latency", "mass"])], list(PAIR)) == [
         ("mass", "mass"),
@@ -167,21 +159,23 @@ def test_names_are_right_one_by_one_or_up_to_what_flights_cannot_tell():
     ]
 
 
-def test_where_nothing_is_in_the_library_only_doubt_or_silence_is_good():
-    assert outcomes_of(found(), truth={}, group="nothing") == [RIGHT]
-    assert outcomes_of(found(remainder="structured"), truth={}, group="nothing") == [
-        RIGHT_TENTATIVE
-    ]
-    assert outcomes_of(found(name("wind", tentative=True)), truth={}, group="nothing") == [
-        TENTATIVE
-    ]
-    assert outcomes_of(found(name("wind")), truth={}, group="nothing") == [WRONG]
-    assert outcomes_of(found(name("wind")), truth={}, group="outsider", outsider="tether") == [
-        WRONG
-    ]
-    assert outcomes_of(
-        found(remainder="structured"), truth={}, group="outsider", outsider="tether"
-    ) == [UNEXPLAINED]
+@pytest.mark.parametrize(
+    ("outsider", "diagnosis", "expected"),
+    [
+        (None, found(), RIGHT),
+        (None, found(remainder="structured"), RIGHT_TENTATIVE),
+        (None, found(name("wind", tentative=True)), TENTATIVE),
+        (None, found(name("wind")), WRONG),
+        ("tether", found(name("wind")), WRONG),
+        ("tether", found(remainder="structured"), UNEXPLAINED),
+    ],
+)
+def test_where_nothing_is_in_the_library_only_doubt_or_silence_is_good(
+    outsider, diagnosis, expected
+):
+    group = "outsider" if outsider else "nothing"
+    (judged,) = judge(outcome(group, {}, diagnosis, outsider=outsider))
+    assert judged.outcome == expected
 
 
 def test_coefficients_are_compared_where_the_truth_is_not_zero():
@@ -419,26 +413,3 @@ def test_a_diagnosis_that_falls_over_is_an_outcome():
     assert judged.outcome == FAILED
     assert "gremlins" in judged.problem
     assert rule([replace(judged, without=())], "1. one effect of typical").met is False
-
-
-@pytest.mark.parametrize("disturbance", sorted(HELD_BACK))
-def test_a_held_back_disturbance_acts_in_flight_and_is_what_the_residual_shows(disturbance):
-    assert HELD_BACK[disturbance].__doc__
-    p = practise_held_back(load_vehicle("ardrone2"), disturbance, "typical", 1, 10.0)
-    (signals,) = log_signals(p.log)
-    r = residual_wrench(signals, p.vehicle)
-    r[:, 3:] = np.einsum("nij,nj->ni", signals.rotation, r[:, 3:])
-    truth = np.column_stack([p.log.force, p.log.torque])
-    r, truth = (low_pass(x, 2.0, signals.period)[200:-200] for x in (r, truth))
-    scale = np.repeat([p.vehicle.weight, p.vehicle.weight * p.vehicle.arm_l], 3)
-    assert np.abs(truth / scale).max() < 0.3
-    axis = int(np.argmax(truth.std(axis=0) / scale))
-    assert truth[:, axis].std() > 0.003 * scale[axis]
-    assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.9
-
-
-def test_a_held_back_disturbance_must_exist():
-    with pytest.raises(InputError, match="gremlins"):
-        practise_held_back(load_vehicle("ardrone2"), "gremlins")
-    with pytest.raises(InputError, match="huge"):
-        practise_held_back(load_vehicle("ardrone2"), "soft_arm", "huge")

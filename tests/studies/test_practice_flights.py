@@ -13,6 +13,7 @@ from windwrench.envs.plant import TICK, is_a_body
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
+from windwrench.studies.trials.held_back_outsiders import HELD_BACK
 from windwrench.studies.trials.logged_poses import FILTERS
 from windwrench.studies.trials.outsiders import OUTSIDERS, Moment
 from windwrench.studies.trials.practice_flights import (
@@ -22,6 +23,7 @@ from windwrench.studies.trials.practice_flights import (
     fly_practice,
     of_mass,
     practise,
+    practise_held_back,
 )
 from windwrench.studies.trials.rotorpy_flights import (
     aero_settings,
@@ -68,9 +70,9 @@ def moment(
     )
 
 
-@pytest.mark.parametrize("name", sorted(OUTSIDERS))
+@pytest.mark.parametrize("name", sorted({**OUTSIDERS, **HELD_BACK}))
 def test_a_disturbance_acts_in_flight_and_is_what_the_residual_shows(name):
-    assert OUTSIDERS[name].__doc__
+    assert {**OUTSIDERS, **HELD_BACK}[name].__doc__
     trajectory = {
         "vortex_ring": "vertical",
         "thrust_saturation": "vertical",
@@ -126,22 +128,6 @@ def test_side_force_and_precession_do_no_work():
     assert turn[3:] @ (m.rotation @ m.rate) == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_tether_is_slack_within_its_length_and_pulls_down_and_back_beyond():
-    pull = model("tether")
-    assert np.all(pull(moment(position=(0, 0, 1.4))) == 0.0)
-    wrench = pull(moment(position=(1.0, 0, 1.5)))
-    assert wrench[0] < 0
-    assert wrench[2] < 0
-    assert wrench[0] / wrench[2] == pytest.approx(1.0 / 1.5)
-
-
-def test_a_wall_draws_by_the_inverse_square():
-    wall = model("wall_attraction")  # at x = 1.4 m
-    near, far = (wall(moment(position=(x, 0, 1.5)))[0] for x in (0.9, 0.4))
-    assert near == pytest.approx(4.0 * far)
-    assert near > 0
-
-
 def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
     dropouts = model("rotor_dropouts")
     wrenches = [dropouts(moment(TICK * i)) for i in range(4000)]
@@ -155,15 +141,6 @@ def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
         np.tile([0, 0, -share, -ARM * share, -ARM * share, yaw], (len(lost), 1)),
         rtol=1e-12,
         atol=1e-15,
-    )
-
-
-def test_wash_costs_thrust_only_in_a_descent_and_saturation_only_at_high_rates():
-    assert np.all(model("vortex_ring")(moment(velocity=(1.0, 0.0, -0.29))) == 0.0)
-    assert model("vortex_ring")(moment(velocity=(0.0, 0.0, -0.8)))[2] < -0.02 * WEIGHT
-    assert np.all(model("thrust_saturation")(moment(speeds=1.04 * HOVER)) == 0.0)
-    assert model("thrust_saturation")(moment(speeds=1.2 * HOVER))[2] == pytest.approx(
-        -0.3 * (1.44 - 1.1) * WEIGHT
     )
 
 
@@ -204,13 +181,6 @@ def test_noise_and_turbulence_are_as_asked():
     assert sigma(calm) == pytest.approx(0.5 * VEHICLE.mocap.sigma_pos_m, rel=0.1)
     assert np.abs(calm.force).max() == 0.0
     assert 0.5 < noisy.force.std() / (3 * 0.015 * WEIGHT / 4.5126) < 1.5
-
-
-def test_every_drawn_inertia_is_that_of_a_body():
-    for seed in range(30):
-        drawn = draw_effect("inertia", VEHICLE, "large", np.random.default_rng(seed))
-        assert is_a_body(get("inertia").amend(VEHICLE, drawn.coefficients).inertia)
-    assert not is_a_body(np.diag([1.0, 1.0, 2.1]))
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -255,21 +225,18 @@ def test_every_effect_and_every_disturbance_is_flown():
     [
         (lambda: fly_practice(VEHICLE, outsider="ghost"), "disturbance"),
         (lambda: fly_practice(VEHICLE, sensor=-1.0), "sensor"),
+        (lambda: fly_practice(VEHICLE, seen=0.0), "seen must be"),
+        (lambda: fly_practice(VEHICLE, seen=1.5), "seen must be"),
         (lambda: fly_practice(VEHICLE, trajectory="loop", outsider="tether"), "trajectory"),
         (lambda: practise(VEHICLE, "ghost"), "kind"),
         (lambda: practise(VEHICLE, "effect", size="huge"), "size"),
+        (lambda: practise_held_back(VEHICLE, "gremlins"), "gremlins"),
+        (lambda: practise_held_back(VEHICLE, "soft_arm", "huge"), "huge"),
     ],
 )
 def test_a_wrong_word_is_named(call, words):
     with pytest.raises(InputError, match=words):
         call()
-
-
-@pytest.fixture(scope="module")
-def flights():
-    if not available():
-        pytest.skip("RotorPy is not installed (pip install rotorpy)")
-    return {aero: rotorpy_flight("fast", 5.0, 0, aero, noise=0.0) for aero in (False, True)}
 
 
 @needs_rotorpy
@@ -288,59 +255,20 @@ def test_rotorpy_s_hummingbird_is_told_in_our_conventions():
     )
 
 
-def test_without_aerodynamics_our_model_explains_rotorpy_s_flight(flights):
-    r, truth = left_over(flights[False], hummingbird_vehicle())
-    assert np.all(truth == 0.0)
-    assert r[:, :3].std(axis=0).max() < 0.01
-    assert r[:, 3:].std(axis=0).max() < 2e-3
-
-
-def test_with_aerodynamics_the_library_s_effects_explain_it(flights):
-    vehicle = hummingbird_vehicle()
-    r, truth = left_over(flights[True], vehicle)
+@needs_rotorpy
+def test_the_library_s_effects_explain_rotorpy_s_flight():
+    vehicle, flight = hummingbird_vehicle(), rotorpy_flight("fast", 5.0, noise=0.0)
+    r, truth = left_over(flight, vehicle)
     for axis in range(3):
         assert np.corrcoef(r[:, axis], truth[:, axis])[0, 1] > 0.999
-    whole, _ = left_over(flights[True], vehicle.with_effects(*aero_settings()))
+    whole, _ = left_over(flight, vehicle.with_effects(*aero_settings()))
     assert whole[:, :3].std(axis=0).max() < 0.01
     assert whole[:, 3:].std(axis=0).max() < 2e-3
     # each of them is needed
     for left_out in range(4):
         rest = [s for i, s in enumerate(aero_settings()) if i != left_out]
-        without, _ = left_over(flights[True], vehicle.with_effects(*rest))
+        without, _ = left_over(flight, vehicle.with_effects(*rest))
         assert without[:, :3].std(axis=0).max() > 0.02
-
-
-def test_rotorpy_s_rotor_speeds_are_those_at_the_instant_of_the_pose(flights):
-    log, vehicle = flights[False], hummingbird_vehicle()
-    up = np.array([matrix_of(q)[:, 2] for q in log.quaternion[1:-1]])
-    acceleration = (log.position[2:] - 2.0 * log.position[1:-1] + log.position[:-2]) / TICK**2 + [
-        0.0,
-        0.0,
-        vehicle.gravity,
-    ]
-    thrust = np.array([vehicle.rotor_wrench(speeds)[0] for speeds in log.rotor_speeds])
-    gap = vehicle.mass * np.einsum("ni,ni->n", up, acceleration) - thrust[1:-1]
-    slope = np.gradient(thrust, TICK)[1:-1]
-    # of the mean over the interval that ends there it would be 3 ms and more
-    assert abs(gap @ slope) / (slope @ slope) < 0.0015
-
-
-@needs_rotorpy
-def test_rotorpy_s_log_has_the_noise_and_the_steps_that_are_asked_for(flights):
-    log = rotorpy_flight("fast", 0.5, 0, True, eight_bit=True)
-    steps = log.rotor_speeds / hummingbird_vehicle(eight_bit=True).omega_lsb
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-    error = log.position - flights[True].position[: len(log.t)]
-    # what the flight does in half a second does not depend on the trajectory's later part
-    assert error[:20].std() == pytest.approx(0.001, rel=0.3)
-
-
-@needs_rotorpy
-def test_a_rotorpy_flight_out_of_range_is_refused():
-    with pytest.raises(InputError, match="seconds"):
-        rotorpy_flight(seconds=0.0)
-    with pytest.raises(InputError, match="trajectory"):
-        rotorpy_flight("loop", 1.0)
 
 
 def test_without_rotorpy_the_message_says_what_to_install(monkeypatch):
@@ -390,12 +318,6 @@ def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
     # it holds its place better in the same gusts
     away = [log.position[200:].std(axis=0).max() for log in logs]
     assert away[1] < away[0]
-
-
-@pytest.mark.parametrize("seen", [0.0, 1.5])
-def test_a_loop_sees_some_of_the_log_s_noise_and_no_more(seen):
-    with pytest.raises(InputError, match="seen must be"):
-        fly_practice(load_vehicle("ardrone2"), seconds=4.0, seen=seen)
 
 
 def test_filters_take_the_noise_at_high_frequencies_alone():
