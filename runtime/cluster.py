@@ -60,9 +60,13 @@ def spread(work: Callable[[T], R], tasks: Sequence[T], address: str) -> Iterator
     done again.
 
     Raises:
-        InputError: as ``connected``.
+        InputError: as ``connected``, or a task failed for good.
     """
     with connected(address) as ray:
         remote = ray.remote(num_cpus=1, max_retries=RETRIES)(work)
         for reference in [remote.remote(task) for task in tasks]:
-            yield ray.get(reference)
+            try:
+                yield ray.get(reference)
+            except ray.exceptions.RayError as error:
+                reason = str(getattr(error, "cause", error)).partition("\n")[0]
+                raise InputError(f"--cluster {address}: a task failed: {reason}") from error

@@ -16,6 +16,7 @@ from ..runtime.yaml_file import parse_yaml, read_yaml
 
 Config = dict[str, Any]
 ALGORITHMS = ("sac", "ppo", "recurrent-ppo", "td3", "imitation", "recurrent-imitation", "tune")
+_COUNTS = ("steps", "environments", "repeat", "rounds", "state", "ahead", "checkpoint")
 
 
 def load_config(algorithm: str, overrides: Sequence[str] = (), file: Path | None = None) -> Config:
@@ -92,23 +93,14 @@ def _like(old: Any, value: Any, where: str) -> Any:
 
 
 def _check(config: Config) -> None:
-    for key in ("steps", "environments", "repeat", "rounds", "state", "ahead"):
-        if config.get(key, 1) < 1:
-            raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {config[key]}")
-    for key in ("every", "episodes"):
-        if config["validation"][key] < 1:
-            raise InputError(
-                f"{config['algorithm']}: validation.{key} must be at least 1, got "
-                f"{config['validation'][key]}"
-            )
-    if config.get("checkpoint", 1) < 1:
-        raise InputError(
-            f"{config['algorithm']}: checkpoint must be at least 1, got {config['checkpoint']}"
-        )
+    counts = {key: config[key] for key in _COUNTS if key in config}
+    counts |= {f"validation.{key}": count for key, count in config["validation"].items()}
+    for key, count in counts.items():
+        if count < 1:
+            raise InputError(f"{config['algorithm']}: {key} must be at least 1, got {count}")
     if config["activation"] not in ("relu", "tanh"):
-        raise unknown_name(
-            "activation", config["activation"], ("relu", "tanh"), config["algorithm"]
-        )
+        activations = ("relu", "tanh")
+        raise unknown_name("activation", config["activation"], activations, config["algorithm"])
     if not all(isinstance(n, int) and n > 0 for n in config["net"]):
         raise InputError(
             f"{config['algorithm']}: net must list sizes of hidden layers, got {config['net']}"

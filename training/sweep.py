@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..runtime.cluster import RETRIES, connected
+from ..runtime.cluster import spread
 from ..runtime.errors import InputError
 from .configuration import Config, load_config
 
@@ -94,7 +94,7 @@ def run_jobs(
     address: str,
     work: Callable[[Job, Path], dict[str, Any]] = run_job,
 ) -> list[dict[str, Any]]:
-    """Do the runs of a sweep with Ray Tune; return the result of each, in their order.
+    """Do the runs of a sweep on a Ray cluster; return the result of each, in their order.
 
     A run whose process or machine is lost goes on elsewhere, from its last checkpoint.
 
@@ -105,36 +105,11 @@ def run_jobs(
         work: does one run in a worker process.
 
     Raises:
-        InputError: as ``connected``, or a run failed for good.
+        InputError: as ``spread``, or a run failed for good.
     """
-    with connected(address):
-        from ray import tune
+    root = folder.resolve()
 
-        by_name = {job.name: job for job in jobs}
-        root = folder.resolve()
+    def trial(job: Job) -> dict[str, Any]:
+        return work(job, root)
 
-        def trial(space: dict[str, Any]) -> None:
-            tune.report(work(by_name[space["run"]], root))
-
-        tuner = tune.Tuner(
-            tune.with_resources(trial, {"cpu": 1}),
-            param_space={"run": tune.grid_search(list(by_name))},
-            run_config=tune.RunConfig(
-                name="ray",
-                storage_path=str(root),
-                verbose=0,
-                failure_config=tune.FailureConfig(max_failures=RETRIES),
-            ),
-        )
-        grid = tuner.fit()
-    if grid.errors:
-        raise InputError(
-            f"--cluster {address}: {len(grid.errors)} of {len(jobs)} runs failed: {grid.errors[0]}"
-        )
-    found = {
-        result.metrics["run"]: {
-            k: result.metrics[k] for k in ("run", "policy", "validation_rmse_m", "seconds")
-        }
-        for result in grid
-    }
-    return [found[job.name] for job in jobs]
+    return list(spread(trial, jobs, address))

@@ -1,6 +1,7 @@
 """Tuning the gains of the designed laws of every task, on validation episodes."""
 
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -16,53 +17,11 @@ from ..runtime.yaml_file import read_yaml
 from .seeds import validation_seeds
 from .training_envs import check_training_env, make_training_env
 
-Ranges = dict[str, tuple[float, float]]
-_FAN_2D: Ranges = {"gain": (4.0, 60.0), "gain_z": (4.0, 60.0)}
-_PD: Ranges = {"kp": (0.5, 60.0), "kd": (0.1, 15.0)}
-_PID: Ranges = {**_PD, "ki": (0.1, 60.0)}
-_WIND: dict[str, Ranges] = {
-    "pid": _PID,
-    "pid-force": {**_PID, "gain": (0.3, 1.2), "lead": (0.02, 1.0)},
-    "indi": {**_PD, "cutoff": (0.5, 10.0), "gain": (0.3, 1.2)},
-    "l1": {**_PD, "pole": (0.3, 20.0), "bandwidth": (0.5, 30.0)},
-    "oracle": {**_PID, "gain": (0.5, 1.2), "preview": (0.03, 0.5)},
-}
-# the ranges searched, each on a logarithmic scale: far beyond what was seen to work
-RANGES: dict[str, dict[str, Ranges]] = {
-    "FanTracking": {
-        "admittance": {"gain": (4.0, 80.0)},
-        "ratio": {"gain": (1.5, 40.0), "least_force": (0.02, 0.5)},
-        "lead": {"gain": (3.0, 40.0), "lead": (0.3, 15.0), "least_force": (0.02, 0.5)},
-        "admittance-pid": {"gain": (4.0, 80.0), "integral": (0.05, 30.0), "lead": (0.1, 30.0)},
-        "tracker": {
-            "gain": (0.5, 5.0),
-            "damping": (0.05, 2.0),
-            "acceleration": (0.005, 0.3),
-            "jumps": (0.05, 1.5),
-            "speed": (0.1, 0.5),
-        },
-        "tracker-informed": {
-            "gain": (0.5, 5.0),
-            "damping": (0.05, 2.0),
-            "ahead": (0.08, 0.8),
-            "spread": (0.03, 0.4),
-        },
-    },
-    "FanTracking2D": {
-        "admittance": _FAN_2D,
-        "ratio": {"gain": (2.0, 30.0), "gain_z": (2.0, 30.0), "least_force": (0.03, 0.4)},
-        "oracle": {"gain": (0.5, 8.0)},
-    },
-    "WindHover": _WIND,
-    "WindTrajectory": _WIND,
-}
-# gains of FanTracking with which a search begins in place of the law's defaults: the defaults are
-# what a search found
-STARTS: dict[str, dict[str, float]] = {
-    "admittance-pid": {"gain": 18.0, "integral": 4.0, "lead": 4.0},
-    "tracker": {"gain": 1.5, "damping": 0.3, "acceleration": 0.03, "jumps": 0.3, "speed": 0.25},
-    "tracker-informed": {"gain": 2.0, "damping": 0.5, "ahead": 0.3, "spread": 0.1},
-}
+_GAINS = yaml.safe_load(
+    (resources.files(__package__) / "configs" / "gains.yaml").read_text(encoding="utf-8")
+)
+RANGES: dict[str, dict[str, dict[str, list[float]]]] = _GAINS["ranges"]  # by task, law and gain
+STARTS: dict[str, dict[str, float]] = _GAINS["starts"]  # by law
 _PRUNE_AFTER = 10  # episodes
 
 
@@ -90,7 +49,7 @@ def first_gains(task: str, law: str) -> dict[str, float]:
     """
     defaults = {**vars(TASKS[task].laws[law]()), **STARTS.get(law, {})}
     ranges = RANGES[task][law].items()
-    return {name: min(max(float(defaults[name]), low), high) for name, (low, high) in ranges}
+    return {name: float(min(max(defaults[name], low), high)) for name, (low, high) in ranges}
 
 
 def tune(

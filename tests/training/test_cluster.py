@@ -107,6 +107,10 @@ def test_runs_on_a_cluster_are_the_local_ones_though_a_worker_is_killed(cluster,
     assert_same_runs(jobs, there, here, tmp_path)
 
 
+def refuse(task):
+    raise ValueError(f"not a number: {task}\nand more")
+
+
 def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
     def die_once(mark):
         if not os.path.exists(mark):
@@ -117,6 +121,11 @@ def test_a_task_whose_worker_is_killed_is_done_again(cluster, tmp_path):
     done_by = list(spread(die_once, [str(tmp_path / "killed")], cluster))
     assert (tmp_path / "killed").exists()
     assert done_by[0] != os.getpid()
+
+
+def test_a_task_that_fails_is_named(cluster):
+    with pytest.raises(InputError, match=r"--cluster local: a task failed: not a number: \[\]$"):
+        list(spread(refuse, [[]], cluster))
 
 
 def test_flights_on_a_cluster_are_the_local_ones(cluster):
