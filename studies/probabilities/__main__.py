@@ -10,8 +10,8 @@ import typer
 from windwrench.runtime.errors import unknown_name
 from windwrench.runtime.page_files import write_json
 from windwrench.studies.pages import DOCS, write_page
+from windwrench.studies.probabilities.calibration import RESULTS, page
 from windwrench.studies.probabilities.flights import OF_TEN, WAYS_TO_LOG, recorded
-from windwrench.studies.probabilities.scores import RESULTS, page
 from windwrench.studies.runner import Jobs, Page, Task, run_tasks, start
 
 _FIRST = {"first": (800_000, 3000), "later": (850_000, 5000), "other logs": (910_000, 170_000)}

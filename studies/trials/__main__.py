@@ -11,8 +11,8 @@ from windwrench.runtime.page_files import write_json
 from windwrench.runtime.provenance import commit
 from windwrench.studies.pages import DOCS, write_page
 from windwrench.studies.runner import Jobs, Page, start
+from windwrench.studies.trials.judgements import judge, rules
 from windwrench.studies.trials.page import RESULTS, page
-from windwrench.studies.trials.scores import judge, rules
 from windwrench.studies.trials.trials import plan, run_trials, stamp
 
 

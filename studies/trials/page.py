@@ -8,7 +8,7 @@ import numpy as np
 from windwrench.studies.pages import kept
 from windwrench.studies.scoring import EQUIVALENTS
 from windwrench.studies.trials.held_back_outsiders import UNSEEN
-from windwrench.studies.trials.scores import (
+from windwrench.studies.trials.judgements import (
     COEFFICIENT_BAR,
     FAILED,
     OUTCOMES,

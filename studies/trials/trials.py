@@ -2,7 +2,7 @@
 diagnosed as a user would.
 
 Every trial is one flight, diagnosed with the whole library and, where it asks for that, with
-effects left out. ``scores`` says what the outcomes are worth.
+effects left out. ``judgements`` says what the outcomes are worth.
 """
 
 import time

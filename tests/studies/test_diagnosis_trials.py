@@ -14,9 +14,7 @@ from windwrench.envs.recording import TRAJECTORIES
 from windwrench.studies.pages import render
 from windwrench.studies.scoring import EQUIVALENTS, match
 from windwrench.studies.trials.held_back_outsiders import HELD_BACK
-from windwrench.studies.trials.outsiders import OUTSIDERS
-from windwrench.studies.trials.page import page as shown_of
-from windwrench.studies.trials.scores import (
+from windwrench.studies.trials.judgements import (
     FAILED,
     RIGHT,
     RIGHT_TENTATIVE,
@@ -28,6 +26,8 @@ from windwrench.studies.trials.scores import (
     left_out,
     rules,
 )
+from windwrench.studies.trials.outsiders import OUTSIDERS
+from windwrench.studies.trials.page import page as shown_of
 from windwrench.studies.trials.trials import Trial, fly_and_diagnose, plan, run_trials
 
 SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, seconds=20.0)

@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 
 from windwrench.identification.findings import Probabilities
-from windwrench.identification.posterior.pooling import POOLING
+from windwrench.identification.posterior.pooling import POOLING, SEARCH_ALONE
 from windwrench.studies.pages import kept
 from windwrench.studies.probabilities.__main__ import plan, plan_of_other_logs
+from windwrench.studies.probabilities.calibration import (
+    RESULTS,
+    Scored,
+    cross_fitted,
+    error_of_perfect_calibration,
+    expected_calibration_error,
+    half_of,
+    weights_without_posterior,
+)
 from windwrench.studies.probabilities.fitting import (
     acts_unknown,
     fit,
@@ -19,14 +28,6 @@ from windwrench.studies.probabilities.fitting import (
     signs_of,
 )
 from windwrench.studies.probabilities.flights import KINDS, WAYS_TO_LOG
-from windwrench.studies.probabilities.scores import (
-    RESULTS,
-    Scored,
-    cross_fitted,
-    error_of_perfect_calibration,
-    expected_calibration_error,
-    half_of,
-)
 
 
 def flight(named, truth, outsider="", left_out=(), sets=None, remainder="none", structure=-1.0):
@@ -54,9 +55,11 @@ def records():
 
 
 def test_the_weights_in_use_are_those_of_the_kept_flights(records):
-    found = fit([r["result"] for r in records])
-    for name, value in asdict(POOLING).items():
-        assert getattr(found, name) == pytest.approx(value, abs=0.02), name
+    found = weights_without_posterior(kept(RESULTS["other logs"]), records)
+    found["with a posterior"] = fit([r["result"] for r in records])
+    for kind, weights in {**SEARCH_ALONE, "with a posterior": POOLING}.items():
+        for name, value in asdict(weights).items():
+            assert getattr(found[kind], name) == pytest.approx(value, abs=0.02), (kind, name)
 
 
 def test_what_is_right():
