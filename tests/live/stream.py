@@ -1,6 +1,7 @@
 """Flights as streams: messages by arrival, with the faults that links have."""
 
-import json
+import socket
+import threading
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,12 @@ from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.live.clocks import Clocks
 from windwrench.live.filtering import LiveFilter, LiveSettings
 from windwrench.live.rows import Joiner
+from windwrench.live.session import Session, SessionSettings
+from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
+from windwrench.runtime.errors import InputError
+
+VEHICLE = load_vehicle("ardrone2")
 
 
 @cache
@@ -53,6 +59,11 @@ def as_csv(flown):
     return "\n".join(lines) + "\n"
 
 
+def wrench_of(outputs):
+    """Estimates (n, 7): time, force, torque."""
+    return np.array([[o.t, *o.estimate.force, *o.estimate.torque] for o in outputs])
+
+
 class Pipeline:
     """Samples in, estimates out, without a source and without time passing."""
 
@@ -74,9 +85,60 @@ class Pipeline:
         return self
 
     def wrench(self):
-        """Estimates (n, 7): time, force, torque."""
-        return np.array([[o.t, *o.estimate.force, *o.estimate.torque] for o in self.outputs])
+        return wrench_of(self.outputs)
 
 
-def dumps(objects):
-    return [json.dumps(one).encode() for one in objects]
+class Running:
+    """A session of a source, in a thread of its own."""
+
+    def __init__(self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings):
+        self.tallies, self.outputs, self.failed = Tallies(), [], []
+        self.source = make_source(text, vehicle, log_map, self.tallies)
+        self.source.descriptor = descriptor  # of a table
+        self.session = Session(
+            self.source,
+            vehicle,
+            self.tallies,
+            settings=SessionSettings(**{"wait": 0.0} | settings),
+            tell=self.outputs.append,
+        )
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self):
+        try:
+            self.session.run()
+        except InputError as error:
+            self.failed.append(str(error))
+
+    def until(self, so):
+        """Wait until it is so, or the stream has ended."""
+        while not so() and self.thread.is_alive():
+            self.thread.join(0.002)
+
+    def count(self, kind):
+        """How many messages of a kind were taken."""
+        return self.tallies.rates[kind].count if kind in self.tallies.rates else 0
+
+    def taken(self, kind, count):
+        self.until(lambda: self.count(kind) >= count)
+
+    def end_by_itself(self):
+        """Wait for the end of the stream; return why it failed."""
+        self.thread.join()
+        return self.end().failed[0]
+
+    def end(self):
+        self.session.stop()
+        self.thread.join()
+        self.tallies.counts.pop("stops", None)  # of the sender, on a busy machine
+        return self
+
+    def wrench(self):
+        return wrench_of(self.outputs)
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]

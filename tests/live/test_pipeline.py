@@ -5,14 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.live.stream import Pipeline, flight, log_of
-from windwrench.dynamics import InputError, load_vehicle
+from tests.live.stream import VEHICLE, Pipeline, flight, log_of
+from windwrench.dynamics import InputError
 from windwrench.dynamics.vehicle import MotorCurve
 from windwrench.identification.wrench_series import estimate_log
 from windwrench.live.messages import Sample
 
 SECOND = 1_000_000_000
-VEHICLE = load_vehicle("ardrone2")
 
 
 def whole(flown, delay=0.01, start=100.0, drift=0.0):

@@ -3,57 +3,42 @@
 import json
 import os
 import socket
-import threading
 
 import numpy as np
 import pytest
 
-from tests.live.stream import as_csv, as_objects, flight
-from tests.live.test_pipeline import VEHICLE, offline
+from tests.live.stream import VEHICLE, Running, as_csv, as_objects, flight, free_port
+from tests.live.test_pipeline import offline
 from windwrench.dynamics import InputError
-from windwrench.identification.logs.log_map import load_map, parse_map
+from windwrench.identification.logs.log_map import load_map
 from windwrench.identification.logs.reading import read_log
 from windwrench.live.field_map import FieldMap, Malformed
-from windwrench.live.session import Session, SessionSettings
 from windwrench.live.sources.open import make_source
 from windwrench.live.tallies import Tallies
 
 
-def run_text(text, log_map=None, pieces=1, **settings):
-    """Run a table through a pipe; return the session and its estimates."""
+def run_text(text, log_map=None, pieces=1):
+    """Run a table through a pipe; return the stream that it was."""
     read, write = os.pipe()
     data = text.encode() if isinstance(text, str) else text
-
-    def feed():
-        size = max(-(-len(data) // pieces), 1)
+    running = Running("-", log_map=log_map, descriptor=read)
+    size = max(-(-len(data) // pieces), 1)
+    try:
         for i in range(0, len(data), size):
             os.write(write, data[i : i + size])
-        os.close(write)
-
-    thread = threading.Thread(target=feed, daemon=True)
-    thread.start()
-    tallies, outputs = Tallies(), []
-    source = make_source("-", VEHICLE, log_map, tallies)
-    source.descriptor = read
-    session = Session(
-        source, VEHICLE, tallies, settings=SessionSettings(**settings), tell=outputs.append
-    )
-    try:
-        session.run()
     finally:
-        while os.read(read, 65536):  # what was not wanted
-            pass
-        thread.join()
-        os.close(read)
-    return session, np.array([[o.t, *o.estimate.force, *o.estimate.torque] for o in outputs])
+        os.close(write)
+    running.thread.join()
+    os.close(read)
+    return running
 
 
 @pytest.mark.parametrize("pieces", [1, 977])
 def test_a_table_on_standard_input_is_the_log(pieces):
-    session, found = run_text(as_csv(flight()), pieces=pieces)
-    np.testing.assert_allclose(found, offline(flight()), atol=1e-9, rtol=0)
-    assert session.ended == "the source ended"
-    assert not session.tallies.counts
+    stream = run_text(as_csv(flight()), pieces=pieces)
+    np.testing.assert_allclose(stream.wrench(), offline(flight()), atol=1e-9, rtol=0)
+    assert stream.session.ended == "the source ended"
+    assert not stream.tallies.counts
 
 
 def test_a_table_of_another_kind_by_its_map(tmp_path):
@@ -64,24 +49,13 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
         "1005;0.11;0.21;-1.51;2;-3;31;3010;3110;3210;3310;11.0\n"
         "1010;0.12;0.22;-1.52;3;-4;32;3020;3120;3220;3320;10.9\n"
     )
-    wanted = parse_map(
-        {
-            "time": {"column": "time_ms", "unit": "ms", "offset": 0},
-            "world": "ned",
-            "body": "frd",
-            "position": {"columns": ["N", "E", "D"]},
-            "attitude": {"columns": ["roll", "pitch", "yaw"], "euler": "zyx"},
-            "rotors": {"columns": ["r1", "r2", "r3", "r4"], "order": "px4-x", "unit": "rpm"},
-            "battery": {"column": "v"},
-        },
-        "a map",
-    )
     (tmp_path / "map.yaml").write_text(
         "time: {column: time_ms, unit: ms, offset: 0}\nworld: ned\nbody: frd\n"
         "position: {columns: [N, E, D]}\n"
         "attitude: {columns: [roll, pitch, yaw], euler: zyx}\n"
         "rotors: {columns: [r1, r2, r3, r4], order: px4-x, unit: rpm}\nbattery: {column: v}\n"
     )
+    wanted = load_map(tmp_path / "map.yaml")
     (tmp_path / "log.csv").write_text(text)
     log = read_log(tmp_path / "log.csv", map=tmp_path / "map.yaml")
     fields = FieldMap(wanted, VEHICLE, "here")
@@ -95,8 +69,7 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
         np.testing.assert_allclose(sign * sample.quaternion, log.quaternion[k], atol=1e-12)
         np.testing.assert_allclose(sample.rotor_speeds, log.rotor_speeds[k])
         assert sample.voltage == log.voltage[k]
-    session, _ = run_text(text, wanted)
-    assert session.estimates == 3
+    assert run_text(text, wanted).session.estimates == 3
 
 
 @pytest.mark.parametrize(
@@ -115,51 +88,29 @@ def test_a_table_of_another_kind_by_its_map(tmp_path):
     ],
 )
 def test_a_table_that_is_none_is_refused(text, said):
-    with pytest.raises(InputError, match=said):
-        run_text(text)
+    assert said in run_text(text).failed[0]
 
 
 def test_a_bad_line_on_the_way_is_counted():
     lines = as_csv(flight()).splitlines()
     lines[500] = lines[500][:20]
-    session, found = run_text("\n".join(lines))
-    assert session.tallies.counts == {"malformed": 1}
-    assert len(found) == len(flight()["t"]) - 1
+    stream = run_text("\n".join(lines))
+    assert stream.tallies.counts == {"malformed": 1}
+    assert len(stream.outputs) == len(flight()["t"]) - 1
 
 
-class Sender:
-    """Sends datagrams to a session that listens, and waits for each to be taken."""
+class Sender(Running):
+    """Sends datagrams to a session that listens, and reads its answers."""
 
     def __init__(self, **options):
-        self.tallies = Tallies()
-        self.outputs, self.answers = [], []
+        self.port, self.answers = free_port(), []
+        super().__init__(f"udp-json://127.0.0.1:{self.port}?reply=1", **options)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
-        probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        probe.bind(("127.0.0.1", 0))
-        self.port = probe.getsockname()[1]
-        probe.close()
-        source = make_source(
-            f"udp-json://127.0.0.1:{self.port}?reply=1", VEHICLE, None, self.tallies
-        )
-        self.session = Session(
-            source,
-            VEHICLE,
-            self.tallies,
-            settings=SessionSettings(**{"wait": 0.0} | options),
-            tell=self.outputs.append,
-        )
-        self.failed = []
-        self.thread = threading.Thread(target=self._run, daemon=True)
-        self.thread.start()
+        self.until(lambda: self.source.link.opened is not None)
 
-    def _run(self):
-        try:
-            self.session.run()
-        except InputError as error:
-            self.failed.append(str(error))
-
-    def send(self, data):
+    def send(self, value):
+        data = value if isinstance(value, bytes) else json.dumps(value).encode()
         self.socket.sendto(data, ("127.0.0.1", self.port))
 
     def read(self):
@@ -171,48 +122,41 @@ class Sender:
                 return
 
     def end(self):
-        self.session.stop()
-        self.thread.join()
+        super().end()
         self.read()
         self.socket.close()
-
-
-def wait_until(what, thread):
-    """Until it is so, or the stream has ended."""
-    while not what() and thread.is_alive():
-        thread.join(0.01)
-
-
-def _rows(sender):
-    rates = sender.tallies.rates
-    return rates["row"].count if "row" in rates else 0
+        return self
 
 
 def test_datagrams_with_faults_over_the_loopback():
-    flown = flight()
-    objects = as_objects(flown)[:500]
-    for i, one in enumerate(objects):
-        one["seq"] = i
     sender = Sender()
-    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
-    sent = [one for i, one in enumerate(objects) if i % 50 != 20]  # 10 are lost
-    for one in sent:
-        before = _rows(sender)
-        sender.send(json.dumps(one).encode())
-        wait_until(lambda n=before: _rows(sender) > n, sender.thread)
+    sent = [one for one in as_objects(flight())[:500] if one["seq"] % 50 != 20]  # 10 are lost
+    for k, one in enumerate(sent):
+        sender.send(one)
+        sender.taken("row", k + 1)
         sender.read()
-    sender.send(json.dumps(sent[-1]).encode())  # once more
+    sender.send(sent[-1])  # once more
     sender.send(b'{"t": 1.0, "px": ')  # cut off
-    sender.send(json.dumps({"t": 99.0, "px": 1.0, "py": 2.0}).encode())  # a field is missing
-    wait_until(lambda: sender.tallies.counts["malformed"] == 2, sender.thread)
-    sender.end()
-    answers = sender.answers
+    sender.send({"t": 99.0, "px": 1.0, "py": 2.0})  # a field is missing
+    sender.until(lambda: sender.tallies.counts["malformed"] == 2)
+    answers = sender.end().answers
     assert not sender.failed
-    sender.tallies.counts.pop("stops", None)  # of the sender, on a busy machine
     assert dict(sender.tallies.counts) == {"lost": 10, "doubled": 1, "malformed": 2}
     assert len(sender.outputs) == len(answers) == len(sent)
     assert answers[-1]["fx"] == sender.outputs[-1].estimate.force[0]
     assert answers[-1]["status"] == "tracking"
+
+
+@pytest.mark.parametrize(
+    ("wraps", "numbers"), [(0, (7, 8, 12, 10, 12)), (256, (254, 255, 3, 1, 3))]
+)
+def test_what_is_missing_in_a_senders_count_is_lost_unless_it_was_late(wraps, numbers):
+    source = make_source("sim:base", VEHICLE, None, Tallies())
+    lost = []
+    for number in numbers:
+        source.count_lost("sender", number, wraps)
+        lost.append(source.tallies.counts["lost"])
+    assert lost == [0, 0, 3, 2, 2]
 
 
 @pytest.mark.parametrize(
@@ -229,26 +173,18 @@ def test_datagrams_with_faults_over_the_loopback():
 )
 def test_a_first_datagram_that_is_none_ends_the_stream(data, said):
     sender = Sender()
-    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
     sender.send(data)
-    sender.thread.join()
-    sender.end()
-    assert said in sender.failed[0]
+    assert said in sender.end_by_itself()
 
 
 def test_a_source_that_says_nothing_ends_in_what_was_expected():
-    sender = Sender(wait=0.2)
-    sender.thread.join()
-    sender.end()
-    assert "no message came within 0.2 s; expected datagrams of JSON" in sender.failed[0]
+    said = "no message came within 0.2 s; expected datagrams of JSON"
+    assert said in Sender(wait=0.2).end_by_itself()
 
 
 def test_two_streams_cannot_listen_at_one_address():
     sender = Sender()
-    wait_until(lambda: sender.session.source.link.opened is not None, sender.thread)
-    again = make_source(f"udp-json://127.0.0.1:{sender.port}", VEHICLE, None, Tallies())
-    with pytest.raises(InputError, match="cannot listen"):
-        again.open()
+    assert "cannot listen" in Running(f"udp-json://127.0.0.1:{sender.port}").end_by_itself()
     sender.end()
 
 
@@ -282,16 +218,12 @@ def test_commands_beyond_their_range_are_no_commands():
 
 def test_the_simulated_vehicle_feels_the_jet():
     """At its true wrench, as a scenario's flight has it; the same seed flies the same."""
-    flights = []
-    for _ in range(2):
-        tallies, outputs = Tallies(), []
-        source = make_source("sim:static?seed=3&speed=0", VEHICLE, None, tallies)
-        settings = SessionSettings(seconds=6.0)
-        Session(source, VEHICLE, tallies, settings=settings, tell=outputs.append).run()
-        flights.append(outputs)
-    force = np.array([o.estimate.force for o in flights[0]])
-    np.testing.assert_array_equal(force, [o.estimate.force for o in flights[1]])
-    truth = np.array([o.row.force for o in flights[0]])
+    flights = [Running("sim:static?seed=3&speed=0", seconds=6.0) for _ in range(2)]
+    for one in flights:
+        one.thread.join()
+    force = flights[0].wrench()[:, 1:4]
+    np.testing.assert_array_equal(force, flights[1].wrench()[:, 1:4])
+    truth = np.array([o.row.force for o in flights[0].outputs])
     assert truth[600:, 0].mean() > 0.2
     # the filter follows with 1 s, and has come from nothing
     np.testing.assert_allclose(force[900:].mean(axis=0), truth[900:].mean(axis=0), atol=0.1)
