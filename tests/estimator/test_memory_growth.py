@@ -13,6 +13,7 @@ from windwrench.envs.vector import FanTrackingVectorEnv
 from windwrench.estimator import ConstantGainFilter, WrenchUKF, WrenchUKFBatch
 
 VEHICLE = load_vehicle("ardrone2")
+SPEEDS = np.full(4, VEHICLE.hover_rate)
 POSE = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -38,47 +39,45 @@ def growth(work):
         tracemalloc.stop()
 
 
-def test_of_what_leaks():
-    kept = []
-    assert growth(lambda: kept.append(bytes(10_000))) > 40_000
-
-
-@pytest.mark.parametrize("make", [WrenchUKF, ConstantGainFilter])
-def test_of_a_filter(make):
-    estimator, speeds = make(VEHICLE), np.full(4, VEHICLE.hover_rate)
+def stepped(estimator, count=None, steps=300):
+    """Return what steps an estimator, or ``count`` side by side, so many times."""
+    given = [np.tile(part, (count, 1)) if count else part for part in (SPEEDS, *POSE)]
     estimator.reset(*POSE)
 
     def work():
-        for _ in range(2000):
-            estimator.step(speeds, *POSE)
+        for _ in range(steps):
+            estimator.step(*given)
 
-    assert growth(work) < 4000
-
-
-def test_of_a_batch():
-    batch, speeds = WrenchUKFBatch(VEHICLE, 50), np.full((50, 4), VEHICLE.hover_rate)
-    batch.reset(*POSE)
-    position, quaternion = (np.tile(part, (50, 1)) for part in POSE)
-
-    def work():
-        for _ in range(40):
-            batch.step(speeds, position, quaternion)
-
-    assert growth(work) < 4000
+    return work
 
 
-@pytest.mark.parametrize(
-    "make",
-    [lambda: FanTrackingEnv("base"), lambda: FanTrackingVectorEnv(3, threads=2, scenario="base")],
-)
-def test_of_an_environment_over_episodes(make):
-    env = make()
+def episode(env, steps=10):
+    """Return what flies the beginning of an episode."""
     action = np.zeros(env.action_space.shape, np.float32)
 
     def work():
         env.reset(seed=0)
-        for _ in range(30):
+        for _ in range(steps):
             env.step(action)
 
-    assert growth(work) < 20_000
-    env.close()
+    return work
+
+
+def test_a_leak_is_seen():
+    kept = []
+    assert growth(lambda: kept.append(bytes(10_000))) > 40_000
+
+
+@pytest.mark.parametrize(
+    ("make", "most"),
+    [
+        (lambda: stepped(WrenchUKF(VEHICLE)), 4000),
+        (lambda: stepped(ConstantGainFilter(VEHICLE)), 4000),
+        (lambda: stepped(WrenchUKFBatch(VEHICLE, 11), 11, 50), 4000),
+        (lambda: episode(FanTrackingEnv("base")), 20_000),
+        (lambda: episode(FanTrackingVectorEnv(3, threads=2, scenario="base")), 20_000),
+    ],
+    ids=["filter", "constant gain", "batch", "environment", "environments"],
+)
+def test_nothing_grows(make, most):
+    assert growth(make()) < most

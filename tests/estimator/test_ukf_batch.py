@@ -37,6 +37,7 @@ def samples():
     quaternion[1:][rng.random((STEPS - 1, COUNT)) < 0.1] = np.nan
     position[40:60, 2] = quaternion[40:60, 2] = np.nan
     position[70, 1] += 0.5  # an outlier
+    position[15:, 4] += [2.0, 0.0, 0.0]  # a jump for good: a gate restarts the filter
     return rotors, position, quaternion
 
 
@@ -69,6 +70,9 @@ def test_each_is_the_single_filter_bit_for_bit(samples, vehicles, gate):
                 together.state[n], ukf.step(rotors[k, n], position[k, n], quaternion[k, n]).state
             )
     np.testing.assert_array_equal(batch.covariance, [ukf.covariance for ukf in singles])
+    assert together.restarts.tolist() == [ukf.estimate.restarts for ukf in singles]
+    assert together.status == [ukf.estimate.status for ukf in singles]
+    assert together.restarts[4] == 1
     last = singles[-1].estimate
     for name in (
         "position",

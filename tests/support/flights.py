@@ -116,3 +116,19 @@ def yawing_flight(
         out["velocity"].append(v)
         out["omega"].append(w)
     return {name: np.array(values) for name, values in out.items()}
+
+
+def begin(estimator, flight, *covariance):
+    """Start an estimator at the true state of a flight."""
+    start = (flight["true_x"][0], flight["true_q"][0], *(covariance or (None,)))
+    estimator.reset(*start, flight["velocity"][0], flight["omega"][0])
+
+
+def fly(estimator, flight, missing=()):
+    """Step an estimator through a flight, some poses missing; return its estimates after each."""
+    poses = zip(flight["position"], flight["quaternion"], strict=True)
+    return [
+        estimator.step(speeds, *((None, None) if k in missing else pose))
+        for k, (speeds, pose) in enumerate(zip(flight["rotors"], poses, strict=True))
+        if k
+    ]

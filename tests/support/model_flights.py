@@ -6,11 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from windwrench.dynamics.rotation import normalise, quaternion_from_mrp, quaternion_multiply
+from windwrench.estimator import UKFTuning
 from windwrench.estimator.estimate import FORCE, POSITION, QUATERNION, RATE, TORQUE, VELOCITY, Array
 from windwrench.estimator.filter_record import BIASES, N, drive, filter_record, propagate
 from windwrench.estimator.imu import expected_imu
 from windwrench.estimator.ukf import default_covariance
 from windwrench.runtime.compiled import compiled
+
+YAWED = {"quaternion": (0.5, 0.0, 0.0, 0.75**0.5), "angular_velocity": (0.0, 0.0, 3.0)}
+ANISOTROPIC = UKFTuning(
+    motor_torque_noise=(0.02, 0.03, 0.04),
+    torque_walk=(2e-4, 3e-4, 4e-4),
+    thrust_noise=(0.2, 0.3, 0.4),
+    force_walk=(2e-3, 3e-3, 4e-3),
+    position_noise=(0.001, 0.002, 0.003),
+    attitude_noise=(0.003, 0.005, 0.008),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +47,16 @@ class ModelRun:
     accelerometer: Array
     gyro_bias: Array  # (K, 3) in them
     accelerometer_bias: Array
+
+    def begin(self, estimator):
+        """Start an estimator where the truth is drawn around."""
+        estimator.reset(
+            self.initial_position,
+            self.initial_quaternion,
+            self.initial_covariance,
+            self.initial_velocity,
+            self.initial_angular_velocity,
+        )
 
 
 def simulate_model(
