@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from tests.support.flights import PERIOD, yawing_flight
+from tests.support.flights import begin, fly, yawing_flight
+from tests.support.model_flights import ANISOTROPIC
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.envs import Fan
 from windwrench.envs.closed_loop import ClosedLoop
 from windwrench.envs.plant import NOISE
-from windwrench.estimator import ConstantGainFilter, UKFTuning, WrenchUKF
+from windwrench.estimator import ConstantGainFilter, WrenchUKF
 
 VEHICLE = load_vehicle("ardrone2")
 ALL = ("position", "velocity", "angular_velocity", "force", "torque")
@@ -41,18 +42,12 @@ def assert_close(a, b, share):
         )
 
 
-def both(vehicle, flight, settled, missing=(), **start):
+def both(vehicle, flight, settled, missing=()):
     """The estimates of the full filter and of this one along a flight, once both have settled."""
     filters = WrenchUKF(vehicle), ConstantGainFilter(vehicle)
-    estimates = [], []
-    for f, out in zip(filters, estimates, strict=True):
-        f.reset(flight["position"][0], flight["quaternion"][0], **start)
-        for k in range(1, len(flight["rotors"])):
-            pose = (
-                (None, None) if k in missing else (flight["position"][k], flight["quaternion"][k])
-            )
-            out.append(f.step(flight["rotors"][k], *pose))
-    return [out[settled:] for out in estimates]
+    for f in filters:
+        begin(f, flight)
+    return [fly(f, flight, missing)[settled:] for f in filters]
 
 
 @pytest.fixture(scope="module")
@@ -61,12 +56,8 @@ def turning():
     return yawing_flight(VEHICLE, 2400, seed=6, torque=(0.01, -0.015, 0.02))
 
 
-def twist(flight):
-    return {"velocity": flight["velocity"][0], "angular_velocity": flight["omega"][0]}
-
-
 def test_it_follows_the_full_filter_through_a_yawing_flight(turning):
-    full, constant = both(VEHICLE, turning, 1500, **twist(turning))
+    full, constant = both(VEHICLE, turning, 1500)
     assert_close(full, constant, 0.1)
     assert np.mean([e.nis for e in constant]) == pytest.approx(6.0, abs=1.0)
 
@@ -90,14 +81,13 @@ def test_it_follows_the_full_filter_in_the_gusts_of_a_jet(yaw):
 
 def test_what_was_not_measured_is_coasted_over(turning):
     missing = set(range(600, 700))  # half a second
-    full, constant = both(VEHICLE, turning, 1800, missing, **twist(turning))
+    full, constant = both(VEHICLE, turning, 1800, missing)
     assert_close(full, constant, 0.1)
     during = both(
         VEHICLE,
         {name: values[:700] for name, values in turning.items()},
         640,
         missing,
-        **twist(turning),
     )[1]
     assert all(np.isnan(e.nis) for e in during)
     np.testing.assert_array_equal(during[0].force, during[-1].force)
@@ -122,8 +112,8 @@ def test_a_part_of_a_pose_is_taken_in(turning):
 def test_it_knows_the_declared_effects():
     vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 1e-4}))
     flight = yawing_flight(VEHICLE, 2000, seed=2)
-    full, constant = both(vehicle, flight, 1500, **twist(flight))
-    plain = both(VEHICLE, flight, 1500, **twist(flight))[1]
+    full, constant = both(vehicle, flight, 1500)
+    plain = both(VEHICLE, flight, 1500)[1]
     difference = largest_differences(full, constant)
     assert difference["force"] < 0.01
     assert difference["torque"] < 0.001
@@ -131,27 +121,17 @@ def test_it_knows_the_declared_effects():
 
 
 def test_noise_of_its_own_on_every_axis_is_exact_at_hover():
-    tuning = UKFTuning(
-        motor_torque_noise=(0.02, 0.03, 0.04),
-        torque_walk=(2e-4, 3e-4, 4e-4),
-        thrust_noise=(0.2, 0.3, 0.4),
-        force_walk=(2e-3, 3e-3, 4e-3),
-        position_noise=(0.001, 0.002, 0.003),
-        attitude_noise=(0.003, 0.005, 0.008),
-    )
-    full, constant = WrenchUKF(VEHICLE, tuning, PERIOD), ConstantGainFilter(VEHICLE, tuning, PERIOD)
-    rng, out = np.random.default_rng(0), ([], [])
+    full, constant = WrenchUKF(VEHICLE, ANISOTROPIC), ConstantGainFilter(VEHICLE, ANISOTROPIC)
+    rng, steps = np.random.default_rng(0), 3000
+    attitude = np.column_stack([np.ones(steps), 0.0025 * rng.standard_normal((steps, 3))])
+    flight = {
+        "rotors": np.tile(VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, np.zeros(3)), (steps, 1)),
+        "position": [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal((steps, 3)),
+        "quaternion": attitude / np.linalg.norm(attitude, axis=1, keepdims=True),
+    }
     for f in (full, constant):
         f.reset([0, 0, 1], [1, 0, 0, 0])
-    W = VEHICLE.rotor_speeds(1.02 * VEHICLE.weight, [0.0, 0.0, 0.0])
-    for _ in range(3000):
-        x, q = (
-            [0.0, 0.0, 1.0] + 0.002 * rng.standard_normal(3),
-            np.append(1.0, 0.0025 * rng.standard_normal(3)),
-        )
-        for f, kept in ((full, out[0]), (constant, out[1])):
-            kept.append(f.step(W, x, q / np.linalg.norm(q)))
-    assert_close(out[0][2500:], out[1][2500:], 0.1)
+    assert_close(*(fly(f, flight)[2500:] for f in (full, constant)), 0.1)
     np.testing.assert_allclose(np.diag(constant.covariance), np.diag(full.covariance), rtol=1e-3)
 
 
@@ -168,28 +148,17 @@ def test_bad_input_is_named_and_changes_nothing():
         f.correct_imu(gyro=[0, 0, 0])
 
 
-def after_a_gap(f, vehicle):
-    """Standard deviations of the horizontal velocity after a gap longer than it coasts over."""
-    f.reset([0, 0, 1], [1, 0, 0, 0])
-    speeds = np.full(4, vehicle.hover_rate)
-    for _ in range(1200):
-        f.step(speeds, [0, 0, 1], [1, 0, 0, 0])
-    for _ in range(25):
-        e = f.step(speeds)
-    return np.sqrt(np.diag(e.covariance))[9:11]
-
-
 def test_a_gap_widens_its_covariance_with_the_declared_effects():
     """Drag holds a velocity that nobody measures: without it the deviation would be larger."""
     vehicle = VEHICLE.with_effects(EffectSetting("rotor_drag", {"kdx": 2e-3, "kdy": 2e-3}))
-    full, constant, free = (
-        after_a_gap(make(model), model)
-        for make, model in (
-            (WrenchUKF, vehicle),
-            (ConstantGainFilter, vehicle),
-            (ConstantGainFilter, VEHICLE),
-        )
-    )
+    deviations = []
+    for f in (WrenchUKF(vehicle), ConstantGainFilter(vehicle), ConstantGainFilter(VEHICLE)):
+        f.reset([0, 0, 1], [1, 0, 0, 0])
+        for k in range(1225):
+            pose = ([0, 0, 1], [1, 0, 0, 0]) if k < 1200 else (None, None)
+            e = f.step(np.full(4, vehicle.hover_rate), *pose)
+        deviations.append(np.sqrt(np.diag(e.covariance))[9:11])  # of the horizontal velocity
+    full, constant, free = deviations
     np.testing.assert_allclose(constant, full, rtol=1e-3)
     assert np.all(free > 1.1 * constant)
 
@@ -199,7 +168,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning):
     full filter do, and what is estimated lies within them from the first pose on.
     """
     gap, rise = range(1200, 1300), 200
-    full, constant = both(VEHICLE, turning, 0, set(gap), **twist(turning))
+    full, constant = both(VEHICLE, turning, 0, set(gap))
     deviations = [np.sqrt(np.diag(e[gap[-1] - 1].covariance)) for e in (full, constant)]
     ratio = deviations[1] / deviations[0]
     assert np.all((ratio[6:] > 0.4) & (ratio[6:] < 1.6))  # it does not know of the tilt
@@ -221,7 +190,7 @@ def test_after_a_gap_it_is_honest_at_any_heading(turning):
 
 def test_it_returns_to_the_constant_gain_wherever_the_vehicle_flies(turning):
     f = ConstantGainFilter(VEHICLE)
-    f.reset(turning["position"][0], turning["quaternion"][0], **twist(turning))
+    begin(f, turning)
     steady = []
     for k in range(1, 1800):
         seen = not 1000 <= k < 1040

@@ -9,9 +9,10 @@ import pytest
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from tests.support.flights import PERIOD, yawing_flight
+from tests.support.flights import PERIOD, begin, fly, yawing_flight
+from tests.support.model_flights import ANISOTROPIC
 from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.estimator import UKFTuning, WrenchUKF
+from windwrench.estimator import WrenchUKF
 from windwrench.estimator.ekf import WrenchEKF, model_jacobian
 from windwrench.estimator.filter_record import drive, propagate
 
@@ -21,14 +22,6 @@ EFFECTS = (
     OFFSET,
     EffectSetting("rotor_drag", {"kdx": 1e-4, "kdy": 2e-4}),
     EffectSetting("ground_effect", {"rho": 3.0}),
-)
-ANISOTROPIC = UKFTuning(
-    motor_torque_noise=(0.02, 0.03, 0.04),
-    torque_walk=(2e-4, 3e-4, 4e-4),
-    thrust_noise=(0.2, 0.3, 0.4),
-    force_walk=(2e-3, 3e-3, 4e-3),
-    position_noise=(0.001, 0.002, 0.003),
-    attitude_noise=(0.003, 0.005, 0.008),
 )
 
 
@@ -111,48 +104,34 @@ def test_jacobian_equals_finite_differences(vehicle, rate):
     assert np.allclose(F, numeric, rtol=0, atol=1e-8)
 
 
-def both(vehicle, flight, tuning=ANISOTROPIC, missing=()):
-    filters = WrenchUKF(vehicle, tuning, PERIOD), WrenchEKF(vehicle, tuning, PERIOD)
-    for f in filters:
-        f.reset(
-            flight["true_x"][0],
-            flight["true_q"][0],
-            None,
-            flight["velocity"][0],
-            flight["omega"][0],
-        )
-    out = []
-    for k in range(1, len(flight["rotors"])):
-        pose = () if k in missing else (flight["position"][k], flight["quaternion"][k])
-        out.append([f.step(flight["rotors"][k], *pose) for f in filters])
-    return out
+def both(vehicle, flight, missing=()):
+    """The estimates of the unscented filter and of this one along a flight."""
+    filters = WrenchUKF(vehicle, ANISOTROPIC, PERIOD), WrenchEKF(vehicle, ANISOTROPIC, PERIOD)
+    for estimator in filters:
+        begin(estimator, flight)
+    return list(zip(*(fly(estimator, flight, missing) for estimator in filters), strict=True))
+
+
+def assert_close(pairs, force, torque):
+    for u, e in pairs:
+        assert np.abs(u.force - e.force).max() < force
+        assert np.abs(u.torque - e.torque).max() < torque
 
 
 def test_close_to_the_unscented_filter_over_a_yawing_flight():
-    flight = yawing_flight(VEHICLE, 2001, seed=3, substeps=5)
-    pairs = both(VEHICLE, flight, missing=range(700, 720))
-    for u, e in pairs[400:]:
-        assert np.allclose(u.force, e.force, atol=1e-3)
-        assert np.allclose(u.torque, e.torque, atol=2e-5)
-        assert np.allclose(
-            np.sqrt(np.diag(u.covariance)), np.sqrt(np.diag(e.covariance)), rtol=5e-3
-        )
-    errors = np.array(
-        [
-            np.concatenate([e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]])
-            for _, e in pairs[1000:]
-        ]
-    )
-    rms = np.sqrt(np.mean(errors**2, axis=0))
+    pairs = both(VEHICLE, yawing_flight(VEHICLE, 1401, seed=3, substeps=5), range(500, 520))
+    assert_close(pairs[300:], 1e-3, 2e-5)
+    deviations = np.sqrt([[np.diag(x.covariance) for x in pair] for pair in pairs[300:]])
+    np.testing.assert_allclose(deviations[:, 0], deviations[:, 1], rtol=5e-3)
+    errors = [np.r_[e.force - [0.3, -0.2, -0.1], e.torque - [0, 0, 0.02]] for _, e in pairs[700:]]
+    rms = np.sqrt(np.mean(np.square(errors), axis=0))
     assert np.all(rms[:3] < 0.03)
     assert np.all(rms[3:] < 2.4e-3)
-    assert np.isnan(pairs[705][1].nis)
-    nis = np.array([[u.nis, e.nis] for u, e in pairs[1000:]])
-    assert np.allclose(nis[:, 0], nis[:, 1], rtol=1e-2, atol=1e-2)
+    assert np.isnan(pairs[505][1].nis)
+    nis = np.array([[u.nis, e.nis] for u, e in pairs[700:]])
+    np.testing.assert_allclose(nis[:, 0], nis[:, 1], rtol=1e-2, atol=1e-2)
 
 
 def test_close_to_the_unscented_filter_with_effects():
-    pairs = both(VEHICLE.with_effects(*EFFECTS), yawing_flight(VEHICLE, 801, seed=4))
-    for u, e in pairs[400:]:
-        assert np.allclose(u.force, e.force, atol=2e-3)
-        assert np.allclose(u.torque, e.torque, atol=5e-5)
+    pairs = both(VEHICLE.with_effects(*EFFECTS), yawing_flight(VEHICLE, 601, seed=4))
+    assert_close(pairs[300:], 2e-3, 5e-5)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support import flights
 from tests.support.flights import PERIOD, matrix, yawing_flight
 from tests.support.model_flights import simulate_model
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
@@ -19,59 +20,35 @@ FORCE, TORQUE = np.array([0.3, -0.2, -0.1]), np.array([0.0, 0.0, 0.02])
 GYRO, ACCELEROMETER = 0.005, 0.05
 
 
-def run(imu, attitude=True, steps=1600, seed=1):
-    flight = yawing_flight(VEHICLE, steps, seed=seed, sigma_position=0.01, sigma_attitude=0.05)
-    ukf = WrenchUKF(
-        VEHICLE,
-        UKFTuning(
-            position_noise=0.01,
-            attitude_noise=0.05,
-            gyro_noise=GYRO,
-            accelerometer_noise=ACCELEROMETER,
-        ),
-        PERIOD,
-    )
-    ukf.reset(
-        flight["true_x"][0],
-        flight["true_q"][0],
-        velocity=flight["velocity"][0],
-        angular_velocity=flight["omega"][0],
-    )
+@pytest.fixture(scope="module")
+def yawing():
+    return yawing_flight(VEHICLE, 1600, seed=1, sigma_position=0.01, sigma_attitude=0.05)
+
+
+def errors(flight, imu, attitude=True):
+    """Return RMS errors of force, torque and angular velocity along an independent flight."""
+    noise = {"gyro_noise": GYRO, "accelerometer_noise": ACCELEROMETER}
+    tuning = UKFTuning(position_noise=0.01, attitude_noise=0.05, **noise)
+    ukf = WrenchUKF(VEHICLE, tuning, PERIOD)
+    flights.begin(ukf, flight)
     rng, rows = np.random.default_rng(0), []
-    for k in range(1, steps):
-        e = ukf.step(
-            flight["rotors"][k],
-            flight["position"][k],
-            flight["quaternion"][k] if attitude else None,
-        )
+    for k in range(1, len(flight["rotors"])):
+        seen = flight["quaternion"][k] if attitude else None
+        e = ukf.step(flight["rotors"][k], flight["position"][k], seen)
         if imu:
-            R = matrix(flight["true_q"][k])
+            R, gyro = matrix(flight["true_q"][k]), GYRO * rng.standard_normal(3)
             up = R @ [0, 0, VEHICLE.k @ flight["rotors"][k] ** 2]
-            gyro = flight["omega"][k] + GYRO * rng.standard_normal(3)
-            e = ukf.correct_imu(
-                gyro, R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3)
-            )
-        rows.append(
-            np.concatenate(
-                [e.force - FORCE, e.torque - TORQUE, e.angular_velocity - flight["omega"][k]]
-            )
-        )
-        assert np.linalg.eigvalsh(e.covariance)[0] > 0
-    return np.sqrt(np.mean(np.array(rows)[600:].reshape(-1, 3, 3) ** 2, axis=(0, 2)))
+            felt = R.T @ (up + FORCE) / VEHICLE.mass + ACCELEROMETER * rng.standard_normal(3)
+            e = ukf.correct_imu(flight["omega"][k] + gyro, felt)
+        rate = e.angular_velocity - flight["omega"][k]
+        rows.append([e.force - FORCE, e.torque - TORQUE, rate])
+    return np.sqrt(np.mean(np.square(rows[600:]), axis=(0, 2)))
 
 
-def test_an_imu_sharpens_every_part_of_the_estimate():
-    without, with_imu = run(False), run(True)
-    assert with_imu[0] < 0.5 * without[0]
-    assert with_imu[1] < 0.2 * without[1]
-    assert with_imu[2] < 0.2 * without[2]
-
-
-def test_with_an_imu_a_position_is_enough():
-    force, torque, rate = run(True, attitude=False)
-    assert force < 0.05
-    assert torque < 0.002
-    assert rate < 0.01
+def test_an_imu_sharpens_every_part_of_the_estimate_and_replaces_an_attitude(yawing):
+    without, with_imu = errors(yawing, False), errors(yawing, True)
+    assert np.all(with_imu < [0.5, 0.2, 0.2] * without)
+    assert np.all(errors(yawing, True, attitude=False) < [0.05, 0.002, 0.01])
 
 
 def test_a_declared_effect_is_in_what_the_accelerometer_should_read():
@@ -101,18 +78,8 @@ def drawn(steps, dt=0.005, seed=0, tuning=None, vehicle=VEHICLE, **settings):
 
 def started(flight, tuning=None, period=0.005, kind=WrenchUKF, vehicle=VEHICLE, gate=None):
     f = kind(vehicle, tuning or UKFTuning.for_vehicle(vehicle, period), period, gate)
-    begin(f, flight)
+    flight.begin(f)
     return f
-
-
-def begin(f, flight):
-    f.reset(
-        flight.initial_position,
-        flight.initial_quaternion,
-        flight.initial_covariance,
-        flight.initial_velocity,
-        flight.initial_angular_velocity,
-    )
 
 
 def fly(f, flight, steps, dt=None, every=4, first="imu", after=0):
@@ -249,29 +216,31 @@ def consistency(rate, pose_hz, runs, seconds, fine=1, kind=WrenchUKF, vehicle=VE
     return found.mean(axis=(1, 2)), [chi2_band(dof, runs) for dof in (6, 3, 18, 24)]
 
 
-def assert_consistent(mean, bands, runs, steps):
+RATES = [(200, 50, 1), (500, 50, 1), (1000, 50, 1), (1000, 100, 10)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "vehicle", "rate", "pose_hz", "fine", "runs", "seconds"),
+    [
+        (WrenchUKF, VEHICLE, 500, 50, 1, 25, 0.6),
+        (WrenchUKF, OFFSET, 500, 50, 1, 25, 0.6),
+        *(
+            pytest.param(kind, VEHICLE, *rates, 100, 2.0, marks=pytest.mark.slow)
+            for kind in (WrenchUKF, WrenchEKF)
+            for rates in RATES
+        ),
+    ],
+)
+def test_the_filter_with_an_imu_is_consistent(kind, vehicle, rate, pose_hz, fine, runs, seconds):
+    """Off the centre of mass the torque's noise is in the specific force; the last rates predict in
+    tenths of the period for which the tuning is stated.
+    """
+    mean, bands = consistency(rate, pose_hz, runs, seconds, fine, kind, vehicle)
     for value, (low, high) in zip(mean, bands, strict=True):
         assert low <= value <= high
     # innovations are independent from step to step, so all of them have a narrow band
-    low, high = chi2_band(6, runs * steps, 0.999)
+    low, high = chi2_band(6, runs * round(seconds * rate), 0.999)
     assert low <= mean[0] <= high
-
-
-@pytest.mark.parametrize("vehicle", [VEHICLE, OFFSET], ids=["centred", "offset"])
-def test_the_filter_with_an_imu_is_consistent(vehicle):
-    """Off the centre of mass the torque's noise is in the specific force."""
-    assert_consistent(*consistency(500, 50, 25, 0.6, vehicle=vehicle), 25, 300)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])
-@pytest.mark.parametrize(
-    ("rate", "pose_hz", "fine"),
-    [(200, 50, 1), (500, 50, 1), (1000, 100, 1), (1000, 50, 1), (1000, 100, 10)],
-)
-def test_nis_and_nees_are_in_their_bands_at_every_rate(kind, rate, pose_hz, fine):
-    """100 runs; the last case predicts in tenths of the period for which its tuning is stated."""
-    assert_consistent(*consistency(rate, pose_hz, 100, 2.0, fine, kind), 100, round(2.0 * rate))
 
 
 def test_biases_are_found_and_cost_nothing():
@@ -331,7 +300,7 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
     flight = drawn(50)
     f, g = started(flight), started(flight)
     fly(g, flight, 5)
-    begin(g, flight)
+    flight.begin(g)
     for k in range(50):
         speeds, x, q = (
             flight.rotor_speeds[k],
@@ -350,19 +319,7 @@ def test_a_filter_that_never_sees_an_imu_keeps_its_bits():
         _ = g.step_address
 
 
-def test_reset_gives_the_biases_their_prior_again():
-    flight = drawn(200)
-    f = started(flight)
-    fly(f, flight, 200)
-    assert np.all(f.gyro_bias_std < 0.05)
-    f.reset([0, 0, 1], [1, 0, 0, 0])
-    np.testing.assert_array_equal(np.concatenate([f.gyro_bias, f.accelerometer_bias]), 0.0)
-    np.testing.assert_allclose(f.gyro_bias_std, 0.1)
-    np.testing.assert_allclose(f.accelerometer_bias_std, 0.2)
-    assert f.imu_refused == 0
-
-
-def test_a_pickled_filter_goes_on_alike():
+def test_a_pickled_filter_goes_on_alike_and_a_reset_one_anew():
     flight = drawn(60)
     f = started(flight, gate=0.999)
     fly(f, flight, 30)
@@ -371,6 +328,12 @@ def test_a_pickled_filter_goes_on_alike():
     fly(g, flight, 30, after=30)
     np.testing.assert_array_equal(f.estimate.state, g.estimate.state)
     np.testing.assert_array_equal(f.covariance_with_biases, g.covariance_with_biases)
+    assert np.all(f.gyro_bias_std < 0.1)
+    f.reset([0, 0, 1], [1, 0, 0, 0])
+    np.testing.assert_array_equal(np.concatenate([f.gyro_bias, f.accelerometer_bias]), 0.0)
+    np.testing.assert_allclose(f.gyro_bias_std, 0.1)
+    np.testing.assert_allclose(f.accelerometer_bias_std, 0.2)
+    assert f.imu_refused == 0
 
 
 @pytest.mark.parametrize("kind", [WrenchUKF, WrenchEKF])

@@ -121,7 +121,7 @@ def test_the_information_is_the_variance_of_the_scores():
     step = 1e-3
     names = ("thrust_noise", "position_noise", "attitude_noise")
     scores, informations = [], []
-    for seed in range(40):
+    for seed in range(30):
         pieces = pieces_of(VEHICLE, *flight(seconds=2.0, seed=seed), None, 0.5, 1.0)
         found, *moved = (
             innovations(VEHICLE, made, PERIOD, pieces, 1e-12, 1.0)

@@ -60,13 +60,12 @@ ARGUMENTS = np.array([380.0, 390.0, 400.0, 410.0]), np.array([0.01, 0.0, 1.0]), 
     "form",
     [
         list,
-        tuple,
         lambda a: np.repeat(a, 2)[::2],
-        lambda a: np.repeat(a, 2)[::2].astype(">f8"),
+        lambda a: a.astype(">f8"),
         lambda a: a.astype(np.longdouble),
         lambda a: [np.array(v) for v in a],
     ],
-    ids=["list", "tuple", "strided", "big-endian", "long", "list of arrays"],
+    ids=["list", "strided", "big-endian", "long", "list of arrays"],
 )
 def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
     states = []
@@ -79,24 +78,15 @@ def test_any_form_of_the_same_numbers_gives_the_same_estimate(form):
     np.testing.assert_array_equal(*states)
 
 
-def test_later_steps_do_not_change_an_estimate():
-    ukf = WrenchUKF(VEHICLE)
-    ukf.reset([0, 0, 1], QUATERNION)
-    first = ukf.step(*ARGUMENTS)
-    state, covariance = first.state.copy(), first.covariance.copy()
-    second = ukf.step(*ARGUMENTS)
-    np.testing.assert_array_equal(first.state, state)
-    np.testing.assert_array_equal(first.covariance, covariance)
-    assert not np.array_equal(second.state, state)
-    np.testing.assert_array_equal(second.state, ukf.estimate.state)
-
-
-def test_a_copy_goes_its_own_way():
+def test_a_copy_and_an_estimate_go_their_own_way():
     one = WrenchUKF(VEHICLE)
     one.reset([0, 0, 1], QUATERNION)
+    first, other = one.step(*ARGUMENTS), copy.deepcopy(one)
+    state, covariance = first.state.copy(), first.covariance.copy()
+    second = one.step(*ARGUMENTS)
+    assert not np.array_equal(second.state, state)
+    np.testing.assert_array_equal(second.state, one.estimate.state)
     one.step(*ARGUMENTS)
-    other = copy.deepcopy(one)
-    expected = one.step(*ARGUMENTS).state
-    for _ in range(3):
-        one.step(*ARGUMENTS)
-    np.testing.assert_array_equal(other.step(*ARGUMENTS).state, expected)
+    np.testing.assert_array_equal(first.state, state)
+    np.testing.assert_array_equal(first.covariance, covariance)
+    np.testing.assert_array_equal(other.step(*ARGUMENTS).state, second.state)
