@@ -90,7 +90,7 @@ def fan_record(fan: Fan, rotor_positions: Array, period: float) -> np.ndarray:
 
 
 @compiled
-def _between(table: Array, i: float, j: float, a: float, b: float) -> float:
+def between(table: Array, i: float, j: float, a: float, b: float) -> float:
     """Return what a table says shares ``a`` and ``b`` beyond its row ``i`` and column ``j``."""
     near, far, near_after, far_after = corners(table, i, j)
     value: float = (1 - a) * ((1 - b) * near + b * far) + (
@@ -115,7 +115,7 @@ def jet_at(
     row, column = choose(inside, row, 0.0), choose(inside, column, 0.0)
     i, j = math.floor(row), math.floor(column)
     a, b = row - i, column - j
-    u, v = _between(axial, i, j, a, b), _between(radial, i, j, a, b)
+    u, v = between(axial, i, j, a, b), between(radial, i, j, a, b)
     wind[0] = choose(inside, f.speed * u, 0.0)
     off = inside & (r > 1e-9)
     scale = choose(off, f.speed * v / choose(off, r, 1.0), 0.0)

@@ -1,7 +1,7 @@
 """The fan-tracking environment."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,14 +10,13 @@ import numpy as np
 
 from ..controllers.observation import OBSERVATION_SIZE
 from ..dynamics.motion import Array
-from ..dynamics.vehicle import EffectSetting, Vehicle
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
-from .closed_loop import ClosedLoop, Stage
+from .closed_loop import ClosedLoop
 from .fan import Fan
 from .observing import LIMITS, View
-from .plant import TICK, PlantSettings
-from .scenarios import SCENARIOS, Scenario, draw_fan_path
+from .plant import TICK
+from .scenarios import SCENARIOS, draw_fan_path
 from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 
 DECISION_TICKS = 16  # 12.5 Hz
@@ -145,28 +144,16 @@ class FanTrackingEnv(Task):
 
     def __init__(
         self,
-        scenario: str | Scenario = "base",
-        render_mode: str | None = None,
-        vehicle: str | Vehicle = "ardrone2",
-        effects: Sequence[EffectSetting] = (),
+        *shared: Any,
         fan: Fan | None = None,
-        settings: PlantSettings | None = None,
         fan_path: Callable[[Array], Array] | None = None,
-        width: int = 640,
-        height: int = 480,
-        truth: str | Vehicle | None = None,
-        estimator: str = "ukf",
         observe: str = "wrench",
-        normalize: bool = False,
-        stages: Sequence[Stage] = (),
+        **named: Any,
     ) -> None:
-        super().__init__(
-            scenario, render_mode, vehicle, effects, truth, settings, estimator, normalize,
-            width, height, stages,
-        )  # fmt: skip
+        super().__init__(*shared, **named)
         self.fan = replace(fan or Fan(), turbulence=self.scenario.turbulence)
         self.fan_path = fan_path
-        self.view = View(observe, normalize)
+        self.view = View(observe, self.normalize)
         bound = self.view.bound()
         self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
         self.fan_motion = ""

@@ -1,20 +1,17 @@
 """Fan tracking in two directions: the fan moves sideways and up and down."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
 from ..dynamics.motion import Array
-from ..dynamics.vehicle import EffectSetting, Vehicle
-from .closed_loop import Stage
+from ..dynamics.vehicle import Vehicle
 from .fan import Fan
 from .fan_tracking import AWAY, CHANGE_COST, DECISION_TICKS, DISTANCE, FAN_TIMES, TRACKING_WIDTH
-from .plant import TICK, PlantSettings
-from .scenarios import SCENARIOS, Scenario, draw_fan_path
+from .plant import TICK
+from .scenarios import SCENARIOS, draw_fan_path
 from .task import LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 
 FAN_HEIGHT = 1.5  # m, of the fan's axis at the start
@@ -112,30 +109,11 @@ class FanTracking2DEnv(Task):
     decision_ticks = DECISION_TICKS
     action_size = 2
 
-    def __init__(
-        self,
-        scenario: str | Scenario = "base",
-        render_mode: str | None = None,
-        vehicle: str | Vehicle = "ardrone2",
-        effects: Sequence[EffectSetting] = (),
-        truth: str | Vehicle | None = None,
-        fan: Fan | None = None,
-        settings: PlantSettings | None = None,
-        estimator: str = "ukf",
-        normalize: bool = False,
-        width: int = 640,
-        height: int = 480,
-        stages: Sequence[Stage] = (),
-    ) -> None:
-        super().__init__(
-            scenario, render_mode, vehicle, effects, truth, settings, estimator, normalize,
-            width, height, stages,
-        )  # fmt: skip
+    def __init__(self, *shared: Any, fan: Fan | None = None, **named: Any) -> None:
+        super().__init__(*shared, **named)
         fan = fan or Fan(height=FAN_HEIGHT, hull_elevation=CAGE)
         self.fan = replace(fan, turbulence=self.scenario.turbulence)
-        self._scales = np.array(SCALES_2D if normalize else np.ones(10), dtype=np.float32)
-        bound = _LIMITS.astype(np.float32) / self._scales
-        self.observation_space = gym.spaces.Box(-bound, bound, (10,), np.float32)
+        self._observe(_LIMITS, SCALES_2D)
         self.fan_motion = ""
 
     def make_loop(self, vehicle: Vehicle, fan: Fan, **given: Any) -> Any:

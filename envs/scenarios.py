@@ -1,7 +1,7 @@
 """The scenarios of the fan-tracking task, as data."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,20 @@ from ..runtime.errors import unknown_name
 Array = NDArray[np.float64]
 
 
+class Drawn:
+    """What is drawn anew each episode: a data class of ranges (low, high)."""
+
+    def draw(self, rng: np.random.Generator) -> dict[str, float]:
+        """Return one value of each field by its name, uniform, in the order of the fields."""
+        ranges = vars(self)
+        return {name: float(rng.uniform(*ranges[name])) for name in ranges}
+
+
 @dataclass(frozen=True)
-class Variation:
+class Variation(Drawn):
     """Domain randomisation: each value is uniform between two bounds, drawn anew each episode.
 
-    All are drawn independently, in the order of the fields. A user's own distribution is a
+    A user's own distribution is a
     ``Scenario(..., varied=True, variation=Variation(mass=(0.8, 1.2)))``.
     """
 
@@ -27,12 +36,6 @@ class Variation:
     mass: tuple[float, float] = (0.93, 1.07)  # of the true vehicle; the filter keeps the declared
     inertia: tuple[float, float] = (0.9, 1.1)
 
-    def draw(self, rng: np.random.Generator) -> dict[str, float]:
-        """Return one value of each field, by its name."""
-        return {
-            field.name: float(rng.uniform(*getattr(self, field.name))) for field in fields(self)
-        }
-
 
 @dataclass(frozen=True)
 class Scenario:
@@ -41,10 +44,7 @@ class Scenario:
     summary: str
     motions: tuple[str, ...] = ("sine", "triangle", "ramp", "still")
     speed: tuple[float, float] = (0.05, 0.35)  # m/s, largest speed of the fan
-    offset: tuple[float, float] = (
-        0.0,
-        0.1,
-    )  # m, of the vehicle from the fan's axis at the start, on either side
+    offset: tuple[float, float] = (0.0, 0.1)  # m, from the fan's axis at the start, either side
     rise_time: float = 0.45  # s, of the filter
     sigma_position: float = 0.001  # m
     sigma_attitude: float = 0.005  # rad

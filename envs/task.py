@@ -74,17 +74,17 @@ class Task(gym.Env[Frame, Frame], ABC):
 
     def __init__(
         self,
-        scenario: Any,
-        render_mode: str | None,
-        vehicle: str | Vehicle,
-        effects: Sequence[EffectSetting],
-        truth: str | Vehicle | None,
-        settings: PlantSettings | None,
-        estimator: str,
-        normalize: bool,
-        width: int,
-        height: int,
-        stages: Sequence[Stage],
+        scenario: Any = "base",
+        render_mode: str | None = None,
+        vehicle: str | Vehicle = "ardrone2",
+        effects: Sequence[EffectSetting] = (),
+        truth: str | Vehicle | None = None,
+        settings: PlantSettings | None = None,
+        estimator: str = "ukf",
+        normalize: bool = False,
+        width: int = 640,
+        height: int = 480,
+        stages: Sequence[Stage] = (),
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -119,6 +119,14 @@ class Task(gym.Env[Frame, Frame], ABC):
         self._in_flight = False
         self._generator: np.random.Generator | None = None
         self.command: Array = np.zeros(self.action_size)  # the last one, in SI units
+
+    def _observe(self, limits: Array, scales: Sequence[float]) -> None:
+        """Set the observation's space, of numbers within ``limits`` that ``normalize`` divides by
+        ``scales``.
+        """
+        self._scales = np.array(scales if self.normalize else np.ones(len(scales)), np.float32)
+        bound = limits.astype(np.float32) / self._scales
+        self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
 
     @property
     def loop(self) -> ClosedLoop:

@@ -1,12 +1,13 @@
 """The scenarios of the tasks in the wind, as data, and the winds that are drawn from them."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..dynamics.motion import Array
 from .references import figure_of_eight, hold, random_spline
+from .scenarios import Drawn
 from .wind import (
     CompiledWind,
     FanWall,
@@ -23,21 +24,15 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class WindVariation:
+class WindVariation(Drawn):
     """Domain randomisation of the tasks in the wind: factors on what the vehicle file and the drag
-    state, each uniform between two bounds and drawn anew each episode, in the order of the fields.
+    state.
     """
 
     mass: Range = (0.93, 1.07)  # of the true vehicle; filter and flight loop keep the declared
     inertia: Range = (0.9, 1.1)
     rotor_drag: Range = (0.8, 1.2)
     hull_area: Range = (0.8, 1.2)
-
-    def draw(self, rng: np.random.Generator) -> dict[str, float]:
-        """Return one value of each field, by its name."""
-        return {
-            field.name: float(rng.uniform(*getattr(self, field.name))) for field in fields(self)
-        }
 
 
 @dataclass(frozen=True)

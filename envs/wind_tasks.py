@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,15 +16,15 @@ from ..controllers.wind_observation import (
 )
 from ..dynamics.mean_jet import AIR_DENSITY
 from ..dynamics.motion import Array
-from ..dynamics.vehicle import EffectSetting, Vehicle
+from ..dynamics.vehicle import Vehicle
 from ..runtime.compiled import compiled, specialised
 from ..runtime.errors import InputError
-from .closed_loop import ClosedLoop, Stage
+from .closed_loop import ClosedLoop
 from .fan import STATIONS, Fan
-from .plant import TICK, PlantSettings
+from .plant import TICK
 from .task import EPISODE_SECONDS, LOST_OFFSET, SETTLE_TICKS, Frame, Task, keep_within
 from .wind import FanWall, Sum, Wind
-from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, WindScenario, draw_reference, draw_winds
+from .wind_scenarios import HEIGHT, START, WIND_SCENARIOS, draw_reference, draw_winds
 
 WIND_DECISION_TICKS = 8  # 25 Hz
 WIND_DECISIONS = round(EPISODE_SECONDS / TICK / WIND_DECISION_TICKS)
@@ -160,31 +159,16 @@ class WindHoverEnv(Task):
 
     def __init__(
         self,
-        scenario: str | WindScenario = "base",
-        render_mode: str | None = None,
-        vehicle: str | Vehicle = "ardrone2",
-        effects: Sequence[EffectSetting] = (),
-        truth: str | Vehicle | None = None,
+        *shared: Any,
         winds: Sequence[Wind] | None = None,
-        settings: PlantSettings | None = None,
-        estimator: str = "ukf",
-        normalize: bool = False,
         model_in_loop: bool = True,
         gains: FlightGains | None = None,
-        width: int = 640,
-        height: int = 480,
-        stages: Sequence[Stage] = (),
+        **named: Any,
     ) -> None:
-        super().__init__(
-            scenario, render_mode, vehicle, effects, truth, settings, estimator, normalize,
-            width, height, stages,
-        )  # fmt: skip
+        super().__init__(*shared, **named)
         self.winds = None if winds is None else Sum(*winds, where=f"{self.name}: winds").winds
         self.model_in_loop, self.gains = bool(model_in_loop), gains
-        scales = OBSERVATION_SCALES if normalize else np.ones(len(OBSERVATION_SCALES))
-        self._scales = np.array(scales, dtype=np.float32)
-        bound = _LIMITS.astype(np.float32) / self._scales
-        self.observation_space = gym.spaces.Box(-bound, bound, bound.shape, np.float32)
+        self._observe(_LIMITS, OBSERVATION_SCALES)
         frame, three = np.empty(WIND_OBSERVATION_SIZE, dtype=np.float32), np.empty(3)
         self._see = specialised(see, np.empty(20), np.empty(10), three, three, three, frame)
         self.reference_name = ""

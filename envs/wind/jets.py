@@ -23,6 +23,7 @@ from ...dynamics.mean_jet import (
 )
 from ...runtime.addresses import numbers_at, pointer_to
 from ...runtime.errors import InputError
+from ..fan import between
 from .field import Array, CompiledWind, number, vector
 from .turbulence import add_modes, waves
 
@@ -76,12 +77,7 @@ def _jets(record: int, count: int, time: int, positions: int, velocities: int) -
                 continue
             i, c = int(row), int(column)
             a, b = row - i, column - c
-            u = (1 - a) * ((1 - b) * axial[i, c] + b * axial[i, c + 1]) + a * (
-                (1 - b) * axial[i + 1, c] + b * axial[i + 1, c + 1]
-            )
-            v = (1 - a) * ((1 - b) * radial[i, c] + b * radial[i, c + 1]) + a * (
-                (1 - b) * radial[i + 1, c] + b * radial[i + 1, c + 1]
-            )
+            u, v = between(axial, i, c, a, b), between(radial, i, c, a, b)
             momentum += speed * speed * u * u
             if r > 1e-9:
                 in_y += speed * v * y / r
