@@ -11,6 +11,7 @@ import ast
 import inspect
 import textwrap
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, cast
 
 from ...dynamics.effects import base, get, names, parts
@@ -57,26 +58,18 @@ class _Function:
     def __init__(self, function: Callable[..., Any], name: str, needed: dict[str, str]) -> None:
         self.name, self.needed = name, needed
         self.globals = function.__globals__
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
-        self.tree = cast(ast.FunctionDef, tree.body[0])
+        self.tree = _tree_of(function)
         self.integers: set[str] = set()
         self.places: dict[str, str] = {}  # short names of places in an array
         self.counter = 0
-        annotated = [a for a in self.tree.args.args if a.annotation is not None]
-        self.floats = [
-            a.arg for a in annotated if isinstance(a.annotation, ast.Name) and _is_float(a)
-        ]
-        self.arrays = [a.arg for a in self.tree.args.args if a.arg not in self.floats]
+        parameters = self.tree.args.args
+        self.floats = [a.arg for a in parameters if _is_float(a.annotation)]
+        self.arrays = [a.arg for a in parameters if a.arg not in self.floats]
         self.returned = 0
 
     def code(self) -> str:
         """Return the C function."""
-        body = [
-            line
-            for statement in self.tree.body
-            if not (isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant))
-            for line in self.statement(statement)
-        ]
+        body = [line for statement in self.tree.body for line in self.statement(statement)]
         stored = _stored(self.tree) | self._written_by_calls()
         parameters = [
             f"{'' if name in stored else 'const '}float *{name}"
@@ -86,20 +79,13 @@ class _Function:
         ]
         if self.returned:
             parameters.append("float *out")
-        local = sorted(
-            {
-                node.id
-                for node in ast.walk(self.tree)
-                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-            }
-            - self.integers
-            - set(self.floats)
-            - {"_"}
-        )
-        head = [f"float {', '.join(f'{name} = 0.0f' for name in local)};"] if local else []
-        used = {node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)}
+        names = [node for node in ast.walk(self.tree) if isinstance(node, ast.Name)]
+        used = {node.id for node in names}
         if taken := sorted(used & _KEYWORDS):
             raise UntranslatableError(f"has a variable {taken[0]}, which is a word of C")
+        assigned = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+        local = sorted(assigned - self.integers - {*self.floats, "_"})
+        head = [f"float {', '.join(f'{name} = 0.0f' for name in local)};"] if local else []
         head += [f"(void){name};" for name in self.arrays if name not in used]
         lines = [f"static void {self.name}({', '.join(parameters)})", "{"]
         lines += [f"    {line}" for line in (*head, *body)]
@@ -109,48 +95,40 @@ class _Function:
         """Return the arrays that are given to a function of ``parts`` that writes into them."""
         written = set()
         for node in ast.walk(self.tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-                part = getattr(parts, node.func.id, None)
-                if part is not None:
-                    tree = ast.parse(inspect.getsource(part.py_func)).body[0]
-                    stores = _stored(tree)
-                    given = cast(ast.FunctionDef, tree).args.args
-                    for parameter, argument in zip(given, node.args, strict=True):
+            match node:
+                case ast.Call(func=ast.Name(id=name)) if hasattr(parts, name):
+                    part = _tree_of(getattr(parts, name).py_func)
+                    stores = _stored(part)
+                    for parameter, argument in zip(part.args.args, node.args, strict=True):
                         if parameter.arg in stores and isinstance(argument, ast.Name):
                             written.add(argument.id)
         return written
 
     def statement(self, node: ast.stmt) -> list[str]:
         """Return the lines of C of a statement."""
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            return self.assignment(node.targets[0], node.value)
-        if isinstance(node, ast.AugAssign):
-            before, value = self.value(node.value)
-            operator = self.operator(node.op)
-            return [*before, f"{self.expression(node.target)} {operator}= {value};"]
-        if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
-            bounds = self.bounds(node.iter)
-            i = node.target.id
-            self.integers.add(i)
-            head = f"for (int {i} = {bounds[0]}; {i} < {bounds[1]}; {i}++) {{"
-            return [head, *self.block(node.body), "}"]
-        if isinstance(node, ast.If):
-            lines = [f"if ({self.expression(node.test)}) {{", *self.block(node.body), "}"]
-            if node.orelse:
-                lines[-1] = "} else {"
-                lines += [*self.block(node.orelse), "}"]
-            return lines
-        if isinstance(node, ast.Return):
-            if node.value is None:
+        match node:
+            case ast.Expr(value=ast.Constant()):  # a docstring
+                return []
+            case ast.Assign(targets=[target], value=value):
+                return self.assignment(target, value)
+            case ast.AugAssign(target=target, op=op, value=value):
+                before, text = self.value(value)
+                return [*before, f"{self.expression(target)} {_operator(op)}= {text};"]
+            case ast.For(target=ast.Name(id=i), iter=over, body=body):
+                first, end = self.bounds(over)
+                self.integers.add(i)
+                head = f"for (int {i} = {first}; {i} < {end}; {i}++) {{"
+                return [head, *self.block(body), "}"]
+            case ast.If(test=test, body=body, orelse=orelse):
+                lines = [f"if ({self.expression(test)}) {{", *self.block(body)]
+                return [*lines, *(["} else {", *self.block(orelse)] if orelse else []), "}"]
+            case ast.Return(value=None):
                 return ["return;"]
-            if isinstance(node.value, ast.Tuple):
-                self.returned = len(node.value.elts)
-                return [
-                    f"out[{i}] = {self.expression(value)};"
-                    for i, value in enumerate(node.value.elts)
-                ]
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-            return [f"{self.part_call(node.value, None)};"]
+            case ast.Return(value=ast.Tuple(elts=values)):
+                self.returned = len(values)
+                return [f"out[{i}] = {self.expression(value)};" for i, value in enumerate(values)]
+            case ast.Expr(value=ast.Call() as call):
+                return [f"{self.part_call(call, None)};"]
         raise UntranslatableError(f"has a statement {type(node).__name__}")
 
     def block(self, body: list[ast.stmt]) -> list[str]:
@@ -159,61 +137,64 @@ class _Function:
 
     def assignment(self, target: ast.expr, value: ast.expr) -> list[str]:
         """Return the lines of an assignment to one target, or to several at once."""
-        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            pairs = [
-                (a, b)
-                for a, b in zip(target.elts, value.elts, strict=True)
-                if not self.names_a_place(a, b)
-            ]
-            target = ast.Tuple([a for a, _ in pairs], ast.Store())
-            value = ast.Tuple([b for _, b in pairs], ast.Load())
-        elif self.names_a_place(target, value):
-            return []
-        if isinstance(target, ast.Tuple):
-            self.counter += 1
-            t = f"t{self.counter}"
-            if isinstance(value, ast.Tuple):
-                values = [self.expression(v) for v in value.elts]
-                lines = [f"const float {t}[] = {{{', '.join(values)}}};"]
-            else:
-                lines = [f"float {t}[{len(target.elts)}];", f"{self.part_call(value, t)};"]
-            for i, one in enumerate(target.elts):
-                if not (isinstance(one, ast.Name) and one.id == "_"):
-                    lines.append(f"{self.expression(one)} = {t}[{i}];")
-            return lines
-        before, text = self.value(value)
-        return [*before, f"{self.expression(target)} = {text};"]
+        match target, value:
+            case ast.Tuple(elts=targets), ast.Tuple(elts=values):
+                pairs = [
+                    pair
+                    for pair in zip(targets, values, strict=True)
+                    if not self.names_a_place(*pair)
+                ]
+                t = self.array_name()
+                given = ", ".join(self.expression(one) for _, one in pairs)
+                lines, targets = [f"const float {t}[] = {{{given}}};"], [one for one, _ in pairs]
+            case ast.Tuple(elts=targets), _:
+                t = self.array_name()
+                lines = [f"float {t}[{len(targets)}];", f"{self.part_call(value, t)};"]
+            case _ if self.names_a_place(target, value):
+                return []
+            case _:
+                before, text = self.value(value)
+                return [*before, f"{self.expression(target)} = {text};"]
+        return lines + [
+            f"{self.expression(one)} = {t}[{i}];"
+            for i, one in enumerate(targets)
+            if not (isinstance(one, ast.Name) and one.id == "_")
+        ]
+
+    def array_name(self) -> str:
+        """Return the name of a new array."""
+        self.counter += 1
+        return f"t{self.counter}"
 
     def names_a_place(self, target: ast.expr, value: ast.expr) -> bool:
         """Return whether an assignment gives a place in an array a short name; keep it."""
-        if not (isinstance(target, ast.Name) and isinstance(value, ast.Name)):
-            return False
-        place = self.globals.get(value.id)
-        if not isinstance(place, int) or getattr(base, value.id, None) != place:
-            return False
-        self.integers.add(target.id)
-        self.places[target.id] = f"WW_{value.id}"
-        return True
+        match target, value:
+            case ast.Name(id=short), ast.Name(id=name) if self.is_place(name):
+                self.integers.add(short)
+                self.places[short] = f"WW_{name}"
+                return True
+        return False
+
+    def is_place(self, name: str) -> bool:
+        """Return whether a name is that of a place in an array, of ``dynamics.effects.base``."""
+        place = self.globals.get(name)
+        return isinstance(place, int) and getattr(base, name, None) == place
 
     def value(self, node: ast.expr) -> tuple[list[str], str]:
         """Return the lines that come before an expression, and the expression."""
-        if (
-            isinstance(node, ast.Subscript)
-            and isinstance(node.value, ast.Call)
-            and isinstance(node.slice, ast.Constant)
-        ):
-            self.counter += 1
-            t = f"t{self.counter}"
-            call = self.part_call(node.value, t)
-            return [f"float {t}[3];", f"{call};"], f"{t}[{node.slice.value!r}]"
+        match node:
+            case ast.Subscript(value=ast.Call() as call, slice=ast.Constant(value=element)):
+                t = self.array_name()
+                return [f"float {t}[3];", f"{self.part_call(call, t)};"], f"{t}[{element!r}]"
         return [], self.expression(node)
 
     def part_call(self, node: ast.expr, out: str | None) -> str:
         """Return the call of a function of ``parts``, which is translated too."""
-        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
-            raise UntranslatableError(f"has an expression {type(node).__name__}")
-        name = node.func.id
-        part = getattr(parts, name, None)
+        match node:
+            case ast.Call(func=ast.Name(id=name), args=given):
+                part = getattr(parts, name, None)
+            case _:
+                raise UntranslatableError(f"has an expression {type(node).__name__}")
         if part is parts.delay:
             raise UntranslatableError("looks back among earlier samples, which the C does not keep")
         if part is None or not hasattr(part, "py_func"):
@@ -221,96 +202,87 @@ class _Function:
         if name not in self.needed:
             self.needed[name] = ""  # its place; calls do not go round in a circle
             self.needed[name] = _Function(part.py_func, f"ww_{name}", self.needed).code()
-        arguments = [self.expression(a) for a in node.args] + ([out] if out else [])
+        arguments = [self.expression(a) for a in given] + ([out] if out else [])
         return f"ww_{name}({', '.join(arguments)})"
 
     def bounds(self, node: ast.expr) -> tuple[str, str]:
         """Return first and last of a range."""
-        if (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id == "range"
-            and len(node.args) in (1, 2)
-        ):
-            given = [self.expression(a, integer=True) for a in node.args]
-            return (given[0], given[1]) if len(given) == 2 else ("0", given[0])
+        match node:
+            case ast.Call(func=ast.Name(id="range"), args=[end]):
+                return "0", self.expression(end, integer=True)
+            case ast.Call(func=ast.Name(id="range"), args=[first, end]):
+                return self.expression(first, integer=True), self.expression(end, integer=True)
         raise UntranslatableError("loops over something else than a range")
-
-    def operator(self, node: ast.AST) -> str:
-        """Return an operator that is the same in C."""
-        if type(node) not in _OPERATORS:
-            raise UntranslatableError(f"has an operator {type(node).__name__}")
-        return _OPERATORS[type(node)]
 
     def expression(self, node: ast.expr, integer: bool = False) -> str:
         """Return an expression; ``integer`` where it is an index."""
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-            return str(node.value) if integer else literal(node.value)
-        if isinstance(node, ast.Name):
-            return self.name_of(node.id, integer)
-        if isinstance(node, ast.BinOp):
-            left = self.expression(node.left, integer)
-            if isinstance(node.op, ast.Pow):
-                return self.power(left, node.right)
-            operator = self.operator(node.op)
-            return f"({left} {operator} {self.expression(node.right, integer)})"
-        if isinstance(node, ast.UnaryOp):
-            sign = {ast.USub: "-", ast.Not: "!"}.get(type(node.op))
-            if sign is not None:
-                return f"({sign}{self.expression(node.operand, integer)})"
-        if isinstance(node, ast.Compare) and len(node.ops) == 1:
-            left, right = self.expression(node.left), self.expression(node.comparators[0])
-            return f"({left} {self.operator(node.ops[0])} {right})"
-        if isinstance(node, ast.BoolOp):
-            operator = f" {self.operator(node.op)} "
-            return f"({operator.join(self.expression(v) for v in node.values)})"
-        if isinstance(node, ast.IfExp):
-            test, yes, no = (self.expression(n) for n in (node.test, node.body, node.orelse))
-            return f"({test} ? {yes} : {no})"
-        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
-            if node.value.id not in self.arrays:
-                raise _no_table(node.value.id)
-            return f"{node.value.id}[{self.expression(node.slice, integer=True)}]"
-        if isinstance(node, ast.Call):
-            return self.call(node)
+        match node:
+            case ast.Constant(value=int() | float() as value):
+                return str(value) if integer else literal(value)
+            case ast.Name(id=name):
+                return self.name_of(name, integer)
+            case ast.BinOp(left=left, op=ast.Pow(), right=exponent):
+                return self.power(self.expression(left), exponent)
+            case ast.BinOp(left=left, op=op, right=right):
+                operands = self.expression(left, integer), self.expression(right, integer)
+                return f"({operands[0]} {_operator(op)} {operands[1]})"
+            case ast.UnaryOp(op=ast.USub() | ast.Not() as op, operand=operand):
+                sign = "-" if isinstance(op, ast.USub) else "!"
+                return f"({sign}{self.expression(operand, integer)})"
+            case ast.Compare(left=left, ops=[op], comparators=[right]):
+                return f"({self.expression(left)} {_operator(op)} {self.expression(right)})"
+            case ast.BoolOp(op=op, values=values):
+                return f"({f' {_operator(op)} '.join(self.expression(v) for v in values)})"
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                yes, no = self.expression(body), self.expression(orelse)
+                return f"({self.expression(test)} ? {yes} : {no})"
+            case ast.Subscript(value=ast.Name(id=name), slice=place):
+                if name not in self.arrays:
+                    raise _no_table(name)
+                return f"{name}[{self.expression(place, integer=True)}]"
+            case ast.Call(func=function, args=given):
+                return f"{_c_function(function, given)}({', '.join(map(self.expression, given))})"
         raise UntranslatableError(f"has an expression {type(node).__name__}")
 
     def power(self, base: str, exponent: ast.expr) -> str:
         """Return a positive number raised to any power, or any number to a small whole one."""
-        given = exponent.value if isinstance(exponent, ast.Constant) else None
-        if isinstance(given, int) and 2 <= given <= 4:
-            return f"({' * '.join([base] * given)})"
+        match exponent:
+            case ast.Constant(value=int() as times) if 2 <= times <= 4:
+                return f"({' * '.join([base] * times)})"
         return f"ww_power({base}, {self.expression(exponent)})"
 
     def name_of(self, name: str, integer: bool) -> str:
         """Return what a name is in C: an index, a constant of the effect's file, or a variable."""
         if name in self.integers:
             return self.places.get(name, name) if integer else f"(float){name}"
-        if name in self.globals and name not in self.arrays:
-            value = self.globals[name]
-            if isinstance(value, int) and getattr(base, name, None) == value:
-                return f"WW_{name}"
-            if isinstance(value, int | float):
-                return str(value) if integer else literal(value)
-            raise _no_table(name)
-        return name
+        if name not in self.globals or name in self.arrays:
+            return name
+        if self.is_place(name):
+            return f"WW_{name}"
+        value = self.globals[name]
+        if isinstance(value, int | float):
+            return str(value) if integer else literal(value)
+        raise _no_table(name)
 
-    def call(self, node: ast.Call) -> str:
-        """Return a call of a function that C has too."""
-        arguments = [self.expression(a) for a in node.args]
-        function = node.func
-        if (
-            isinstance(function, ast.Attribute)
-            and isinstance(function.value, ast.Name)
-            and function.value.id == "math"
-        ):
-            if function.attr not in _MATHS:
-                raise UntranslatableError(f"calls math.{function.attr}, which the C has not")
-            return f"{_MATHS[function.attr]}({', '.join(arguments)})"
-        name = function.id if isinstance(function, ast.Name) else "a method"
-        if name in ("min", "max") and len(arguments) == 2:
-            return f"{'smaller' if name == 'min' else 'larger'}({', '.join(arguments)})"
-        raise UntranslatableError(f"calls {name}, which the C has not")
+
+def _c_function(function: ast.expr, given: list[ast.expr]) -> str:
+    """Return the name of a function that C has too."""
+    match function:
+        case ast.Attribute(value=ast.Name(id="math"), attr=name):
+            if name not in _MATHS:
+                raise UntranslatableError(f"calls math.{name}, which the C has not")
+            return _MATHS[name]
+        case ast.Name(id="min" | "max" as name) if len(given) == 2:
+            return "smaller" if name == "min" else "larger"
+    name = function.id if isinstance(function, ast.Name) else "a method"
+    raise UntranslatableError(f"calls {name}, which the C has not")
+
+
+def _operator(node: ast.AST) -> str:
+    """Return an operator that is the same in C."""
+    if type(node) not in _OPERATORS:
+        raise UntranslatableError(f"has an operator {type(node).__name__}")
+    return _OPERATORS[type(node)]
 
 
 def _no_table(name: str) -> UntranslatableError:
@@ -319,19 +291,22 @@ def _no_table(name: str) -> UntranslatableError:
     )
 
 
-def _is_float(argument: ast.arg) -> bool:
-    return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "float"
+def _is_float(annotation: ast.expr | None) -> bool:
+    return isinstance(annotation, ast.Name) and annotation.id == "float"
+
+
+def _tree_of(function: Callable[..., Any]) -> ast.FunctionDef:
+    return cast(ast.FunctionDef, ast.parse(textwrap.dedent(inspect.getsource(function))).body[0])
 
 
 def _stored(tree: ast.AST) -> set[str]:
     """Return the arrays into which a function writes."""
-    return {
-        node.value.id
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Subscript)
-        and isinstance(node.ctx, ast.Store)
-        and isinstance(node.value, ast.Name)
-    }
+    stored = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()):
+                stored.add(name)
+    return stored
 
 
 def translate(effect: Effect, needed: dict[str, str]) -> str:
@@ -363,16 +338,10 @@ def definitions(code: str) -> str:
 
 def exportable_effects() -> list[str]:
     """Return the names of all effects that can be exported."""
-    return [name for name in names() if refusal(name) is None]
-
-
-def refusal(name: str) -> str | None:
-    """Return why an effect cannot be exported, or None if it can."""
-    effect = get(name)
-    if effect.kind == "body":
-        return None
-    try:
-        translate(effect, {})
-    except UntranslatableError as error:
-        return str(error)
-    return None
+    found = []
+    for name in names():
+        with suppress(UntranslatableError):
+            if get(name).kind != "body":  # its numbers are the vehicle's
+                translate(get(name), {})
+            found.append(name)
+    return found
