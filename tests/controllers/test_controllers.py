@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.controllers import CONTROLLERS, Admittance, Hover, Oracle, Ratio, make_controller
+from windwrench.controllers import CONTROLLERS, Admittance, Oracle, Ratio, make_controller
 from windwrench.controllers.flight import flight_record, fly, move_setpoint
 from windwrench.controllers.observation import FORCE_X, MAX_COMMAND, OBSERVATION_SIZE, TORQUE_Z
 from windwrench.dynamics import InputError, load_vehicle
@@ -67,20 +67,13 @@ def test_the_ratio_grows_as_the_force_falls_but_not_without_bound():
     )
 
 
-def test_hover_does_nothing():
-    assert Hover()(observation(0.5))[0] == 0.0
-
-
 def test_the_oracle_moves_with_the_fan_and_towards_it():
     oracle = Oracle()
     assert oracle(observation(), info(fan_velocity=0.3))[0] == pytest.approx(0.3)
     assert oracle(observation(), info(fan_y=0.2))[0] > 0
     assert oracle(observation(), info(y=0.2))[0] < 0
-
-
-def test_the_oracle_needs_to_see_the_fan():
     with pytest.raises(InputError, match=r"oracle: needs the environment's info"):
-        Oracle()(observation())
+        oracle(observation())
 
 
 def test_an_unknown_controller_names_the_nearest():

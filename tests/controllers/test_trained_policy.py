@@ -89,47 +89,28 @@ def test_a_recurrent_policy_forgets_at_the_start_of_an_episode(cell, gates):
     assert [policy(observation)[0] for _ in range(3)] == first
 
 
-def test_the_lstm_is_torch_s():
+@pytest.mark.parametrize("name", ["lstm", "gru"])
+def test_a_cell_is_torch_s(name):
     torch = pytest.importorskip(
         "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
     )
     torch.manual_seed(0)
-    cell = torch.nn.LSTM(5, 7)
+    cell = getattr(torch.nn, name.upper())(5, 7)
+    parts = {"input": "weight_ih", "hidden": "weight_hh"}
+    parts |= {"input_bias": "bias_ih", "hidden_bias": "bias_hh"}
     weights = {
-        "lstm_input": cell.weight_ih_l0,
-        "lstm_hidden": cell.weight_hh_l0,
-        "lstm_input_bias": cell.bias_ih_l0,
-        "lstm_hidden_bias": cell.bias_hh_l0,
+        f"{name}_{part}": getattr(cell, f"{other}_l0").detach().numpy()
+        for part, other in parts.items()
     }
-    weights = {name: tensor.detach().numpy() for name, tensor in weights.items()}
     inputs = torch.randn(6, 1, 5)
     with torch.no_grad():
         expected = cell(inputs)[0][:, 0].numpy()
     hidden, state = np.zeros(7, dtype=np.float32), np.zeros(7, dtype=np.float32)
     for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
-        hidden, state = lstm(weights, x, hidden, state)
-        np.testing.assert_allclose(hidden, h, atol=1e-6)
-
-
-def test_the_gru_is_torch_s():
-    torch = pytest.importorskip(
-        "torch", reason="torch is not installed: pip install 'windwrench[rl]'"
-    )
-    torch.manual_seed(0)
-    cell = torch.nn.GRU(5, 7)
-    weights = {
-        "gru_input": cell.weight_ih_l0,
-        "gru_hidden": cell.weight_hh_l0,
-        "gru_input_bias": cell.bias_ih_l0,
-        "gru_hidden_bias": cell.bias_hh_l0,
-    }
-    weights = {name: tensor.detach().numpy() for name, tensor in weights.items()}
-    inputs = torch.randn(6, 1, 5)
-    with torch.no_grad():
-        expected = cell(inputs)[0][:, 0].numpy()
-    hidden = np.zeros(7, dtype=np.float32)
-    for x, h in zip(inputs[:, 0].numpy(), expected, strict=True):
-        hidden = gru(weights, x, hidden)
+        if name == "lstm":
+            hidden, state = lstm(weights, x, hidden, state)
+        else:
+            hidden = gru(weights, x, hidden)
         np.testing.assert_allclose(hidden, h, atol=1e-6)
 
 

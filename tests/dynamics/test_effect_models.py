@@ -34,7 +34,12 @@ W = np.array([380.0, 400.0, 420.0, 410.0])
 
 
 def wrench(
-    vehicle, position=(0.0, 0.0, 0.15), wind=(0.0, 0.0, 0.0), acceleration=(0.0, 0.0, 0.0, 0.0)
+    vehicle,
+    position=(0.0, 0.0, 0.15),
+    wind=(0.0, 0.0, 0.0),
+    acceleration=(0.0, 0.0, 0.0, 0.0),
+    omega=OMEGA,
+    speeds=W,
 ):
     """Force (world) and torque (body) of a vehicle's effects in the state above."""
     bundle = compile_effects(vehicle)
@@ -48,8 +53,8 @@ def wrench(
         np.asarray(position, float),
         R,
         V,
-        OMEGA,
-        W,
+        omega,
+        speeds,
         np.asarray(wind, float),
         11.0,
         0.0,
@@ -125,25 +130,8 @@ def test_rotor_drag_acts_at_each_rotor_in_its_plane(com):
 
 
 def test_rotor_drag_does_nothing_to_a_vehicle_that_drifts_with_the_air():
-    still = compile_effects(setting("rotor_drag", kdx=1e-4, kdy=1e-4))
-    out = np.full(6, np.nan)
-    effect_wrench(
-        still.wrench_models,
-        still.wrench_coefficients,
-        still.constants,
-        body_record(VEHICLE)[0],
-        np.zeros(3),
-        R,
-        V,
-        np.zeros(3),
-        W,
-        V,
-        0.0,
-        0.0,
-        np.zeros(STATE_SIZE),
-        out,
-    )
-    np.testing.assert_allclose(out, 0.0, atol=1e-15)
+    got = wrench(setting("rotor_drag", kdx=1e-4, kdy=1e-4), wind=V, omega=np.zeros(3))
+    np.testing.assert_allclose(got, 0.0, atol=1e-15)
 
 
 def test_ground_effect_lifts_each_rotor_by_its_own_height():
@@ -282,26 +270,8 @@ def test_rotor_interaction_follows_what_sets_leading_and_following_rotors_apart(
 
 
 def test_rotors_that_turn_alike_lose_in_the_wake_alone():
-    alike = np.full(4, 400.0)
-    bundle = compile_effects(setting("rotor_interaction", kp=5e-4))
-    out = np.full(6, np.nan)
-    effect_wrench(
-        bundle.wrench_models,
-        bundle.wrench_coefficients,
-        bundle.constants,
-        body_record(VEHICLE)[0],
-        np.zeros(3),
-        R,
-        V,
-        OMEGA,
-        alike,
-        np.zeros(3),
-        0.0,
-        0.0,
-        np.zeros(STATE_SIZE),
-        out,
-    )
-    np.testing.assert_allclose(out, 0.0, atol=1e-12)
+    got = wrench(setting("rotor_interaction", kp=5e-4), speeds=np.full(4, 400.0))
+    np.testing.assert_allclose(got, 0.0, atol=1e-12)
 
 
 def test_rate_damping_opposes_the_body_rate():

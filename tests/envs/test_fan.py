@@ -65,11 +65,6 @@ def test_the_yaw_torque_is_odd_in_the_offset_and_the_force_even(profile):
     assert wrench(0.0)[5] == pytest.approx(0.0, abs=1e-14)
 
 
-def test_the_yaw_torque_is_positive_on_the_side_of_positive_y(profile):
-    inside = (OFFSETS > 0.05) & (OFFSETS < 0.9)
-    assert np.all(profile[inside, 5] > 0.0)
-
-
 def test_the_yaw_torque_is_the_paper_s_in_size_and_place(profile):
     at = OFFSETS[np.argmax(profile[:, 5])]
     assert 0.4 <= at <= 0.6
@@ -111,22 +106,6 @@ def test_the_momentum_flux_is_the_same_at_every_distance():
     ]
     disc = np.pi * (FAN.radius**2 - FAN.hub_radius**2) * FAN.speed**2
     np.testing.assert_allclose(flux, disc, rtol=0.005)
-
-
-def test_the_mean_flow_is_free_of_divergence():
-    h = 0.05  # the table's own step along x
-    for x in (1.0, 1.5, 2.3, 3.0):
-        slopes = []
-        for r in np.arange(0.1, 1.0, 0.04):
-            # through a ring of radius r: d/dx of u, and (1/r) d/dr of r v
-            along = (wind(x + h, r, FAN.height)[0] - wind(x - h, r, FAN.height)[0]) / (2 * h)
-            out, inner = r + 0.02, r - 0.02
-            across = (out * wind(x, out, FAN.height)[1] - inner * wind(x, inner, FAN.height)[1]) / (
-                r * 0.04
-            )
-            slopes.append((along, across))
-        along, across = np.array(slopes).T
-        assert np.abs(along + across).max() < 0.03 * np.abs(along).max()
 
 
 def test_still_air_is_drawn_into_the_jet():
@@ -179,11 +158,6 @@ def test_gusts_are_correlated_over_a_quarter_of_a_metre(long_gusts):
         np.testing.assert_allclose(
             np.corrcoef(samples[:, :, axis].T), np.exp(-distance / 0.25), atol=0.09
         )
-
-
-def test_gusts_along_different_axes_are_independent(long_gusts):
-    samples, _ = long_gusts
-    assert abs(np.corrcoef(samples[:, 0, 0], samples[:, 0, 1])[0, 1]) < 0.08
 
 
 def test_gusts_last_for_the_stated_time(long_gusts):

@@ -172,8 +172,3 @@ def test_what_does_not_fly_in_lanes_is_refused(given, word):
     with pytest.raises(InputError, match=word) as refusal:
         make(**{"num_envs": 2} | given)
     assert "\n" not in str(refusal.value)
-
-
-def test_a_reset_comes_first():
-    with pytest.raises(InputError, match="reset"):
-        make(2).step(np.zeros((2, 1)))

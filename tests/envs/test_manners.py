@@ -110,29 +110,6 @@ def test_episodes_follow_each_other_as_gymnasium_s_own_vector_environment_has_it
         same(one[4], other[4])
 
 
-def test_statistics_of_an_episode_come_with_its_last_step():
-    """What scripts in the manner of CleanRL's read: ``SyncVectorEnv``, restarts within the step."""
-    envs = gym.vector.SyncVectorEnv(
-        [
-            lambda: gym.wrappers.RecordEpisodeStatistics(
-                gym.make(NAME, max_episode_steps=3, normalize=True)
-            )
-        ]
-        * 2,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-    )
-    first, _ = envs.reset(seed=0)
-    summed = np.zeros(2)
-    for action in ACTIONS[:3]:
-        seen, rewards, lost, over, infos = envs.step(np.stack([action, -action]))
-        summed += rewards
-    assert over.all()
-    assert not lost.any()
-    np.testing.assert_allclose(infos["final_info"]["episode"]["r"], summed, rtol=1e-6)
-    assert not np.array_equal(seen[0], infos["final_obs"][0])
-    assert seen.shape == first.shape
-
-
 def same(one, other):
     assert set(one) == set(other)
     for key, value in one.items():

@@ -161,71 +161,31 @@ def test_a_film_without_its_extra_is_refused(tmp_path, monkeypatch):
 
 
 def test_commands_write_films_and_replays(tmp_path):
-    command = [sys.executable, "-c", "from windwrench.cli import main; main()"]
-    done = run(
-        tmp_path,
-        *command,
-        "fly",
-        "--scenario",
-        "static",
-        "--gif",
-        "--film-seconds",
-        "0.2",
-        "--out",
-        "out",
+    def windwrench(arguments):
+        code = "from windwrench.cli import main; main()"
+        return run(tmp_path, sys.executable, "-c", code, *arguments.split())
+
+    def files(folder):
+        return {p.name for p in (tmp_path / folder).iterdir()}
+
+    done = windwrench("fly --scenario static --gif --film-seconds 0.2 --out out")
+    assert done.returncode == 0, done.stderr
+    assert files("out") == {"fly.gif", "fly.png", "fly.scene.png", "run.json"}
+    done = windwrench(
+        "record --seconds 3 --trajectory circle --vehicle crazyflie "
+        "--effect constant_force:fx=0.1 --out log.csv"
     )
     assert done.returncode == 0, done.stderr
-    assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "fly.gif",
-        "fly.png",
-        "fly.scene.png",
-        "run.json",
-    }
-    done = run(
-        tmp_path,
-        *command,
-        "record",
-        "--seconds",
-        "3",
-        "--trajectory",
-        "circle",
-        "--vehicle",
-        "crazyflie",
-        "--effect",
-        "constant_force:fx=0.1",
-        "--out",
-        "log.csv",
+    done = windwrench(
+        "estimate log.csv --film --vehicle crazyflie --from 2 --film-seconds 0.5 --json --out again"
     )
     assert done.returncode == 0, done.stderr
-    done = run(
-        tmp_path,
-        *command,
-        "estimate",
-        "log.csv",
-        "--film",
-        "--vehicle",
-        "crazyflie",
-        "--from",
-        "2",
-        "--film-seconds",
-        "0.5",
-        "--json",
-        "--out",
-        "again",
-    )
-    assert done.returncode == 0, done.stderr
-    assert {p.name for p in (tmp_path / "again").iterdir()} == {
-        "film.gif",
-        "film.png",
-        "run.json",
-        "wrench.csv",
-        "wrench.png",
-    }
+    assert files("again") == {"film.gif", "film.png", "run.json", "wrench.csv", "wrench.png"}
     assert json.loads(done.stdout)["result"]["force_mean_N"][0] > 0.02
     picture = matplotlib.image.imread(tmp_path / "again" / "film.png")
     red, green, blue = np.moveaxis(picture[..., :3], 2, 0)
     assert np.count_nonzero((red - green > 0.25) & (red - blue > 0.25)) > 30  # path and force
-    done = run(tmp_path, *command, "estimate", "log.csv", "--film", "--from", "4", "--out", "late")
+    done = windwrench("estimate log.csv --film --from 4 --out late")
     assert done.returncode == 2
     assert "--from 4" in done.stderr
     assert not (tmp_path / "late").exists()

@@ -70,22 +70,6 @@ def test_threads_give_the_same_bits(estimator, threads):
     spread.close()
 
 
-def test_a_lost_vehicle_starts_anew_and_the_others_fly_on():
-    envs = make(2, scenario="static", max_episode_steps=1000)
-    _, infos = envs.reset(seed=0)
-    away = np.array([[np.sign(infos["offset"][0])], [0.0]], np.float32)
-    lost = np.zeros(2, bool)
-    while not lost.any():
-        _, _, lost, _, infos = envs.step(away)
-        assert infos["time"][0] < 6.0
-    assert lost.tolist() == [True, False]
-    then = infos["time"][1]
-    _, rewards, lost, _, infos = envs.step(away)
-    assert not lost.any()
-    assert rewards[0] == 0.0
-    assert infos["time"].tolist() == [0.0, pytest.approx(then + 0.08)]
-
-
 def test_seeds_may_be_listed_and_a_part_reset():
     envs = make(3)
     frames, _ = envs.reset(seed=[7, 5, 7])
