@@ -7,19 +7,13 @@ fast (0: as fast as it can be computed).
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 
 from ...controllers import make_controller
-from ...dynamics.vehicle import Mocap
-from ...envs.closed_loop import ClosedLoop
-from ...envs.fan import Fan
-from ...envs.fan_tracking import DECISION_TICKS, DISTANCE
-from ...envs.plant import NOISE, TICK, PlantSettings
+from ...envs.fan_tracking import DECISION_TICKS, FanTrackingEnv
+from ...envs.plant import NOISE, TICK
 from ...envs.scenarios import draw_fan_path, get_scenario
-from ...envs.task import SETTLE_TICKS
-from ...estimator import UKFTuning
 from ...runtime.errors import InputError
 from ..messages import Array, Sample
 from .base import Source
@@ -41,25 +35,22 @@ class Simulated(Source):
         self._seed = int(self.address.number("seed", 0.0))
         self._controller = make_controller("admittance")
         self._rng = np.random.default_rng(self._seed)
-        self._loop: ClosedLoop | None = None
         self._ticks = 0
-        self._begun = 0  # ns, when tick 0 was due
-        self._fan_y: Array = np.zeros(1)
         self._command = 0.0
+
+    def _fan_path(self, t: Array) -> Array:
+        """Return where the fan stands (n,), m, at times (n,), s: drawn anew from the same numbers,
+        so that a flight may last for as long as one watches.
+        """
+        return draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[2]
 
     def open(self) -> None:
         """Take off."""
-        scenario = self._scenario
-        mocap = Mocap(1.0 / TICK, scenario.sigma_position, scenario.sigma_attitude)
-        declared = replace(self.vehicle, mocap=mocap)
-        tuning = UKFTuning.for_vehicle(declared, TICK, scenario.rise_time)
-        fan = replace(Fan(), turbulence=scenario.turbulence)
-        self._loop = ClosedLoop(declared, None, tuning, fan, PlantSettings.for_vehicle(declared))
+        task = FanTrackingEnv(self._scenario, vehicle=self.vehicle, fan_path=self._fan_path)
+        task.reset(seed=self._seed)
         self._controller.reset()
-        offset = float(self._rng.uniform(*scenario.offset) * self._rng.choice([-1.0, 1.0]))
-        self._loop.reset(self._rng, np.array([DISTANCE, offset, fan.height]), math.pi)
-        self._loop.run(self._rng.standard_normal((SETTLE_TICKS, NOISE)), self._fan_y)
-        self._begun = time.monotonic_ns()
+        self._loop = task.loop
+        self._begun = time.monotonic_ns()  # when tick 0 was due
 
     def receive(self, timeout: float) -> list[Sample] | None:
         """Fly as far as time has passed; return what was measured."""
@@ -81,10 +72,9 @@ class Simulated(Source):
     def _tick(self, arrival: int) -> Sample:
         """Fly one tick; return the pose that it samples, and the rotor speeds then."""
         loop = self._loop
-        assert loop is not None
         phase = self._ticks % DECISION_TICKS
         if phase == 0:
-            self._decide(loop)
+            self._decide()
         before, external = loop.unrounded.copy(), loop.external.copy()
         loop.run(self._rng.standard_normal((1, NOISE)), self._fan_y[phase : phase + 1])
         if not loop.healthy():
@@ -109,16 +99,13 @@ class Simulated(Source):
         self._ticks += 1
         return sample
 
-    def _decide(self, loop: ClosedLoop) -> None:
+    def _decide(self) -> None:
         """Move the fan, and have the controller answer what the vehicle feels."""
-        # drawn anew from the same numbers each time: the path at these times, however long it is
-        # flown
         t = TICK * (self._ticks + np.arange(DECISION_TICKS, dtype=np.float64))
-        self._fan_y = draw_fan_path(self._scenario, np.random.default_rng(self._seed), t)[2]
-        x = loop.state
+        self._fan_y, x = self._fan_path(t), self._loop.state
         observation = np.array([*x[16:19], *x[13:16], x[8], self._command], dtype=np.float32)
         self._command = float(self._controller(observation, None)[0])
-        loop.setpoint[4] = self._command
+        self._loop.setpoint[4] = self._command
 
     def expected(self) -> str:
         """Return what must come."""
