@@ -14,13 +14,10 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from tests.live.stream import as_csv, flight
-from tests.live.test_pipeline import VEHICLE, offline
+from tests.live.stream import VEHICLE, Running, as_csv, flight
+from tests.live.test_pipeline import offline
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
-from windwrench.live.session import Session, SessionSettings
-from windwrench.live.sources.open import make_source
-from windwrench.live.tallies import Tallies
 from windwrench.live.terminal_page import page
 from windwrench.live.web_view import WebView
 from windwrench.runtime.errors import InputError
@@ -85,12 +82,9 @@ def test_an_address_is_printed_as_it_is(capsys):
 @pytest.fixture(scope="module")
 def watched():
     """A flight of 2 s that was watched."""
-    tallies = Tallies()
-    source = make_source("sim:base?speed=0", VEHICLE, None, tallies)
-    session = Session(source, VEHICLE, tallies, settings=SessionSettings(seconds=2.0))
-    session.watch()
-    session.run()
-    return session
+    running = Running("sim:base?speed=0", watched=True, seconds=2.0)
+    running.thread.join()
+    return running.session
 
 
 def test_the_terminal_page_shows_what_there_is(watched):
@@ -145,17 +139,25 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
     assert not [line for line in shown.stderr.splitlines() if "CONSOLE" in line]
 
 
-def test_its_user_ends_it_and_loses_nothing(tmp_path):
+def fed(log, rows):
+    """A command that was fed rows of a flight, once it has printed as many estimates, their lines,
+    and the thread that reads them.
+    """
     text = as_csv(flight()).splitlines(keepends=True)
-    log = tmp_path / "flight.csv"
     running = start("-", "--vehicle", "ardrone2", "--record", log)
     lines = []
     reader = threading.Thread(target=lambda: lines.extend(running.stdout))
     reader.start()
-    running.stdin.write("".join(text[:701]).encode())
+    running.stdin.write("".join(text[: rows + 1]).encode())
     running.stdin.flush()
-    while len(lines) < 701 and running.poll() is None:
+    while len(lines) < rows + 1 and running.poll() is None:
         time.sleep(0.02)
+    return running, lines, reader
+
+
+def test_its_user_ends_it_and_loses_nothing(tmp_path):
+    log = tmp_path / "flight.csv"
+    running, lines, reader = fed(log, 700)
     running.send_signal(signal.SIGINT)
     said = running.stderr.read().decode()
     assert running.wait() == 130
@@ -168,29 +170,12 @@ def test_its_user_ends_it_and_loses_nothing(tmp_path):
 
 
 def test_a_recording_that_is_killed_is_a_log_up_to_its_last_second(tmp_path):
-    text = as_csv(flight()).splitlines(keepends=True)
     log = tmp_path / "flight.csv"
-    running = start("-", "--vehicle", "ardrone2", "--record", log)
-    lines = []
-    reader = threading.Thread(target=lambda: lines.extend(running.stdout))
-    reader.start()
-    running.stdin.write("".join(text[:1201]).encode())
-    running.stdin.flush()
-    wanted = 0.005 * 1199 - 1.0  # s, the end of the stream but for its last second
-    for _ in range(1500):  # what is recorded follows what is printed
-        if running.poll() is not None or (len(lines) == 1201 and _last_time(log) > wanted):
-            break
-        time.sleep(0.02)
+    running, _, reader = fed(log, 1200)
     os.kill(running.pid, signal.SIGKILL)
     running.wait()
     reader.join()
-    assert read_log(log).t[-1] > wanted
-
-
-def _last_time(log):
-    """Return the time of the last whole line of a log that is being written, s."""
-    rows = log.read_bytes().split(b"\n")[1:-1] if log.exists() else []
-    return float(rows[-1].split(b",")[0]) if rows else 0.0
+    assert read_log(log).t[-1] > 0.005 * 1199 - 1.0
 
 
 @pytest.mark.parametrize("text", ["t,px,py\n1,2,3\n", ""])

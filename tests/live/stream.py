@@ -91,7 +91,9 @@ class Pipeline:
 class Running:
     """A session of a source, in a thread of its own."""
 
-    def __init__(self, text, vehicle=VEHICLE, log_map=None, descriptor=None, **settings):
+    def __init__(
+        self, text, vehicle=VEHICLE, log_map=None, descriptor=None, watched=False, **settings
+    ):
         self.tallies, self.outputs, self.failed = Tallies(), [], []
         self.source = make_source(text, vehicle, log_map, self.tallies)
         self.source.descriptor = descriptor  # of a table
@@ -102,6 +104,8 @@ class Running:
             settings=SessionSettings(**{"wait": 0.0} | settings),
             tell=self.outputs.append,
         )
+        if watched:
+            self.session.watch()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self.thread.start()
 
