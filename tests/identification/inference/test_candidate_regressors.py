@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from windwrench.dynamics import load_vehicle
-from windwrench.envs.recording import record_flight
+from tests.support.searches import VEHICLE, recorded
 from windwrench.identification.inference.candidate_regressors import (
     REGRESSORS,
     _resonant_response,
@@ -14,15 +13,10 @@ from windwrench.identification.inference.candidate_regressors import (
     standardised,
 )
 from windwrench.identification.inference.regression import Flights
-from windwrench.identification.logs.flight_log import FlightLog
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def flights_of(trajectory):
-    c = record_flight(VEHICLE, (), trajectory, 12.0, 1)
-    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
-    return Flights([log], VEHICLE)
+    return Flights([recorded(trajectory, 12.0)], VEHICLE)
 
 
 @pytest.fixture(scope="module")

@@ -4,17 +4,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.searches import VEHICLE, searched, settings
 from windwrench.identification.inference.equivalence import (
     composite_doubts,
     unlisted_equivalent_doubts,
 )
-from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.search import FittedEffects
 from windwrench.studies.trials.practice_flights import fly_practice
 
-FLIGHTS = SimpleNamespace(vehicle=load_vehicle("ardrone2"))
-MASS = FLIGHTS.vehicle.mass
+FLIGHTS = SimpleNamespace(vehicle=VEHICLE)
+MASS = VEHICLE.mass
 
 
 @pytest.mark.parametrize(
@@ -74,18 +73,11 @@ def test_a_thrust_beside_a_steady_force_needs_flight_that_tells_them_apart(traje
     """In hover they are the same but for a hundred-thousandth; the attitude's noise would have less
     thrust, and more force.
     """
-    truth = {"constant_force": {"fx": -0.23, "fy": -0.23, "fz": -0.23}}
-    log = fly_practice(
-        FLIGHTS.vehicle,
-        tuple(EffectSetting(k, v) for k, v in truth.items()),
-        trajectory,
-        40.0,
-        seed=1,
-        turbulence=0.0,
-        sensor=0.5,
-    )
-    search = Search(Flights([log], FLIGHTS.vehicle), ("constant_force", "thrust_scale", "mass"))
-    fit = FittedEffects(truth)
+    steady = {"constant_force": {"fx": -0.23, "fy": -0.23, "fz": -0.23}}
+    quiet = {"seconds": 40.0, "seed": 1, "turbulence": 0.0, "sensor": 0.5}
+    log = fly_practice(VEHICLE, settings(steady), trajectory, **quiet)
+    search, _ = searched(log, ("constant_force", "thrust_scale", "mass"))
+    fit = FittedEffects(steady)
     regression = search.linearise(fit)
     search.set_noise(fit, regression)
     asked = [gain.effect for gain in search.gains(fit, regression, search.gram(fit, regression))]

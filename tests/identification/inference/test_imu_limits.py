@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.imu_flights import imu_flight, pose_removed
-from windwrench.dynamics import load_vehicle
+from tests.support.searches import VEHICLE, searched
 from windwrench.dynamics.effects import get
 from windwrench.dynamics.vehicle import EffectSetting
 from windwrench.identification.inference.imu_limits import (
@@ -15,34 +15,24 @@ from windwrench.identification.inference.imu_limits import (
     hidden_causes,
     with_errors_of_fusion,
 )
-from windwrench.identification.inference.regression import Flights
-from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.search import FittedEffects
 from windwrench.identification.inference.selection_rules import MEASURED
 
-VEHICLE = load_vehicle("ardrone2")
 FORCE = {"fx": 0.2, "fy": 0.2}
-
-
-def search_on(log, library, fit):
-    search = Search(Flights([log], VEHICLE), library)
-    search.set_noise(fit, search.linearise(fit))
-    return search
 
 
 @pytest.mark.parametrize(("trajectory", "hidden"), [("yaw", True), ("excite", False)])
 def test_a_tilted_thrust_axis_shows_where_thrust_changes(trajectory, hidden):
     """A bias does the same as long as thrust is steady. Torques and inertia it does not touch."""
     log = pose_removed(imu_flight(VEHICLE, trajectory=trajectory, turbulence=1.0))
-    nothing = FittedEffects({})
-    search = search_on(log, ["thrust_axis_tilt", "com_offset", "rate_damping"], nothing)
+    search, nothing = searched(log, ["thrust_axis_tilt", "com_offset", "rate_damping"])
     assert hidden_by_bias(search, nothing) == ({"thrust_axis_tilt"} if hidden else set())
 
 
 def test_an_unknown_heading_is_in_the_deviation_of_a_steady_force():
     flown = imu_flight(VEHICLE, (EffectSetting("constant_force", FORCE),), trajectory="yaw")
-    begun = FittedEffects({"constant_force": {**FORCE, "fz": 0.0}})
-    search = search_on(pose_removed(flown), ["constant_force", "com_offset"], begun)
-    fit = search.refit(begun)
+    begun = {"constant_force": {**FORCE, "fz": 0.0}}
+    search, fit = searched(pose_removed(flown), ["constant_force", "com_offset"], **begun)
     wider = with_errors_of_fusion(search, fit)
     assert wider.setting == fit.setting
     first = np.searchsorted(flown.t, search.flights.logs[0].t[0])
@@ -64,9 +54,7 @@ def test_a_name_is_doubted_where_a_cause_that_does_not_show_would_look_like_it()
     """
     wake = {c.name: c.typical[0] for c in get("rotor_interaction").coefficients}
     flown = imu_flight(VEHICLE, (EffectSetting("rotor_interaction", wake),), trajectory="excite")
-    begun = FittedEffects({"mass": {"dm": 0.03}})
-    search = search_on(pose_removed(flown), ["mass"], begun)
-    fit = search.refit(begun)
+    search, fit = searched(pose_removed(flown), ["mass"], mass={"dm": 0.03})
     assert any("rotor_interaction" in text for text in hidden_causes(search, fit))
     heavy = FittedEffects({"mass": {"dm": 0.3}}, fit.std)
     assert not any("rotor_interaction" in text for text in hidden_causes(search, heavy))
@@ -80,8 +68,7 @@ def test_noise_of_rotor_speeds_is_averaged_and_is_no_lag():
     noise = np.random.default_rng(0).normal(0.0, 3.0, log.rotor_speeds.shape)
     spreads, gained = [], []
     for flown in (log, replace(log, rotor_speeds=log.rotor_speeds + noise)):
-        nothing = FittedEffects({})
-        search = search_on(flown, ["motor_lag"], nothing)
+        search, nothing = searched(flown, ["motor_lag"])
         fit = search.refit(nothing)
         spreads.append(fit.setting[""]["rotor_spread"])
         lag = search.refit(FittedEffects({**fit.setting, "motor_lag": {"tau": 0.01}}))

@@ -3,17 +3,16 @@
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.searches import VEHICLE, searched, settings
 from windwrench.dynamics.effects import names
 from windwrench.identification.diagnosis import diagnose
 from windwrench.identification.inference.disturbance_filter import innovations
 from windwrench.identification.inference.innovations import Innovations
 from windwrench.identification.inference.regression import Flights, typical_size
-from windwrench.identification.inference.search import SEARCH, FittedEffects, Search
+from windwrench.identification.inference.search import SEARCH
 from windwrench.identification.inference.selection_rules import MEASURED
 from windwrench.studies.trials.practice_flights import fly_practice
 
-VEHICLE = load_vehicle("ardrone2")
 PERIOD = 0.005
 TRUTHS = {
     "inertia": {"jx": 0.1, "jy": 0.1, "jz": 0.0},
@@ -48,9 +47,8 @@ def test_innovations_are_white_and_small_with_the_gusts_that_are(strength):
     pose, drive = gusts(strength, 0.25, 40_000, np.random.default_rng(1))
     e = {}
     for factor in (1.0, 0.01, 100.0):
-        e[factor] = innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)[
-            1000:, 0
-        ]
+        found = innovations(pose[:, None], drive[:, None], factor * strength, 0.25, PERIOD)
+        e[factor] = found[1000:, 0]
     white = np.array([np.corrcoef(e[1.0][k:], e[1.0][:-k])[0, 1] for k in range(1, 20)])
     assert np.abs(white).max() < 0.025
     assert e[1.0].var() < min(e[0.01].var(), e[100.0].var())
@@ -60,12 +58,9 @@ def test_what_gusts_suggest_is_not_confirmed(gusty):
     """The loop's torques follow the gusts: regressed on from both sides, an effect that is not
     there explains much.
     """
-    search = Search(Flights([gusty], VEHICLE), names())
-    regression = search.linearise(FittedEffects({}))
-    search.set_noise(FittedEffects({}), regression)
-    best = search.gains(FittedEffects({}), regression, search.gram(FittedEffects({}), regression))[
-        0
-    ]
+    search, nothing = searched(gusty, names())
+    regression = search.linearise(nothing)
+    best = search.gains(nothing, regression, search.gram(nothing, regression))[0]
     suggested = search.refit(best.fit).setting[best.effect]
     assert best.deviance_reduction > 10.0 * MEASURED.least_deviance_reduction
     assert (
@@ -98,8 +93,7 @@ def test_gusts_alone_are_neither_named_nor_a_law(gusty):
 @pytest.mark.parametrize("effect", TRUTHS)
 def test_the_truth_is_confirmed_in_gusts_and_twice_it_is_not(effect):
     truth = {effect: TRUTHS[effect]}
-    settings = tuple(EffectSetting(name, values) for name, values in truth.items())
-    log = fly_practice(VEHICLE, settings, "excite", 30.0, seed=1, turbulence=4.0)
+    log = fly_practice(VEHICLE, settings(truth), "excite", 30.0, seed=1, turbulence=4.0)
     flights = Flights([log], VEHICLE)
     twice = {name: {k: 2.0 * v for k, v in values.items()} for name, values in truth.items()}
     assert Innovations(flights, {}).confirm(truth)
@@ -109,9 +103,7 @@ def test_the_truth_is_confirmed_in_gusts_and_twice_it_is_not(effect):
 
 def test_a_column_is_confirmed_as_the_effect_is_whose_it_is():
     truth = {"constant_force": {"fx": 0.1, "fy": -0.1, "fz": 0.0}}
-    log = fly_practice(
-        VEHICLE, tuple(EffectSetting(k, v) for k, v in truth.items()), "excite", 20.0, seed=2
-    )
+    log = fly_practice(VEHICLE, settings(truth), "excite", 20.0, seed=2)
     flights = Flights([log], VEHICLE)
     column = flights.residual({}) - flights.residual(truth)
     innovations = Innovations(flights, {})

@@ -5,21 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import load_vehicle
+from tests.support.searches import VEHICLE, recorded, searched
 from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.envs.recording import record_flight
-from windwrench.identification.inference.regression import (
-    Flights,
-)
-from windwrench.identification.inference.search import FittedEffects, Search
-from windwrench.identification.inference.time_offsets import (
-    with_uneven_lag,
-)
-from windwrench.identification.logs.flight_log import FlightLog
+from windwrench.identification.inference.time_offsets import with_uneven_lag
 from windwrench.identification.motion.signals import log_signals
 from windwrench.identification.motion.smoothing import low_pass
 
-VEHICLE = load_vehicle("ardrone2")
 TAU, APART = 0.03, 0.008  # s: 22 ms up, 38 ms down
 EFFECTS = {"motor_lag": {"tau": TAU}, "mass": {"dm": 0.0}}
 
@@ -37,8 +28,7 @@ def followed(commands, period, up, down):
 
 def flown(commanded):
     """A flight, and its log with the commands that such a lag turns into its rotor speeds."""
-    c = record_flight(VEHICLE, (), "excite", 20.0, 3)
-    log = FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
+    log = recorded(seed=3)
     speeds = low_pass(log.rotor_speeds, 12.0, log.period)
     rate = np.gradient(speeds, log.period, axis=0)
     tau = np.where(rate > 0.0, TAU - APART, TAU + APART)
@@ -59,10 +49,7 @@ def test_the_first_order_is_most_of_it():
 
 
 def fitted(log, *effects):
-    search = Search(Flights([log], VEHICLE), ["motor_lag", "mass"])
-    begun = FittedEffects({effect: dict(EFFECTS[effect]) for effect in effects})
-    search.set_noise(begun, search.linearise(begun))
-    return search, search.refit(begun)
+    return searched(log, ["motor_lag", "mass"], **{name: EFFECTS[name] for name in effects})
 
 
 def test_a_lag_that_is_uneven_leaves_no_mass():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.searches import VEHICLE, searched, settings
 from windwrench.dynamics.effects import names
 from windwrench.identification.inference.likelihood_refit import (
     delay_alternatives,
@@ -15,29 +15,19 @@ from windwrench.identification.inference.likelihood_refit import (
     refitted_by_likelihood,
     with_lag,
 )
-from windwrench.identification.inference.regression import (
-    Flights,
-)
-from windwrench.identification.inference.search import FittedEffects, Search
+from windwrench.identification.inference.search import FittedEffects
 from windwrench.identification.inference.time_offsets import (
     ROTOR_TIME_OFFSET,
 )
 from windwrench.studies.trials.practice_flights import fly_practice
-
-VEHICLE = load_vehicle("ardrone2")
 
 
 def fitted(truth, guess, seconds=40.0, **flight):
     """Return the search, and the least-squares fit of the effects of ``guess``, on a flight with
     those of ``truth``.
     """
-    settings = tuple(EffectSetting(name, dict(values)) for name, values in truth.items())
-    search = Search(
-        Flights([fly_practice(VEHICLE, settings, seconds=seconds, **flight)], VEHICLE), names()
-    )
-    fit = FittedEffects({name: dict(values) for name, values in guess.items()})
-    search.set_noise(fit, search.linearise(fit))
-    return search, search.refit(fit)
+    log = fly_practice(VEHICLE, settings(truth), seconds=seconds, **flight)
+    return searched(log, names(), **guess)
 
 
 def test_a_lag_is_no_delay_of_the_turn_rates():

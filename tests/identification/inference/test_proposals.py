@@ -2,19 +2,16 @@
 
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.searches import DRAG, VEHICLE, settings
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.inference.search import Search
 from windwrench.identification.inference.stepwise_search import find_effects, with_proposal
 from windwrench.studies.trials.practice_flights import fly_practice
 
-VEHICLE = load_vehicle("ardrone2")
-DRAG = {"kdx": 1.2e-4, "kdy": 1.2e-4}
-
 
 @pytest.fixture(scope="module")
 def flights():
-    flown = fly_practice(VEHICLE, (EffectSetting("rotor_drag", DRAG),), "excite", 20.0, seed=5)
+    flown = fly_practice(VEHICLE, settings({"rotor_drag": DRAG}), "excite", 20.0, seed=5)
     return Flights([flown], VEHICLE)
 
 

@@ -3,22 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.identification.inference.test_search import DRAG, VEHICLE, flown
-from windwrench.identification.inference.regression import Flights
+from tests.identification.inference.test_search import flown
+from tests.support.searches import DRAG, searched
 from windwrench.identification.inference.residual_structure import (
     REGRESSOR,
     VARYING,
     find_structure,
     varying_coefficients,
 )
-from windwrench.identification.inference.search import FittedEffects, Search
-
-
-def searched(log, library, **setting):
-    search = Search(Flights([log], VEHICLE), library)
-    begun = FittedEffects({k: dict(v) for k, v in setting.items()})
-    search.set_noise(begun, search.linearise(begun))
-    return search, search.refit(begun) if setting else begun
 
 
 def test_the_true_model_leaves_none():

@@ -3,42 +3,25 @@
 import numpy as np
 import pytest
 
-from windwrench.dynamics import load_vehicle
-from windwrench.dynamics.vehicle import EffectSetting
-from windwrench.envs.recording import background, record_flight
-from windwrench.identification.inference.regression import (
-    Flights,
-)
-from windwrench.identification.inference.search import (
-    FittedEffects,
-    Search,
-    is_possible,
-    with_changes,
-)
+from tests.support.searches import DRAG, VEHICLE, recorded, searched
+from windwrench.envs.recording import background
+from windwrench.identification.inference.search import FittedEffects, is_possible, with_changes
 from windwrench.identification.inference.stepwise_search import are_told_apart
 from windwrench.identification.inference.time_offsets import (
     ATTITUDE_TIME_OFFSET,
     ROTOR_TIME_OFFSET,
 )
-from windwrench.identification.logs.flight_log import FlightLog
 
-VEHICLE = load_vehicle("ardrone2")
-DRAG = {"kdx": 1.2e-4, "kdy": 1.2e-4}
 LIBRARY = ["rotor_drag", "body_drag", "mass", "com_offset", "constant_force", "latency"]
 
 
-def flown(trajectory="excite", seconds=20.0, **effects):
-    settings = tuple(EffectSetting(name, values) for name, values in effects.items())
-    c = record_flight(VEHICLE, settings, trajectory, seconds, 1, background(VEHICLE, 1.0))
-    return FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c["voltage"])
+def flown(trajectory="excite", **effects):
+    return recorded(trajectory, background=background(VEHICLE, 1.0), **effects)
 
 
 @pytest.fixture(scope="module")
 def search():
-    found = Search(Flights([flown(rotor_drag=DRAG)], VEHICLE), LIBRARY)
-    nothing = FittedEffects({})
-    found.set_noise(nothing, found.linearise(nothing))
-    return found
+    return searched(flown(rotor_drag=DRAG), LIBRARY)[0]
 
 
 def gains_at(search, fit):
@@ -99,11 +82,9 @@ def test_no_air_damps_a_load_so_much(damping, there):
 
 
 def test_in_a_hover_a_force_and_a_thrust_are_not_told_apart():
-    log = flown("hover", constant_force={"fx": 0.0, "fy": 0.0, "fz": 0.1})
-    hover = Search(Flights([log], VEHICLE), ["constant_force", "thrust_scale"])
-    nothing = FittedEffects({})
-    hover.set_noise(nothing, hover.linearise(nothing))
-    fit = hover.refit(FittedEffects({"constant_force": {"fx": 0.0, "fy": 0.0, "fz": 0.1}}))
+    up = {"fx": 0.0, "fy": 0.0, "fz": 0.1}
+    hover, _ = searched(flown("hover", constant_force=up), ["constant_force", "thrust_scale"])
+    fit = hover.refit(FittedEffects({"constant_force": up}))
     assert "thrust_scale" not in {x.effect for x in gains_at(hover, fit)}
 
 
@@ -111,9 +92,7 @@ def test_effects_of_a_fit_are_told_apart_or_it_is_none(search):
     """A refit may run along what flights do not show: a hover's mass and thrust, to -80 %."""
     both = FittedEffects({"rotor_drag": dict(DRAG), "mass": {"dm": 0.01}})
     assert are_told_apart(search, search.refit(both))
-    hover = Search(Flights([flown("hover")], VEHICLE), ["mass", "thrust_scale"])
-    nothing = FittedEffects({})
-    hover.set_noise(nothing, hover.linearise(nothing))
+    hover, _ = searched(flown("hover"), ["mass", "thrust_scale"])
     far = FittedEffects({"mass": {"dm": -0.5 * VEHICLE.mass}, "thrust_scale": {"s": -0.5}})
     assert not are_told_apart(hover, far)
     assert are_told_apart(hover, far.without("mass"))

@@ -5,24 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.envs.recording import record_flight
+from tests.support.searches import recorded
+from windwrench.dynamics import load_vehicle
 from windwrench.identification.inference.turning_delay import turning_delay
-from windwrench.identification.logs.flight_log import FlightLog
 from windwrench.identification.motion.signals import log_signals
 
 
-def flown(vehicle, *effects):
-    c = record_flight(vehicle, effects, "excite", 20.0, seed=3)
-    return log_signals(
-        FlightLog(c["t"], c["position"], c["quaternion"], c["rotor_speeds"], c.get("voltage"))
-    )
+def flown(vehicle, **effects):
+    return log_signals(recorded(seed=3, vehicle=vehicle, **effects))
 
 
 @pytest.mark.parametrize("vehicle", ["ardrone2", "crazyflie"])
 def test_the_delay_that_was_flown(vehicle):
     model = load_vehicle(vehicle)
-    found = turning_delay(flown(model, EffectSetting("latency", {"d": 0.035})), model)
+    found = turning_delay(flown(model, latency={"d": 0.035}), model)
     assert found is not None
     assert found.setting("latency") == {"latency": {"d": found.seconds}}
     assert found.seconds == pytest.approx(0.035, abs=0.004)
@@ -31,7 +27,7 @@ def test_the_delay_that_was_flown(vehicle):
 
 def test_a_lag_shows_as_the_latency_of_what_it_delays():
     model = load_vehicle("ardrone2")
-    found = turning_delay(flown(model, EffectSetting("motor_lag", {"tau": 0.04})), model)
+    found = turning_delay(flown(model, motor_lag={"tau": 0.04}), model)
     assert found is not None
     assert 0.025 < found.seconds < 0.042
 

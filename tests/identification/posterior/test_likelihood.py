@@ -3,24 +3,19 @@
 import numpy as np
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
-from windwrench.identification.inference.regression import (
-    Flights,
-)
-from windwrench.identification.inference.time_offsets import (
-    LAG_ASYMMETRY,
-)
+from tests.support.searches import VEHICLE, settings
+from windwrench.identification.inference.regression import Flights
+from windwrench.identification.inference.time_offsets import LAG_ASYMMETRY
 from windwrench.identification.posterior.likelihood import BETWEEN, GAIN, UNKNOWN, Likelihood
 from windwrench.studies.trials.practice_flights import fly_practice
 
-VEHICLE = load_vehicle("ardrone2")
 HEAVIER, COLUMN = {"mass": {"dm": 0.03}}, ("mass", "dm")
 
 
 @pytest.fixture(scope="module")
 def flights():
-    effects = tuple(EffectSetting(k, v) for k, v in HEAVIER.items())
-    return Flights([fly_practice(VEHICLE, effects, "excite", 20.0, seed=5)], VEHICLE)
+    flown = fly_practice(VEHICLE, settings(HEAVIER), "excite", 20.0, seed=5)
+    return Flights([flown], VEHICLE)
 
 
 def best_change(sums, column):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from windwrench.dynamics import EffectSetting, load_vehicle
+from tests.support.searches import DRAG, VEHICLE, settings
 from windwrench.identification.inference.regression import Flights
 from windwrench.identification.posterior.likelihood import Likelihood
 from windwrench.identification.posterior.ranking import rank
@@ -11,17 +11,13 @@ from windwrench.studies.trials.practice_flights import fly_practice
 LIBRARY = ("rotor_drag", "mass", "inertia", "constant_force", "motor_lag")
 
 
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("ardrone2")
+def flown(**effects):
+    log = fly_practice(VEHICLE, settings(effects), "excite", 20.0, seed=5)
+    return Flights([log], VEHICLE)
 
 
-def flown(vehicle, *effects):
-    return Flights([fly_practice(vehicle, effects, "excite", 20.0, seed=5)], vehicle)
-
-
-def test_a_missing_mass_is_found(vehicle):
-    flights = flown(vehicle, EffectSetting("mass", {"dm": 0.03}))
+def test_a_missing_mass_is_found():
+    flights = flown(mass={"dm": 0.03})
     found = rank(flights, LIBRARY)
     best = found.sets[0]
     assert best.effects == ("mass",)
@@ -31,20 +27,19 @@ def test_a_missing_mass_is_found(vehicle):
     assert found.structure < 3.0
 
 
-def test_nothing_is_found_in_turbulence_alone(vehicle):
-    found = rank(flown(vehicle), LIBRARY)
+def test_nothing_is_found_in_turbulence_alone():
+    found = rank(flown(), LIBRARY)
     assert found.sets[0].effects == ()
     assert max(found.probability.values()) < 0.5
 
 
-def test_a_law_that_the_library_lacks_shows_as_structure(vehicle):
-    drag = EffectSetting("rotor_drag", {"kdx": 1.2e-4, "kdy": 1.2e-4})
-    assert rank(flown(vehicle, drag), ("mass", "inertia")).structure > 10.0
+def test_a_law_that_the_library_lacks_shows_as_structure():
+    assert rank(flown(rotor_drag=DRAG), ("mass", "inertia")).structure > 10.0
 
 
-def test_what_another_search_proposes_is_asked_too(vehicle):
-    truth = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": {"kdx": 1.2e-4, "kdy": 1.2e-4}}
-    flights = flown(vehicle, *(EffectSetting(k, v) for k, v in truth.items()))
+def test_what_another_search_proposes_is_asked_too():
+    truth = {"wind": {"wx": 2.0, "wy": 1.0}, "rotor_drag": DRAG}
+    flights = flown(**truth)
     near = {k: {x: 0.9 * y for x, y in v.items()} for k, v in truth.items()}
     best = rank(flights, ("wind", *LIBRARY), near).sets[0]
     assert best.effects == ("rotor_drag", "wind")
@@ -53,9 +48,9 @@ def test_what_another_search_proposes_is_asked_too(vehicle):
     assert rank(flights, ("mass",), truth).sets == rank(flights, ("mass",)).sets
 
 
-def test_the_noise_is_that_of_the_flight(vehicle):
-    noise = Likelihood(flown(vehicle), {}).noise
+def test_the_noise_is_that_of_the_flight():
+    noise = Likelihood(flown(), {}).noise
     for axis in noise[:3]:
-        assert axis.pose == pytest.approx(vehicle.mocap.sigma_pos_m, rel=0.1)
+        assert axis.pose == pytest.approx(VEHICLE.mocap.sigma_pos_m, rel=0.1)
     for axis in noise[3:]:
-        assert axis.pose == pytest.approx(vehicle.mocap.sigma_att_rad, rel=0.1)
+        assert axis.pose == pytest.approx(VEHICLE.mocap.sigma_att_rad, rel=0.1)
