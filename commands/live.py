@@ -26,7 +26,6 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..dynamics.vehicle import Vehicle
     from ..live.session import Means, Session
 
 _PAGES = 5.0  # a second
@@ -110,8 +109,6 @@ def live(
 
     Example: windwrench live sim:base
     """
-    import shutil
-
     from ..dynamics.vehicle_file import load_vehicle, preset_names
     from ..identification.logs.log_map import load_map
     from ..live.filtering import LiveSettings, warm_up
@@ -154,8 +151,6 @@ def live(
 
     session = Session(
         stream,
-        model,
-        tallies,
         settings,
         recorder,
         SessionSettings(wait=wait, seconds=seconds),
@@ -166,10 +161,10 @@ def live(
         if view:
             from ..live.web_view import WebView
 
-            address = shown.enter_context(WebView(session, model, port)).address
+            address = shown.enter_context(WebView(session, port)).address
             note(f"page: {address}")
-        interrupted = _watch(session, model, shutil.get_terminal_size().columns)
-    result = _summary(session, model, means)
+        interrupted = _watch(session)
+    result = _summary(session, means)
     if recorder is not None and recorder.rows:
         run.written.append(recorder.path)
         note(f"wrote {recorder.path}")
@@ -184,7 +179,7 @@ def live(
     return result
 
 
-def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
+def _watch(session: "Session") -> bool:
     """Show a stream until it ends; return whether the user ended it.
 
     Raises:
@@ -204,10 +199,8 @@ def _watch(session: "Session", vehicle: "Vehicle", width: int) -> bool:
 
     from ..live.terminal_page import page
 
-    title = f"{session.source.name}, {vehicle.name}"
-
     def render() -> Any:
-        return page(session.snapshot(), title, vehicle.weight, vehicle.arm_l)
+        return page(session.snapshot(), session.source)
 
     thread = threading.Thread(target=work, name="stream", daemon=True)
     interrupted = False
@@ -236,7 +229,7 @@ def _each_page(done: threading.Event, show: Callable[[], None]) -> None:
         done.wait(1.0 / _PAGES)
 
 
-def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str, Any]:
+def _summary(session: "Session", means: "Means") -> dict[str, Any]:
     """Say what came and what became of it; return it."""
     from ..live.terminal_page import counts_words
 
@@ -244,7 +237,7 @@ def _summary(session: "Session", vehicle: "Vehicle", means: "Means") -> dict[str
     median, most = now.latency_ms
     result: dict[str, Any] = {
         "source": session.source.name,
-        "vehicle": vehicle.name,
+        "vehicle": session.source.vehicle.name,
         "seconds": now.seconds,
         "estimates": now.estimates,
         "messages": {kind: rate.count for kind, rate in session.tallies.rates.items()},

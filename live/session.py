@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
 from .clocks import Clocks
 from .filtering import LiveFilter, LiveSettings, Output
@@ -25,22 +24,20 @@ from .messages import Row, Sample
 from .recorder import Recorder
 from .rows import Joiner
 from .sources.base import Source
-from .tallies import Tallies
 
 _SECOND = 1_000_000_000  # ns
 _VIEW_SECONDS, _VIEWED = 30.0, 50.0  # what a view shows: so long, and so often a second
+SILENT = 0.5  # s without a message after which a source has stopped
+_POLL = 0.1  # s between two looks at whether to end
+_TURN = 2e-4  # s after which Python's threads take turns: an arrival waits no longer for the page
 
 
 @dataclass(frozen=True)
 class SessionSettings:
-    """When a stream is said to be none, to have stopped, or to be over."""
+    """When a stream is said to be none, or to be over."""
 
     wait: float = 10.0  # s for the first estimate; 0: for ever
-    silent: float = 0.5  # s without a message after which a source has stopped
     seconds: float | None = None  # s of the stream's time, after which it is over
-    poll: float = 0.1  # s between two looks at whether to end
-    # s after which Python has threads take turns: an arrival waits no longer for the page
-    turn: float = 2e-4
 
 
 @dataclass
@@ -65,9 +62,7 @@ class Session:
     """One stream.
 
     Args:
-        source: of messages.
-        vehicle: that flies.
-        tallies: that the source counts in.
+        source: of messages; it states the vehicle and counts.
         live: settings of the filter.
         recorder: where rows are recorded; None: nowhere.
         settings: of the session.
@@ -78,24 +73,22 @@ class Session:
     def __init__(
         self,
         source: Source,
-        vehicle: Vehicle,
-        tallies: Tallies,
         live: LiveSettings | None = None,
         recorder: Recorder | None = None,
         settings: SessionSettings | None = None,
         tell: Callable[[Output], None] = lambda output: None,
         flush: Callable[[], None] = lambda: None,
     ) -> None:
+        tallies = source.tallies
         self.source, self.tallies, self.recorder = source, tallies, recorder
-        self.filter = LiveFilter(vehicle, tallies, live)
+        self.filter = LiveFilter(source.vehicle, tallies, live)
         self._clocks = Clocks(tallies, self.filter.settings.horizon, source.paced)
-        self._joiner = Joiner(vehicle, tallies)
+        self._joiner = Joiner(source.vehicle, tallies)
         self._settings = settings or SessionSettings()
         self._tell, self._flush = tell, flush
         self._stop = threading.Event()
         self._first = self._last = time.monotonic_ns()  # of messages
         self._begin_t: float | None = None
-        self._kinds: set[str] = set()
         self._unrecorded: list[Row] = []
         self._fresh: list[int] = []  # ns, arrivals whose estimates are being told
         self.output: Output | None = None
@@ -133,7 +126,7 @@ class Session:
         try:
             self.source.open()
             self._first = self._last = time.monotonic_ns()
-            with _undisturbed(self._settings.turn):
+            with _undisturbed():
                 while not self._stop.is_set():
                     if not self._once():
                         break
@@ -152,14 +145,14 @@ class Session:
 
     def _once(self) -> bool:
         """Deal with what has come; return whether there may be more."""
-        samples = self.source.receive(self._settings.poll)
+        samples = self.source.receive(_POLL)
         now = time.monotonic_ns()
         if samples is None:
             self.ended = "the source ended"
             return False
         if samples:
-            silence = now - self._last > self._settings.silent * _SECOND
-            if silence and self._kinds and self.source.paced:
+            silence = now - self._last > SILENT * _SECOND
+            if silence and self.tallies.rates and self.source.paced:
                 self.tallies.counts["stops"] += 1
             self._last = now
             spent = time.thread_time_ns()
@@ -184,7 +177,6 @@ class Session:
     def take(self, sample: Sample) -> None:
         """Deal with one message."""
         self.tallies.message(sample.kind, sample.arrival)
-        self._kinds.add(sample.kind)
         t = self._clocks.time(sample)
         row = None if t is None else self._joiner.take(sample, t)
         if row is not None:
@@ -226,7 +218,7 @@ class Session:
     def _nothing(self, when: str) -> InputError:
         """Return the error for a stream without an estimate."""
         waiting = self.tallies.counts["waiting"]
-        came = ", ".join(sorted(self._kinds))
+        came = ", ".join(sorted(self.tallies.rates))
         if not came:
             found = "no message came"
         elif waiting:
@@ -287,10 +279,10 @@ class Means:
 
 
 @contextmanager
-def _undisturbed(turn: float) -> Iterator[None]:
+def _undisturbed() -> Iterator[None]:
     """Have other threads give way soon, and the collector of garbage leave what is there alone."""
     before = sys.getswitchinterval()
-    sys.setswitchinterval(turn)
+    sys.setswitchinterval(_TURN)
     gc.collect()
     gc.freeze()
     try:

@@ -7,25 +7,19 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from .session import Snapshot
+from .session import SILENT, Snapshot
+from .sources.base import Source
 
 _BAR = 20  # characters
-_SILENT = 0.5  # s without a message that is worth red ink
 
 # words for counts that are good to know and no trouble
 _HARMLESS = ("late", "doubled")
 
 
-def page(snapshot: Snapshot, title: str, weight: float, arm: float) -> RenderableType:
-    """Return the page.
-
-    Args:
-        snapshot: of the stream.
-        title: source and vehicle.
-        weight: of the vehicle, N: half of it is a long bar.
-        arm: of its rotors, m.
-    """
-    head = Text(title, style="bold")
+def page(snapshot: Snapshot, source: Source) -> RenderableType:
+    """Return the page of a stream; half of the vehicle's weight is a long bar."""
+    weight, arm = source.vehicle.weight, source.vehicle.arm_l
+    head = Text(f"{source.name}, {source.vehicle.name}", style="bold")
     output = snapshot.output
     if output is None:
         return Group(head, Text(f"waiting for messages ... {snapshot.silence:.0f} s", style="dim"))
@@ -50,7 +44,7 @@ def page(snapshot: Snapshot, title: str, weight: float, arm: float) -> Renderabl
 def _lines(snapshot: Snapshot) -> list[Text]:
     output = snapshot.output
     assert output is not None
-    silent = snapshot.silence > _SILENT
+    silent = snapshot.silence > SILENT
     status = f"SILENT for {snapshot.silence:.1f} s" if silent else output.estimate.status
     good = not silent and output.estimate.status == "tracking"
     nis = output.estimate.nis

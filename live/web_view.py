@@ -15,10 +15,9 @@ from importlib import resources
 from types import TracebackType
 from typing import Any
 
-from ..dynamics.vehicle import Vehicle
 from ..runtime.errors import InputError
 from .filtering import Output
-from .session import Session
+from .session import SILENT, Session
 
 _EVERY = 0.1  # s between two events
 _HOSTS = ("127.0.0.1", "localhost")
@@ -29,15 +28,14 @@ class WebView:
 
     Args:
         session: to show.
-        vehicle: that flies.
         port: to listen at; 0: any free one.
 
     Raises:
         InputError: another listens there.
     """
 
-    def __init__(self, session: Session, vehicle: Vehicle, port: int) -> None:
-        self._session, self._vehicle = session, vehicle
+    def __init__(self, session: Session, port: int) -> None:
+        self._session = session
         self._over = threading.Event()
         page = resources.files(__package__).joinpath("view.html").read_bytes()
         view = self
@@ -103,12 +101,13 @@ class WebView:
 
     def _tell(self, file: Any) -> None:
         """Send events until the browser goes or the stream ends; the first has the last 30 s."""
+        source = self._session.source
         first: dict[str, Any] = {
-            "vehicle": self._vehicle.name,
-            "source": self._session.source.name,
-            "weight": self._vehicle.weight,
-            "arm": self._vehicle.arm_l,
-            "rotors": self._vehicle.positions.tolist(),
+            "vehicle": source.vehicle.name,
+            "source": source.name,
+            "weight": source.vehicle.weight,
+            "arm": source.vehicle.arm_l,
+            "rotors": source.vehicle.positions.tolist(),
         }
         number = 0
         try:
@@ -135,7 +134,7 @@ class WebView:
             "points": [_point(one) for one in points],
             "position": estimate.position.tolist(),
             "quaternion": estimate.quaternion.tolist(),
-            "status": "silent" if now.silence > 0.5 else estimate.status,
+            "status": "silent" if now.silence > SILENT else estimate.status,
             "rates": now.rates,
             "counts": now.counts,
             "restarts": now.restarts,

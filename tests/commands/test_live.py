@@ -14,7 +14,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from tests.live.stream import VEHICLE, Running, as_csv, flight
+from tests.live.stream import Running, as_csv, flight
 from tests.live.test_pipeline import offline
 from windwrench.cli import app
 from windwrench.identification.logs.reading import read_log
@@ -91,14 +91,14 @@ def test_the_terminal_page_shows_what_there_is(watched):
     from rich.console import Console
 
     out = Console(file=StringIO(), width=100)
-    out.print(page(watched.snapshot(), "sim:base", VEHICLE.weight, VEHICLE.arm_l))
+    out.print(page(watched.snapshot(), watched.source))
     text = out.file.getvalue()
     for word in ("force (N)", "torque (mNm)", "+-", "status", "rates", "row", "dropped", "nothing"):
         assert word in text
 
 
 def test_the_page_in_a_browser_is_served_here_alone(watched):
-    with WebView(watched, VEHICLE, 0) as view:
+    with WebView(watched, 0) as view:
         assert view.address.startswith("http://127.0.0.1:")
         with urllib.request.urlopen(view.address) as answer:
             text = answer.read().decode()
@@ -114,7 +114,7 @@ def test_the_page_in_a_browser_is_served_here_alone(watched):
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(other)
         with pytest.raises(InputError, match="--port"):
-            WebView(watched, VEHICLE, int(view.address.rpartition(":")[2].strip("/")))
+            WebView(watched, int(view.address.rpartition(":")[2].strip("/")))
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_the_page_in_a_real_browser(watched, tmp_path):
 
     if BROWSER is None:
         pytest.skip("no browser is installed")
-    with WebView(watched, VEHICLE, 0) as view:
+    with WebView(watched, 0) as view:
         view._over.set()  # one event, and the page is done
         shown = subprocess.run(
             [

@@ -99,8 +99,6 @@ class Running:
         self.source.descriptor = descriptor  # of a table
         self.session = Session(
             self.source,
-            vehicle,
-            self.tallies,
             settings=SessionSettings(**{"wait": 0.0} | settings),
             tell=self.outputs.append,
         )
