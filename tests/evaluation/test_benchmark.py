@@ -79,20 +79,14 @@ def test_any_seed_of_32_bits_has_episodes_of_its_own(task):
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        ((["hovre"], ["base"], 2, 0), "Did you mean 'hover'"),
-        ((["hover"], ["bsae"], 2, 0), "Did you mean 'base'"),
         ((["hover"], ["base"], 0, 0), "--episodes must be at least 1"),
         ((["hover"], ["base"], 2, -1), "--seed must lie between"),
-        ((["hover"], ["base"], 1, 0, "WindHovr"), "Did you mean 'WindHover'"),
-        ((["admittance"], ["base"], 1, 0, "WindHover"), "unknown controller 'admittance'"),
-        ((["pid"], ["static"], 1, 0, "WindHover"), "unknown scenario 'static'"),
-        ((["pid"], ["base"], 0, 0, "WindHover"), "--episodes"),
+        ((["pid"], ["static"], 1, 0, 1, lambda n: None, None, "WindHover"), "unknown scenario"),
     ],
 )
 def test_what_cannot_be_flown_is_named(request_, words):
-    names, scenarios, episodes, seed, *task = request_
     with pytest.raises(InputError, match=words):
-        fly_all(names, scenarios, episodes, seed, 1, task=task[0] if task else "FanTracking")
+        fly_all(*request_)
 
 
 @pytest.mark.parametrize(("task", "law"), [("FanTracking", "admittance"), ("WindHover", "pid")])

@@ -38,19 +38,6 @@ def test_a_sweep_is_every_value_with_every_seed():
     ]
 
 
-@pytest.mark.parametrize(
-    ("search", "words"),
-    [
-        ("learner.gamma", "expected KEY=VALUE"),
-        ("learner.gamma=0.9", "expected KEY=VALUE"),
-        ("learner.gama=0.9|0.8", "Did you mean 'learner.gamma'"),
-    ],
-)
-def test_a_search_that_cannot_be_is_named(search, words):
-    with pytest.raises(InputError, match=words):
-        jobs_of("sac", "base", [0], [], [search])
-
-
 @pytest.fixture(scope="module")
 def cluster():
     ray = pytest.importorskip(

@@ -7,7 +7,6 @@ import pytest
 
 from windwrench.controllers.observation import VELOCITY_Y
 from windwrench.controllers.trained_policy import TrainedPolicy, load_policy
-from windwrench.dynamics import InputError
 from windwrench.envs.fan_tracking import FanTrackingEnv
 from windwrench.training.configuration import features_of, load_config
 
@@ -135,20 +134,3 @@ def test_a_command_can_be_taught_in_place_of_the_motion(tmp_path):
     card = load_policy(run_training(config, "base", 0, tmp_path)).card
     assert "gain" not in card
     assert json.dumps(card["config"]) == json.dumps(config)
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("says=place", "unknown word 'place'"),
-        ("cell=rnn", "unknown cell"),
-        ("rounds=0", "rounds must be at least 1"),
-        ("ahead=0", "ahead must be at least 1"),
-        ("repeat=2", "repeat must be 1"),
-        ("gains=[]", "gains must list numbers"),
-        ("features.frame=[std_force_x]", "sees std_force_x"),
-    ],
-)
-def test_a_wrong_setting_is_named(override, words):
-    with pytest.raises(InputError, match=words):
-        config_of(override)

@@ -33,33 +33,13 @@ from windwrench.training.training_envs import make_training_envs
 from windwrench.training.vec_env import FeatureVecEnv
 
 LEARNERS = ["sac", "td3", "ppo", "recurrent-ppo"]
+_OFF_POLICY = ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"]
+_ON_POLICY = ["steps=240", "environments=2", "learner.n_steps=30", "learner.batch_size=20"]
 TINY = {
-    "sac": ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"],
-    "td3": ["steps=240", "environments=2", "learner.learning_starts=40", "learner.batch_size=16"],
-    "ppo": [
-        "steps=240",
-        "environments=2",
-        "learner.n_steps=30",
-        "learner.batch_size=20",
-        "learner.n_epochs=2",
-    ],
-    "recurrent-ppo": [
-        "steps=240",
-        "environments=2",
-        "learner.n_steps=30",
-        "learner.batch_size=20",
-        "learner.n_epochs=2",
-        "lstm=4",
-    ],
-    "imitation": ["steps=600", "rounds=2", "epochs=2"],
-    "recurrent-imitation": [
-        "steps=1000",
-        "rounds=2",
-        "epochs=1",
-        "last_epochs=1",
-        "state=4",
-        "gains=[2.0]",
-    ],
+    "sac": _OFF_POLICY,
+    "td3": _OFF_POLICY,
+    "ppo": [*_ON_POLICY, "learner.n_epochs=2"],
+    "recurrent-ppo": [*_ON_POLICY, "learner.n_epochs=2", "lstm=4"],
 }
 SHORT = ["net=[8]", "validation.every=120", "validation.episodes=1"]
 
@@ -69,8 +49,7 @@ def tiny(algorithm, *more):
         pytest.importorskip(
             "sb3_contrib", reason="sb3_contrib is not installed: pip install 'windwrench[rl]'"
         )
-    checkpoint = ["checkpoint=60"] if algorithm in LEARNERS else []
-    return load_config(algorithm, [*SHORT, *TINY[algorithm], *checkpoint, *more])
+    return load_config(algorithm, [*SHORT, *TINY[algorithm], "checkpoint=60", *more])
 
 
 def make_env(config, seed=0):
@@ -95,48 +74,24 @@ def test_a_run_that_stopped_goes_on_as_if_it_had_not(algorithm, tmp_path):
     assert (a.steps, a.rmse_m) == (b.steps, b.rmse_m) == ([120, 240], b.rmse_m)
 
 
-def test_another_seed_is_another_run(tmp_path):
-    config = tiny("sac")
-    train(config, "base", 0, tmp_path / "a")
-    train(config, "base", 1, tmp_path / "b")
-    assert (tmp_path / "a" / "last.npz").read_bytes() != (tmp_path / "b" / "last.npz").read_bytes()
-
-
 def test_a_killed_run_leaves_nothing_half_written_and_goes_on(tmp_path):
-    words = [
-        sys.executable,
-        "-c",
-        "from windwrench.cli import main; main()",
-        "train",
-        "sac",
-        "--seed",
-        "3",
-        "--out",
-    ]
-    words += [
-        str(tmp_path / "killed"),
-        *(w for s in [*SHORT, *TINY["sac"], "checkpoint=60"] for w in ("--set", s)),
-    ]
+    killed = tmp_path / "killed"
+    settings = [w for s in [*SHORT, *TINY["sac"], "checkpoint=60"] for w in ("--set", s)]
+    program = "from windwrench.cli import main; main()"
     process = subprocess.Popen(
-        words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [sys.executable, "-c", program, "train", "sac", "--seed=3", f"--out={killed}", *settings],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
-    deadline = time.monotonic() + 120
-    while (
-        not (tmp_path / "killed" / "checkpoint.pt").exists()
-        and process.poll() is None
-        and time.monotonic() < deadline
-    ):
+    while not (killed / "checkpoint.pt").exists() and process.poll() is None:
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    assert (tmp_path / "killed" / "checkpoint.pt").exists()
-    config = tiny("sac")
-    train(config, "base", 3, tmp_path / "killed")
-    train(config, "base", 3, tmp_path / "whole")
-    assert (tmp_path / "whole" / "last.npz").read_bytes() == (
-        tmp_path / "killed" / "last.npz"
-    ).read_bytes()
-    assert not list((tmp_path / "killed").glob(".*.tmp"))
+    train(tiny("sac"), "base", 3, killed)
+    train(tiny("sac"), "base", 3, tmp_path / "whole")
+    assert (tmp_path / "whole" / "last.npz").read_bytes() == (killed / "last.npz").read_bytes()
+    assert not list(killed.glob(".*.tmp"))
 
 
 @pytest.mark.parametrize("algorithm", LEARNERS)
@@ -242,27 +197,6 @@ def test_every_key_can_be_overridden_and_no_other():
                 text = key if name is None else f"{key}.{name}"
                 again = load_config(algorithm, [f"{text}={json.dumps(old)}"])
                 assert again == config
-
-
-@pytest.mark.parametrize(
-    ("override", "words"),
-    [
-        ("learner.gama=0.9", "Did you mean 'learner.gamma'"),
-        ("learner.gamma=high", "learner.gamma must be a number"),
-        ("learner.gamma", "expected KEY=VALUE"),
-        ("learner=1", "holds keys of its own"),
-        ("steps=0", "steps must be at least 1"),
-        ("steps=1.5", "steps must be a whole number"),
-        ("net=[0]", "net must list"),
-        ("features.frame=[torque]", "unknown quantity"),
-        ("estimator=kalman", "unknown estimator"),
-        ("algorithm=ppo", "cannot be overridden"),
-        ("validation.episodes=0", "validation.episodes"),
-    ],
-)
-def test_a_wrong_setting_is_named(override, words):
-    with pytest.raises(InputError, match=words):
-        load_config("sac", [override])
 
 
 def test_a_configuration_file_comes_before_single_settings(tmp_path):

@@ -1,12 +1,9 @@
-"""Tuned gains of the hand-designed laws, and the commands of learning that a user mistypes."""
-
-import sys
+"""Tuned gains of the designed laws."""
 
 import numpy as np
 import pytest
 import yaml
 
-from windwrench.cli import main
 from windwrench.controllers import CONTROLLERS, LAWS, make_controller
 from windwrench.controllers.registry import tuned_gains
 from windwrench.dynamics import InputError
@@ -61,37 +58,3 @@ def test_a_search_finds_gains_no_worse_than_the_default_and_keeps_the_others(tmp
     path.write_text("- 1\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"tuned.yaml: expected laws"):
         keep_gains(found, path, "the command")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("train", "saq"), "Did you mean 'sac'"),
-        (("train", "sac", "--scenario", "bse"), "Did you mean 'base'"),
-        (("train", "sac", "--set", "learner.gama=1"), "Did you mean 'learner.gamma'"),
-        (("train", "sac", "--steps", "0"), "--steps"),
-        (("train", "sac", "--search", "steps"), "expected KEY=VALUE|VALUE"),
-        (("train", "imitation", "--scenario", "wid"), "Did you mean 'wide'"),
-        (("train", "tune", "--set", "controller=admitance"), "Did you mean 'admittance'"),
-        (("train", "tune", "--set", "task=WindHovr"), "Did you mean 'WindHover'"),
-        (("train", "tune", "--set", "episodes=200000"), "there are 100000 episodes"),
-        (("train", "tune", "--set", "trials=0"), "trials must be at least 1"),
-        (("train", "tune", "--seeds", "2"), "expected no --seeds"),
-        (("benchmark", "--controllers", "nowhere.npz"), "nowhere.json: no such file"),
-        (("fly", "--controller", "nowhere.npz"), "nowhere.json: no such file"),
-    ],
-)
-def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, capfd, arguments, words):
-    pytest.importorskip(
-        "stable_baselines3",
-        reason="stable_baselines3 is not installed: pip install 'windwrench[rl]'",
-    )
-    pytest.importorskip("optuna", reason="optuna is not installed: pip install 'windwrench[rl]'")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["windwrench", *arguments])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    lines = capfd.readouterr().err.strip().splitlines()
-    assert len(lines) == 1
-    assert words in lines[0]

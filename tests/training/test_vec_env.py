@@ -143,14 +143,3 @@ def test_the_scenario_of_a_mixed_episode_says_nothing_of_its_motion():
         "base": {"sine", "triangle", "ramp", "still"},
         "fast": {"sine", "triangle", "ramp"},
     }
-
-
-def test_mixed_worlds_repeat_with_their_seeds():
-    def flight():
-        env = FeatureVecEnv(make_training_envs("wide", 2), FEATURES, seed_of)
-        rows = [env.reset()]
-        for _ in range(10):
-            rows.append(env.step(np.full((2, 1), 0.1, dtype=np.float32))[0])
-        return np.array(rows)
-
-    np.testing.assert_array_equal(flight(), flight())
