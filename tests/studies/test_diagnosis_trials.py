@@ -4,7 +4,6 @@ stopped.
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from windwrench.dynamics import InputError
@@ -32,9 +31,8 @@ from windwrench.studies.trials.trials import Trial, fly_and_diagnose, plan, run_
 SHORT = Trial("typical", ("mass",), trajectory="vertical", turbulence=0.0, seconds=20.0)
 
 
-def name(effect, tentative=False, like=(), probability=None, **coefficients):
+def name(effect, tentative=False, like=(), **coefficients):
     return {
-        "probability": probability,
         "name": effect,
         "coefficients": coefficients,
         "std": {k: 0.01 * abs(v) for k, v in coefficients.items()},
@@ -43,7 +41,7 @@ def name(effect, tentative=False, like=(), probability=None, **coefficients):
     }
 
 
-def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more):
+def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1):
     verdict = (
         ("explained" if remainder == "none" else "partly explained")
         if effects
@@ -63,7 +61,6 @@ def found(*effects, remainder="none", without=(), after=1.1, rollout=0.1, **more
         "floor": {"force_rms": 0.02, "torque_rms": 1e-3},
         "structure": [],
         "seconds": 1.0,
-        **more,
     }
 
 
@@ -245,24 +242,6 @@ def test_the_rules_count_what_they_say():
     assert rule(judged, "6. residual").measured == "1.10 at worst"
 
 
-def test_gusts_are_compared_with_those_flown():
-    right, calm = (
-        outcome("nothing", {}, found(gusts=[0.012, 0.018, 0.03, 1.0, 1.0, 1.0])),
-        outcome("nothing", {}, found()),
-    )
-    right["flown"]["gusts"], calm["flown"]["gusts"] = 0.01, 0.0
-    (windy,), (still,) = judge(right), judge(calm)
-    assert windy.gusts == pytest.approx(2.0)
-    assert np.isnan(still.gusts)
-    assert rule(
-        [windy, still], "-. estimated standard deviation of the force disturbance"
-    ).measured.startswith("2.00 times")
-    assert (
-        rule([still], "-. estimated standard deviation of the force disturbance").measured
-        == "not flown"
-    )
-
-
 def test_what_a_flight_cannot_tell_is_told_apart_from_what_the_diagnosis_overlooks():
     cannot = outcome(
         "typical",
@@ -278,53 +257,6 @@ def test_what_a_flight_cannot_tell_is_told_apart_from_what_the_diagnosis_overloo
     )
     judged = [j for o in (cannot, could) for j in judge(o)]
     assert rule(judged, "5. of those confidently wrong").measured == "50.0% (1 of 2, 9–91 %)"
-
-
-def test_probabilities_are_counted_where_they_make_a_name_sure():
-    likely = {"probability": 0.97}
-    judged = [
-        j
-        for o in (
-            outcome(
-                "typical",
-                MASS,
-                found(name("mass", **likely, dm=0.04), name("wind", **likely), unknown=0.02),
-                found(name("latency", **likely), without=("mass",), unknown=0.1),
-            ),
-            outcome("hover", MASS, found(name("wind", probability=0.6), unknown=0.3)),
-            outcome("outsider", {}, found(name("wind"), unknown=0.2), outsider="sloshing"),
-        )
-        for j in judge(o)
-    ]
-    assert rule(judged, "8. names with a probability").measured.startswith("1 of 2 ")
-    assert rule(judged, "8. the cause not in the library").measured.startswith("1 of 2 ")
-    # of four pairs, 0.1 and 0.2 against 0.02 and 0.3, two are in order
-    assert rule(judged, "8. the cause in the library, or not").measured == "0.500 (2 against 2)"
-    unasked = judge(outcome("typical", MASS, found(name("mass", dm=0.04))))
-    assert rule(unasked, "8. the cause in the library, or not").measured == "not flown"
-
-
-def test_coefficients_of_rotorpy_are_held_to_the_bar():
-    truth = {
-        "rotor_drag": {"kdx": 1e-4, "kdy": 1e-4},
-        "inflow_thrust": {"kz": 2e-4},
-        "translational_lift": {"kh": 3e-3},
-        "body_drag": {"cx": 5e-3},
-    }
-    near = [
-        name("rotor_drag", kdx=1.01e-4, kdy=0.98e-4),
-        name("inflow_thrust", kz=2e-4),
-        name("translational_lift", kh=3e-3),
-    ]
-    good = [
-        j
-        for o in (outcome("rotorpy", truth, found(*near)), outcome("rotorpy", {}, found()))
-        for j in judge(o)
-    ]
-    assert all(r.met for r in rules(good) if r.subject.startswith("7."))
-    assert rule(good, "7. RotorPy, aerodynamics on: k_d").measured == "2.0% at worst"
-    bad = judge(outcome("rotorpy", truth, found(*near[:2], name("wind"))))
-    assert [r.met for r in rules(bad) if r.subject.startswith("7.")] == [False, False, None]
 
 
 def test_the_page_lists_every_miss():
@@ -380,19 +312,6 @@ def test_a_flight_loops_answer_to_gusts_and_noise_is_given_no_name(trial):
     (judged,) = judge(fly_and_diagnose(trial))
     assert judged.outcome in (RIGHT, RIGHT_TENTATIVE, SILENT)
     assert set(judged.truth) == {name.split(" ")[0].rstrip("?") for name in judged.named}
-
-
-def test_an_unbiased_fit_is_expected_within_the_bar_as_often_as_its_deviations_say():
-    (judged,) = judge(outcome("typical", MASS, found(name("mass", dm=0.04))))
-    # one coefficient with a standard deviation of 5 %, another with one of 2.5 %; whatever their
-    # errors are
-    some = [replace(judged, errors={"mass.dm": (0.05 * s, s)}) for s in (0.1, 3.0)]
-    expected = rule(some, "1. the same of both")
-    assert expected.measured.startswith("68.3% of flights; 50% of the coefficients are within one")
-    assert expected.met is None
-    both = [replace(judged, errors={"wind.wx": (0.05, 1.0), "wind.wy": (0.025, 1.0)})]
-    assert rule(both, "1. the same of both").measured.startswith("65.2%")
-    assert rule([replace(judged, errors={})], "1. the same of both").count == 0
 
 
 def test_a_diagnosis_that_falls_over_is_an_outcome():

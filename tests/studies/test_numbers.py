@@ -11,14 +11,10 @@ from windwrench.studies import pages as rendering
 from windwrench.studies import quotes as quoting
 from windwrench.studies.pages import missing_sources
 
-SLOW = {"diagnosis-trials"}  # judges 768 diagnoses
 QUOTES, NOT_RESULTS = quoting.read_quotes()
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in rendering.PAGES],
-)
+@pytest.mark.parametrize("name", rendering.PAGES)
 def test_a_page_holds_what_its_results_say(name):
     assert rendering.differing_lines(name) == []
 

@@ -8,7 +8,6 @@ import pytest
 
 from windwrench.dynamics import EffectSetting, InputError, load_vehicle
 from windwrench.dynamics.effects import check_setting, get, names
-from windwrench.dynamics.rotation import matrix_of
 from windwrench.envs.plant import TICK, is_a_body
 from windwrench.identification.motion.residual import residual_wrench
 from windwrench.identification.motion.signals import log_signals
@@ -113,19 +112,6 @@ def test_friction_has_one_size_and_drag_grows_with_the_cube():
     assert model("dry_friction")(slow)[0] == pytest.approx(model("dry_friction")(fast)[0], rel=0.01)
     assert model("cubic_drag")(fast)[0] == pytest.approx(8.0 * model("cubic_drag")(slow)[0])
     assert np.all(model("dry_friction")(moment()) == 0.0)
-
-
-def test_side_force_and_precession_do_no_work():
-    m = moment(
-        velocity=(0.7, -0.4, 0.2),
-        rate=(0.5, -0.3, 0.8),
-        rotation=matrix_of(np.array([0.8, 0.36, 0.0, 0.48])),
-    )
-    side, turn = model("magnus_force")(m), model("flywheel")(m)
-    assert np.linalg.norm(side[:3]) > 1e-3
-    assert side[:3] @ m.velocity == pytest.approx(0.0, abs=1e-15)
-    assert np.linalg.norm(turn[3:]) > 1e-4
-    assert turn[3:] @ (m.rotation @ m.rate) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_dropout_lowers_the_thrust_of_the_rear_left_rotor():
@@ -291,18 +277,6 @@ def test_a_vehicle_of_another_mass_hovers_with_rotor_tips_as_fast(mass):
     assert is_a_body(vehicle.inertia)
     log = fly_practice(vehicle, seconds=4.0)
     assert np.linalg.norm(log.force[:, :2], axis=1).max() < vehicle.weight / 10.0
-
-
-def test_effects_of_the_library_s_own_vehicles_have_its_typical_sizes():
-    for name, column in (("ardrone2", 0), ("crazyflie", 1)):
-        effect = draw_effect("rotor_drag", load_vehicle(name), "typical", np.random.default_rng(0))
-        typical = {c.name: c.typical[column] for c in get("rotor_drag").coefficients}
-        ratio = effect.coefficients["kdx"] / typical["kdx"]
-        assert 0.8 <= ratio <= 1.25
-    between = of_mass(load_vehicle("ardrone2"), 0.12)
-    large, small = next(c.typical for c in get("com_offset").coefficients if c.name == "cx")
-    drawn = draw_effect("com_offset", between, "typical", np.random.default_rng(0)).coefficients
-    assert 1.25 * small < abs(drawn["cx"]) < 0.8 * large
 
 
 def test_a_loop_that_reads_a_gyro_sees_less_noise_than_its_log_holds():
