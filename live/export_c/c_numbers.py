@@ -31,6 +31,11 @@ def table(values: ArrayLike, what: str = "a number") -> str:
     return "{\n    " + ",\n    ".join(table(row, what) for row in array) + "}"
 
 
+def shape(values: ArrayLike) -> str:
+    """Return the sizes of an array as a C declaration has them."""
+    return "".join(f"[{n}]" for n in np.shape(values))
+
+
 def _wrapped(words: list[str]) -> str:
     lines, line = [], ""
     for word in words:

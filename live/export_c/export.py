@@ -31,7 +31,7 @@ from ...estimator.recovery import NOISE
 from ...estimator.ukf import default_covariance
 from ...runtime.errors import InputError
 from . import hover
-from .c_numbers import literal, table
+from .c_numbers import literal, shape, table
 from .effect_code import (
     UntranslatableError,
     definitions,
@@ -59,6 +59,18 @@ _FUNCTIONS = (
     ("exponential", "ww_exp("),
     ("arctangent", "ww_atan2("),
 )
+# constants of the Python filters
+_KNOWN = {
+    "N": N,
+    "NOISE": NOISE,
+    "PI": math.pi,
+    "LONG_TURN": LONG_TURN,
+    "LARGEST_MRP_VARIANCE": LARGEST_MRP_VARIANCE,
+    "LONGEST_GAP": _LONGEST_GAP,
+    "NEAR": _NEAR,
+    "CATCH_UP": CATCH_UP,
+    "IMU_PATIENCE": IMU_PATIENCE,
+}
 # the file that is written, and its template
 FILES = {
     "windwrench_filter.h": "windwrench_filter.h.j2",
@@ -121,8 +133,9 @@ def export_c(
     made = FILTERS[estimator](vehicle, tuning, period, gate, Recovery())
     if policy is not None and policy["kind"] == "tracker":
         policy = tracker_policy(vehicle, tuning, period)
-    imu = estimator != "constant-gain"
-    offset = bool(np.any(made.record[0]["body"]["com"] != 0.0))
+    f = made.record[0]
+    kept = hover.kept(f)
+    offset = bool(np.any(f["body"]["com"] != 0.0))
     context: dict[str, Any] = {
         "version": __version__,
         "command": _one_line(command),
@@ -130,15 +143,22 @@ def export_c(
         "estimator": estimator,
         "precision": precision,
         "functions": ", ".join(f if precision == "double" else f"{f}f" for f in FUNCTIONS),
-        "imu": imu,
+        "imu": estimator != "constant-gain",
         "gated": gate is not None,
         "gate": 0.0 if gate is None else gate,
         "patience": f"{made.recovery.patience:g}",
         "rate": rate,
         "period": literal(period),
-        "mass": literal(float(made.record[0]["body"]["mass"])),
-        "kept": len(hover.kept(made.record[0])),
-        "hover_speed": literal(float(made.record[0]["last_speeds"][0])),
+        "mass": literal(float(f["body"]["mass"])),
+        "f": f,
+        "filter": made,
+        "known": _KNOWN,
+        "hover": hover,
+        "kept": kept,
+        "wrench_coefficients": f["wrench_coefficients"][: len(wrench), :PARAMETERS],
+        "converged": [f["converged"][i, j] for i, j in kept],
+        "first_variance": np.diag(default_covariance(vehicle, tuning)),
+        "hover_speed": literal(float(f["last_speeds"][0])),
         "agreeing": AGREEING,
         "agreeing_poses": AGREEING_POSES,
         "offset": offset,
@@ -158,7 +178,6 @@ def export_c(
         "voltage": "WW_ROTOR_VOLTAGE]" in effect_code,
     }
     context["uses_smaller"] = "smaller(" in effect_code or policy is not None
-    context["constants"] = _constants(made, estimator, context)
     environment = Environment(
         loader=PackageLoader("windwrench.live.export_c", "templates"),
         undefined=StrictUndefined,
@@ -167,6 +186,7 @@ def export_c(
         keep_trailing_newline=True,
         autoescape=False,  # C, no page
     )
+    environment.filters |= {"literal": literal, "table": table, "shape": shape}
     files = {
         name: in_precision(environment.get_template(source).render(context), precision)
         for name, source in FILES.items()
@@ -232,101 +252,3 @@ def _effects(vehicle: Vehicle) -> tuple[list[Effect], list[Effect], list[Effect]
         found["sensing"],
         "\n".join([definitions(always + code) + "\n", *functions, code]),
     )
-
-
-def _constants(made: WrenchUKF, estimator: str, context: Mapping[str, Any]) -> list[str]:
-    """Return the lines of C that define all numbers of a filter."""
-    f = made.record[0]
-    body = f["body"]
-    lines: list[str] = []
-
-    def define(name: str, value: float, meaning: str) -> None:
-        lines.append(f"#define WW_{name} {literal(value, name)} /* {meaning} */")
-
-    def array(name: str, values: Any, meaning: str) -> None:
-        shape = "".join(f"[{n}]" for n in np.shape(values))
-        lines.append(
-            f"static const float ww_{name}{shape} = {table(values, name)}; /* {meaning} */"
-        )
-
-    def entries(name: str, values: list[hover.Entry], meaning: str) -> None:
-        lines.append(f"#define WW_{name.upper()} {len(values)}")
-        rows = ", ".join(f"{{{e[0]}, {e[1]}, {e[2]}, {literal(e[3], name)}}}" for e in values)
-        lines.append(f"static const ww_entry ww_{name}[] = {{{rows}}}; /* {meaning} */")
-
-    define("PERIOD", made.period, "s, that the noise is stated for")
-    define("MASS", body["mass"], "kg")
-    define("GRAVITY", body["gravity"], "m/s2")
-    define("HOVER_SPEED", f["last_speeds"][0], "rad/s")
-    array("inertia", body["inertia"], "kg m2, about the centre of mass")
-    array("inverse_inertia", body["inverse_inertia"], "1/(kg m2)")
-    array("mixing", body["mixing"], "squared rotor speeds to thrust (N) and torques (Nm)")
-    if context["offset"]:
-        array("com", body["com"], "m, centre of mass from the geometric centre")
-    if context["wrench"] or context["rotor_effects"] or context["sensing"]:
-        array("effect_vehicle", f["constants"], "what effects may know of the vehicle")
-    if context["wrench"]:
-        array("thrust_k", body["k"], "N/(rad/s)^2")
-        rows = f["wrench_coefficients"][: len(context["wrench"]), :PARAMETERS]
-        array("wrench_coefficients", rows, "of the effects, one a row")
-    if context["rotor_effects"]:
-        rows = f["rotor_coefficients"][: len(context["rotor_effects"])]
-        array("rotor_coefficients", rows, "of the effects on the rotors, one a row")
-    if context["sensing"]:
-        rows = f["sensing_coefficients"][: len(context["sensing"])]
-        array("sensing_coefficients", rows, "of the effects on what is measured, one a row")
-    define("LONG_TURN", LONG_TURN, "rad a step, beyond which the body turns exactly")
-    define("PI", math.pi, "")
-    lines[-1] = lines[-1].replace(" /*  */", "")
-    if estimator != "constant-gain":
-        array("motor_torque_std", np.sqrt(f["motor_torque"]), "Nm, body, new each period")
-        array("thrust_std", np.sqrt(f["thrust"]), "N, body, new each period")
-        array("torque_walk", f["torque_walk"], "variance a period, world")
-        array("force_walk", f["force_walk"], "variance a period, world")
-    array("noise", f["noise"], "variance of a measured pose: MRP, position")
-    define("LARGEST_MRP_VARIANCE", LARGEST_MRP_VARIANCE, "an attitude cannot be less known")
-    array("prior", f["prior"][::3], "variances of what nothing is known of, three rows each")
-    array("lost", f["lost"][::3], "variances beyond which what is not measured is given up")
-    array("reason", f["reason"][::3], "squares of torque and force beyond which none is believed")
-    array("push", f["push"], "rad/s2 and m/s2 of the hardest push")
-    define("RESPONSE", f["response"], "s in which the filter follows a push")
-    define("PATIENCE", f["patience"], "s")
-    define("ALARM_THREE", f["alarm"][0], "largest NIS that is taken in unseen, of three numbers")
-    define("ALARM_SIX", f["alarm"][1], "and of six")
-    define("RESTART_AT", f["restart_at"], "NIS beyond which no linear correction is made")
-    kappa = float(f["kappa"])
-    if estimator == "ukf":
-        define("SPREAD", math.sqrt(N + NOISE + kappa), "how far out sigma points lie")
-        define("WEIGHT", 0.5 / (N + NOISE + kappa), "of a sigma point")
-    if estimator == "constant-gain":
-        define("LONGEST_GAP", _LONGEST_GAP, "s that the constant gain coasts over")
-        define("NEAR", _NEAR, "of the converged variances: nearly converged again")
-        define("SETTLE", f["settle"], "s for which they must have been")
-        define("CATCH_UP", CATCH_UP, "predictions, at most, that make up for a gap")
-        entries("couplings", hover.couplings(f), "derivatives of the accelerations at hover")
-        entries("noises", hover.noises(f), "variances that time adds; lower half")
-        kept = hover.kept(f)
-        rows = ", ".join(f"{{{i}, {j}}}" for i, j in kept)
-        lines.append(
-            f"static const unsigned char ww_kept[WW_KEPT][2] = {{{rows}}};"
-            " /* rows and columns of covariances that are not always zero, the diagonal first */"
-        )
-        array(
-            "converged",
-            [f["converged"][i, j] for i, j in kept],
-            "those after a correction, facing along x",
-        )
-    else:
-        first = np.diag(default_covariance(made.vehicle, made.tuning))
-        array("first_variance", first, "after ww_init")
-        define("IMU_SPREAD", math.sqrt(N + kappa), "of sigma points of an inertial measurement")
-        define("IMU_WEIGHT", 0.5 / (N + kappa), "of one of them")
-        imu = f["imu"]
-        array("imu_noise", f["imu_noise"], "variances of gyro and accelerometer")
-        array("bias_prior", imu["prior"], "variances of their biases at first")
-        array("bias_walk", imu["walk"], "and what is added to them in a period")
-        define("IMU_GATE_THREE", imu["gate"][0], "largest NIS of one sensor")
-        define("IMU_GATE_SIX", imu["gate"][1], "of both")
-        define("IMU_GATE_AGREE", imu["gate"][2], "of samples that agree")
-        define("IMU_PATIENCE", IMU_PATIENCE, "s of refusals that a bias is believed")
-    return lines
