@@ -44,7 +44,7 @@ def flown(seed):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_trajectories_are_those_of_the_environments_version(scenario):
-    now, golden = trajectory(scenario), KEPT["scenarios"][scenario]
+    now, golden = trajectory("FanTracking", scenario), KEPT["scenarios"][scenario]
     for name, tolerance in TOLERANCE.items():
         np.testing.assert_allclose(
             now[name],

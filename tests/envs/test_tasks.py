@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import windwrench  # noqa: F401  registers the environments
-from tests.support.golden_tasks import GOLDEN, SEED, trajectory
+from tests.support.golden_trajectories import GOLDEN_TASKS, SEED_OF_TASKS, trajectory
 from windwrench.controllers import wind_observation as seen
 from windwrench.dynamics import EffectSetting, InputError
 from windwrench.envs.closed_loop import ClosedLoop
@@ -22,7 +22,7 @@ from windwrench.envs.wind_tasks import WindHoverEnv
 from windwrench.evaluation.tasks import TASKS
 
 NAMES = ("FanTracking2D", "WindHover", "WindTrajectory")
-KEPT = json.loads(GOLDEN.read_text(encoding="utf-8"))
+KEPT = json.loads(GOLDEN_TASKS.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("name", ["FanTracking", *NAMES])
@@ -37,7 +37,7 @@ def test_gymnasium_s_checker_finds_nothing(name):
 def test_trajectories_are_those_of_the_version(name, part):
     golden = KEPT[name]
     assert golden["version"] == f"v{gym.spec(f'windwrench/{name}-v0').version}"
-    assert golden["seed"] == SEED
+    assert golden["seed"] == SEED_OF_TASKS
     assert set(golden["scenarios"]) == set(TASKS[name].scenarios)
     history = TASKS[name].environment.__doc__.partition("## Version history")[2]
     assert golden["version"] in re.findall(r"^\s+\* (v\d+):", history, re.M)

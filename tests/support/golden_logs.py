@@ -48,7 +48,6 @@ battery: {column: Vbat, unit: V}
 accelerometer: {columns: [ax, ay, az], unit: m/s2}
 gyro: {columns: [wx, wy, wz], unit: rad/s}
 """
-FORM_READERS = {"ardupilot_bin", "betaflight", "crazyflie_sd"}
 FORM_MAPS = {"betaflight_csv": "betaflight", "crazyflie_csv": "cflib", "racer": "neurobem"}
 
 

@@ -1,56 +1,61 @@
-"""Trajectories of every scenario, as a few numbers: what a change of the physics changes.
+"""Trajectories of every task and scenario, as a few numbers: what a change of the physics changes.
 
-``python -m tests.support.golden_trajectories`` writes ``tests/golden/trajectories.json`` anew. Do
-that only for a change of physics that is meant, and say it in the environment's version history,
-with a new version of the environment's name.
+``python -m tests.support.golden_trajectories`` writes ``tests/golden/trajectories.json``, of
+``FanTracking`` under its admittance law, and ``tests/golden/tasks.json``, of the other tasks under
+random commands, anew. Do that only for a change of physics that is meant, and say it in the
+environment's version history, with a new version of the environment's name.
 """
 
 import json
 
+import gymnasium
 import numpy as np
 
+import windwrench  # noqa: F401 - registers the environments
 from tests.support.paths import ROOT
 from windwrench.controllers import make_controller
-from windwrench.envs import FanTrackingEnv
-from windwrench.envs.scenarios import SCENARIOS
+from windwrench.evaluation.tasks import TASKS
 
 GOLDEN = ROOT / "tests" / "golden" / "trajectories.json"
-SEED = 20161009
-DECISIONS = 40  # 3.2 s
+GOLDEN_TASKS = ROOT / "tests" / "golden" / "tasks.json"
+SEED, SEED_OF_TASKS = 20161009, 20261124
+DECISIONS = 40
 EVERY = 8  # decisions between two samples
 
 
-def trajectory(scenario):
-    """Return observations (5, 8), true wrench (5, 6) and position (5,) y in m of an episode's first
-    seconds.
+def trajectory(task, scenario):
+    """Return observations, true wrench (5, 6), reward (5,), and ``y`` (FanTracking) or ``error``
+    (5,) in m, of an episode's first decisions.
     """
-    env, pilot = FanTrackingEnv(scenario), make_controller("admittance")
+    env, is_fan = TASKS[task].environment(scenario), task == "FanTracking"
+    seed, place = (SEED, "y") if is_fan else (SEED_OF_TASKS, "error")
+    drawn = np.random.default_rng(seed).uniform(-0.5, 0.5, (DECISIONS, *env.action_space.shape))
+    pilot = make_controller("admittance")
     pilot.reset()
-    observation, info = env.reset(seed=SEED)
-    kept = {"observation": [], "wrench": [], "y": [], "reward": []}
+    observation, info = env.reset(seed=seed)
+    kept = {"observation": [], "wrench": [], place: [], "reward": []}
     for k in range(1, DECISIONS + 1):
-        observation, reward, _, _, info = env.step(
-            np.asarray(pilot(observation, info), dtype=np.float32)
-        )
+        action = pilot(observation, info) if is_fan else drawn[k - 1]
+        observation, reward, _, _, info = env.step(np.asarray(action, dtype=np.float32))
         if k % EVERY == 0:
             kept["observation"].append([float(x) for x in observation])
             kept["wrench"].append([float(x) for x in (*info["force"], *info["torque"])])
-            kept["y"].append(float(info["y"]))
+            kept[place].append(float(info[place]))
             kept["reward"].append(float(reward))
     return kept
 
 
-if __name__ == "__main__":
-    import gymnasium
-
-    import windwrench  # noqa: F401 - registers the environment
-
-    version = f"v{gymnasium.spec('windwrench/FanTracking-v0').version}"
-    GOLDEN.parent.mkdir(exist_ok=True)
-    kept = {
-        "version": version,
-        "seed": SEED,
-        "scenarios": {name: trajectory(name) for name in SCENARIOS},
+def recorded(task):
+    """Return what is kept of a task."""
+    return {
+        "version": f"v{gymnasium.spec(f'windwrench/{task}-v0').version}",
+        "seed": SEED if task == "FanTracking" else SEED_OF_TASKS,
+        "scenarios": {name: trajectory(task, name) for name in TASKS[task].scenarios},
     }
-    GOLDEN.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    print(f"wrote {GOLDEN}")
+
+
+if __name__ == "__main__":
+    others = {task: recorded(task) for task in TASKS if task != "FanTracking"}
+    for path, kept in ((GOLDEN, recorded("FanTracking")), (GOLDEN_TASKS, others)):
+        path.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+        print(f"wrote {path}")

@@ -25,7 +25,6 @@ from windwrench.identification.logs.log_map import (
     Sensor,
     TimeColumn,
 )
-from windwrench.identification.logs.map_guess import Guess
 from windwrench.identification.logs.rotor_orders import ORDERS
 
 Array = NDArray[np.float64]
@@ -313,28 +312,3 @@ def fields_of(m: LogMap) -> dict[Field, Any]:
             ("battery", "unit"): m.battery.unit,
         }
     return out
-
-
-def judge(guess: Guess, truth: LogMap) -> tuple[list[Field], list[Field]]:
-    """Return the fields that are wrong and marked as guesses (or whose columns are listed as not
-    used), and those that are wrong and marked as certain.
-    """
-    doubtful = {(r.section, r.field) for r in guess.doubts}
-    found, true = fields_of(guess.log_map), fields_of(truth)
-    flagged: list[Field] = []
-    silent: list[Field] = []
-    motors = {"rotors", "commands"}
-    for key in sorted(set(found) | set(true)):
-        if found.get(key) == true.get(key):
-            continue
-        section = key[0]
-        if key not in found:
-            # a channel that was not found is listed among the columns that are not used
-            other = next((s for s in motors if (s, "unit") in found), "")
-            unsure = section not in motors or (other, "unit") in doubtful
-            (flagged if unsure else silent).append(key)
-        elif key in doubtful or (section in motors and (section, "unit") in doubtful):
-            flagged.append(key)
-        else:
-            silent.append(key)
-    return flagged, silent

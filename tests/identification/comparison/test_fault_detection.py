@@ -1,4 +1,4 @@
-"""Rotor faults: simulated flights of another simulator, and measured logs."""
+"""Rotor faults: simulated flights, and measured logs."""
 
 import json
 
@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.identification.vehicle_fit.flown import inertial_flights
 from tests.support.data_paths import data_file
-from tests.support.drawn_faults import draw_flight
+from tests.support.golden_identification import failing_flight
 from windwrench.cli import app
 from windwrench.identification.comparison.fault_balance import AT_ONCE, Begin, FaultBalance
-from windwrench.identification.comparison.fault_channels import sample
+from windwrench.identification.comparison.fault_channels import channels_of_log, sample
 from windwrench.identification.comparison.fault_detection import find_fault
 from windwrench.identification.comparison.fault_noise import ORDER, fit_noise
 from windwrench.identification.comparison.words import fault_data, fault_headline
@@ -34,7 +35,7 @@ def test_the_noise_of_an_autoregression_is_whitened():
 
 def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
     """The sums that run backwards, against one regression a time."""
-    samples = sample(draw_flight(1, "fault").channels)
+    samples = sample(channels_of_log(failing_flight()))
     balance = FaultBalance(samples, samples.thrust(0.03, 0.0, 0.0), 0.03)
     noise = balance.noises(balance.residuals())
     rows = np.array([60, 150, len(samples.t) - 6])
@@ -59,21 +60,21 @@ def test_a_step_is_weighed_as_if_it_were_fitted_at_every_time():
 
 
 def test_a_failing_rotor_is_named_with_its_time():
-    drawn = draw_flight(1001, "fault")
-    found = find_fault(drawn.channels)
-    assert found.likeliest == str(drawn.rotor)
+    found = find_fault(channels_of_log(failing_flight()))
+    assert found.likeliest == "3"
     assert found.sure
-    assert found.onset[1] <= drawn.onset <= found.onset[2]
+    assert found.onset[1] <= 9.0 <= found.onset[2]
     assert found.onset[2] - found.onset[1] < 0.1
-    assert 0.5 * drawn.loss < 1.0 - found.remaining[0] < 1.5 * drawn.loss
+    assert 0.2 < 1.0 - found.remaining[0] < 0.6
     said = fault_headline(found)
-    assert f"Rotor {drawn.rotor} (" in said
-    assert fault_data(found)["rotor"] == drawn.rotor
+    assert "Rotor 3 (" in said
+    assert fault_data(found)["rotor"] == 3
     assert json.dumps(fault_data(found))
 
 
 def test_a_flight_without_a_fault_names_no_rotor():
-    found = find_fault(draw_flight(0, "none").channels)
+    ((log, _),) = inertial_flights([3])
+    found = find_fault(channels_of_log(log))
     assert found.likeliest == "nothing"
     assert fault_headline(found).startswith("No rotor lost thrust")
     assert fault_data(found)["rotor"] is None
